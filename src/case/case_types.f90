@@ -1,0 +1,137 @@
+!> A case as the user wrote it: one type per namelist group, defaults as initial values.
+!!
+!! The names are those of the namelist variables. SI units; angles in degrees where a name
+!! ends in `_deg`. `case_input_m` fills these types and checks them.
+module case_types_m
+  use kinds_m, only: wp, name_length
+  implicit none
+  private
+  public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
+  public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
+  public :: absent
+
+  real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
+
+  type :: run_t
+    character(:), allocatable :: title, output
+    character(name_length) :: physics = 'coupled'   !! 'coupled', 'fluid' or 'dry'
+    real(wp) :: t_end = absent                      !! required [s]
+    real(wp) :: dt = 1.0e-2_wp                      !! largest fluid time step [s]
+    real(wp) :: cfl_max = 0.5_wp                    !! 0: dt stays fixed
+    real(wp) :: field_interval = 0.1_wp             !! [s], 0: never
+    real(wp) :: history_interval = 0.0_wp           !! [s], 0: every step
+    real(wp) :: restart_interval = 1.0_wp           !! [s], 0: only at the end
+    logical :: stop_when_settled = .false.
+    real(wp) :: rest_speed = 1.0e-3_wp              !! [m/s]
+    real(wp) :: rest_time = 0.5_wp                  !! [s]
+  end type run_t
+
+  type :: grid_input_t
+    integer :: cells(3) = 0                         !! required
+    real(wp) :: length(3) = absent                  !! required [m]
+    real(wp) :: origin(3) = 0.0_wp                  !! [m]
+  end type grid_input_t
+
+  !> First index: 1 lower side, 2 upper side; last index: x, y, z.
+  type :: boundary_input_t
+    character(name_length) :: kind(2, 3) = reshape([character(name_length) :: 'no_slip', 'no_slip', &
+      'no_slip', 'no_slip', 'no_slip', 'open'], [2, 3])
+    real(wp) :: velocity(3, 2, 3) = 0.0_wp          !! wall or inflow velocity [m/s]
+  end type boundary_input_t
+
+  type :: fluid_t
+    real(wp) :: liquid_density = 998.2_wp, gas_density = 1.204_wp          !! [kg/m3]
+    real(wp) :: liquid_viscosity = 1.002e-3_wp, gas_viscosity = 1.82e-5_wp !! [Pa s]
+    real(wp) :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]                    !! [m/s2]
+    real(wp) :: water_level = absent                !! [m]; absent: no liquid below a level
+    real(wp) :: surface_tension = 0.0_wp            !! [N/m]
+    logical :: single_phase = .false.
+    real(wp) :: velocity(3) = 0.0_wp                !! uniform initial velocity [m/s]
+  end type fluid_t
+
+  type :: water_t
+    real(wp) :: min(3) = absent, max(3) = absent    !! a box of liquid at t = 0 [m]
+  end type water_t
+
+  type :: numerics_t
+    character(name_length) :: coupling = 'monolithic'
+    integer :: coupling_passes = 1
+    character(name_length) :: momentum = 'conservative'
+    character(name_length) :: advection = 'tvd5'
+    character(name_length) :: interface = 'plic'
+    character(name_length) :: solid_fraction = 'exact'
+    integer :: subcells = 4
+    character(name_length) :: pressure_solver = 'cg'
+    character(name_length) :: preconditioner = 'multigrid'
+    real(wp) :: divergence_tolerance = 1.0e-6_wp    !! [1/s]
+    integer :: max_pressure_passes = 10
+  end type numerics_t
+
+  type :: contact_input_t
+    character(name_length) :: model = 'spheres'
+    character(name_length) :: law = 'restitution'
+    real(wp) :: restitution = 0.3_wp
+    real(wp) :: contact_time = 2.0e-3_wp            !! [s]
+    real(wp) :: k_n = 1.0e5_wp, gamma_n = 1.0_wp, eta_n = 10.0_wp   !! [N/m^gamma, -, N s/m]
+    real(wp) :: k_t = 1.0e5_wp, gamma_t = 1.0_wp, eta_t = 10.0_wp
+    real(wp) :: friction = 0.6_wp, wall_friction = 0.4_wp
+    real(wp) :: substep_ratio = 0.05_wp
+    real(wp) :: courant_max = 0.1_wp                !! C_s of eq. (6)
+    logical :: sleep = .true.
+  end type contact_input_t
+
+  type :: shape_input_t
+    character(name_length) :: name = '', kind = ''  !! required
+    real(wp) :: size(3) = absent                    !! required [m]
+    real(wp) :: density = 2300.0_wp                 !! [kg/m3]
+    character(:), allocatable :: file
+    real(wp) :: scale = 1.0_wp
+    integer :: refinement = 2
+    character(name_length) :: spheres = 'centroid'
+    real(wp) :: sphere_spacing = 0.0_wp             !! [m]
+  end type shape_input_t
+
+  type :: body_input_t
+    character(name_length) :: shape = ''            !! required
+    real(wp) :: position(3) = absent                !! required: centre of mass [m]
+    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]   !! w, x, y, z; axis and angle end up here
+    real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
+    real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
+    logical :: fixed = .false.
+    real(wp) :: release_time = 0.0_wp               !! [s]
+  end type body_input_t
+
+  type :: drop_input_t
+    character(name_length) :: shape = ''            !! required
+    real(wp) :: position(3) = absent                !! required [m]
+    integer :: count = 1
+    real(wp) :: first_time = 0.0_wp, interval = 1.0_wp   !! [s]
+    real(wp) :: spread(3) = 0.0_wp                  !! [m]
+    character(name_length) :: orientation = 'given' !! 'given' or 'random'
+    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp) :: tilt_deg = 0.0_wp
+    real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
+    integer :: seed = 1
+  end type drop_input_t
+
+  type :: bed_input_t
+    character(:), allocatable :: file
+    character(name_length) :: kind = 'heightmap'
+  end type bed_input_t
+
+  type :: case_t
+    character(:), allocatable :: text               !! the case file, verbatim
+    type(run_t) :: run
+    type(grid_input_t) :: grid
+    type(boundary_input_t) :: boundary
+    type(fluid_t) :: fluid
+    type(numerics_t) :: numerics
+    type(contact_input_t) :: contact
+    type(bed_input_t) :: bed
+    type(water_t), allocatable :: water(:)
+    type(shape_input_t), allocatable :: shape(:)
+    type(body_input_t), allocatable :: body(:)
+    type(drop_input_t), allocatable :: drop(:)
+  end type case_t
+
+end module case_types_m

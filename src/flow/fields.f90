@@ -1,0 +1,45 @@
+!> The state of the fluid on the grid.
+module fields_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo
+  implicit none
+  private
+  public :: flow_t, flow_init
+
+  type :: flow_t
+    real(wp), allocatable :: u(:, :, :, :)      !! velocity at the cell centre, x y z last [m/s]
+    real(wp), allocatable :: p(:, :, :)         !! pressure [Pa]
+    real(wp), allocatable :: uf(:, :, :, :)     !! fluid velocity normal to the lower face, open part [m/s]
+    real(wp), allocatable :: solid_flux(:, :, :, :) !! volume rate of the solids through the lower face [m3/s]
+    real(wp), allocatable :: liquid(:, :, :)    !! volume of liquid W in the cell [m3]
+    real(wp), allocatable :: room(:, :, :)      !! carried open volume Vt of the cell [m3]
+    real(wp), allocatable :: c(:, :, :)         !! C^: liquid share of the full cell below its plane, extended
+                                                !! through bodies; gives density, gravity, normals [-]
+    real(wp), allocatable :: rho(:, :, :)       !! density of the fluid, from c [kg/m3]
+    real(wp), allocatable :: mu(:, :, :)        !! viscosity of the fluid, from c [Pa s]
+    real(wp) :: liquid_initial = 0.0_wp         !! sum of `liquid` at t = 0 [m3]
+    real(wp) :: liquid_inflow = 0.0_wp          !! time integral of the net inflow of liquid [m3]
+  end type flow_t
+
+contains
+
+  !> Allocate a fluid at rest, all gas, without pressure.
+  subroutine flow_init(grid, flow)
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(out) :: flow
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    allocate (flow%u(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (flow%uf, source=flow%u)
+    allocate (flow%solid_flux, source=flow%u)
+    allocate (flow%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (flow%liquid, source=flow%p)
+    allocate (flow%room, source=flow%p)
+    allocate (flow%c, source=flow%p)
+    allocate (flow%rho, source=flow%p)
+    allocate (flow%mu, source=flow%p)
+  end subroutine flow_init
+
+end module fields_m

@@ -1,0 +1,111 @@
+!> The Cartesian grid: cells, spacing and the part of it that this process owns.
+!!
+!! Every array over cells is declared with the *global* cell index and `n_halo` halo cells:
+!! `a(lo(1)-n_halo:hi(1)+n_halo, ...)`. A face array carries the face direction as its last index;
+!! element `(i,j,k,d)` is the *lower* face of cell `(i,j,k)` in direction d, so the upper face of the
+!! cell is the lower face of its neighbour, and the sides of the tank at the upper end are faces n+1.
+module grid_m
+  use kinds_m, only: wp
+  use case_types_m, only: grid_input_t, boundary_input_t
+  use parallel_m, only: decompose
+  implicit none
+  private
+  public :: grid_t, grid_init, n_halo, unit_step
+  public :: side_no_slip, side_slip, side_open, side_periodic, side_inflow, side_outflow
+
+  integer, parameter :: n_halo = 3   !! halo width of cell and face arrays: reach of the fifth-order scheme
+
+  integer, parameter :: side_no_slip = 1, side_slip = 2, side_open = 3, side_periodic = 4
+  integer, parameter :: side_inflow = 5, side_outflow = 6
+
+  !> `unit_step(:, d)` is the index step to the next cell in direction d.
+  integer, parameter :: unit_step(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
+
+  type :: grid_t
+    integer :: n(3) = 0           !! cells of the whole domain
+    integer :: lo(3) = 1          !! first cell of this process (global index)
+    integer :: hi(3) = 0          !! last cell of this process
+    logical :: periodic(3) = .false.
+    logical :: at_side(2, 3) = .true.   !! this process touches the lower / upper side of the domain
+    integer :: side(2, 3) = side_no_slip
+    real(wp) :: side_velocity(3, 2, 3) = 0.0_wp   !! wall or inflow velocity [m/s]
+    real(wp) :: origin(3) = 0.0_wp, length(3) = 0.0_wp   !! [m]
+    real(wp) :: h(3) = 0.0_wp     !! spacing [m]
+    real(wp) :: volume = 0.0_wp   !! of a cell [m3]
+    real(wp) :: area(3) = 0.0_wp  !! of a face normal to each direction [m2]
+  contains
+    procedure :: face => grid_face
+    procedure :: centre => grid_centre
+    procedure :: cell_of => grid_cell_of
+  end type grid_t
+
+contains
+
+  !> Grid of a case, cut into blocks of cells for the processes of this run.
+  subroutine grid_init(input, boundary, grid)
+    type(grid_input_t), intent(in) :: input
+    type(boundary_input_t), intent(in) :: boundary
+    type(grid_t), intent(out) :: grid
+    integer :: s, d
+
+    grid%n = input%cells
+    grid%origin = input%origin
+    grid%length = input%length
+    grid%h = input%length/real(input%cells, wp)
+    grid%volume = product(grid%h)
+    grid%area = grid%volume/grid%h
+    grid%side_velocity = boundary%velocity
+    do d = 1, 3
+      do s = 1, 2
+        grid%side(s, d) = side_code(boundary%kind(s, d))
+      end do
+      grid%periodic(d) = grid%side(1, d) == side_periodic
+    end do
+    call decompose(grid%n, grid%periodic, grid%lo, grid%hi, grid%at_side)
+  end subroutine grid_init
+
+  !> Code of a boundary kind; zero for an unknown name.
+  pure function side_code(kind) result(code)
+    character(*), intent(in) :: kind
+    integer :: code
+
+    select case (trim(kind))
+    case ('no_slip'); code = side_no_slip
+    case ('slip'); code = side_slip
+    case ('open'); code = side_open
+    case ('periodic'); code = side_periodic
+    case ('inflow'); code = side_inflow
+    case ('outflow'); code = side_outflow
+    case default; code = 0
+    end select
+  end function side_code
+
+  !> Coordinate of lower face number i in direction d [m].
+  elemental function grid_face(self, i, d) result(x)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: i, d
+    real(wp) :: x
+
+    x = self%origin(d) + real(i - 1, wp)*self%h(d)
+  end function grid_face
+
+  !> Coordinate of the centre of cell number i in direction d [m].
+  elemental function grid_centre(self, i, d) result(x)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: i, d
+    real(wp) :: x
+
+    x = self%origin(d) + (real(i, wp) - 0.5_wp)*self%h(d)
+  end function grid_centre
+
+  !> Number of the cell that holds coordinate x in direction d; may lie outside 1..n.
+  elemental function grid_cell_of(self, x, d) result(i)
+    class(grid_t), intent(in) :: self
+    real(wp), intent(in) :: x   !! [m]
+    integer, intent(in) :: d
+    integer :: i
+
+    i = floor((x - self%origin(d))/self%h(d)) + 1
+  end function grid_cell_of
+
+end module grid_m

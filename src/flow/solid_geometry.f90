@@ -1,0 +1,71 @@
+!> What the flow has to know about the solids in the grid: shares, open faces, wall distances.
+!!
+!! Data only: `coupling/solid_fraction.f90` fills it from the tetrahedra of the bodies, the flow
+!! reads it, and neither room knows the other.
+module solid_geometry_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo
+  implicit none
+  private
+  public :: solid_geometry_t, solid_geometry_init, no_hit
+
+  real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
+
+  type :: solid_geometry_t
+    real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell volume, all bodies, 0..1 [-]
+    real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
+    integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid there
+    !> Legs between the centres of the two cells of a lower face d, in units of h(d), 0..1:
+    !! distance from the lower cell (i-1) up to the first surface, and from the upper cell (i) down to
+    !! the first surface; `no_hit` where the leg is free. The bodies hit stand in `leg_body_*`.
+    real(wp), allocatable :: leg_low(:, :, :, :), leg_high(:, :, :, :)
+    integer, allocatable :: leg_body_low(:, :, :, :), leg_body_high(:, :, :, :)
+
+    !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m].
+    integer :: n_tet = 0
+    real(wp), allocatable :: corner(:, :, :)
+    !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, 0 elsewhere;
+    !! its tetrahedra are `tet(first(m):first(m+1)-1)`, indices into `corner`.
+    integer :: n_cut = 0
+    integer, allocatable :: cut(:, :, :)
+    integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
+    integer, allocatable :: first(:), tet(:)
+
+    !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and the centroid of its part.
+    integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
+    integer, allocatable :: cell(:, :)          !! (3, *) cell index
+    real(wp), allocatable :: cell_alpha(:)      !! share of the cell volume [-]
+    real(wp), allocatable :: cell_centroid(:, :) !! (3, *) centroid of the solid part [m]
+    !> Per body b: faces `body_face(b):body_face(b+1)-1` with its own share and the centroid of its part.
+    integer, allocatable :: body_face(:)
+    integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
+    real(wp), allocatable :: face_beta(:)       !! share of the face area [-]
+    real(wp), allocatable :: face_centroid(:, :) !! (3, *) [m]
+  end type solid_geometry_t
+
+contains
+
+  !> Allocate the arrays over cells for a domain without solids.
+  subroutine solid_geometry_init(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(out) :: solid
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    allocate (solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
+    allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (solid%leg_low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=no_hit)
+    allocate (solid%leg_high, source=solid%leg_low)
+    allocate (solid%leg_body_low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
+    allocate (solid%leg_body_high, source=solid%leg_body_low)
+    allocate (solid%cut(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (solid%corner(3, 4, 0), solid%cut_cell(3, 0), solid%first(1), solid%tet(0))
+    solid%first = 1
+    allocate (solid%body_cell(1), solid%body_face(1), source=1)
+    allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
+    allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
+  end subroutine solid_geometry_init
+
+end module solid_geometry_m
