@@ -1,0 +1,168 @@
+!> Sums over all cells of all processes that give the same bits in any order (see `exact_bins_m`).
+!!
+!! `exact_sum`, `exact_sums`, `exact_dot` and `exact_dots` need one message each. For terms that
+!! arise here and there, like forces on bodies, keep bins: start from `no_terms`, `exact_add` terms,
+!! `merge_bins` of threads, and turn all bins into numbers with one `exact_totals`.
+module exact_sum_m
+  use kinds_m, only: wp, i8
+  use exact_bins_m, only: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
+  use parallel_m, only: global_sum_bins
+  implicit none
+  private
+  public :: exact_sum, exact_sums, exact_dot, exact_dots
+  public :: bin_size, no_terms, exact_add, merge_bins, exact_totals
+
+  integer, parameter :: worth_threads = 8192   !! fewer terms are summed by one thread
+
+contains
+
+  !> Sum of all elements of all processes.
+  function exact_sum(a) result(s)
+    real(wp), intent(in), contiguous :: a(:)
+    real(wp) :: s
+    integer(i8) :: bins(bin_size, 1)
+    real(wp) :: total(1)
+
+    bins(:, 1) = no_terms
+    call add_column(a, bins(:, 1))
+    call exact_totals(bins, total)
+    s = total(1)
+  end function exact_sum
+
+  !> Sums of the columns of `a` over all processes, with one message.
+  function exact_sums(a) result(s)
+    real(wp), intent(in), contiguous :: a(:, :)   !! (terms, sums); the terms may differ by process
+    real(wp) :: s(size(a, 2))
+    integer(i8) :: bins(bin_size, size(a, 2))
+    integer :: m
+
+    do m = 1, size(a, 2)
+      bins(:, m) = no_terms
+      call add_column(a(:, m), bins(:, m))
+    end do
+    call exact_totals(bins, s)
+  end function exact_sums
+
+  !> Sum of x*y over the inner cells of all processes.
+  function exact_dot(x, y, width) result(s)
+    real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)   !! blocks with halos
+    integer, intent(in) :: width   !! halo cells on every side of both
+    real(wp) :: s
+    integer(i8) :: bins(bin_size, 1)
+    real(wp) :: total(1)
+
+    bins(:, 1) = no_terms
+    call add_products(x, y, width, bins(:, 1))
+    call exact_totals(bins, total)
+    s = total(1)
+  end function exact_dot
+
+  !> Sums of x1*y1 and of x2*y2 over the inner cells of all processes, with one message.
+  function exact_dots(x1, y1, x2, y2, width) result(s)
+    real(wp), intent(in), contiguous :: x1(:, :, :), y1(:, :, :), x2(:, :, :), y2(:, :, :)
+    integer, intent(in) :: width   !! halo cells on every side of all four
+    real(wp) :: s(2)
+    integer(i8) :: bins(bin_size, 2)
+
+    bins(:, 1) = no_terms
+    bins(:, 2) = no_terms
+    call add_products(x1, y1, width, bins(:, 1))
+    call add_products(x2, y2, width, bins(:, 2))
+    call exact_totals(bins, s)
+  end function exact_dots
+
+  !> Add terms of this process to a sum kept in bins.
+  pure subroutine exact_add(terms, bins)
+    real(wp), intent(in) :: terms(:)
+    integer(i8), intent(inout) :: bins(bin_size)
+    real(wp) :: p(chunk_size)
+    integer :: first, n
+
+    do first = 1, size(terms), chunk_size
+      n = min(chunk_size, size(terms) - first + 1)
+      p(:n) = terms(first:first + n - 1)
+      call add_terms(p(:n), bins)
+    end do
+  end subroutine exact_add
+
+  !> Values of sums kept in bins, over all processes, with one message.
+  subroutine exact_totals(bins, s)
+    integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, sums); all processes after
+    real(wp), intent(out) :: s(:)
+    integer :: m
+
+    call global_sum_bins(bins)
+    do m = 1, size(s)
+      s(m) = bins_value(bins(:, m))
+    end do
+  end subroutine exact_totals
+
+  !> Add all elements of a column, chunk by chunk, on all threads if it is long.
+  subroutine add_column(a, bins)
+    real(wp), intent(in), contiguous :: a(:)
+    integer(i8), intent(inout) :: bins(bin_size)
+    integer(i8) :: mine(bin_size)
+    integer :: first
+
+    !$omp parallel private(mine) if (size(a) > worth_threads)
+    mine = no_terms
+    !$omp do schedule(static)
+    do first = 1, size(a), chunk_size
+      call exact_add(a(first:min(first + chunk_size - 1, size(a))), mine)
+    end do
+    !$omp end do nowait
+    !$omp critical (merge_columns)
+    call merge_bins(mine, bins)
+    !$omp end critical (merge_columns)
+    !$omp end parallel
+  end subroutine add_column
+
+  !> Add the products of the inner cells, plane by plane, on all threads if there are many.
+  subroutine add_products(x, y, width, bins)
+    real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)
+    integer, intent(in) :: width
+    integer(i8), intent(inout) :: bins(bin_size)
+    integer(i8) :: mine(bin_size)
+    integer :: k, first(3), last(3)
+
+    first = width + 1
+    last = shape(x) - width
+    !$omp parallel private(mine) if (product(last - first + 1) > worth_threads)
+    mine = no_terms
+    !$omp do schedule(static)
+    do k = first(3), last(3)
+      call add_plane(x(:, :, k), y(:, :, k), first, last, mine)
+    end do
+    !$omp end do nowait
+    !$omp critical (merge_products)
+    call merge_bins(mine, bins)
+    !$omp end critical (merge_products)
+    !$omp end parallel
+  end subroutine add_products
+
+  !> Add the products of one plane, gathered row by row into chunks.
+  pure subroutine add_plane(x, y, first, last, bins)
+    real(wp), intent(in), contiguous :: x(:, :), y(:, :)
+    integer, intent(in) :: first(3), last(3)   !! inner cells
+    integer(i8), intent(inout) :: bins(bin_size)
+    real(wp) :: p(chunk_size)
+    integer :: i, j, start, n, held
+
+    held = 0
+    do j = first(2), last(2)
+      do start = first(1), last(1), chunk_size
+        n = min(chunk_size, last(1) - start + 1)
+        if (held + n > chunk_size) then
+          call add_terms(p(:held), bins)
+          held = 0
+        end if
+        do i = 0, n - 1
+          p(held + 1 + i) = x(start + i, j)*y(start + i, j)
+        end do
+        held = held + n
+      end do
+    end do
+    if (held > 0) call add_terms(p(:held), bins)
+  end subroutine add_plane
+
+end module exact_sum_m

@@ -1,0 +1,144 @@
+!> Vectors, rotations as quaternions (w, x, y, z) and small dense systems; all pure.
+module vectors_m
+  use kinds_m, only: wp
+  implicit none
+  private
+  public :: cross, norm, normalised
+  public :: quaternion_product, quaternion_from_axis, quaternion_exp, rotation_matrix, rotate
+  public :: inverse3, solve6
+
+contains
+
+  !> Vector product a x b.
+  pure function cross(a, b) result(c)
+    real(wp), intent(in) :: a(3), b(3)
+    real(wp) :: c(3)
+
+    c(1) = a(2)*b(3) - a(3)*b(2)
+    c(2) = a(3)*b(1) - a(1)*b(3)
+    c(3) = a(1)*b(2) - a(2)*b(1)
+  end function cross
+
+  !> Euclidean length of a vector of any length.
+  pure function norm(a) result(length)
+    real(wp), intent(in) :: a(:)
+    real(wp) :: length
+
+    length = sqrt(dot_product(a, a))
+  end function norm
+
+  !> The vector (or quaternion) divided by its length; a zero vector stays zero.
+  pure function normalised(q) result(r)
+    real(wp), intent(in) :: q(:)
+    real(wp) :: r(size(q))
+    real(wp) :: length
+
+    length = norm(q)
+    r = q
+    if (length > 0.0_wp) r = q/length
+  end function normalised
+
+  !> Product a b: the rotation b followed by the rotation a.
+  pure function quaternion_product(a, b) result(c)
+    real(wp), intent(in) :: a(4), b(4)
+    real(wp) :: c(4)
+
+    c(1) = a(1)*b(1) - dot_product(a(2:4), b(2:4))
+    c(2:4) = a(1)*b(2:4) + b(1)*a(2:4) + cross(a(2:4), b(2:4))
+  end function quaternion_product
+
+  !> Rotation by an angle about an axis of any length, right-handed.
+  pure function quaternion_from_axis(axis, angle_rad) result(q)
+    real(wp), intent(in) :: axis(3)
+    real(wp), intent(in) :: angle_rad   !! [rad]
+    real(wp) :: q(4)
+
+    q(1) = cos(0.5_wp*angle_rad)
+    q(2:4) = sin(0.5_wp*angle_rad)*normalised(axis)
+  end function quaternion_from_axis
+
+  !> Rotation by the vector w = angle*axis; exact also as w goes to zero.
+  pure function quaternion_exp(w) result(q)
+    real(wp), intent(in) :: w(3)   !! rotation vector [rad]
+    real(wp) :: q(4)
+    real(wp), parameter :: small = 1.0e-4_wp   !! where the next term of the series is below 1e-17
+    real(wp) :: angle, sine_over_angle
+
+    angle = norm(w)
+    if (angle > small) then
+      sine_over_angle = sin(0.5_wp*angle)/angle
+    else
+      sine_over_angle = 0.5_wp - angle**2/48.0_wp
+    end if
+    q(1) = cos(0.5_wp*angle)
+    q(2:4) = sine_over_angle*w
+  end function quaternion_exp
+
+  !> Matrix r from body to space axes, x_space = matmul(r, x_body), for a unit quaternion.
+  pure function rotation_matrix(q) result(r)
+    real(wp), intent(in) :: q(4)
+    real(wp) :: r(3, 3)
+    real(wp) :: w, x, y, z
+
+    w = q(1)
+    x = q(2)
+    y = q(3)
+    z = q(4)
+    r(:, 1) = [1 - 2*(y*y + z*z), 2*(x*y + w*z), 2*(x*z - w*y)]
+    r(:, 2) = [2*(x*y - w*z), 1 - 2*(x*x + z*z), 2*(y*z + w*x)]
+    r(:, 3) = [2*(x*z + w*y), 2*(y*z - w*x), 1 - 2*(x*x + y*y)]
+  end function rotation_matrix
+
+  !> Vector v turned by the unit quaternion q, from body to space axes.
+  pure function rotate(q, v) result(r)
+    real(wp), intent(in) :: q(4), v(3)
+    real(wp) :: r(3)
+    real(wp) :: t(3)
+
+    t = 2*cross(q(2:4), v)
+    r = v + q(1)*t + cross(q(2:4), t)
+  end function rotate
+
+  !> Inverse of a regular 3 x 3 matrix.
+  pure function inverse3(a) result(b)
+    real(wp), intent(in) :: a(3, 3)
+    real(wp) :: b(3, 3)
+    real(wp) :: determinant
+
+    b(1, :) = cross(a(:, 2), a(:, 3))
+    b(2, :) = cross(a(:, 3), a(:, 1))
+    b(3, :) = cross(a(:, 1), a(:, 2))
+    determinant = dot_product(b(1, :), a(:, 1))
+    b = b/determinant
+  end function inverse3
+
+  !> Solution of a x = b for a symmetric 6 x 6 matrix, by elimination with row exchange.
+  !!
+  !! A pivot below round-off of the largest element means a singular direction: its unknown is zero.
+  pure function solve6(a, b) result(x)
+    real(wp), intent(in) :: a(6, 6), b(6)
+    real(wp) :: x(6)
+    real(wp) :: m(6, 7), row(7), tiny_pivot
+    integer :: i, j, best
+
+    m(:, :6) = a
+    m(:, 7) = b
+    tiny_pivot = 10*epsilon(1.0_wp)*maxval(abs(a))
+    do i = 1, 6
+      best = i - 1 + maxloc(abs(m(i:, i)), 1)
+      row = m(best, :)
+      m(best, :) = m(i, :)
+      m(i, :) = row
+      if (abs(row(i)) <= tiny_pivot) cycle
+      do j = i + 1, 6
+        m(j, i:) = m(j, i:) - (m(j, i)/row(i))*row(i:)
+      end do
+    end do
+    x = 0.0_wp
+    do i = 6, 1, -1
+      if (abs(m(i, i)) <= tiny_pivot) cycle
+      x(i) = (m(i, 7) - dot_product(m(i, i + 1:6), x(i + 1:)))/m(i, i)
+    end do
+  end function solve6
+
+end module vectors_m

@@ -1,0 +1,70 @@
+!> Checks for the unit tests: count, name what failed, end with an exit code.
+module check_m
+  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use kinds_m, only: wp
+  implicit none
+  private
+  public :: check, finish_checks
+
+  integer, save :: n_passed = 0, n_failed = 0
+
+  !> One check: of a condition, of equal integers, or of reals within an absolute tolerance.
+  interface check
+    procedure :: check_condition, check_integer, check_real, check_reals
+  end interface check
+
+contains
+
+  subroutine check_condition(name, condition)
+    character(*), intent(in) :: name
+    logical, intent(in) :: condition
+
+    if (condition) then
+      n_passed = n_passed + 1
+    else
+      n_failed = n_failed + 1
+      write (error_unit, '(2a)') 'FAILED: ', name
+    end if
+  end subroutine check_condition
+
+  subroutine check_integer(name, value, expected)
+    character(*), intent(in) :: name
+    integer, intent(in) :: value, expected
+
+    call check_condition(name, value == expected)
+    if (value /= expected) write (error_unit, '(2(a, i0))') '  got ', value, ', expected ', expected
+  end subroutine check_integer
+
+  !> Passes when |value - expected| <= tolerance; NaN fails.
+  subroutine check_real(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value, expected, tolerance
+
+    call check_reals(name, [value], [expected], tolerance)
+  end subroutine check_real
+
+  !> Passes when every |value - expected| <= tolerance.
+  subroutine check_reals(name, value, expected, tolerance)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: value(:), expected(:), tolerance
+    logical :: good
+    integer :: i
+
+    good = size(value) == size(expected)
+    if (good) good = all(abs(value - expected) <= tolerance)
+    call check_condition(name, good)
+    if (good) return
+    do i = 1, min(size(value), size(expected))
+      if (abs(value(i) - expected(i)) <= tolerance) cycle
+      write (error_unit, '(a, i0, 3(a, es24.16))') '  element ', i, ': got ', value(i), &
+        ', expected ', expected(i), ', tolerance ', tolerance
+    end do
+  end subroutine check_reals
+
+  !> Print the counts; stop with code 1 when a check failed or none was made.
+  subroutine finish_checks()
+    write (output_unit, '(i0, a, i0, a)') n_passed, ' passed, ', n_failed, ' failed'
+    if (n_failed > 0 .or. n_passed == 0) stop 1
+  end subroutine finish_checks
+
+end module check_m
