@@ -8,7 +8,7 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: absent
+  public :: absent, is_given
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
 
@@ -51,6 +51,7 @@ module case_types_m
 
   type :: water_t
     real(wp) :: min(3) = absent, max(3) = absent    !! a box of liquid at t = 0 [m]
+    integer :: line = 0                             !! of the case file, where the group begins
   end type water_t
 
   type :: numerics_t
@@ -89,6 +90,7 @@ module case_types_m
     integer :: refinement = 2
     character(name_length) :: spheres = 'centroid'
     real(wp) :: sphere_spacing = 0.0_wp             !! [m]
+    integer :: line = 0                             !! of the case file, where the group begins
   end type shape_input_t
 
   type :: body_input_t
@@ -99,6 +101,7 @@ module case_types_m
     real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
     logical :: fixed = .false.
     real(wp) :: release_time = 0.0_wp               !! [s]
+    integer :: line = 0                             !! of the case file, where the group begins
   end type body_input_t
 
   type :: drop_input_t
@@ -112,6 +115,7 @@ module case_types_m
     real(wp) :: tilt_deg = 0.0_wp
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1
+    integer :: line = 0                             !! of the case file, where the group begins
   end type drop_input_t
 
   type :: bed_input_t
@@ -133,5 +137,15 @@ module case_types_m
     type(body_input_t), allocatable :: body(:)
     type(drop_input_t), allocatable :: drop(:)
   end type case_t
+
+contains
+
+  !> Did the user give this real variable a value?
+  elemental function is_given(x) result(yes)
+    real(wp), intent(in) :: x
+    logical :: yes
+
+    yes = x > absent
+  end function is_given
 
 end module case_types_m

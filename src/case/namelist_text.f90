@@ -1,0 +1,661 @@
+!> The text of a case, cut into groups of assignments with their line numbers.
+!!
+!! Our own small tokenizer in place of the namelist `read` of Fortran, which stops at the first error
+!! of a group, skips unknown groups without a word and lets a repeated group keep old values. Here
+!! every fault of form is noted with its line and reading goes on. The grammar:
+!!
+!!     text       = { group | comment }
+!!     group      = '&' name { assignment | comment } '/'
+!!     assignment = name '=' value { separator value }
+!!     value      = [ count '*' ] ( word | quoted string )
+!!
+!! Separators are blanks, line ends and single commas (one more after the last value is fine); a comment
+!! runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
+module namelist_text_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, c_associated
+  use errors_m, only: problems_t, to_text
+  use value_text_m, only: lower_case, printable, quoted_text, parse_integer, value_ok
+  implicit none
+  private
+  public :: read_text, cut_groups
+  public :: namelist_text_t, group_text_t, assignment_t, value_t
+
+  !> One value as it stands in the text, without its quotes.
+  type :: value_t
+    character(:), allocatable :: text
+    logical :: quoted = .false.
+  end type value_t
+
+  type :: assignment_t
+    character(:), allocatable :: name      !! in small letters
+    integer :: line = 0
+    integer :: n = 0                       !! number of values, repeat counts multiplied out
+    type(value_t), allocatable :: value(:)
+    logical :: faulty = .false.            !! a problem with it has been reported already
+  contains
+    procedure :: shown => assignment_shown
+  end type assignment_t
+
+  type :: group_text_t
+    character(:), allocatable :: name      !! in small letters, without '&'
+    integer :: line = 0                    !! where the group begins
+    integer :: n = 0                       !! number of assignments
+    type(assignment_t), allocatable :: assignment(:)
+    logical :: faulty = .false.            !! damaged: assignments may be missing from it
+  contains
+    procedure :: find => group_find
+  end type group_text_t
+
+  type :: namelist_text_t
+    integer :: n = 0                       !! number of groups
+    type(group_text_t), allocatable :: group(:)
+  end type namelist_text_t
+
+  !> Where the reader stands in the text.
+  type :: cursor_t
+    character(:), allocatable :: text      !! line ends are a single line feed, the last one included
+    integer :: at = 1                      !! next character
+    integer :: line = 1
+  end type cursor_t
+
+  character(*), parameter :: line_feed = achar(10), carriage_return = achar(13), tab = achar(9)
+  character(*), parameter :: blanks = ' '//tab//line_feed
+  character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
+  character(*), parameter :: name_characters = letters//'0123456789_%'
+  character(*), parameter :: word_ends = blanks//',;!=&/"'''
+  integer, parameter :: longest_text = 2**24   !! bytes of a case file
+  integer, parameter :: most_values = 1000     !! values of one variable
+
+  interface
+    function c_fopen(path, mode) bind(c, name='fopen') result(stream)
+      import :: c_char, c_ptr
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+      type(c_ptr) :: stream
+    end function c_fopen
+    function c_fdopen(fd, mode) bind(c, name='fdopen') result(stream)
+      import :: c_char, c_int, c_ptr
+      integer(c_int), value :: fd
+      character(kind=c_char), intent(in) :: mode(*)
+      type(c_ptr) :: stream
+    end function c_fdopen
+    function c_fread(buffer, size, count, stream) bind(c, name='fread') result(n)
+      import :: c_char, c_size_t, c_ptr
+      character(kind=c_char), intent(out) :: buffer(*)
+      integer(c_size_t), value :: size, count
+      type(c_ptr), value :: stream
+      integer(c_size_t) :: n
+    end function c_fread
+    function c_ferror(stream) bind(c, name='ferror') result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: stream
+      integer(c_int) :: status
+    end function c_ferror
+    function c_fclose(stream) bind(c, name='fclose') result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: stream
+      integer(c_int) :: status
+    end function c_fclose
+    function c_isatty(fd) bind(c, name='isatty') result(yes)
+      import :: c_int
+      integer(c_int), value :: fd
+      integer(c_int) :: yes
+    end function c_isatty
+  end interface
+
+contains
+
+  !> Read a whole file, or standard input if `file` is empty, byte for byte.
+  !!
+  !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound.
+  subroutine read_text(file, text, problems)
+    character(*), intent(in) :: file
+    character(:), allocatable, intent(out) :: text
+    type(problems_t), intent(inout) :: problems
+    character(kind=c_char) :: piece(65536)
+    character(65536) :: part
+    character(:), allocatable :: source
+    type(c_ptr) :: stream
+    integer :: n, i, status
+
+    text = ''
+    source = file
+    if (len(file) == 0) then
+      source = 'standard input'
+      if (c_isatty(0_c_int) /= 0) then
+        call problems%add_message('no case given: name a file, or use ./mics < input/blocks.nml')
+        return
+      end if
+      stream = c_fdopen(0_c_int, 'r'//c_null_char)
+    else
+      stream = c_fopen(file//c_null_char, 'r'//c_null_char)
+    end if
+    if (.not. c_associated(stream)) then
+      call problems%add_message(source//': there is no such file, or it may not be read')
+      return
+    end if
+    do
+      n = int(c_fread(piece, 1_c_size_t, size(piece, kind=c_size_t), stream))
+      if (n == 0 .or. len(text) > longest_text) exit
+      do i = 1, n
+        part(i:i) = piece(i)
+      end do
+      text = text//part(:n)
+    end do
+    if (c_ferror(stream) /= 0) call problems%add_message(source//': could not be read')
+    status = c_fclose(stream)
+    call check_text(source, text, problems)
+  end subroutine read_text
+
+  !> Refuse what cannot be a case: nothing at all, binary data, another encoding than UTF-8.
+  subroutine check_text(source, text, problems)
+    character(*), intent(in) :: source
+    character(*), intent(in) :: text
+    type(problems_t), intent(inout) :: problems
+
+    if (problems%n > 0) return
+    if (len(text) == 0) then
+      call problems%add_message(source//': the case is empty')
+    else if (len(text) > longest_text) then
+      call problems%add_message(source//': longer than 16 MiB, this cannot be a case')
+    else if (index(text, achar(0)) > 0) then
+      call problems%add_message(source//': holds zero bytes; a case is plain UTF-8 text')
+    end if
+  end subroutine check_text
+
+  !> Cut the text of a case into its groups.
+  subroutine cut_groups(text, list, problems)
+    character(*), intent(in) :: text
+    type(namelist_text_t), intent(out) :: list
+    type(problems_t), intent(inout) :: problems
+    type(cursor_t) :: cursor
+    type(group_text_t) :: group
+    logical :: stray_reported
+
+    cursor%text = plain_lines(text)
+    allocate (list%group(8))
+    stray_reported = .false.
+    do
+      call skip_blanks(cursor)
+      if (at_end(cursor)) exit
+      if (next(cursor) == '&') then
+        call read_group(cursor, group, problems)
+        if (len(group%name) > 0) call append_group(list, group)
+        stray_reported = .false.
+      else
+        if (.not. stray_reported) call report_stray(cursor, list, problems)
+        stray_reported = .true.
+        call skip_line(cursor)
+      end if
+    end do
+  end subroutine cut_groups
+
+  !> Line ends of every system as one line feed; a byte-order mark dropped; the last line ended.
+  pure function plain_lines(text) result(plain)
+    character(*), intent(in) :: text
+    character(:), allocatable :: plain
+    character(*), parameter :: byte_order_mark = achar(239)//achar(187)//achar(191)
+    integer :: i, n, first
+
+    first = 1
+    if (index(text, byte_order_mark) == 1) first = 4
+    allocate (character(len(text) + 1) :: plain)
+    n = 0
+    do i = first, len(text)
+      if (text(i:i) == line_feed .and. i > 1) then
+        if (text(i - 1:i - 1) == carriage_return) cycle
+      end if
+      n = n + 1
+      plain(n:n) = text(i:i)
+      if (text(i:i) == carriage_return) plain(n:n) = line_feed
+    end do
+    plain = plain(:n)//line_feed
+  end function plain_lines
+
+  !> Text where only a group may stand.
+  subroutine report_stray(cursor, list, problems)
+    type(cursor_t), intent(in) :: cursor
+    type(namelist_text_t), intent(in) :: list
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: message
+    integer :: length
+
+    length = index(cursor%text(cursor%at:), line_feed) - 1
+    message = printable(trim(cursor%text(cursor%at:cursor%at + length - 1)))
+    message = 'text outside the groups: '//message
+    if (list%n > 0) message = message//' ; &'//list%group(list%n)%name//' has ended with its ''/'''
+    call problems%add_message(message, cursor%line)
+  end subroutine report_stray
+
+  !> Read one group from its '&' to its '/'.
+  subroutine read_group(cursor, group, problems)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(out) :: group
+    type(problems_t), intent(inout) :: problems
+    logical :: comma   ! the last thing read is a comma
+
+    group%line = cursor%line
+    cursor%at = cursor%at + 1
+    group%name = lower_case(take_run(cursor, name_characters))
+    allocate (group%assignment(16))
+    if (len(group%name) == 0) then
+      call problems%add_message('''&'' without the name of a group', cursor%line)
+      return
+    else if (group%name == 'end') then
+      call problems%add_message('&end: a group ends with ''/''', cursor%line)
+      group%name = ''
+      return
+    end if
+    comma = .false.
+    do
+      call skip_blanks(cursor)
+      if (group_ends(cursor, group, problems)) exit
+      if (next(cursor) == ',') then
+        if (comma .or. .not. has_value(group)) then
+          call report(cursor, group, 'nothing in front of a comma; every value must be written', problems)
+        end if
+        comma = .true.
+        cursor%at = cursor%at + 1
+        cycle
+      end if
+      comma = .false.
+      if (starts_assignment(cursor)) then
+        call start_assignment(cursor, group, problems)
+      else
+        call read_value(cursor, group, problems)
+      end if
+    end do
+    call check_last(group, problems)
+  end subroutine read_group
+
+  !> Is the group over: its '/', or the next group or the end of the text without one?
+  function group_ends(cursor, group, problems) result(yes)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(inout) :: group
+    type(problems_t), intent(inout) :: problems
+    logical :: yes
+    character(:), allocatable :: rest
+
+    yes = .true.
+    if (at_end(cursor)) then
+      rest = 'the end of the text'
+    else if (next(cursor) == '/') then
+      cursor%at = cursor%at + 1
+      return
+    else if (next(cursor) == '&') then
+      rest = 'the next ''&'' on line '//to_text(cursor%line)
+      if (lower_case(cursor%text(cursor%at:min(cursor%at + 3, len(cursor%text)))) == '&end') then
+        cursor%at = cursor%at + 4
+      end if
+    else
+      yes = .false.
+      return
+    end if
+    if (.not. group%faulty) then
+      call problems%add_message('&'//group%name//': no ''/'' closes the group before '//rest, group%line)
+    end if
+    group%faulty = .true.
+  end function group_ends
+
+  !> Does a name with its '=' follow? (A word alone is a value.)
+  pure function starts_assignment(cursor) result(yes)
+    type(cursor_t), intent(in) :: cursor
+    logical :: yes
+    integer :: i, n, closing
+
+    yes = .false.
+    associate (text => cursor%text)
+      if (verify(text(cursor%at:cursor%at), letters//'_') > 0) return
+      n = len(text)
+      i = past_blanks(text, cursor%at + verify(text(cursor%at:), name_characters) - 1)
+      if (i <= n) then
+        if (text(i:i) == '(') then
+          closing = scan(text(i:), ')'//line_feed)
+          if (closing > 0) i = past_blanks(text, i + closing)
+        end if
+      end if
+      if (i <= n) yes = text(i:i) == '='
+    end associate
+  end function starts_assignment
+
+  !> Open the assignment whose name and '=' follow.
+  subroutine start_assignment(cursor, group, problems)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(inout) :: group
+    type(problems_t), intent(inout) :: problems
+    type(assignment_t) :: new
+    integer :: same
+
+    call check_last(group, problems)
+    new%line = cursor%line
+    new%name = lower_case(take_run(cursor, name_characters))
+    allocate (new%value(4))
+    same = group%find(new%name)
+    call append_assignment(group, new)
+    call skip_blanks(cursor)
+    if (next(cursor) == '(') then
+      call report(cursor, group, 'parts of a list cannot be set; write the whole list, ' &
+                  //new%name//' = first, second, ...', problems)
+    else if (same > 0) then
+      call report(cursor, group, 'given twice in one group, first on line ' &
+                  //to_text(group%assignment(same)%line), problems)
+    end if
+    do while (next(cursor) /= '=')
+      if (next(cursor) == line_feed) cursor%line = cursor%line + 1
+      cursor%at = cursor%at + 1
+    end do
+    cursor%at = cursor%at + 1
+  end subroutine start_assignment
+
+  !> Read one value, repeat count included, into the last assignment of the group.
+  subroutine read_value(cursor, group, problems)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(inout) :: group
+    type(problems_t), intent(inout) :: problems
+    type(value_t) :: value
+    integer :: count, digits
+
+    count = 1
+    digits = verify(cursor%text(cursor%at:), '0123456789') - 1
+    if (digits > 0 .and. cursor%text(cursor%at + digits:cursor%at + digits) == '*') then
+      call read_count(cursor, group, digits, count, problems)
+      if (scan(next(cursor), word_ends) > 0 .and. scan(next(cursor), '"''') == 0) then
+        call report(cursor, group, 'a repeat count without its value', problems)
+        return
+      end if
+    end if
+    select case (next(cursor))
+    case ('''', '"')
+      call take_string(cursor, group, value, problems)
+    case ('=')
+      call report(cursor, group, '''='' without a name in front of it', problems)
+      cursor%at = cursor%at + 1
+      return
+    case (';')
+      call report(cursor, group, 'values are separated by commas or blanks, not by '';''', problems)
+      cursor%at = cursor%at + 1
+      return
+    case default
+      value%text = take_until(cursor, word_ends)
+      call take_path(cursor, value%text)
+    end select
+    if (.not. allocated(value%text)) return
+    if (group%n == 0) then
+      call problems%add_message('&'//group%name//' '//printable(value%text) &
+                                //': no ''='' follows; write name = value', cursor%line)
+      group%faulty = .true.
+      return
+    end if
+    call append_value(cursor, group, value, count, problems)
+  end subroutine read_value
+
+  !> The repeat count in front of a '*'.
+  subroutine read_count(cursor, group, digits, count, problems)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(inout) :: group
+    integer, intent(in) :: digits
+    integer, intent(out) :: count
+    type(problems_t), intent(inout) :: problems
+    integer :: info
+
+    count = 0
+    call parse_integer(cursor%text(cursor%at:cursor%at + digits - 1), count, info)
+    if (info /= value_ok .or. count < 1 .or. count > most_values) then
+      call report(cursor, group, 'repeat count ' &
+                  //printable(cursor%text(cursor%at:cursor%at + digits - 1)) &
+                  //' must be 1 to '//to_text(most_values), problems)
+      count = 1
+    end if
+    cursor%at = cursor%at + digits + 1
+  end subroutine read_count
+
+  !> A quoted string; left unallocated if its line ends first.
+  subroutine take_string(cursor, group, value, problems)
+    type(cursor_t), intent(inout) :: cursor
+    type(group_text_t), intent(inout) :: group
+    type(value_t), intent(inout) :: value
+    type(problems_t), intent(inout) :: problems
+    character(1) :: quote
+    integer :: i
+
+    quote = next(cursor)
+    value%text = ''
+    value%quoted = .true.
+    i = cursor%at + 1
+    do
+      if (cursor%text(i:i) == line_feed) then
+        call report(cursor, group, 'the string '//printable(cursor%text(cursor%at:i - 1)) &
+                    //' is not closed on its line', problems)
+        group%faulty = .true.
+        deallocate (value%text)
+        exit
+      else if (cursor%text(i:i) == quote) then
+        i = i + 1
+        if (cursor%text(i:i) /= quote) exit
+      end if
+      value%text = value%text//cursor%text(i:i)
+      i = i + 1
+    end do
+    cursor%at = i
+  end subroutine take_string
+
+  !> An unquoted path: a '/' between characters of a word that is no number belongs to the word, so
+  !! that one missing pair of quotes is one problem and does not end the group.
+  subroutine take_path(cursor, word)
+    type(cursor_t), intent(inout) :: cursor
+    character(:), allocatable, intent(inout) :: word
+
+    if (scan(word, letters//'~') == 0 .or. verify(word(1:1), '0123456789+-') == 0) return
+    do while (next(cursor) == '/')
+      if (scan(cursor%text(cursor%at + 1:cursor%at + 1), word_ends) > 0) exit
+      word = word//'/'
+      cursor%at = cursor%at + 1
+      word = word//take_until(cursor, word_ends)
+    end do
+  end subroutine take_path
+
+  !> Add a value, `count` times, to the last assignment.
+  subroutine append_value(cursor, group, value, count, problems)
+    type(cursor_t), intent(in) :: cursor
+    type(group_text_t), intent(inout) :: group
+    type(value_t), intent(in) :: value
+    integer, intent(in) :: count
+    type(problems_t), intent(inout) :: problems
+    type(value_t), allocatable :: longer(:)
+    integer :: i
+
+    associate (last => group%assignment(group%n))
+      if (last%n + count > most_values) then
+        call report(cursor, group, 'more than '//to_text(most_values)//' values', problems)
+        return
+      end if
+      if (last%n + count > size(last%value)) then
+        allocate (longer(2*(last%n + count)))
+        longer(:last%n) = last%value(:last%n)
+        call move_alloc(longer, last%value)
+      end if
+      do i = 1, count
+        last%value(last%n + i) = value
+      end do
+      last%n = last%n + count
+    end associate
+  end subroutine append_value
+
+  !> Report the last assignment if it ended up without a value.
+  subroutine check_last(group, problems)
+    type(group_text_t), intent(inout) :: group
+    type(problems_t), intent(inout) :: problems
+
+    if (group%n == 0) return
+    associate (last => group%assignment(group%n))
+      if (last%n > 0 .or. last%faulty .or. group%faulty) return
+      call problems%add_message('&'//group%name//' '//last%name//' = : the value is missing', last%line)
+      last%faulty = .true.
+    end associate
+  end subroutine check_last
+
+  !> Note a fault of form of the last assignment, once for each assignment.
+  subroutine report(cursor, group, what, problems)
+    type(cursor_t), intent(in) :: cursor
+    type(group_text_t), intent(inout) :: group
+    character(*), intent(in) :: what
+    type(problems_t), intent(inout) :: problems
+
+    if (group%n == 0) then
+      if (.not. group%faulty) call problems%add_message('&'//group%name//': '//what, cursor%line)
+      group%faulty = .true.
+      return
+    end if
+    associate (last => group%assignment(group%n))
+      if (.not. last%faulty) then
+        call problems%add_message('&'//group%name//' '//last%name//': '//what, cursor%line)
+      end if
+      last%faulty = .true.
+    end associate
+  end subroutine report
+
+  !> Add a group to the list.
+  subroutine append_group(list, group)
+    type(namelist_text_t), intent(inout) :: list
+    type(group_text_t), intent(in) :: group
+    type(group_text_t), allocatable :: longer(:)
+
+    if (list%n == size(list%group)) then
+      allocate (longer(2*list%n))
+      longer(:list%n) = list%group
+      call move_alloc(longer, list%group)
+    end if
+    list%n = list%n + 1
+    list%group(list%n) = group
+  end subroutine append_group
+
+  !> Add an assignment to the group.
+  subroutine append_assignment(group, new)
+    type(group_text_t), intent(inout) :: group
+    type(assignment_t), intent(in) :: new
+    type(assignment_t), allocatable :: longer(:)
+
+    if (group%n == size(group%assignment)) then
+      allocate (longer(2*group%n))
+      longer(:group%n) = group%assignment
+      call move_alloc(longer, group%assignment)
+    end if
+    group%n = group%n + 1
+    group%assignment(group%n) = new
+  end subroutine append_assignment
+
+  !> Number of the first assignment to `name`; 0 if there is none.
+  pure function group_find(self, name) result(i)
+    class(group_text_t), intent(in) :: self
+    character(*), intent(in) :: name
+    integer :: i
+
+    do i = 1, self%n
+      if (self%assignment(i)%name == name) return
+    end do
+    i = 0
+  end function group_find
+
+  !> The values of an assignment as a message shows them.
+  pure function assignment_shown(self) result(text)
+    class(assignment_t), intent(in) :: self
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, self%n
+      if (i > 1) text = text//', '
+      if (self%value(i)%quoted) then
+        text = text//quoted_text(self%value(i)%text)
+      else
+        text = text//self%value(i)%text
+      end if
+    end do
+    text = printable(text)
+  end function assignment_shown
+
+  !> Has the last assignment a value already?
+  pure function has_value(group) result(yes)
+    type(group_text_t), intent(in) :: group
+    logical :: yes
+
+    yes = .false.
+    if (group%n > 0) yes = group%assignment(group%n)%n > 0 .or. group%assignment(group%n)%faulty
+  end function has_value
+
+  !> The next character; only to be asked before the end.
+  pure function next(cursor) result(c)
+    type(cursor_t), intent(in) :: cursor
+    character(1) :: c
+
+    c = cursor%text(cursor%at:cursor%at)
+  end function next
+
+  pure function at_end(cursor) result(yes)
+    type(cursor_t), intent(in) :: cursor
+    logical :: yes
+
+    yes = cursor%at > len(cursor%text)
+  end function at_end
+
+  !> Go on past blanks, line ends and comments.
+  pure subroutine skip_blanks(cursor)
+    type(cursor_t), intent(inout) :: cursor
+
+    do while (.not. at_end(cursor))
+      if (next(cursor) == '!') then
+        call skip_line(cursor)
+      else if (scan(next(cursor), blanks) == 1) then
+        if (next(cursor) == line_feed) cursor%line = cursor%line + 1
+        cursor%at = cursor%at + 1
+      else
+        exit
+      end if
+    end do
+  end subroutine skip_blanks
+
+  !> Go on to the start of the next line.
+  pure subroutine skip_line(cursor)
+    type(cursor_t), intent(inout) :: cursor
+
+    cursor%at = cursor%at + index(cursor%text(cursor%at:), line_feed)
+    cursor%line = cursor%line + 1
+  end subroutine skip_line
+
+  !> First place at or after i that is no blank and no line end.
+  pure function past_blanks(text, i) result(j)
+    character(*), intent(in) :: text
+    integer, intent(in) :: i
+    integer :: j
+
+    j = i
+    do while (j <= len(text))
+      if (scan(text(j:j), blanks) == 0) exit
+      j = j + 1
+    end do
+  end function past_blanks
+
+  !> Take the longest run of characters from `set`.
+  function take_run(cursor, set) result(word)
+    type(cursor_t), intent(inout) :: cursor
+    character(*), intent(in) :: set
+    character(:), allocatable :: word
+    integer :: length
+
+    length = verify(cursor%text(cursor%at:), set) - 1
+    word = cursor%text(cursor%at:cursor%at + length - 1)
+    cursor%at = cursor%at + length
+  end function take_run
+
+  !> Take everything up to the first character from `set`; the line feed at the end is always one.
+  function take_until(cursor, set) result(word)
+    type(cursor_t), intent(inout) :: cursor
+    character(*), intent(in) :: set
+    character(:), allocatable :: word
+    integer :: length
+
+    length = scan(cursor%text(cursor%at:), set) - 1
+    word = cursor%text(cursor%at:cursor%at + length - 1)
+    cursor%at = cursor%at + length
+  end function take_until
+
+end module namelist_text_m

@@ -1,0 +1,262 @@
+!> Numbers, logicals and names as text: checked and read from a case file, compared, shown.
+!!
+!! Nothing here uses a Fortran formatted read on unchecked text: the form of a value is checked
+!! character by character first, so a bad value never raises a floating-point exception.
+module value_text_m
+  use kinds_m, only: wp, i8
+  implicit none
+  private
+  public :: parse_real, parse_integer, parse_logical
+  public :: quoted_text, printable
+  public :: lower_case, nearest_name, edit_distance
+  public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
+
+  !> What a parser found.
+  integer, parameter :: value_ok = 0, value_malformed = 1, value_not_finite = 2
+  integer, parameter :: value_too_large = 3, value_not_whole = 4
+
+  !> Largest size of a real value, and one over its smallest: products of a few such values
+  !! (a volume, an inertia) stay inside the range of real64.
+  integer, parameter :: largest_exponent = 30
+
+  integer, parameter :: longest_shown = 60   !! characters of a value in a message
+
+contains
+
+  !> Read a real number: digits, at most one point, exponent with `e` or `d`.
+  pure subroutine parse_real(text, x, info)
+    character(*), intent(in) :: text
+    real(wp), intent(inout) :: x      !! changed only when `info` is `value_ok`
+    integer, intent(out) :: info
+    character(len(text)) :: word
+    integer :: mantissa_end, exponent, power, status
+
+    word = lower_case(text)
+    info = value_malformed
+    if (is_not_finite(word)) info = value_not_finite
+    if (info == value_not_finite) return
+    mantissa_end = scan(word, 'ed') - 1
+    if (mantissa_end < 0) mantissa_end = len(word)
+    if (.not. is_decimal(word(:mantissa_end))) return
+    exponent = 0
+    if (mantissa_end < len(word)) then
+      if (.not. is_whole(word(mantissa_end + 2:))) return
+      call small_integer(word(mantissa_end + 2:), exponent)
+      word(mantissa_end + 1:mantissa_end + 1) = 'e'
+    end if
+    call leading_power(word(:mantissa_end), power)
+    if (power == -huge(0)) then      ! zero, whatever the exponent
+      word = word(:mantissa_end)
+    else if (abs(power + exponent) > largest_exponent) then
+      info = value_too_large
+      return
+    end if
+    read (word, *, iostat=status) x
+    if (status == 0) info = value_ok
+  end subroutine parse_real
+
+  !> Read a whole number in the range of the default integer.
+  pure subroutine parse_integer(text, n, info)
+    character(*), intent(in) :: text
+    integer, intent(inout) :: n       !! changed only when `info` is `value_ok`
+    integer, intent(out) :: info
+    integer(i8) :: total
+    integer :: i, digit, first
+    real(wp) :: x
+
+    info = value_malformed
+    if (.not. is_whole(text)) then
+      call parse_real(text, x, i)
+      if (i /= value_malformed) info = value_not_whole
+      return
+    end if
+    info = value_too_large
+    total = 0_i8
+    first = 1
+    if (scan(text(1:1), '+-') == 1) first = 2
+    do i = first, len(text)
+      digit = iachar(text(i:i)) - iachar('0')
+      total = 10_i8*total + int(digit, i8)
+      if (total > int(huge(n), i8)) return
+    end do
+    if (text(1:1) == '-') total = -total
+    n = int(total)
+    info = value_ok
+  end subroutine parse_integer
+
+  !> Read a logical: .true. .false. .t. .f. true false t f, in any case of letters.
+  pure subroutine parse_logical(text, flag, info)
+    character(*), intent(in) :: text
+    logical, intent(inout) :: flag    !! changed only when `info` is `value_ok`
+    integer, intent(out) :: info
+
+    info = value_ok
+    select case (lower_case(text))
+    case ('.true.', '.t.', 'true', 't'); flag = .true.
+    case ('.false.', '.f.', 'false', 'f'); flag = .false.
+    case default; info = value_malformed
+    end select
+  end subroutine parse_logical
+
+  !> Text between quotes, the quotes inside it doubled.
+  pure function quoted_text(raw) result(text)
+    character(*), intent(in) :: raw
+    character(:), allocatable :: text
+    integer :: i
+
+    text = "'"
+    do i = 1, len(raw)
+      text = text//raw(i:i)
+      if (raw(i:i) == "'") text = text//"'"
+    end do
+    text = text//"'"
+  end function quoted_text
+
+  !> A value as it may stand in a message: no control characters, not too long.
+  pure function printable(raw) result(text)
+    character(*), intent(in) :: raw
+    character(:), allocatable :: text
+    integer :: i, n
+
+    n = len(raw)
+    if (n > longest_shown) then
+      n = longest_shown - 3
+      do while (n > 1)               ! never cut a UTF-8 character in two
+        if (iand(ichar(raw(n + 1:n + 1)), 192) /= 128) exit
+        n = n - 1
+      end do
+    end if
+    text = raw(:n)
+    do i = 1, n
+      if (ichar(text(i:i)) < 32 .or. ichar(text(i:i)) == 127) text(i:i) = '?'
+    end do
+    if (n < len(raw)) text = text//'...'
+  end function printable
+
+  !> Small letters for A to Z; every other byte stays.
+  pure function lower_case(text) result(small)
+    character(*), intent(in) :: text
+    character(len(text)) :: small
+    integer :: i
+
+    small = text
+    do i = 1, len(text)
+      if (text(i:i) >= 'A' .and. text(i:i) <= 'Z') small(i:i) = achar(iachar(text(i:i)) + 32)
+    end do
+  end function lower_case
+
+  !> The entry of `known` that is nearest to `name` by edit distance, the first among equals.
+  pure function nearest_name(name, known) result(nearest)
+    character(*), intent(in) :: name
+    character(*), intent(in) :: known(:)
+    character(:), allocatable :: nearest
+    integer :: i, distance, best
+
+    nearest = ''
+    best = huge(best)
+    do i = 1, size(known)
+      distance = edit_distance(lower_case(name), lower_case(trim(known(i))))
+      if (distance >= best) cycle
+      best = distance
+      nearest = trim(known(i))
+    end do
+  end function nearest_name
+
+  !> Least number of letters to insert, delete, replace or swap (neighbours) that turns a into b.
+  pure function edit_distance(a, b) result(distance)
+    character(*), intent(in) :: a, b
+    integer :: distance
+    integer :: before(0:len(b)), last(0:len(b)), row(0:len(b))
+    integer :: i, j, cost
+
+    last = [(j, j=0, len(b))]
+    before = last
+    do i = 1, len(a)
+      row(0) = i
+      do j = 1, len(b)
+        cost = merge(0, 1, a(i:i) == b(j:j))
+        row(j) = min(last(j) + 1, row(j - 1) + 1, last(j - 1) + cost)
+      end do
+      do j = 2, merge(len(b), 0, i > 1)
+        if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
+          row(j) = min(row(j), before(j - 2) + 1)
+        end if
+      end do
+      before = last
+      last = row
+    end do
+    distance = last(len(b))
+  end function edit_distance
+
+  !> Is the word one of the spellings of infinity or not-a-number?
+  pure function is_not_finite(word) result(yes)
+    character(*), intent(in) :: word  !! small letters
+    logical :: yes
+    integer :: first
+
+    first = 1
+    if (len(word) > 0) then
+      if (scan(word(1:1), '+-') == 1) first = 2
+    end if
+    select case (word(first:))
+    case ('nan', 'inf', 'infinity'); yes = .true.
+    case default; yes = index(word(first:), 'nan(') == 1
+    end select
+  end function is_not_finite
+
+  !> Optional sign, digits with at most one point, at least one digit?
+  pure function is_decimal(word) result(yes)
+    character(*), intent(in) :: word
+    logical :: yes
+    integer :: i, first, points
+
+    first = 1
+    if (len(word) > 0) then
+      if (scan(word(1:1), '+-') == 1) first = 2
+    end if
+    points = 0
+    do i = first, len(word)
+      if (word(i:i) == '.') points = points + 1
+    end do
+    yes = verify(word(first:), '0123456789.') == 0 .and. points <= 1 &
+      .and. len(word) - first + 1 > points
+  end function is_decimal
+
+  !> Optional sign and at least one digit, nothing else?
+  pure function is_whole(word) result(yes)
+    character(*), intent(in) :: word
+    logical :: yes
+
+    yes = is_decimal(word) .and. index(word, '.') == 0
+  end function is_whole
+
+  !> Value of a checked whole number, cut off at a million: enough to call an exponent too large.
+  pure subroutine small_integer(word, n)
+    character(*), intent(in) :: word
+    integer, intent(out) :: n
+    integer :: i
+
+    n = 0
+    do i = 1, len(word)
+      if (scan(word(i:i), '+-') == 1) cycle
+      n = min(1000000, 10*n + iachar(word(i:i)) - iachar('0'))
+    end do
+    if (word(1:1) == '-') n = -n
+  end subroutine small_integer
+
+  !> Power of ten of the first digit that is not zero; `-huge(0)` for zero itself.
+  pure subroutine leading_power(mantissa, power)
+    character(*), intent(in) :: mantissa   !! a checked decimal number
+    integer, intent(out) :: power
+    integer :: first, point
+
+    power = -huge(0)
+    first = scan(mantissa, '123456789')
+    if (first == 0) return
+    point = index(mantissa, '.')
+    if (point == 0) point = len(mantissa) + 1
+    power = point - first
+    if (power > 0) power = power - 1
+  end subroutine leading_power
+
+end module value_text_m
