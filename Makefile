@@ -1,0 +1,104 @@
+# make            ./mics, one process        make MPI=1     ./mics_mpi, many processes
+# make DEBUG=1    the same with all checks   make help      all targets
+VERSION := 0.1.0
+
+FC_SERIAL := h5fc
+FC_MPI := h5pfc
+OPT := -O3 -march=native
+OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow
+FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
+PYTHON := .venv/bin/python
+CASE := input/blocks.nml
+
+parallel := $(if $(MPI),mpi,serial)
+variant := $(parallel)$(if $(DEBUG),-debug)
+B := build/$(variant)
+binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)
+compiler := $(if $(MPI),$(FC_MPI),$(FC_SERIAL))
+flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT))
+
+other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
+sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
+unit_sources := $(wildcard verification/unit/*.f90)
+units := $(patsubst verification/unit/%.f90,$(B)/%,$(wildcard verification/unit/test_*.f90))
+vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
+
+.DELETE_ON_ERROR:
+.SECONDEXPANSION:
+.PHONY: all units deps run test verify mutate lint clean help FORCE
+
+all: $(binary)
+
+help:
+	@echo 'make deps     install what is missing: compiler, HDF5, MPI, Python packages in .venv'
+	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
+	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
+	@echo 'make run      deps, build, run $(CASE), draw the pictures'
+	@echo 'make test     deps, all builds, every quick test'
+	@echo 'make verify   the same with the long tests'
+	@echo 'make mutate   break formulas one by one; each must turn a test red'
+	@echo 'make lint     style of the Fortran and Python sources'
+	@echo 'make clean    remove what make has built'
+	@echo 'Variables: OPT="-O2" for a portable binary, FC_SERIAL, FC_MPI, CASE'
+
+$(binary): $$(OBJECTS_mics)
+	$(if $(OBJECTS_mics),,$(error src/mics.f90, the main program, is missing))
+	$(compiler) $(flags) -o $@ $^
+
+units: $(units)
+
+$(units): $(B)/%: $$(OBJECTS_$$*)
+	$(compiler) $(flags) -o $@ $^
+
+$(B)/%.o: %.f90 $(B)/settings
+	$(compiler) $(flags) -J$(B) -c -o $@ $<
+
+# Compiler and flags; a change rebuilds everything. The compiler is tried, not trusted to exist.
+tried = $(shell echo '$(compiler) $(flags)' | cmp -s - $@ || \
+  tools/try_compiler.sh $(parallel) $(compiler) || echo no)
+$(B)/settings: FORCE
+	$(if $(tried),$(error $(compiler) cannot build a Fortran program with HDF5; run: make deps))
+	@mkdir -p $(B)
+	@echo '$(compiler) $(flags)' | cmp -s - $@ || echo '$(compiler) $(flags)' > $@
+
+$(B)/build_info.f90: FORCE
+	@mkdir -p $(B)
+	@awk -v version='$(VERSION)' -v flags='$(flags)' \
+	  -v revision="$$(git describe --always --dirty --abbrev=12 2>/dev/null || echo unknown)" \
+	  -f tools/build_info.awk < /dev/null > $@.new
+	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+
+$(B)/sources: FORCE
+	@mkdir -p $(B)
+	@echo '$(sources) $(unit_sources)' | cmp -s - $@ || echo '$(sources) $(unit_sources)' > $@
+
+$(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
+	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
+
+ifneq ($(filter-out deps lint clean help run test verify mutate,$(or $(MAKECMDGOALS),all)),)
+include $(B)/depend.mk
+endif
+
+deps:
+	@tools/deps.sh
+
+run: deps
+	@$(MAKE) --no-print-directory
+	./mics < $(CASE)
+	$(PYTHON) tools/plot_pile.py mics-out
+	$(PYTHON) tools/plot_history.py mics-out
+
+test: deps
+	@verification/run_tests -m 'not slow'
+
+verify: deps
+	@verification/run_tests
+
+mutate: deps
+	@$(PYTHON) verification/mutate.py
+
+lint: deps
+	@tools/lint.sh
+
+clean:
+	rm -rf build mics mics_mpi mics_debug mics_mpi_debug
