@@ -193,7 +193,7 @@ contains
   pure function plain_lines(text) result(plain)
     character(*), intent(in) :: text
     character(:), allocatable :: plain
-    character(*), parameter :: byte_order_mark = achar(239)//achar(187)//achar(191)
+    character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
     integer :: i, n, first
 
     first = 1

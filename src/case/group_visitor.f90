@@ -1,0 +1,510 @@
+!> One description of a namelist group for both ways: reading its values and writing them out.
+!!
+!! A `visit_...` procedure names each variable of a group once, `call v%item('dt', run%dt)`. A reading
+!! visitor then fills the variable from the text if the user gave it and notes what is wrong with it; a
+!! writing visitor appends `dt = 0.01` to its text. The names asked for are the known names, so an
+!! unknown variable and its nearest neighbour need no second list.
+module group_visitor_m
+  use kinds_m, only: wp, name_length
+  use errors_m, only: problems_t, to_text
+  use case_types_m, only: is_given
+  use namelist_text_m, only: group_text_t, value_t
+  use not_yet_m, only: is_not_yet, not_yet_message
+  use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
+    quoted_text, printable, value_ok, value_not_finite, value_too_large, value_not_whole
+  implicit none
+  private
+  public :: group_visitor_t
+
+  integer, parameter :: most_variables = 64   !! of one group
+
+  type :: group_visitor_t
+    logical :: writing = .false.
+    character(:), allocatable :: text      !! what a writing visitor has written
+    type(problems_t) :: problems           !! what a reading visitor has found
+    type(group_text_t) :: group            !! the group being read
+    integer, private :: n_known = 0
+    character(name_length), private :: known(most_variables) = ''
+  contains
+    procedure :: start_reading, start_writing, finish
+    procedure :: given, good, all_good, needed, require, note
+    procedure :: option, name, list
+    procedure, private :: item_real, item_reals, item_integer, item_integers, item_logical, item_text
+    generic :: item => item_real, item_reals, item_integer, item_integers, item_logical, item_text
+    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, write_line
+    procedure, private :: refuse_not_yet
+  end type group_visitor_t
+
+contains
+
+  !> Begin to read a group; a group the user did not write has an empty one in its place.
+  subroutine start_reading(self, group)
+    class(group_visitor_t), intent(inout) :: self
+    type(group_text_t), intent(in) :: group
+
+    self%writing = .false.
+    self%group = group
+    self%n_known = 0
+  end subroutine start_reading
+
+  !> Begin to write a group.
+  subroutine start_writing(self, group)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: group
+
+    self%writing = .true.
+    if (.not. allocated(self%text)) self%text = ''
+    self%text = self%text//'&'//group//new_line('a')
+  end subroutine start_writing
+
+  !> End a group: report the variables nobody asked for, or close the group written.
+  subroutine finish(self)
+    class(group_visitor_t), intent(inout) :: self
+    integer :: i
+
+    if (self%writing) then
+      self%text = self%text//'/'//new_line('a')
+      return
+    end if
+    do i = 1, self%group%n
+      associate (a => self%group%assignment(i))
+        if (any(self%known(:self%n_known) == a%name)) cycle
+        call self%problems%add_message('&'//self%group%name//' '//printable(a%name) &
+          //': unknown variable, nearest known: '//nearest_name(a%name, self%known(:self%n_known)), a%line)
+      end associate
+    end do
+  end subroutine finish
+
+  !> Did the user write this variable?
+  pure function given(self, variable) result(yes)
+    class(group_visitor_t), intent(in) :: self
+    character(*), intent(in) :: variable
+    logical :: yes
+
+    yes = .false.
+    if (.not. self%writing) yes = self%group%find(variable) > 0
+  end function given
+
+  !> Is nothing wrong with this variable so far? A default is good.
+  pure function good(self, variable) result(yes)
+    class(group_visitor_t), intent(in) :: self
+    character(*), intent(in) :: variable
+    logical :: yes
+    integer :: i
+
+    i = self%group%find(variable)
+    yes = .true.
+    if (i > 0) yes = .not. self%group%assignment(i)%faulty
+  end function good
+
+  !> Is nothing wrong with the whole group so far?
+  pure function all_good(self) result(yes)
+    class(group_visitor_t), intent(in) :: self
+    logical :: yes
+    integer :: i
+
+    yes = .not. self%group%faulty
+    do i = 1, self%group%n
+      yes = yes .and. .not. self%group%assignment(i)%faulty
+    end do
+  end function all_good
+
+  !> Report a required variable that is missing.
+  subroutine needed(self, variable, meaning)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    character(*), intent(in) :: meaning   !! what it stands for, with its unit
+
+    if (self%writing .or. self%group%faulty) return
+    if (self%group%find(variable) > 0) return
+    if (self%group%line > 0) then
+      call self%problems%add_message('&'//self%group%name//' '//variable//': missing, required: '//meaning, &
+                                     self%group%line)
+    else
+      call self%problems%add_message('&'//self%group%name//' '//variable//': missing, required: '//meaning &
+                                     //' (there is no group &'//self%group%name//')')
+    end if
+  end subroutine needed
+
+  !> Report what is wrong with a variable unless `ok`; only the first problem of each is told.
+  subroutine require(self, variable, ok, allowed)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    logical, intent(in) :: ok
+    character(*), intent(in) :: allowed   !! what is wrong and what is allowed
+    integer :: i
+
+    if (ok .or. self%writing) return
+    i = self%group%find(variable)
+    if (i > 0) then
+      call self%fault(i, allowed)
+    else
+      call self%note(variable//' (by default): '//allowed)
+    end if
+  end subroutine require
+
+  !> Report a problem of the group as a whole.
+  subroutine note(self, what)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: what
+
+    if (self%writing) return
+    if (self%group%line > 0) then
+      call self%problems%add_message('&'//self%group%name//' '//what, self%group%line)
+    else
+      call self%problems%add_message('&'//self%group%name//' '//what)
+    end if
+  end subroutine note
+
+  !> A real number.
+  subroutine item_real(self, variable, x)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    real(wp), intent(inout) :: x
+    real(wp) :: values(1)
+
+    values = x
+    call self%list(variable, values, 1, 1)
+    x = values(1)
+  end subroutine item_real
+
+  !> Exactly as many real numbers as `x` has elements.
+  subroutine item_reals(self, variable, x)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    real(wp), intent(inout) :: x(:)
+
+    call self%list(variable, x, size(x), size(x))
+  end subroutine item_reals
+
+  !> Between `least` and `most` real numbers; the elements not given stay as they are.
+  subroutine list(self, variable, x, least, most)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    real(wp), intent(inout) :: x(:)
+    integer, intent(in) :: least, most
+    real(wp) :: values(size(x))
+    integer :: i, j
+
+    if (self%writing) then
+      if (is_given(x(1))) call self%write_line(variable, reals_text(pack(x, is_given(x))))
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    if (.not. self%count_is(i, least, most)) return
+    values = x
+    do j = 1, self%group%assignment(i)%n
+      call self%read_real(i, j, values(j))
+    end do
+    if (.not. self%good(variable)) return
+    call self%refuse_not_yet(i, '*', any(abs(values - x) > 0.0_wp))
+    x = values
+  end subroutine list
+
+  !> A whole number.
+  subroutine item_integer(self, variable, n)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    integer, intent(inout) :: n
+    integer :: values(1)
+
+    values = n
+    call self%item_integers(variable, values)
+    n = values(1)
+  end subroutine item_integer
+
+  !> Exactly as many whole numbers as `n` has elements.
+  subroutine item_integers(self, variable, n)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    integer, intent(inout) :: n(:)
+    character(:), allocatable :: text
+    integer :: values(size(n))
+    integer :: i, j
+
+    if (self%writing) then
+      text = to_text(n(1))
+      do j = 2, size(n)
+        text = text//', '//to_text(n(j))
+      end do
+      call self%write_line(variable, text)
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    if (.not. self%count_is(i, size(n), size(n))) return
+    values = n
+    do j = 1, size(n)
+      call self%read_integer(i, j, values(j))
+    end do
+    if (.not. self%good(variable)) return
+    call self%refuse_not_yet(i, '*', any(values /= n))
+    n = values
+  end subroutine item_integers
+
+  !> A logical.
+  subroutine item_logical(self, variable, flag)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    logical, intent(inout) :: flag
+    integer :: i, info
+    logical :: before
+
+    if (self%writing) then
+      call self%write_line(variable, to_text(flag))
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    if (.not. self%count_is(i, 1, 1)) return
+    before = flag
+    associate (value => self%group%assignment(i)%value(1))
+      call parse_logical(value%text, flag, info)
+      if (value%quoted) info = value_not_whole
+    end associate
+    if (info /= value_ok) call self%fault(i, 'must be .true. or .false.')
+    if (info == value_ok) call self%refuse_not_yet(i, '*', flag .neqv. before)
+  end subroutine item_logical
+
+  !> Text of any length.
+  subroutine item_text(self, variable, text)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    character(:), allocatable, intent(inout) :: text
+    integer :: i
+    logical :: ok
+
+    if (self%writing) then
+      call self%write_line(variable, quoted_text(text))
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    call self%read_text(i, ok)
+    if (.not. ok) return
+    call self%refuse_not_yet(i, '*', self%group%assignment(i)%value(1)%text /= text)
+    text = self%group%assignment(i)%value(1)%text
+  end subroutine item_text
+
+  !> The name of something the user made up: letters, digits and `_ - .`, at most `name_length`.
+  subroutine name(self, variable, word)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    character(name_length), intent(inout) :: word
+    character(*), parameter :: allowed = &
+      'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
+    integer :: i
+    logical :: ok
+
+    if (self%writing) then
+      call self%write_line(variable, quoted_text(trim(word)))
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    call self%read_text(i, ok)
+    if (.not. ok) return
+    associate (text => self%group%assignment(i)%value(1)%text)
+      if (len(text) == 0 .or. len(text) > name_length .or. verify(text, allowed) > 0 &
+          .or. scan(text//'.', '.') == 1) then
+        call self%fault(i, 'a name has 1 to '//to_text(name_length) &
+                        //' letters, digits or _ - . and does not begin with a point')
+      else
+        word = text
+      end if
+    end associate
+  end subroutine name
+
+  !> One of the words in `allowed`; those this version cannot do are refused as such.
+  subroutine option(self, variable, word, allowed)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    character(name_length), intent(inout) :: word
+    character(*), intent(in) :: allowed(:)
+    character(:), allocatable :: choices
+    integer :: i, j
+    logical :: ok
+
+    if (self%writing) then
+      call self%write_line(variable, quoted_text(trim(word)))
+      return
+    end if
+    i = self%lookup(variable)
+    if (i == 0) return
+    call self%read_text(i, ok)
+    if (.not. ok) return
+    choices = ''
+    do j = 1, size(allowed)
+      if (is_not_yet(self%group%name, variable, allowed(j))) cycle
+      if (len(choices) > 0) choices = choices//', '
+      choices = choices//quoted_text(trim(allowed(j)))
+    end do
+    associate (text => self%group%assignment(i)%value(1)%text)
+      if (.not. (any(allowed == text) .and. len(text) == len_trim(text)) .or. len(text) == 0) then
+        call self%fault(i, 'unknown, must be one of '//choices)
+      else if (is_not_yet(self%group%name, variable, text)) then
+        call self%fault(i, not_yet_message//', so far: '//choices)
+      else
+        word = text
+      end if
+    end associate
+  end subroutine option
+
+  !> Number of the assignment to a variable, 0 if the user gave none or it is damaged.
+  function lookup(self, variable) result(i)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    integer :: i
+
+    self%n_known = self%n_known + 1
+    self%known(self%n_known) = variable
+    i = self%group%find(variable)
+    if (i == 0) return
+    if (self%group%assignment(i)%faulty) i = 0
+  end function lookup
+
+  !> Note what is wrong with assignment i; only the first problem of each is told.
+  subroutine fault(self, i, what)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i
+    character(*), intent(in) :: what
+
+    associate (a => self%group%assignment(i))
+      if (.not. a%faulty) then
+        call self%problems%add_message('&'//self%group%name//' '//a%name//' = '//a%shown()//': '//what, a%line)
+      end if
+      a%faulty = .true.
+    end associate
+  end subroutine fault
+
+  !> Has assignment i the right number of values?
+  function count_is(self, i, least, most) result(yes)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i, least, most
+    logical :: yes
+    character(:), allocatable :: what, word
+    integer :: j
+
+    associate (a => self%group%assignment(i))
+      yes = a%n >= least .and. a%n <= most
+      if (yes) return
+      what = to_text(least)
+      if (most > least) what = what//' to '//to_text(most)
+      what = to_text(a%n)//trim(merge(' value given,  ', ' values given, ', a%n == 1))//' '//what//' needed'
+      do j = a%n, 2, -1
+        if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
+        word = printable(a%value(j)%text)
+      end do
+      if (allocated(word)) what = what//'; is an ''='' missing after '//word//'?'
+    end associate
+    call self%fault(i, what)
+  end function count_is
+
+  !> Value j of assignment i as a real number.
+  subroutine read_real(self, i, j, x)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i, j
+    real(wp), intent(inout) :: x
+    character(:), allocatable :: subject
+    integer :: info
+
+    subject = ''
+    associate (a => self%group%assignment(i))
+      if (a%n > 1) subject = 'value '//to_text(j)//' '
+      if (a%value(j)%quoted) then
+        call self%fault(i, subject//'must be a number, without quotes')
+        return
+      end if
+      call parse_real(a%value(j)%text, x, info)
+    end associate
+    select case (info)
+    case (value_ok)
+    case (value_not_finite); call self%fault(i, subject//'must be a finite number')
+    case (value_too_large); call self%fault(i, subject//'must be 0 or between 1e-30 and 1e30 in size')
+    case default; call self%fault(i, subject//'must be a number')
+    end select
+  end subroutine read_real
+
+  !> Value j of assignment i as a whole number.
+  subroutine read_integer(self, i, j, n)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i, j
+    integer, intent(inout) :: n
+    character(:), allocatable :: subject
+    integer :: info
+
+    subject = ''
+    associate (a => self%group%assignment(i))
+      if (a%n > 1) subject = 'value '//to_text(j)//' '
+      call parse_integer(a%value(j)%text, n, info)
+      if (a%value(j)%quoted) info = value_not_whole
+    end associate
+    if (info == value_too_large) then
+      call self%fault(i, subject//'must be at most '//to_text(huge(n))//' in size')
+    else if (info /= value_ok) then
+      call self%fault(i, subject//'must be a whole number')
+    end if
+  end subroutine read_integer
+
+  !> Is assignment i one quoted text?
+  subroutine read_text(self, i, ok)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i
+    logical, intent(out) :: ok
+
+    ok = self%count_is(i, 1, 1)
+    if (.not. ok) return
+    associate (a => self%group%assignment(i))
+      ok = a%value(1)%quoted
+      if (.not. ok) then
+        call self%fault(i, 'text needs quotes, '//quoted_text(printable(a%value(1)%text)))
+      end if
+    end associate
+  end subroutine read_text
+
+  !> Refuse assignment i if its variable is in the table of what is not available yet.
+  subroutine refuse_not_yet(self, i, value, changed)
+    class(group_visitor_t), intent(inout) :: self
+    integer, intent(in) :: i
+    character(*), intent(in) :: value
+    logical, intent(in) :: changed   !! the value is not the default
+
+    if (.not. changed) return
+    if (.not. is_not_yet(self%group%name, self%group%assignment(i)%name, value)) return
+    call self%fault(i, not_yet_message)
+  end subroutine refuse_not_yet
+
+  !> Write one variable.
+  subroutine write_line(self, variable, value)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable, value
+
+    self%text = self%text//'  '//variable//' = '//value//new_line('a')
+  end subroutine write_line
+
+  !> Real numbers between commas.
+  pure function reals_text(x) result(text)
+    real(wp), intent(in) :: x(:)
+    character(:), allocatable :: text
+    integer :: j
+
+    text = to_text(x(1))
+    do j = 2, size(x)
+      text = text//', '//to_text(x(j))
+    end do
+  end function reals_text
+
+  !> Could the word be a variable whose '=' was forgotten? (A logical could not.)
+  pure function looks_like_name(word) result(yes)
+    character(*), intent(in) :: word
+    logical :: yes
+    logical :: flag
+    integer :: info
+
+    flag = .false.
+    call parse_logical(word, flag, info)
+    yes = info /= value_ok .and. lge(lower_case(word(1:1)), 'a') .and. lle(lower_case(word(1:1)), 'z')
+  end function looks_like_name
+
+end module group_visitor_m

@@ -1,0 +1,48 @@
+!> What the contract of the input promises and this version cannot do yet.
+!!
+!! One table: whoever makes a feature work deletes its lines here.
+module not_yet_m
+  implicit none
+  private
+  public :: is_not_yet, not_yet_message
+
+  character(*), parameter :: not_yet_message = 'not available yet'
+
+  type :: entry_t
+    character(16) :: group     !! name of the group
+    character(16) :: variable  !! '' for the whole group
+    character(16) :: value     !! an option; '*' for every value but the default
+  end type entry_t
+
+  type(entry_t), parameter :: table(*) = [ &
+    entry_t('boundary', 'x_min', 'inflow'), entry_t('boundary', 'x_min', 'outflow'), &
+    entry_t('boundary', 'x_max', 'inflow'), entry_t('boundary', 'x_max', 'outflow'), &
+    entry_t('boundary', 'y_min', 'inflow'), entry_t('boundary', 'y_min', 'outflow'), &
+    entry_t('boundary', 'y_max', 'inflow'), entry_t('boundary', 'y_max', 'outflow'), &
+    entry_t('boundary', 'z_min', 'inflow'), entry_t('boundary', 'z_min', 'outflow'), &
+    entry_t('boundary', 'z_max', 'inflow'), entry_t('boundary', 'z_max', 'outflow'), &
+    entry_t('boundary', 'x_min_velocity', '*'), entry_t('boundary', 'x_max_velocity', '*'), &
+    entry_t('boundary', 'y_min_velocity', '*'), entry_t('boundary', 'y_max_velocity', '*'), &
+    entry_t('boundary', 'z_min_velocity', '*'), entry_t('boundary', 'z_max_velocity', '*'), &
+    entry_t('fluid', 'surface_tension', '*'), &
+    entry_t('numerics', 'momentum', 'c_ismac'), &
+    entry_t('numerics', 'advection', 'upwind'), &
+    entry_t('numerics', 'solid_fraction', 'subcell'), &
+    entry_t('contact', 'model', 'surface'), &
+    entry_t('shape', 'kind', 'cylinder'), entry_t('shape', 'kind', 'tetrapod'), &
+    entry_t('shape', 'kind', 'dolos'), entry_t('shape', 'kind', 'reef_cube'), &
+    entry_t('shape', 'kind', 'file'), entry_t('shape', 'file', '*'), &
+    entry_t('shape', 'spheres', 'inscribed'), entry_t('shape', 'spheres', 'dense'), &
+    entry_t('bed', '', '')]
+
+contains
+
+  !> Is this value of this variable (or, with empty names, this whole group) in the table?
+  pure function is_not_yet(group, variable, value) result(yes)
+    character(*), intent(in) :: group, variable, value
+    logical :: yes
+
+    yes = any(table%group == group .and. table%variable == variable .and. table%value == value)
+  end function is_not_yet
+
+end module not_yet_m
