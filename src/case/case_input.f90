@@ -1,13 +1,13 @@
 !> All groups of a case: their variables, defaults, and every check that needs no geometry.
 !!
-!! Each group stands in one `visit_...` procedure, which serves reading and writing alike. The order of
-!! the procedures is that of the contract. Nothing stops here: all that is wrong is collected.
+!! Each group stands in one `visit_...` procedure, which serves reading and writing alike. The order
+!! of the procedures is that of the contract. Nothing stops here: all that is wrong is collected.
 module case_input_m
   use kinds_m, only: wp, name_length, pi
   use errors_m, only: problems_t, to_text
   use vectors_m, only: quaternion_from_axis
-  use case_types_m, only: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t, &
-    contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, absent, is_given
+  use case_types_m, only: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, &
+    numerics_t, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, absent, is_given
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use group_visitor_m, only: group_visitor_t
   use not_yet_m, only: is_not_yet, not_yet_message
@@ -17,13 +17,13 @@ module case_input_m
   public :: read_case, parameters_text, side_name
 
   !> The groups of the contract; those from `first_repeated` to `last_repeated` may be repeated.
-  character(name_length), parameter :: groups(*) = [character(name_length) :: 'run', 'grid', 'boundary', &
-    'fluid', 'numerics', 'contact', 'bed', 'water', 'shape', 'body', 'drop']
+  character(name_length), parameter :: groups(*) = [character(name_length) :: 'run', 'grid', &
+    'boundary', 'fluid', 'numerics', 'contact', 'bed', 'water', 'shape', 'body', 'drop']
   integer, parameter :: first_repeated = 8
 
   real(wp), parameter :: most_cells = real(huge(0), wp)   !! cells are counted in default integers
   real(wp), parameter :: most_steps = 1.0e9_wp
-  real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells: beyond, faces lose their digits
+  real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
   integer, parameter :: most_drops = 100000, finest_shape = 16
 
 contains
@@ -89,7 +89,8 @@ contains
       if (groups(g) == list%group(i)%name) exit
     end do
     if (g > size(groups)) then
-      call v%note('unknown group, nearest known: &'//nearest_name(printable(list%group(i)%name), groups))
+      call v%note('unknown group, nearest known: &' &
+                  //nearest_name(printable(list%group(i)%name), groups))
       return
     else if (is_not_yet(list%group(i)%name, '', '')) then
       call v%note('this group is '//not_yet_message)
@@ -185,7 +186,7 @@ contains
 
     call v%needed('t_end', 'the simulated time [s]')
     call v%item('title', run%title)
-    call v%option('physics', run%physics, [character(8) :: 'coupled', 'fluid', 'dry'])
+    call v%option('physics', run%physics, 'coupled fluid dry')
     call v%item('t_end', run%t_end)
     call v%item('dt', run%dt)
     call v%item('cfl_max', run%cfl_max)
@@ -201,7 +202,8 @@ contains
     if (is_given(run%t_end)) then
       call v%require('t_end', run%t_end > 0.0_wp, 'must be positive [s]')
       if (v%good('dt')) then
-        call v%require('t_end', run%t_end >= run%dt, 'must be at least dt = '//to_text(run%dt)//' s')
+        call v%require('t_end', run%t_end >= run%dt, &
+                       'must be at least dt = '//to_text(run%dt)//' s')
         call v%require('t_end', run%t_end <= most_steps*run%dt, 'must be at most ' &
                        //to_text(most_steps)//' steps of dt = '//to_text(run%dt)//' s')
       end if
@@ -209,8 +211,10 @@ contains
     call require_not_negative(v, 'cfl_max', run%cfl_max, '[-]; 0 keeps dt fixed')
     call v%require('output', len_trim(run%output) > 0, 'must name a folder')
     call require_not_negative(v, 'field_interval', run%field_interval, '[s]; 0 means never')
-    call require_not_negative(v, 'history_interval', run%history_interval, '[s]; 0 means every step')
-    call require_not_negative(v, 'restart_interval', run%restart_interval, '[s]; 0 means only at the end')
+    call require_not_negative(v, 'history_interval', run%history_interval, &
+                              '[s]; 0 means every step')
+    call require_not_negative(v, 'restart_interval', run%restart_interval, &
+                              '[s]; 0 means only at the end')
     call v%require('rest_speed', run%rest_speed > 0.0_wp, 'must be positive [m/s]')
     call require_not_negative(v, 'rest_time', run%rest_time, '[s]')
   end subroutine visit_run
@@ -232,7 +236,8 @@ contains
                    'too many cells, at most '//to_text(huge(0))//' in all')
     call v%require('length', all(grid%length > 0.0_wp), 'must be positive [m]')
     if (.not. (v%good('cells') .and. v%good('length'))) return
-    call v%require('origin', all(abs(grid%origin) <= farthest_origin*grid%length/real(grid%cells, wp)), &
+    call v%require('origin', &
+                   all(abs(grid%origin) <= farthest_origin*grid%length/real(grid%cells, wp)), &
                    'too far from zero: cell faces would lose their digits')
   end subroutine visit_grid
 
@@ -244,8 +249,8 @@ contains
 
     do d = 1, 3
       do s = 1, 2
-        call v%option(side_name(s, d), boundary%kind(s, d), [character(name_length) :: &
-          'no_slip', 'slip', 'open', 'periodic', 'inflow', 'outflow'])
+        call v%option(side_name(s, d), boundary%kind(s, d), &
+                      'no_slip slip open periodic inflow outflow')
       end do
     end do
     do d = 1, 3
@@ -314,26 +319,27 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(numerics_t), intent(inout) :: numerics
 
-    call v%option('coupling', numerics%coupling, [character(name_length) :: 'monolithic', 'mics'])
+    call v%option('coupling', numerics%coupling, 'monolithic mics')
     call v%item('coupling_passes', numerics%coupling_passes)
-    call v%option('momentum', numerics%momentum, [character(name_length) :: 'conservative', 'c_ismac'])
-    call v%option('advection', numerics%advection, [character(name_length) :: 'tvd5', 'upwind'])
-    call v%option('interface', numerics%interface, [character(name_length) :: 'plic'])
-    call v%option('solid_fraction', numerics%solid_fraction, [character(name_length) :: 'exact', 'subcell'])
+    call v%option('momentum', numerics%momentum, 'conservative c_ismac')
+    call v%option('advection', numerics%advection, 'tvd5 upwind')
+    call v%option('interface', numerics%interface, 'plic')
+    call v%option('solid_fraction', numerics%solid_fraction, 'exact subcell')
     call v%item('subcells', numerics%subcells)
-    call v%option('pressure_solver', numerics%pressure_solver, [character(name_length) :: 'cg', 'bicgstab'])
-    call v%option('preconditioner', numerics%preconditioner, &
-                  [character(name_length) :: 'multigrid', 'jacobi', 'none'])
+    call v%option('pressure_solver', numerics%pressure_solver, 'cg bicgstab')
+    call v%option('preconditioner', numerics%preconditioner, 'multigrid jacobi none')
     call v%item('divergence_tolerance', numerics%divergence_tolerance)
     call v%item('max_pressure_passes', numerics%max_pressure_passes)
 
     call require_range(v, 'coupling_passes', numerics%coupling_passes, 1, 1000)
     if (v%good('coupling')) then
-      call v%require('coupling_passes', numerics%coupling_passes == 1 .or. numerics%coupling == 'mics', &
+      call v%require('coupling_passes', &
+                     numerics%coupling_passes == 1 .or. numerics%coupling == 'mics', &
                      'only coupling = ''mics'' makes more than one pass')
     end if
     call require_range(v, 'subcells', numerics%subcells, 1, 32)
-    call v%require('divergence_tolerance', numerics%divergence_tolerance > 0.0_wp, 'must be positive [1/s]')
+    call v%require('divergence_tolerance', numerics%divergence_tolerance > 0.0_wp, &
+                   'must be positive [1/s]')
     call require_range(v, 'max_pressure_passes', numerics%max_pressure_passes, 1, 1000)
   end subroutine visit_numerics
 
@@ -342,8 +348,8 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(contact_input_t), intent(inout) :: contact
 
-    call v%option('model', contact%model, [character(name_length) :: 'surface', 'spheres'])
-    call v%option('law', contact%law, [character(name_length) :: 'restitution', 'constants'])
+    call v%option('model', contact%model, 'surface spheres')
+    call v%option('law', contact%law, 'restitution constants')
     call v%item('restitution', contact%restitution)
     call v%item('contact_time', contact%contact_time)
     call v%item('k_n', contact%k_n)
@@ -383,8 +389,8 @@ contains
     call v%needed('name', 'what &body and &drop call the shape')
     call v%needed('kind', '''hexapod'', ''cube'', ''box'' or ''sphere''')
     call v%name('name', shape%name)
-    call v%option('kind', shape%kind, [character(name_length) :: 'hexapod', 'cube', 'box', 'sphere', &
-      'cylinder', 'tetrapod', 'dolos', 'reef_cube', 'file'])
+    call v%option('kind', shape%kind, &
+                  'hexapod cube box sphere cylinder tetrapod dolos reef_cube file')
     n = size_count(shape%kind)
     if (shape%kind /= '' .and. n > 0) call v%needed('size', size_meaning(shape%kind))
     if (shape%kind == '') n = 0
@@ -393,10 +399,11 @@ contains
     call v%item('file', shape%file)
     call v%item('scale', shape%scale)
     call v%item('refinement', shape%refinement)
-    call v%option('spheres', shape%spheres, [character(name_length) :: 'centroid', 'inscribed', 'dense'])
+    call v%option('spheres', shape%spheres, 'centroid inscribed dense')
     call v%item('sphere_spacing', shape%sphere_spacing)
 
-    call v%require('size', all(shape%size > 0.0_wp .or. .not. is_given(shape%size)), 'must be positive [m]')
+    call v%require('size', all(shape%size > 0.0_wp .or. .not. is_given(shape%size)), &
+                   'must be positive [m]')
     call v%require('density', shape%density > 0.0_wp, 'must be positive [kg/m3]')
     call v%require('scale', shape%scale > 0.0_wp, 'must be positive [-]')
     call require_range(v, 'refinement', shape%refinement, 1, finest_shape)
@@ -456,7 +463,8 @@ contains
     character(name_length), intent(in) :: shapes(:)
     logical :: given_attitude
     integer :: i
-    character(10), parameter :: attitude(4) = [character(10) :: 'quaternion', 'axis', 'angle_deg', 'tilt_deg']
+    character(10), parameter :: attitude(4) = &
+      [character(10) :: 'quaternion', 'axis', 'angle_deg', 'tilt_deg']
 
     drop%line = v%group%line
     call visit_shape_name(v, drop%shape, shapes)
@@ -466,8 +474,8 @@ contains
     call v%item('first_time', drop%first_time)
     call v%item('interval', drop%interval)
     call v%item('spread', drop%spread)
-    call v%option('orientation', drop%orientation, [character(name_length) :: 'given', 'random'])
-    given_attitude = drop%orientation == 'given' .or. .not. v%good('orientation')
+    call v%option('orientation', drop%orientation, 'given random')
+    given_attitude = drop%orientation == 'given'
     if (given_attitude .or. .not. v%writing) then
       call visit_attitude(v, drop%quaternion)
       call v%item('tilt_deg', drop%tilt_deg)
@@ -494,7 +502,7 @@ contains
 
     call v%needed('file', 'the form of the bed')
     call v%item('file', bed%file)
-    call v%option('kind', bed%kind, [character(name_length) :: 'heightmap', 'stl'])
+    call v%option('kind', bed%kind, 'heightmap stl')
     call v%require('file', len_trim(bed%file) > 0, 'must name a file')
   end subroutine visit_bed
 
@@ -533,8 +541,10 @@ contains
                      'give the quaternion, or axis with angle_deg, not both')
       call v%require('quaternion', any(abs(q) > 0.0_wp), 'must not be zero')
     else
-      call v%require('axis', v%given('angle_deg') .or. .not. v%given('axis'), 'needs angle_deg as well')
-      call v%require('angle_deg', v%given('axis') .or. .not. v%given('angle_deg'), 'needs axis as well')
+      call v%require('axis', v%given('angle_deg') .or. .not. v%given('axis'), &
+                     'needs angle_deg as well')
+      call v%require('angle_deg', v%given('axis') .or. .not. v%given('angle_deg'), &
+                     'needs axis as well')
       call v%require('axis', any(abs(axis) > 0.0_wp), 'must not be zero')
       if (v%good('axis') .and. v%good('angle_deg') .and. v%given('axis')) then
         q = quaternion_from_axis(axis, modulo(angle_deg, 720.0_wp)*pi/180.0_wp)
@@ -544,8 +554,8 @@ contains
     q = unit_quaternion(q)
   end subroutine visit_attitude
 
-  !> A quaternion of length one; one that is so already, to round-off, stays as it is, so that writing
-  !! and reading again changes nothing.
+  !> A quaternion of length one; one that is so already, to round-off, stays as it is, so that
+  !! writing and reading again changes nothing.
   pure function unit_quaternion(q) result(unit)
     real(wp), intent(in) :: q(4)
     real(wp) :: unit(4)
@@ -574,8 +584,8 @@ contains
     do d = 1, 3
       if (case%grid%cells(d) /= 1) cycle
       call v%require('cells', all(case%boundary%kind(:, d) == 'slip') .or. &
-        all(case%boundary%kind(:, d) == 'periodic'), 'one cell in a direction makes the case 2-D, then ' &
-        //side_name(1, d)//' and '//side_name(2, d)//' must both be ''slip'' or ''periodic''')
+        all(case%boundary%kind(:, d) == 'periodic'), &
+        'one cell in a direction makes the case 2-D, then '//side_name(1, d)//' and '//side_name(2, d)//' must both be ''slip'' or ''periodic''')
     end do
   end subroutine check_together
 

@@ -34,8 +34,8 @@ module case_types_m
 
   !> First index: 1 lower side, 2 upper side; last index: x, y, z.
   type :: boundary_input_t
-    character(name_length) :: kind(2, 3) = reshape([character(name_length) :: 'no_slip', 'no_slip', &
-      'no_slip', 'no_slip', 'no_slip', 'open'], [2, 3])
+    character(name_length) :: kind(2, 3) = reshape([character(name_length) :: &
+      'no_slip', 'no_slip', 'no_slip', 'no_slip', 'no_slip', 'open'], [2, 3])
     real(wp) :: velocity(3, 2, 3) = 0.0_wp          !! wall or inflow velocity [m/s]
   end type boundary_input_t
 
@@ -96,7 +96,8 @@ module case_types_m
   type :: body_input_t
     character(name_length) :: shape = ''            !! required
     real(wp) :: position(3) = absent                !! required: centre of mass [m]
-    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]   !! w, x, y, z; axis and angle end up here
+    !> w, x, y, z, normalised; axis and angle end up here as well.
+    real(wp) :: quaternion(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
     logical :: fixed = .false.

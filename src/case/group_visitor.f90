@@ -1,9 +1,9 @@
 !> One description of a namelist group for both ways: reading its values and writing them out.
 !!
-!! A `visit_...` procedure names each variable of a group once, `call v%item('dt', run%dt)`. A reading
-!! visitor then fills the variable from the text if the user gave it and notes what is wrong with it; a
-!! writing visitor appends `dt = 0.01` to its text. The names asked for are the known names, so an
-!! unknown variable and its nearest neighbour need no second list.
+!! A `visit_...` procedure names each variable of a group once, `call v%item('dt', run%dt)`. A
+!! reading visitor then fills the variable from the text if the user gave it and notes what is wrong
+!! with it; a writing visitor appends `dt = 0.01` to its text. The names asked for are the known
+!! names, so an unknown variable and its nearest neighbour need no second list.
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
@@ -29,10 +29,11 @@ module group_visitor_m
     procedure :: start_reading, start_writing, finish
     procedure :: given, good, all_good, needed, require, note
     procedure :: option, name, list
-    procedure, private :: item_real, item_reals, item_integer, item_integers, item_logical, item_text
+    procedure, private :: item_real, item_reals, item_integer, item_integers
+    procedure, private :: item_logical, item_text
     generic :: item => item_real, item_reals, item_integer, item_integers, item_logical, item_text
-    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, write_line
-    procedure, private :: refuse_not_yet
+    procedure, private :: lookup, fault, choices, count_is, read_real, read_integer, read_text
+    procedure, private :: write_line, refuse_not_yet
   end type group_visitor_t
 
 contains
@@ -70,7 +71,8 @@ contains
       associate (a => self%group%assignment(i))
         if (any(self%known(:self%n_known) == a%name)) cycle
         call self%problems%add_message('&'//self%group%name//' '//printable(a%name) &
-          //': unknown variable, nearest known: '//nearest_name(a%name, self%known(:self%n_known)), a%line)
+          //': unknown variable, nearest known: ' &
+          //nearest_name(a%name, self%known(:self%n_known)), a%line)
       end associate
     end do
   end subroutine finish
@@ -118,11 +120,10 @@ contains
     if (self%writing .or. self%group%faulty) return
     if (self%group%find(variable) > 0) return
     if (self%group%line > 0) then
-      call self%problems%add_message('&'//self%group%name//' '//variable//': missing, required: '//meaning, &
-                                     self%group%line)
+      call self%note(variable//': missing, required: '//meaning)
     else
-      call self%problems%add_message('&'//self%group%name//' '//variable//': missing, required: '//meaning &
-                                     //' (there is no group &'//self%group%name//')')
+      call self%note(variable//': missing, required: '//meaning &
+                     //' (there is no group &'//self%group%name//')')
     end if
   end subroutine needed
 
@@ -321,9 +322,8 @@ contains
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     character(name_length), intent(inout) :: word
-    character(*), intent(in) :: allowed(:)
-    character(:), allocatable :: choices
-    integer :: i, j
+    character(*), intent(in) :: allowed   !! the words, one blank between them
+    integer :: i
     logical :: ok
 
     if (self%writing) then
@@ -334,22 +334,37 @@ contains
     if (i == 0) return
     call self%read_text(i, ok)
     if (.not. ok) return
-    choices = ''
-    do j = 1, size(allowed)
-      if (is_not_yet(self%group%name, variable, allowed(j))) cycle
-      if (len(choices) > 0) choices = choices//', '
-      choices = choices//quoted_text(trim(allowed(j)))
-    end do
     associate (text => self%group%assignment(i)%value(1)%text)
-      if (.not. (any(allowed == text) .and. len(text) == len_trim(text)) .or. len(text) == 0) then
-        call self%fault(i, 'unknown, must be one of '//choices)
+      if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. scan(text//' ', ' ') <= len(text) &
+          .or. len(text) == 0) then
+        call self%fault(i, 'unknown, must be one of '//self%choices(variable, allowed))
       else if (is_not_yet(self%group%name, variable, text)) then
-        call self%fault(i, not_yet_message//', so far: '//choices)
+        call self%fault(i, not_yet_message//', so far: '//self%choices(variable, allowed))
       else
         word = text
       end if
     end associate
   end subroutine option
+
+  !> The words of a list that are available, as a message shows them.
+  pure function choices(self, variable, allowed) result(text)
+    class(group_visitor_t), intent(in) :: self
+    character(*), intent(in) :: variable
+    character(*), intent(in) :: allowed
+    character(:), allocatable :: text
+    integer :: first, last
+
+    text = ''
+    first = 1
+    do while (first <= len(allowed))
+      last = first + scan(allowed(first:)//' ', ' ') - 2
+      if (.not. is_not_yet(self%group%name, variable, allowed(first:last))) then
+        if (len(text) > 0) text = text//', '
+        text = text//quoted_text(allowed(first:last))
+      end if
+      first = last + 2
+    end do
+  end function choices
 
   !> Number of the assignment to a variable, 0 if the user gave none or it is damaged.
   function lookup(self, variable) result(i)
@@ -372,7 +387,8 @@ contains
 
     associate (a => self%group%assignment(i))
       if (.not. a%faulty) then
-        call self%problems%add_message('&'//self%group%name//' '//a%name//' = '//a%shown()//': '//what, a%line)
+        call self%problems%add_message('&'//self%group%name//' '//a%name//' = '//a%shown()//': ' &
+                                       //what, a%line)
       end if
       a%faulty = .true.
     end associate
@@ -391,7 +407,8 @@ contains
       if (yes) return
       what = to_text(least)
       if (most > least) what = what//' to '//to_text(most)
-      what = to_text(a%n)//trim(merge(' value given,  ', ' values given, ', a%n == 1))//' '//what//' needed'
+      what = ' given, '//what//' needed'
+      what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//what
       do j = a%n, 2, -1
         if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
         word = printable(a%value(j)%text)
@@ -421,7 +438,8 @@ contains
     select case (info)
     case (value_ok)
     case (value_not_finite); call self%fault(i, subject//'must be a finite number')
-    case (value_too_large); call self%fault(i, subject//'must be 0 or between 1e-30 and 1e30 in size')
+    case (value_too_large)
+      call self%fault(i, subject//'must be 0 or between 1e-30 and 1e30 in size')
     case default; call self%fault(i, subject//'must be a number')
     end select
   end subroutine read_real
@@ -504,7 +522,7 @@ contains
 
     flag = .false.
     call parse_logical(word, flag, info)
-    yes = info /= value_ok .and. lge(lower_case(word(1:1)), 'a') .and. lle(lower_case(word(1:1)), 'z')
+    yes = info /= value_ok .and. scan(lower_case(word(1:1)), 'abcdefghijklmnopqrstuvwxyz') == 1
   end function looks_like_name
 
 end module group_visitor_m

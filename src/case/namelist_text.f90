@@ -1,16 +1,16 @@
 !> The text of a case, cut into groups of assignments with their line numbers.
 !!
-!! Our own small tokenizer in place of the namelist `read` of Fortran, which stops at the first error
-!! of a group, skips unknown groups without a word and lets a repeated group keep old values. Here
-!! every fault of form is noted with its line and reading goes on. The grammar:
+!! Our own small tokenizer in place of the namelist `read` of Fortran, which stops at the first
+!! error of a group, skips unknown groups without a word and lets a repeated group keep old values.
+!! Here every fault of form is noted with its line and reading goes on. The grammar:
 !!
 !!     text       = { group | comment }
 !!     group      = '&' name { assignment | comment } '/'
 !!     assignment = name '=' value { separator value }
 !!     value      = [ count '*' ] ( word | quoted string )
 !!
-!! Separators are blanks, line ends and single commas (one more after the last value is fine); a comment
-!! runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
+!! Separators are blanks, line ends and single commas (one more after the last value is fine); a
+!! comment runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
 module namelist_text_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, c_associated
   use errors_m, only: problems_t, to_text
@@ -53,7 +53,7 @@ module namelist_text_m
 
   !> Where the reader stands in the text.
   type :: cursor_t
-    character(:), allocatable :: text      !! line ends are a single line feed, the last one included
+    character(:), allocatable :: text      !! each line ends in a single line feed
     integer :: at = 1                      !! next character
     integer :: line = 1
   end type cursor_t
@@ -251,7 +251,7 @@ contains
       if (group_ends(cursor, group, problems)) exit
       if (next(cursor) == ',') then
         if (comma .or. .not. has_value(group)) then
-          call report(cursor, group, 'nothing in front of a comma; every value must be written', problems)
+          call report(cursor, group, 'nothing in front of a comma; write every value', problems)
         end if
         comma = .true.
         cursor%at = cursor%at + 1
@@ -291,7 +291,8 @@ contains
       return
     end if
     if (.not. group%faulty) then
-      call problems%add_message('&'//group%name//': no ''/'' closes the group before '//rest, group%line)
+      call problems%add_message('&'//group%name//': no ''/'' closes the group before '//rest, &
+                                group%line)
     end if
     group%faulty = .true.
   end function group_ends
@@ -488,7 +489,8 @@ contains
     if (group%n == 0) return
     associate (last => group%assignment(group%n))
       if (last%n > 0 .or. last%faulty .or. group%faulty) return
-      call problems%add_message('&'//group%name//' '//last%name//' = : the value is missing', last%line)
+      call problems%add_message('&'//group%name//' '//last%name//' = : the value is missing', &
+                                last%line)
       last%faulty = .true.
     end associate
   end subroutine check_last
