@@ -7,7 +7,8 @@ module case_input_m
   use errors_m, only: problems_t, to_text
   use vectors_m, only: quaternion_from_axis
   use case_types_m, only: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, &
-    numerics_t, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, absent, is_given
+    numerics_t, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, absent, &
+    is_given
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use group_visitor_m, only: group_visitor_t
   use not_yet_m, only: is_not_yet, not_yet_message
@@ -585,7 +586,8 @@ contains
       if (case%grid%cells(d) /= 1) cycle
       call v%require('cells', all(case%boundary%kind(:, d) == 'slip') .or. &
         all(case%boundary%kind(:, d) == 'periodic'), &
-        'one cell in a direction makes the case 2-D, then '//side_name(1, d)//' and '//side_name(2, d)//' must both be ''slip'' or ''periodic''')
+        'one cell in a direction makes the case 2-D, then '//side_name(1, d)//' and ' &
+        //side_name(2, d)//' must both be ''slip'' or ''periodic''')
     end do
   end subroutine check_together
 
