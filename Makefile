@@ -5,7 +5,8 @@ VERSION := 0.1.0
 FC_SERIAL := h5fc
 FC_MPI := h5pfc
 OPT := -O3 -march=native
-OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow
+OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \
+  -ffpe-trap=invalid,zero,overflow
 FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
 PYTHON := .venv/bin/python
 CASE := input/blocks.nml

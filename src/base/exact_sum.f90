@@ -18,7 +18,7 @@ contains
 
   !> Sum of all elements of all processes.
   function exact_sum(a) result(s)
-    real(wp), intent(in), contiguous :: a(:)
+    real(wp), intent(in) :: a(:)
     real(wp) :: s
     integer(i8) :: bins(bin_size, 1)
     real(wp) :: total(1)
@@ -31,7 +31,7 @@ contains
 
   !> Sums of the columns of `a` over all processes, with one message.
   function exact_sums(a) result(s)
-    real(wp), intent(in), contiguous :: a(:, :)   !! (terms, sums); the terms may differ by process
+    real(wp), intent(in) :: a(:, :)   !! (terms, sums); the terms may differ by process
     real(wp) :: s(size(a, 2))
     integer(i8) :: bins(bin_size, size(a, 2))
     integer :: m
@@ -99,7 +99,7 @@ contains
 
   !> Add all elements of a column, chunk by chunk, on all threads if it is long.
   subroutine add_column(a, bins)
-    real(wp), intent(in), contiguous :: a(:)
+    real(wp), intent(in) :: a(:)
     integer(i8), intent(inout) :: bins(bin_size)
     integer(i8) :: mine(bin_size)
     integer :: first

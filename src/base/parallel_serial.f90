@@ -129,53 +129,70 @@ contains
     real(wp), intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d
-    integer :: e, extent(3)
 
-    extent = shape(a)
-    do e = 1, 3
-      if (.not. (wraps(e) .and. chosen(e, d))) cycle
-      call wrap_wp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
-    end do
+    call fill_wp(a, [shape(a), 1], width, d)
   end subroutine halo_wp_3
 
   subroutine halo_wp_4(a, width, d)
     real(wp), intent(inout), contiguous :: a(:, :, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d
-    integer :: e, extent(4)
 
-    extent = shape(a)
-    do e = 1, 3
-      if (.not. (wraps(e) .and. chosen(e, d))) cycle
-      call wrap_wp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
-    end do
+    call fill_wp(a, shape(a), width, d)
   end subroutine halo_wp_4
 
   subroutine halo_sp_3(a, width, d)
     real(sp), intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d
-    integer :: e, extent(3)
 
-    extent = shape(a)
-    do e = 1, 3
-      if (.not. (wraps(e) .and. chosen(e, d))) cycle
-      call wrap_sp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
-    end do
+    call fill_sp(a, [shape(a), 1], width, d)
   end subroutine halo_sp_3
 
   subroutine halo_integer_3(a, width, d)
     integer, intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d
-    integer :: e, extent(3)
 
-    extent = shape(a)
+    call fill_integer(a, [shape(a), 1], width, d)
+  end subroutine halo_integer_3
+
+  !> Periodic images into the halos of an array of up to four directions.
+  subroutine fill_wp(a, extent, width, d)
+    real(wp), intent(inout) :: a(*)
+    integer, intent(in) :: extent(4), width
+    integer, intent(in), optional :: d
+    integer :: e
+
+    do e = 1, 3
+      if (.not. (wraps(e) .and. chosen(e, d))) cycle
+      call wrap_wp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
+    end do
+  end subroutine fill_wp
+
+  subroutine fill_sp(a, extent, width, d)
+    real(sp), intent(inout) :: a(*)
+    integer, intent(in) :: extent(4), width
+    integer, intent(in), optional :: d
+    integer :: e
+
+    do e = 1, 3
+      if (.not. (wraps(e) .and. chosen(e, d))) cycle
+      call wrap_sp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
+    end do
+  end subroutine fill_sp
+
+  subroutine fill_integer(a, extent, width, d)
+    integer, intent(inout) :: a(*)
+    integer, intent(in) :: extent(4), width
+    integer, intent(in), optional :: d
+    integer :: e
+
     do e = 1, 3
       if (.not. (wraps(e) .and. chosen(e, d))) cycle
       call wrap_integer(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
     end do
-  end subroutine halo_integer_3
+  end subroutine fill_integer
 
   subroutine gather_wp(local, lo, hi, whole)
     real(wp), intent(in), contiguous :: local(:, :, :)   !! cells lo:hi
@@ -195,28 +212,28 @@ contains
 
   !> Largest of the values of all processes, element by element, in place.
   subroutine global_max(x)
-    real(wp), intent(inout) :: x(:)
+    real(wp), intent(inout), contiguous :: x(:)
 
     x = x   ! the only process holds the result
   end subroutine global_max
 
   !> Smallest of the values of all processes, element by element, in place.
   subroutine global_min(x)
-    real(wp), intent(inout) :: x(:)
+    real(wp), intent(inout), contiguous :: x(:)
 
     x = x   ! the only process holds the result
   end subroutine global_min
 
   !> Sum over all processes of counts, element by element, in place.
   subroutine global_sum(n)
-    integer(i8), intent(inout) :: n(:)
+    integer(i8), intent(inout), contiguous :: n(:)
 
     n = n   ! the only process holds the result
   end subroutine global_sum
 
   !> Sum over all processes of the bins of several order-free sums, in place, in one message.
   subroutine global_sum_bins(bins)
-    integer(i8), intent(inout) :: bins(:, :)   !! (bin_size, number of sums)
+    integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, number of sums)
 
     bins = bins   ! the only process holds the result
   end subroutine global_sum_bins
@@ -234,7 +251,7 @@ contains
   end subroutine broadcast_integer
 
   subroutine broadcast_integers(x)
-    integer, intent(inout) :: x(:)
+    integer, intent(inout), contiguous :: x(:)
 
     x = x
   end subroutine broadcast_integers
@@ -246,7 +263,7 @@ contains
   end subroutine broadcast_real
 
   subroutine broadcast_reals(x)
-    real(wp), intent(inout) :: x(:)
+    real(wp), intent(inout), contiguous :: x(:)
 
     x = x
   end subroutine broadcast_reals
