@@ -24,6 +24,7 @@ module solid_geometry_m
     !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m].
     integer :: n_tet = 0
     real(wp), allocatable :: corner(:, :, :)
+    integer, allocatable :: body_tet(:)         !! (n_bodies + 1) tetrahedra of body b: body_tet(b):body_tet(b+1)-1
     !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, 0 elsewhere;
     !! its tetrahedra are `tet(first(m):first(m+1)-1)`, indices into `corner`.
     integer :: n_cut = 0
@@ -46,10 +47,11 @@ module solid_geometry_m
 contains
 
   !> Allocate the arrays over cells for a domain without solids.
-  subroutine solid_geometry_init(grid, solid)
+  subroutine solid_geometry_init(grid, solid, n_bodies)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(out) :: solid
-    integer :: a(3), b(3)
+    integer, intent(in), optional :: n_bodies   !! length of the lists by body
+    integer :: a(3), b(3), n
 
     a = grid%lo - n_halo
     b = grid%hi + n_halo
@@ -63,7 +65,9 @@ contains
     allocate (solid%cut(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (solid%corner(3, 4, 0), solid%cut_cell(3, 0), solid%first(1), solid%tet(0))
     solid%first = 1
-    allocate (solid%body_cell(1), solid%body_face(1), source=1)
+    n = 0
+    if (present(n_bodies)) n = n_bodies
+    allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%body_tet(n + 1), source=1)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
   end subroutine solid_geometry_init

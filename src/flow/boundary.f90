@@ -1,0 +1,107 @@
+!> Halo cells of every boundary kind, written once for a direction and a side.
+!!
+!! Each routine exchanges halos between processes (and wraps periodic directions) one direction at a
+!! time and fills the halos outside the domain in the same pass, so edges and corners come out right.
+module boundary_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo, side_no_slip, side_slip, side_periodic
+  use parallel_m, only: halo_exchange
+  implicit none
+  private
+  public :: fill_scalar_halo, fill_velocity_halo, is_wall
+
+contains
+
+  !> A side that no fluid passes.
+  pure function is_wall(side) result(wall)
+    integer, intent(in) :: side
+    logical :: wall
+
+    wall = side == side_no_slip .or. side == side_slip
+  end function is_wall
+
+  !> Halo of a cell value with zero normal gradient at every side of the domain.
+  subroutine fill_scalar_halo(grid, a)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
+    integer :: d, s, m
+
+    do d = 1, 3
+      call halo_exchange(a, n_halo, d)
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. grid%side(s, d) == side_periodic) cycle
+        do m = 1, n_halo
+          call mirror_plane(a, d, ghost_layer(grid, s, d, m), mirror_layer(grid, s, d, 1), &
+                            1.0_wp, 0.0_wp)
+        end do
+      end do
+    end do
+  end subroutine fill_scalar_halo
+
+  !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd in the
+  !! normal component only), open sides carry the value of the last cell outward.
+  subroutine fill_velocity_halo(grid, u)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)   !! [m/s]
+    integer :: d, s, m, c
+    real(wp) :: factor, shift
+
+    do d = 1, 3
+      call halo_exchange(u, n_halo, d)
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. grid%side(s, d) == side_periodic) cycle
+        do c = 1, 3
+          factor = 1.0_wp
+          shift = 0.0_wp
+          if (grid%side(s, d) == side_no_slip .or. (grid%side(s, d) == side_slip .and. c == d)) then
+            factor = -1.0_wp
+            shift = 2.0_wp*grid%side_velocity(c, s, d)
+          end if
+          do m = 1, n_halo
+            call mirror_plane(u(:, :, :, c), d, ghost_layer(grid, s, d, m), &
+                              mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), factor, shift)
+          end do
+        end do
+      end do
+    end do
+  end subroutine fill_velocity_halo
+
+  !> Position of halo layer m outside side s, counted in the local array with its halo (first = 1).
+  pure function ghost_layer(grid, s, d, m) result(layer)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, m
+    integer :: layer
+
+    layer = merge(n_halo + 1 - m, n_halo + grid%hi(d) - grid%lo(d) + 1 + m, s == 1)
+  end function ghost_layer
+
+  !> Position of the m-th layer of cells inside side s; a thin domain repeats its last layer.
+  pure function mirror_layer(grid, s, d, m) result(layer)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, m
+    integer :: layer, cells, inner
+
+    cells = grid%hi(d) - grid%lo(d) + 1
+    inner = min(m, cells)
+    layer = merge(n_halo + inner, n_halo + cells + 1 - inner, s == 1)
+  end function mirror_layer
+
+  !> One layer normal to d from another: a(to) = factor*a(from) + shift.
+  pure subroutine mirror_plane(a, d, to, from, factor, shift)
+    real(wp), intent(inout), contiguous :: a(:, :, :)
+    integer, intent(in) :: d, to, from
+    real(wp), intent(in) :: factor, shift
+
+    select case (d)
+    case (1)
+      a(to, :, :) = factor*a(from, :, :) + shift
+    case (2)
+      a(:, to, :) = factor*a(:, from, :) + shift
+    case (3)
+      a(:, :, to) = factor*a(:, :, from) + shift
+    end select
+  end subroutine mirror_plane
+
+end module boundary_m

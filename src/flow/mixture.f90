@@ -1,0 +1,41 @@
+!> Density and viscosity of the fluid from its liquid share, and their values on the faces.
+module mixture_m
+  use kinds_m, only: wp
+  use case_types_m, only: fluid_t
+  use fields_m, only: flow_t
+  implicit none
+  private
+  public :: mix_fluid, face_mean, harmonic_mean
+
+contains
+
+  !> Density and viscosity of the fluid in every cell, halo included:
+  !! $$ \rho = \rho_g + (\rho_l - \rho_g) C, \quad \mu = \mu_g + (\mu_l - \mu_g) C $$
+  !!
+  !! C is the liquid share of the *fluid* (`flow%c`, extended through bodies), never of the mixture with
+  !! the solid: gravity acts on the fluid alone, weight acts on the bodies in their own equations.
+  subroutine mix_fluid(fluid, flow)
+    type(fluid_t), intent(in) :: fluid
+    type(flow_t), intent(inout) :: flow
+
+    flow%rho = fluid%gas_density + (fluid%liquid_density - fluid%gas_density)*flow%c
+    flow%mu = fluid%gas_viscosity + (fluid%liquid_viscosity - fluid%gas_viscosity)*flow%c
+  end subroutine mix_fluid
+
+  !> Density on a face: arithmetic mean, which makes 1/rho the harmonic mean of the paper's C-HSMAC.
+  elemental function face_mean(a, b) result(m)
+    real(wp), intent(in) :: a, b
+    real(wp) :: m
+
+    m = 0.5_wp*(a + b)
+  end function face_mean
+
+  !> Viscosity on the leg between two cells: continuous stress across a jump halfway.
+  elemental function harmonic_mean(a, b) result(m)
+    real(wp), intent(in) :: a, b
+    real(wp) :: m
+
+    m = 2.0_wp*a*b/(a + b)
+  end function harmonic_mean
+
+end module mixture_m

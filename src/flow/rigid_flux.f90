@@ -1,0 +1,236 @@
+!> The six unit motions of each body as volume fluxes through the solid parts of the cell faces.
+!!
+!! A body pushes the volume `s_f . (U, Omega)` through its part of face f. Summed over the faces of a
+!! cell this is J_k, the column of the coupled pressure equation; the same numbers, by summation by
+!! parts, turn the pressure into the paper's volume integral of -grad p over the body.
+!! Source: Batty, Bertails & Bridson (2007) in the variational form, with exact face areas.
+module rigid_flux_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_m, only: is_wall
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t
+  use exact_sum_m, only: exact_sums
+  implicit none
+  private
+  public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux
+  public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm
+
+  type :: rigid_flux_t
+    real(wp), allocatable :: s(:, :)         !! (6, faces of `solid%face`) flux of the unit motions [m2, m3]
+    logical, allocatable :: mine(:)          !! (faces) this process adds the face to sums
+    integer, allocatable :: first(:)         !! (bodies + 1) entries of each body in the lists below
+    integer, allocatable :: cell(:, :)       !! (3, *) own cells with open faces that a body pushes on
+    real(wp), allocatable :: j(:, :)         !! (6, *) net unit fluxes out of the cell [m2, m3]
+    real(wp), allocatable :: work(:, :)      !! (*, 6) terms of the sums
+    integer, allocatable :: slot(:, :, :)    !! entry of a cell while the lists are built
+  end type rigid_flux_t
+
+contains
+
+  !> Allocate for `n` bodies on a grid.
+  subroutine rigid_flux_init(grid, n, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n
+    type(rigid_flux_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    allocate (self%slot(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (self%first(n + 1), source=1)
+    allocate (self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(6, 0), self%work(0, 6))
+  end subroutine rigid_flux_init
+
+  !> Lever arm from a centre of mass, by the nearest periodic image [m].
+  pure function nearest_arm(grid, x, centre) result(arm)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: x(3), centre(3)
+    real(wp) :: arm(3)
+
+    arm = x - centre
+    where (grid%periodic) arm = arm - grid%length*anint(arm/grid%length)
+  end function nearest_arm
+
+  !> Unit fluxes through the faces, and their net values for the cells that hold fluid.
+  subroutine build_rigid_flux(grid, solid, bodies, active, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                              grid%lo(3) - n_halo:)   !! cell has an open face
+    type(rigid_flux_t), intent(inout) :: self
+    integer :: b, m, d, n_entry, entry_of_body
+    integer :: low(3), high(3)
+
+    call make_room(self, solid%body_face(bodies%n + 1) - 1)
+    n_entry = 0
+    do b = 1, bodies%n
+      self%first(b) = n_entry + 1
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        d = solid%face(4, m)
+        high = solid%face(1:3, m)
+        low = high - unit_step(:, d)
+        self%s(:, m) = 0.0_wp
+        self%mine(m) = owned(grid, high, d)
+        if (closed_side(grid, high(d), d)) cycle
+        self%s(1:3, m) = grid%area(d)*solid%face_beta(m)*real(unit_step(:, d), wp)
+        self%s(4:6, m) = cross(nearest_arm(grid, solid%face_centroid(:, m), bodies%x(:, b)), self%s(1:3, m))
+        call add_to_cell(low, self%s(:, m))
+        call add_to_cell(high, -self%s(:, m))
+      end do
+      do entry_of_body = self%first(b), n_entry
+        self%slot(self%cell(1, entry_of_body), self%cell(2, entry_of_body), self%cell(3, entry_of_body)) = 0
+      end do
+    end do
+    self%first(bodies%n + 1) = n_entry + 1
+  contains
+    subroutine add_to_cell(c, outflow)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: outflow(6)
+      integer :: e
+
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (.not. active(c(1), c(2), c(3))) return
+      e = self%slot(c(1), c(2), c(3))
+      if (e == 0) then
+        n_entry = n_entry + 1
+        e = n_entry
+        self%slot(c(1), c(2), c(3)) = e
+        self%cell(:, e) = c
+        self%j(:, e) = 0.0_wp
+      end if
+      self%j(:, e) = self%j(:, e) + outflow
+    end subroutine add_to_cell
+  end subroutine build_rigid_flux
+
+  !> Lists long enough for n_face faces; a face gives at most two cells.
+  subroutine make_room(self, n_face)
+    type(rigid_flux_t), intent(inout) :: self
+    integer, intent(in) :: n_face
+
+    if (size(self%s, 2) >= n_face) return
+    deallocate (self%s, self%mine, self%cell, self%j, self%work)
+    allocate (self%s(6, 2*n_face), self%mine(2*n_face), self%cell(3, 4*n_face), self%j(6, 4*n_face), self%work(4*n_face, 6))
+  end subroutine make_room
+
+  !> A lower face of index i that lies on a wall of the domain: no fluid and no pressure there.
+  pure function closed_side(grid, i, d) result(closed)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: i, d
+    logical :: closed
+
+    closed = (i == 1 .and. is_wall(grid%side(1, d))) .or. &
+             (i == grid%n(d) + 1 .and. is_wall(grid%side(2, d)))
+  end function closed_side
+
+  !> Each face belongs to one process: that of the cell above it, or at the upper end of the domain
+  !! that of the cell below it.
+  pure function owned(grid, f, d) result(mine)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: f(3), d
+    logical :: mine
+    integer :: last(3)
+
+    last = grid%hi
+    if (grid%hi(d) == grid%n(d) .and. .not. grid%periodic(d)) last(d) = last(d) + 1
+    mine = all(f >= grid%lo) .and. all(f <= last)
+  end function owned
+
+  !> Volume rate of all bodies through the lower faces [m3/s].
+  subroutine solid_face_flux(grid, solid, bodies, self, flux)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(in) :: self
+    real(wp), intent(out), contiguous :: flux(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                              grid%lo(3) - n_halo:, :)
+    integer :: b, m, f(4)
+
+    flux = 0.0_wp
+    do b = 1, bodies%n
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        f = solid%face(:, m)
+        flux(f(1), f(2), f(3), f(4)) = flux(f(1), f(2), f(3), f(4)) + &
+                                       dot_product(self%s(:, m), bodies%motion(:, b))
+      end do
+    end do
+  end subroutine solid_face_flux
+
+  !> Force and torque of a cell field of pressure on each body, face by face:
+  !! $$ F_k = \sum_f s_f (p_{low} - p_{high}) $$
+  !! The pressure of cells without open faces counts as it stands.
+  subroutine force_from_faces(grid, solid, bodies, self, p, force)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(inout) :: self
+    real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)   !! [Pa], halo filled
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies) force, torque about the centre of mass [N, N m]
+    integer :: b, m, t, f(3), e(3)
+
+    do b = 1, bodies%n
+      t = 0
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        if (.not. self%mine(m)) cycle
+        f = solid%face(1:3, m)
+        e = unit_step(:, solid%face(4, m))
+        t = t + 1
+        self%work(t, :) = self%s(:, m)*(side_value(f - e) - side_value(f))
+      end do
+      force(:, b) = exact_sums(self%work(1:t, :))
+    end do
+  contains
+    !> Pressure of a cell; zero outside an open side.
+    pure function side_value(c) result(value)
+      integer, intent(in) :: c(3)
+      real(wp) :: value
+
+      value = 0.0_wp
+      if (all((c >= 1 .and. c <= grid%n) .or. grid%periodic)) value = p(c(1), c(2), c(3))
+    end function side_value
+  end subroutine force_from_faces
+
+  !> Force and torque of a pressure correction that is zero in cells without open faces.
+  subroutine force_from_cells(bodies, self, phi, lower, force)
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(inout) :: self
+    integer, intent(in) :: lower(3)        !! lower bounds of phi
+    real(wp), intent(in), contiguous :: phi(lower(1):, lower(2):, lower(3):)   !! [Pa]
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
+    integer :: b, e, first, last
+
+    force = 0.0_wp
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      first = self%first(b)
+      last = self%first(b + 1) - 1
+      do e = first, last
+        self%work(e - first + 1, :) = self%j(:, e)*phi(self%cell(1, e), self%cell(2, e), self%cell(3, e))
+      end do
+      force(:, b) = exact_sums(self%work(1:last - first + 1, :))
+    end do
+  end subroutine force_from_cells
+
+  !> Add the flux of given motions of the free bodies to a cell field: y += sum_k J_k a_k.
+  subroutine add_cell_flux(bodies, self, a, lower, y)
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(in) :: self
+    real(wp), intent(in) :: a(:, :)         !! (6, bodies) motions
+    integer, intent(in) :: lower(3)         !! lower bounds of y
+    real(wp), intent(inout), contiguous :: y(lower(1):, lower(2):, lower(3):)
+    integer :: b, e
+
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      do e = self%first(b), self%first(b + 1) - 1
+        associate (c => self%cell(:, e))
+          y(c(1), c(2), c(3)) = y(c(1), c(2), c(3)) + dot_product(self%j(:, e), a(:, b))
+        end associate
+      end do
+    end do
+  end subroutine add_cell_flux
+
+end module rigid_flux_m

@@ -1,0 +1,601 @@
+!> Implicit viscosity with no-slip on the bodies: legs to the exact surface, film cells, and the body
+!! velocities as unknowns of the same system.
+!!
+!! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
+!! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
+!! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. A cell whose
+!! centre lies in a body but which has open faces (film cell) hangs on the wall alone. The force on
+!! the body is the sum over its wall legs, so the stage conserves momentum.
+!! Departure from the paper: its overlay gives a drag that depends on the time step.
+module viscous_m
+  use kinds_m, only: wp
+  use case_types_m, only: fluid_t
+  use vectors_m, only: cross
+  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm
+  use mixture_m, only: harmonic_mean
+  use boundary_m, only: fill_velocity_halo
+  use exact_sum_m, only: exact_dot, exact_sums
+  use parallel_m, only: halo_exchange, global_max
+  implicit none
+  private
+  public :: viscous_t, viscous_init, build_viscous, solve_viscous, open_share
+
+  real(wp), parameter :: least_theta = 1.0e-3_wp    !! shortest leg, in cells
+  real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
+  real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
+  integer, parameter :: max_iterations = 500
+
+  type :: viscous_t
+    real(wp), allocatable :: mass(:, :, :, :)  !! rho m V/dt of each component, 0: not an unknown [kg/s]
+    real(wp), allocatable :: leg(:, :, :, :)   !! conductance of the leg across the lower face [kg/s]
+    real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
+    real(wp), allocatable :: r(:, :, :, :), z(:, :, :, :), s(:, :, :, :), y(:, :, :, :)
+    integer :: n_wall = 0                      !! wall legs, grouped by body
+    integer, allocatable :: first(:)           !! (bodies + 1)
+    integer, allocatable :: cell(:, :)         !! (3, *)
+    real(wp), allocatable :: k(:)              !! conductance [kg/s]
+    real(wp), allocatable :: arm(:, :)         !! (3, *) from the centre of mass to the wall [m]
+    real(wp), allocatable :: work(:, :)        !! (*, 6)
+    real(wp), allocatable :: body_matrix(:, :, :)   !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
+    real(wp), allocatable :: spin_drag(:)      !! 2 mu V of the body: torque per angular velocity [N m s]
+    integer, allocatable :: wall_body(:)       !! body of each leg as found, before grouping
+    integer, allocatable :: found_cell(:, :)
+    real(wp), allocatable :: found_k(:), found_arm(:, :)
+  end type viscous_t
+
+contains
+
+  !> Allocate the work arrays.
+  subroutine viscous_init(grid, n_bodies, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_bodies
+    type(viscous_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%leg, self%diagonal, self%r, self%z, self%s, self%y, source=self%mass)
+    allocate (self%first(n_bodies + 1), source=1)
+    allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
+    allocate (self%spin_drag(n_bodies), source=0.0_wp)
+    allocate (self%cell(3, 0), self%k(0), self%arm(3, 0), self%work(0, 6))
+    allocate (self%wall_body(0), self%found_cell(3, 0), self%found_k(0), self%found_arm(3, 0))
+  end subroutine viscous_init
+
+  !> Share of the cell's mass that moves with velocity component d: mean of its two open faces.
+  elemental function open_share(w_low, w_high) result(m)
+    real(wp), intent(in) :: w_low, w_high   !! open shares of the lower and upper face
+    real(wp) :: m
+
+    m = 0.5_wp*(w_low + w_high)
+  end function open_share
+
+  !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+      contiguous :: rho, mu      !! [kg/m3], [Pa s]
+    real(wp), intent(in) :: dt   !! [s]
+    type(viscous_t), intent(inout) :: self
+    integer :: d
+
+    self%n_wall = 0
+    self%diagonal = 0.0_wp
+    do d = 1, 3
+      call unknown_masses(grid, solid, rho, dt, d, self)
+    end do
+    do d = 1, 3
+      call legs_of_direction(grid, solid, bodies, mu, d, self)
+    end do
+    call film_legs(grid, solid, bodies, mu, self)
+    call group_by_body(bodies%n, self)
+    call bodies_seen_by_legs(solid, bodies, mu, grid, self)
+    self%diagonal = self%diagonal + self%mass
+  end subroutine build_viscous
+
+  !> Mass over dt of component d in each cell; zero where the velocity is the wall's.
+  subroutine unknown_masses(grid, solid, rho, dt, d, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: d
+    type(viscous_t), intent(inout) :: self
+    integer :: i, j, k, e(3)
+    real(wp) :: m
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j, m) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          m = open_share(solid%open(i, j, k, d), solid%open(i + e(1), j + e(2), k + e(3), d))
+          if (m < least_mass) m = merge(least_mass, 0.0_wp, solid%inside(i, j, k) == 0)
+          self%mass(i, j, k, d) = rho(i, j, k)*m*grid%volume/dt
+        end do
+      end do
+    end do
+  end subroutine unknown_masses
+
+  !> Legs between neighbours in direction d: ordinary, or wall legs of one or both cells.
+  subroutine legs_of_direction(grid, solid, bodies, mu, d, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:)
+    integer, intent(in) :: d
+    type(viscous_t), intent(inout) :: self
+    integer :: i, j, k, e(3), low(3), high(3), upper(3)
+    real(wp) :: conductance   !! A/h [m]
+    logical :: low_wet, high_wet, free_leg
+
+    e = unit_step(:, d)
+    upper = grid%hi + e
+    conductance = grid%area(d)/grid%h(d)
+    do k = grid%lo(3), upper(3)
+      do j = grid%lo(2), upper(2)
+        do i = grid%lo(1), upper(1)
+          high = [i, j, k]
+          low = high - e
+          self%leg(i, j, k, d) = 0.0_wp
+          if (at_domain_side(grid, high(d), d)) then
+            call side_leg(high(d))
+            cycle
+          end if
+          low_wet = solid%inside(low(1), low(2), low(3)) == 0
+          high_wet = solid%inside(i, j, k) == 0
+          free_leg = solid%leg_low(i, j, k, d) > 1.0_wp .and. solid%leg_high(i, j, k, d) > 1.0_wp
+          if (low_wet .and. high_wet .and. free_leg) then
+            self%leg(i, j, k, d) = conductance*harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, k))
+            call add_diagonal(low, self%leg(i, j, k, d))
+            call add_diagonal(high, self%leg(i, j, k, d))
+          else
+            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
+            if (high_wet) call wall_leg(high, solid%leg_high(i, j, k, d), -1, &
+                                        solid%leg_body_high(i, j, k, d))
+          end if
+        end do
+      end do
+    end do
+  contains
+    !> Both cells of an ordinary leg, as far as they are ours.
+    subroutine add_diagonal(c, value)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: value
+
+      self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + value
+    end subroutine add_diagonal
+
+    !> Leg from the centre of cell c along +d or -d to the surface of a body.
+    subroutine wall_leg(c, theta, sense, body)
+      integer, intent(in) :: c(3), sense, body
+      real(wp), intent(in) :: theta   !! [cells]
+      real(wp) :: x_wall(3), t
+      integer :: a
+
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      t = min(max(theta, least_theta), 1.0_wp)
+      do a = 1, 3
+        x_wall(a) = grid%centre(c(a), a)
+      end do
+      x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
+      call add_wall(self, c, body, mu(c(1), c(2), c(3))*conductance/t, &
+                    nearest_arm(grid, x_wall, bodies%x(:, body)))
+    end subroutine wall_leg
+
+    !> Half a leg to a wall of the domain at rest; slip walls hold the normal component only.
+    subroutine side_leg(face)
+      integer, intent(in) :: face
+      integer :: s, c(3)
+      real(wp) :: value
+
+      s = merge(1, 2, face == 1)
+      c = merge(high, low, s == 1)
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (solid%inside(c(1), c(2), c(3)) /= 0) return
+      value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
+      if (grid%side(s, d) == side_no_slip) call add_diagonal(c, value)
+      if (grid%side(s, d) == side_slip) self%diagonal(c(1), c(2), c(3), d) = &
+        self%diagonal(c(1), c(2), c(3), d) + value
+    end subroutine side_leg
+  end subroutine legs_of_direction
+
+  !> A lower face of index i that lies on a side of the domain with a boundary condition.
+  pure function at_domain_side(grid, i, d) result(side)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: i, d
+    logical :: side
+
+    side = (i == 1 .or. i == grid%n(d) + 1) .and. .not. grid%periodic(d)
+  end function at_domain_side
+
+  !> Film cells: centre inside a body, but with open faces. Their fluid, V_o = V(1 - alpha), lies in a
+  !! layer of mean thickness V_o/A_w on the wall area A_w and hangs on it by 2 mu A_w^2/V_o.
+  subroutine film_legs(grid, solid, bodies, mu, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:)
+    type(viscous_t), intent(inout) :: self
+    integer :: i, j, k, d, e(3)
+    real(wp) :: wall(3), area2, layer
+
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          if (solid%inside(i, j, k) == 0) cycle
+          if (all(self%mass(i, j, k, :) <= 0.0_wp)) cycle
+          do d = 1, 3
+            e = unit_step(:, d)
+            wall(d) = grid%area(d)*(solid%open(i + e(1), j + e(2), k + e(3), d) - solid%open(i, j, k, d))
+          end do
+          area2 = max(sum(wall**2), (1.0e-3_wp*minval(grid%area))**2)
+          layer = max(1.0_wp - solid%alpha(i, j, k), 1.0e-3_wp)*grid%volume
+          call add_wall(self, [i, j, k], solid%inside(i, j, k), 2.0_wp*mu(i, j, k)*area2/layer, &
+                        nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, 3)], &
+                                    bodies%x(:, solid%inside(i, j, k))))
+        end do
+      end do
+    end do
+  end subroutine film_legs
+
+  !> Note a wall leg of conductance k between a cell and a body.
+  subroutine add_wall(self, c, body, k, arm)
+    type(viscous_t), intent(inout) :: self
+    integer, intent(in) :: c(3), body
+    real(wp), intent(in) :: k        !! [kg/s]
+    real(wp), intent(in) :: arm(3)   !! [m]
+    integer :: n
+
+    n = self%n_wall + 1
+    if (n > size(self%found_k)) call grow(self)
+    self%n_wall = n
+    self%found_cell(:, n) = c
+    self%wall_body(n) = body
+    self%found_k(n) = k
+    self%found_arm(:, n) = arm
+    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
+  end subroutine add_wall
+
+  !> Double the length of the lists of wall legs.
+  subroutine grow(self)
+    type(viscous_t), intent(inout) :: self
+    integer, allocatable :: cells(:, :), body(:)
+    real(wp), allocatable :: k(:), arm(:, :)
+    integer :: n, m
+
+    n = self%n_wall
+    m = max(1024, 2*n)
+    allocate (cells(3, m), body(m), k(m), arm(3, m))
+    cells(:, :n) = self%found_cell(:, :n)
+    body(:n) = self%wall_body(:n)
+    k(:n) = self%found_k(:n)
+    arm(:, :n) = self%found_arm(:, :n)
+    call move_alloc(cells, self%found_cell)
+    call move_alloc(body, self%wall_body)
+    call move_alloc(k, self%found_k)
+    call move_alloc(arm, self%found_arm)
+    deallocate (self%cell, self%k, self%arm, self%work)
+    allocate (self%cell(3, m), self%k(m), self%arm(3, m), self%work(m, 6))
+  end subroutine grow
+
+  !> Bring the wall legs into the order of the bodies, keeping the order of the cells.
+  subroutine group_by_body(n_bodies, self)
+    integer, intent(in) :: n_bodies
+    type(viscous_t), intent(inout) :: self
+    integer :: b, m, place
+
+    self%first = 0
+    do m = 1, self%n_wall
+      self%first(self%wall_body(m)) = self%first(self%wall_body(m)) + 1
+    end do
+    place = 1
+    do b = 1, n_bodies + 1
+      m = self%first(b)
+      self%first(b) = place
+      place = place + m
+    end do
+    do m = 1, self%n_wall
+      b = self%wall_body(m)
+      place = self%first(b)
+      self%first(b) = place + 1
+      self%cell(:, place) = self%found_cell(:, m)
+      self%k(place) = self%found_k(m)
+      self%arm(:, place) = self%found_arm(:, m)
+    end do
+    do b = n_bodies + 1, 2, -1
+      self%first(b) = self%first(b - 1)
+    end do
+    self%first(1) = 1
+  end subroutine group_by_body
+
+  !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia over
+  !! dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave out.
+  subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:)
+    type(viscous_t), intent(inout) :: self
+    integer :: b, c, m, n
+    real(wp) :: unit(6)        !! one of the six unit motions
+    real(wp) :: mu_volume(6)
+
+    do b = 1, bodies%n
+      n = self%first(b + 1) - self%first(b)
+      do c = 1, 6
+        unit = 0.0_wp
+        unit(c) = 1.0_wp
+        do m = self%first(b), self%first(b + 1) - 1
+          associate (i => self%cell(:, m))
+            self%work(m - self%first(b) + 1, :) = &
+              wrench(self%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, self%arm(:, m))), &
+                     self%arm(:, m))
+          end associate
+        end do
+        self%body_matrix(:, c, b) = exact_sums(self%work(1:n, :))
+      end do
+      mu_volume = viscosity_times_volume(b)
+      self%spin_drag(b) = 2.0_wp*mu_volume(1)
+      do c = 4, 6
+        self%body_matrix(c, c, b) = self%body_matrix(c, c, b) + self%spin_drag(b)
+      end do
+    end do
+  contains
+    !> Integral of the viscosity of the surrounding fluid over the body, in all six places [Pa s m3].
+    function viscosity_times_volume(body) result(total)
+      integer, intent(in) :: body
+      real(wp) :: total(6)
+      integer :: m, n, i(3)
+
+      n = 0
+      do m = solid%body_cell(body), solid%body_cell(body + 1) - 1
+        i = solid%cell(:, m)
+        if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+        n = n + 1
+        if (n > size(self%work, 1)) call grow_work(self)
+        self%work(n, :) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+      end do
+      total = exact_sums(self%work(1:n, :))
+    end function viscosity_times_volume
+  end subroutine bodies_seen_by_legs
+
+  !> Double the length of the work array of the sums.
+  subroutine grow_work(self)
+    type(viscous_t), intent(inout) :: self
+    real(wp), allocatable :: longer(:, :)
+
+    allocate (longer(2*size(self%work, 1) + 64, 6), source=0.0_wp)
+    longer(1:size(self%work, 1), :) = self%work
+    call move_alloc(longer, self%work)
+  end subroutine grow_work
+
+  !> Force at a point and its torque about the centre of mass, as one vector of six.
+  pure function wrench(f, arm) result(w)
+    real(wp), intent(in) :: f(3), arm(3)
+    real(wp) :: w(6)
+
+    w(1:3) = f
+    w(4:6) = cross(arm, f)
+  end function wrench
+
+  !> Solve for the velocity after viscosity, in place, together with the motion of the free bodies.
+  !!
+  !! On entry `flow%u` and `bodies%motion` are the velocities with all other forces in; on return
+  !! with viscosity too. `force` is what the fluid did to each body, fixed ones included [N, N m].
+  subroutine solve_viscous(grid, bodies, dt, flow, self, force, iterations, converged)
+    type(grid_t), intent(in) :: grid
+    type(rigid_motion_t), intent(inout) :: bodies
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(viscous_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer, intent(out) :: iterations
+    logical, intent(out) :: converged
+    real(wp), dimension(6, bodies%n) :: r_body, z_body, s_body, y_body, start
+    real(wp) :: rz, rz_new, alpha, beta, scale, worst
+    integer :: b
+
+    start = bodies%motion
+    s_body = bodies%motion
+    self%s = flow%u
+    call zero_where_wall(self, self%s)
+    call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
+    self%r = self%mass*flow%u - self%y
+    do b = 1, bodies%n
+      r_body(:, b) = inertial_momentum(bodies, b, dt, start(:, b)) - y_body(:, b)
+    end do
+    call velocity_scale(flow, bodies, scale)
+    flow%u = self%s
+    rz = 0.0_wp
+    iterations = 0
+    do
+      call precondition()
+      worst = largest_step()
+      converged = worst <= tolerance*scale
+      if (converged .or. iterations == max_iterations) exit
+      rz_new = dot(self%r, self%z) + sum_bodies(r_body, z_body)
+      beta = merge(rz_new/max(rz, tiny(rz)), 0.0_wp, iterations > 0)
+      rz = rz_new
+      self%s = merge(self%z + beta*self%s, self%z, iterations > 0)
+      s_body = merge(z_body + beta*s_body, z_body, iterations > 0)
+      call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
+      alpha = rz/(dot(self%s, self%y) + sum_bodies(s_body, y_body))
+      flow%u = flow%u + alpha*self%s
+      bodies%motion = bodies%motion + alpha*s_body
+      self%r = self%r - alpha*self%y
+      r_body = r_body - alpha*y_body
+      iterations = iterations + 1
+    end do
+    call force_of_legs(bodies, flow, self, force)
+  contains
+    !> Divide the residual by the diagonal; bodies by their translational or rotational inertia.
+    subroutine precondition()
+      integer :: b, c
+
+      self%z = self%r/max(self%diagonal, tiny(1.0_wp))
+      call zero_where_wall(self, self%z)
+      z_body = 0.0_wp
+      do b = 1, bodies%n
+        if (.not. bodies%free(b)) cycle
+        do c = 1, 3
+          z_body(c, b) = r_body(c, b)/(bodies%mass(b)/dt + self%body_matrix(c, c, b))
+          z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + self%body_matrix(c + 3, c + 3, b))
+        end do
+      end do
+    end subroutine precondition
+
+    !> Largest velocity change that one Jacobi step would make [m/s].
+    function largest_step() result(step)
+      real(wp) :: step
+      real(wp) :: m(1)
+
+      m = maxval(abs(self%z))
+      call global_max(m)
+      step = m(1)
+      if (bodies%n > 0) step = max(step, maxval(abs(z_body(1:3, :))))
+    end function largest_step
+
+    !> Scalar product over the cells of all processes.
+    function dot(a, b) result(total)
+      real(wp), intent(in), contiguous :: a(:, :, :, :), b(:, :, :, :)
+      real(wp) :: total
+      integer :: c
+
+      total = 0.0_wp
+      do c = 1, 3
+        total = total + exact_dot(a(:, :, :, c), b(:, :, :, c), n_halo)
+      end do
+    end function dot
+
+    !> Scalar product over the free bodies.
+    pure function sum_bodies(a, b) result(total)
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp) :: total
+      integer :: n
+
+      total = 0.0_wp
+      do n = 1, size(a, 2)
+        if (bodies%free(n)) total = total + dot_product(a(:, n), b(:, n))
+      end do
+    end function sum_bodies
+  end subroutine solve_viscous
+
+  !> Largest velocity of fluid and bodies [m/s]; never zero.
+  subroutine velocity_scale(flow, bodies, scale)
+    type(flow_t), intent(in) :: flow
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(out) :: scale
+    real(wp) :: m(1)
+
+    m = maxval(abs(flow%u))
+    call global_max(m)
+    scale = max(m(1), 1.0e-12_wp)
+    if (bodies%n > 0) scale = max(scale, maxval(abs(bodies%motion(1:3, :))))
+  end subroutine velocity_scale
+
+  !> Momentum and angular momentum over dt of a motion of body b.
+  pure function inertial_momentum(bodies, b, dt, motion) result(p)
+    type(rigid_motion_t), intent(in) :: bodies
+    integer, intent(in) :: b
+    real(wp), intent(in) :: dt, motion(6)
+    real(wp) :: p(6)
+
+    p(1:3) = bodies%mass(b)*motion(1:3)/dt
+    p(4:6) = matmul(bodies%inertia(:, :, b), motion(4:6))/dt
+  end function inertial_momentum
+
+  !> Velocity components that are the wall's are not unknowns.
+  pure subroutine zero_where_wall(self, a)
+    type(viscous_t), intent(in) :: self
+    real(wp), intent(inout) :: a(:, :, :, :)
+
+    where (self%mass <= 0.0_wp) a = 0.0_wp
+  end subroutine zero_where_wall
+
+  !> The system applied to velocities x and body motions x_body.
+  subroutine apply_viscous(grid, bodies, dt, self, x, x_body, y, y_body)
+    type(grid_t), intent(in) :: grid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: dt
+    type(viscous_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: x(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in) :: x_body(:, :)
+    real(wp), intent(out), contiguous :: y(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:, :)
+    real(wp), intent(out) :: y_body(:, :)
+    integer :: i, j, k, c, b, m
+
+    call halo_exchange(x, n_halo)
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            y(i, j, k, c) = self%diagonal(i, j, k, c)*x(i, j, k, c) &
+              - self%leg(i, j, k, 1)*x(i - 1, j, k, c) - self%leg(i + 1, j, k, 1)*x(i + 1, j, k, c) &
+              - self%leg(i, j, k, 2)*x(i, j - 1, k, c) - self%leg(i, j + 1, k, 2)*x(i, j + 1, k, c) &
+              - self%leg(i, j, k, 3)*x(i, j, k - 1, c) - self%leg(i, j, k + 1, 3)*x(i, j, k + 1, c)
+          end do
+        end do
+      end do
+    end do
+    do b = 1, bodies%n
+      do m = self%first(b), self%first(b + 1) - 1
+        associate (n => self%cell(:, m))
+          self%work(m - self%first(b) + 1, :) = &
+            wrench(self%k(m)*unknown(self%mass(n(1), n(2), n(3), :), x(n(1), n(2), n(3), :)), self%arm(:, m))
+          y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) - self%k(m)*wall_velocity(x_body(:, b), self%arm(:, m))
+        end associate
+      end do
+      y_body(:, b) = 0.0_wp
+      if (.not. bodies%free(b)) cycle
+      y_body(:, b) = inertial_momentum(bodies, b, dt, x_body(:, b)) &
+                   + matmul(self%body_matrix(:, :, b), x_body(:, b)) &
+                   - exact_sums(self%work(1:self%first(b + 1) - self%first(b), :))
+    end do
+  end subroutine apply_viscous
+
+  !> Velocity components that are unknowns; the others move with the wall and pull on nothing.
+  pure function unknown(mass, x) result(v)
+    real(wp), intent(in) :: mass(3), x(3)
+    real(wp) :: v(3)
+
+    v = merge(x, 0.0_wp, mass > 0.0_wp)
+  end function unknown
+
+  !> Viscous force and torque on each body, from its wall legs [N, N m].
+  subroutine force_of_legs(bodies, flow, self, force)
+    type(rigid_motion_t), intent(in) :: bodies
+    type(flow_t), intent(in) :: flow
+    type(viscous_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)
+    integer :: b, m
+    real(wp) :: slip(3)
+
+    do b = 1, bodies%n
+      do m = self%first(b), self%first(b + 1) - 1
+        associate (n => self%cell(:, m))
+          slip = flow%u(n(1), n(2), n(3), :) - wall_velocity(bodies%motion(:, b), self%arm(:, m))
+          self%work(m - self%first(b) + 1, :) = &
+            wrench(self%k(m)*unknown(self%mass(n(1), n(2), n(3), :), slip), self%arm(:, m))
+        end associate
+      end do
+      force(:, b) = exact_sums(self%work(1:self%first(b + 1) - self%first(b), :))
+      force(4:6, b) = force(4:6, b) - self%spin_drag(b)*bodies%motion(4:6, b)
+    end do
+  end subroutine force_of_legs
+
+end module viscous_m

@@ -1,0 +1,110 @@
+!> Implicit viscosity: exact shear past a wall inside the cells, film cells, momentum of the stage.
+program test_viscous
+  use kinds_m, only: wp
+  use case_types_m, only: grid_input_t, boundary_input_t
+  use grid_m, only: grid_t, grid_init
+  use fields_m, only: flow_t, flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
+  use viscous_m, only: viscous_t, viscous_init, build_viscous, solve_viscous
+  use parallel_m, only: parallel_init, parallel_final
+  use check_m, only: check, finish_checks
+  implicit none
+  type(grid_t) :: grid
+  type(flow_t) :: flow
+  type(solid_geometry_t) :: solid
+  type(rigid_motion_t) :: wall
+  type(viscous_t) :: viscous
+  real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, long_time = 1.0e14_wp
+  real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]   !! of the surface, cell height 1/8
+  real(wp) :: force(6, 1), z, worst, momentum(2)
+  integer :: k, n, iterations
+  logical :: converged
+
+  call parallel_init()
+  call make_grid()
+  do n = 1, size(heights)
+    call make_wall(heights(n))
+    ! A long step brings the steady shear flow between the moving surface and the tank's upper wall.
+    call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+    call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+    worst = 0.0_wp
+    do k = 1, 8
+      z = grid%centre(k, 3)
+      if (z < heights(n)) cycle
+      worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - speed*(depth - z)/(depth - heights(n)))))
+    end do
+    call check('converged', converged)
+    call check('linear profile above a wall inside a cell', worst, 0.0_wp, 1.0e-7_wp)
+    call check('shear force on the wall', force(1, 1), -mu*speed/(depth - heights(n)), 1.0e-7_wp*mu*speed)
+  end do
+
+  ! A free body and the fluid it drags: the stage gives to one what it takes from the other.
+  call make_wall(heights(2))
+  wall%free = .true.
+  momentum(1) = fluid_momentum() + wall%mass(1)*wall%motion(1, 1)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
+  call solve_viscous(grid, wall, 5.0_wp, flow, viscous, force, iterations, converged)
+  momentum(2) = fluid_momentum() + wall%mass(1)*wall%motion(1, 1) &
+                + 5.0_wp*sum(2.0_wp*mu*8.0_wp*flow%u(1:4, 1:4, 8, 1))/16.0_wp
+  call check('momentum of body, fluid and tank wall', momentum(2), momentum(1), 1.0e-7_wp*momentum(1))
+  call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
+             5.0_wp*force(1, 1), 1.0e-7_wp*momentum(1))
+  call finish_checks()
+  call parallel_final()
+contains
+  !> 4 x 4 x 8 cells of a unit cube, periodic sideways.
+  subroutine make_grid()
+    type(grid_input_t) :: input
+    type(boundary_input_t) :: boundary
+
+    input%cells = [4, 4, 8]
+    input%length = 1.0_wp
+    boundary%kind(:, 1:2) = 'periodic'
+    boundary%kind(:, 3) = 'no_slip'
+    call grid_init(input, boundary, grid)
+    call viscous_init(grid, 1, viscous)
+  end subroutine make_grid
+
+  !> A body that fills everything below height z0 and moves along x.
+  subroutine make_wall(z0)
+    real(wp), intent(in) :: z0
+    integer :: k
+    real(wp) :: low, share
+
+    call flow_init(grid, flow)
+    call solid_geometry_init(grid, solid, 1)
+    call rigid_motion_init(1, wall)
+    flow%rho = rho
+    flow%mu = mu
+    wall%present = .true.
+    wall%motion(:, 1) = [speed, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    wall%mass = 50.0_wp
+    wall%inertia(:, :, 1) = reshape([1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp], [3, 3])
+    wall%inverse_inertia(:, :, 1) = wall%inertia(:, :, 1)*1.0e-18_wp
+    do k = 1, 8
+      low = grid%face(k, 3)
+      share = min(max((z0 - low)/grid%h(3), 0.0_wp), 1.0_wp)
+      solid%alpha(:, :, k) = share
+      solid%open(:, :, k, 1:2) = 1.0_wp - share
+      if (low < z0) solid%open(:, :, k, 3) = 0.0_wp
+      if (grid%centre(k, 3) < z0) solid%inside(:, :, k) = 1
+      if (k == 1) cycle
+      if (grid%centre(k - 1, 3) < z0 .and. grid%centre(k, 3) > z0) then
+        solid%leg_high(:, :, k, 3) = (grid%centre(k, 3) - z0)/grid%h(3)
+        solid%leg_body_high(:, :, k, 3) = 1
+      end if
+    end do
+  end subroutine make_wall
+
+  !> Momentum of the unknowns along x [kg m/s].
+  function fluid_momentum() result(p)
+    real(wp) :: p
+    integer :: k
+
+    p = 0.0_wp
+    do k = 1, 8
+      p = p + rho*grid%volume*sum(0.5_wp*(solid%open(1:4, 1:4, k, 1) + solid%open(2:5, 1:4, k, 1))*flow%u(1:4, 1:4, k, 1))
+    end do
+  end function fluid_momentum
+end program test_viscous
