@@ -30,35 +30,54 @@ module exact_bins_m
 
 contains
 
-  !> Add the terms p to the bins; p is used up.
+  !> Add terms to the bins.
   pure subroutine add_terms(p, bins)
-    real(wp), intent(inout), contiguous :: p(:)   !! at most `chunk_size` terms
+    real(wp), intent(in), contiguous :: p(:)   !! at most `chunk_size` terms
     integer(i8), intent(inout) :: bins(bin_size)
     integer(i8) :: part(bin_size)
-    real(wp) :: largest, total, unit
-    integer :: i, top, b
+    real(wp) :: total(3)
+    integer :: top, b
 
-    largest = 0.0_wp
-    !$omp simd reduction(max: largest)
-    do i = 1, size(p)
-      largest = max(largest, abs(p(i)))
-    end do
-    top = top_bin(largest)
+    part = 0_i8
+    top = top_bin(largest_term(p))
     if (top < not_a_number) then
-      do b = 1, 3
-        call split_terms(p, top + 1 - b, total)
-        if (.not. abs(total) <= huge(total)) then
-          top = not_a_number
-          exit
-        end if
-        unit = scale(1.0_wp, -bin_digits*(top + 1 - b))
-        part(1 + b) = int(total*unit, i8)
-      end do
+      call split_terms(p, top, total)
+      if (abs(total(1)) <= huge(total)) then
+        do b = 1, 3
+          part(1 + b) = int(scale(total(b), -bin_digits*(top + 1 - b)), i8)
+        end do
+      else
+        top = not_a_number
+      end if
     end if
     part(1) = int(top, i8)
-    if (top == not_a_number) part(2:) = 0_i8
     call merge_bins(part, bins)
   end subroutine add_terms
+
+  !> Largest magnitude of the terms; four at a time, for a maximum waits for the one before.
+  pure function largest_term(p) result(largest)
+    real(wp), intent(in), contiguous :: p(:)
+    real(wp) :: largest
+    real(wp) :: m1, m2, m3, m4
+    integer :: i, q
+
+    q = size(p)/4
+    m1 = 0.0_wp
+    m2 = 0.0_wp
+    m3 = 0.0_wp
+    m4 = 0.0_wp
+    !$omp simd reduction(max: m1, m2, m3, m4)
+    do i = 1, q
+      m1 = max(m1, abs(p(i)))
+      m2 = max(m2, abs(p(q + i)))
+      m3 = max(m3, abs(p(2*q + i)))
+      m4 = max(m4, abs(p(3*q + i)))
+    end do
+    largest = max(m1, m2, m3, m4)
+    do i = 4*q + 1, size(p)
+      largest = max(largest, abs(p(i)))
+    end do
+  end function largest_term
 
   !> Index of the highest bin that terms up to `largest` reach.
   pure function top_bin(largest) result(top)
@@ -76,25 +95,33 @@ contains
     top = max(top, lowest)
   end function top_bin
 
-  !> Take from each term the part that bin t holds, and add these parts.
+  !> Cut each term into the parts that three bins hold, and add these parts.
   !!
   !! Adding and subtracting 1.5 units of the 53rd digit rounds to the unit. No sum here passes
   !! 2**47 units, so every addition is exact and may go in any order.
-  pure subroutine split_terms(p, t, total)
-    real(wp), intent(inout), contiguous :: p(:)
-    integer, intent(in) :: t
-    real(wp), intent(out) :: total
-    real(wp) :: shifter, high
+  pure subroutine split_terms(p, top, total)
+    real(wp), intent(in), contiguous :: p(:)
+    integer, intent(in) :: top          !! index of the highest bin
+    real(wp), intent(out) :: total(3)   !! from high to low
+    real(wp) :: shift_1, shift_2, shift_3, high, middle, low, sum_1, sum_2, sum_3
     integer :: i
 
-    shifter = scale(1.5_wp, bin_digits*t + digits(1.0_wp) - 1)
-    total = 0.0_wp
-    !$omp simd reduction(+: total) private(high)
+    shift_1 = scale(1.5_wp, bin_digits*top + digits(1.0_wp) - 1)
+    shift_2 = scale(shift_1, -bin_digits)
+    shift_3 = scale(shift_2, -bin_digits)
+    sum_1 = 0.0_wp
+    sum_2 = 0.0_wp
+    sum_3 = 0.0_wp
+    !$omp simd reduction(+: sum_1, sum_2, sum_3) private(high, middle, low)
     do i = 1, size(p)
-      high = (p(i) + shifter) - shifter
-      p(i) = p(i) - high
-      total = total + high
+      high = (p(i) + shift_1) - shift_1
+      middle = ((p(i) - high) + shift_2) - shift_2
+      low = (((p(i) - high) - middle) + shift_3) - shift_3
+      sum_1 = sum_1 + high
+      sum_2 = sum_2 + middle
+      sum_3 = sum_3 + low
     end do
+    total = [sum_1, sum_2, sum_3]
   end subroutine split_terms
 
   !> Add the bins of one sum to those of another.
