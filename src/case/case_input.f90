@@ -90,14 +90,14 @@ contains
       if (groups(g) == list%group(i)%name) exit
     end do
     if (g > size(groups)) then
-      call v%note('unknown group, nearest known: &' &
+      call v%note(': unknown group, nearest known: &' &
                   //nearest_name(printable(list%group(i)%name), groups))
       return
     else if (is_not_yet(list%group(i)%name, '', '')) then
-      call v%note('this group is '//not_yet_message)
+      call v%note(': this group is '//not_yet_message)
       return
     else if (n(g) > 0 .and. g < first_repeated) then
-      call v%note('the group is given twice, first on line ' &
+      call v%note(': the group is given twice, first on line ' &
                   //to_text(first_line(list, list%group(i)%name)))
       return
     end if

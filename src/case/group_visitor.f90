@@ -68,11 +68,10 @@ contains
       return
     end if
     do i = 1, self%group%n
-      associate (a => self%group%assignment(i))
-        if (any(self%known(:self%n_known) == a%name)) cycle
-        call self%problems%add_message('&'//self%group%name//' '//printable(a%name) &
-          //': unknown variable, nearest known: ' &
-          //nearest_name(a%name, self%known(:self%n_known)), a%line)
+      associate (name => self%group%assignment(i)%name)
+        if (any(self%known(:self%n_known) == name)) cycle
+        call self%fault(i, 'unknown variable, nearest known: ' &
+                        //nearest_name(name, self%known(:self%n_known)))
       end associate
     end do
   end subroutine finish
@@ -120,9 +119,9 @@ contains
     if (self%writing .or. self%group%faulty) return
     if (self%group%find(variable) > 0) return
     if (self%group%line > 0) then
-      call self%note(variable//': missing, required: '//meaning)
+      call self%note(' '//variable//': missing, required: '//meaning)
     else
-      call self%note(variable//': missing, required: '//meaning &
+      call self%note(' '//variable//': missing, required: '//meaning &
                      //' (there is no group &'//self%group%name//')')
     end if
   end subroutine needed
@@ -140,20 +139,20 @@ contains
     if (i > 0) then
       call self%fault(i, allowed)
     else
-      call self%note(variable//' (by default): '//allowed)
+      call self%note(' '//variable//' (by default): '//allowed)
     end if
   end subroutine require
 
-  !> Report a problem of the group as a whole.
+  !> Report a problem of the group; `what` goes on right after its name.
   subroutine note(self, what)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: what
 
     if (self%writing) return
     if (self%group%line > 0) then
-      call self%problems%add_message('&'//self%group%name//' '//what, self%group%line)
+      call self%problems%add_message('&'//self%group%name//what, self%group%line)
     else
-      call self%problems%add_message('&'//self%group%name//' '//what)
+      call self%problems%add_message('&'//self%group%name//what)
     end if
   end subroutine note
 

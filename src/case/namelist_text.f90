@@ -284,6 +284,7 @@ contains
     else if (next(cursor) == '&') then
       rest = 'the next ''&'' on line '//to_text(cursor%line)
       if (lower_case(cursor%text(cursor%at:min(cursor%at + 3, len(cursor%text)))) == '&end') then
+        rest = '&end'
         cursor%at = cursor%at + 4
       end if
     else
@@ -381,8 +382,10 @@ contains
     end select
     if (.not. allocated(value%text)) return
     if (group%n == 0) then
-      call problems%add_message('&'//group%name//' '//printable(value%text) &
-                                //': no ''='' follows; write name = value', cursor%line)
+      if (.not. group%faulty) then
+        call problems%add_message('&'//group%name//' '//printable(value%text) &
+                                  //': no ''='' follows; write name = value', cursor%line)
+      end if
       group%faulty = .true.
       return
     end if
