@@ -1,30 +1,276 @@
 !> State of the blocks and their equations of motion; the only place that moves them.
+!!
+!! $$ M \frac{dU}{dt} = F_{fluid} + F_{contact} + M g, \qquad \frac{dL}{dt} = T_{fluid} + T_{contact} $$
+!!
+!! The state is (x, q, v, l) with l the angular momentum in space axes, so that a free body keeps l
+!! exactly and no gyroscopic term appears. A substep drifts for half its time, kicks, and drifts again.
 module rigid_body_m
   use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, normalised
   use tet_mesh_m, only: shape_t
+  use drops_m, only: draw_drop
   implicit none
   private
-  public :: blocks_t
+  public :: blocks_t, blocks_init, release_body
+  public :: begin_step, drift, kick, set_velocity_after_fluid
+  public :: space_tensor, kinetic_energy, potential_energy
 
   !> All bodies of a run, in the order of the contract: `&body`, then `&drop`.
   type :: blocks_t
     integer :: n = 0
     type(shape_t), allocatable :: shapes(:)
+    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, shapes) body axes [1/(kg m2)]
     integer, allocatable :: shape(:)             !! (n) index into shapes
     real(wp), allocatable :: mass(:)             !! (n) [kg]
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
     logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
-    real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass [m]
+    real(wp), allocatable :: given_v(:, :)       !! (3, n) velocity at release; of fixed bodies for ever [m/s]
+    real(wp), allocatable :: given_omega(:, :)   !! (3, n) likewise, space frame [rad/s]
+    real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass, never wrapped [m]
     real(wp), allocatable :: q(:, :)             !! (4, n) attitude w, x, y, z [-]
     real(wp), allocatable :: v(:, :)             !! (3, n) velocity [m/s]
     real(wp), allocatable :: l(:, :)             !! (3, n) angular momentum, space frame [kg m2/s]
     real(wp), allocatable :: omega(:, :)         !! (3, n) angular velocity, space frame [rad/s]
+    real(wp), allocatable :: v_start(:, :), l_start(:, :)   !! (3, n) v and l at the start of the fluid step
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
     real(wp), allocatable :: fluid_force(:, :), fluid_torque(:, :)
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
     integer, allocatable :: contacts(:)          !! (n) different partners touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them
   end type blocks_t
+
+contains
+
+  !> The bodies of a case at their starting poses; those of `&body` due at t = 0 are released.
+  subroutine blocks_init(case, shapes, blocks)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(blocks_t), intent(out) :: blocks
+    integer :: b, i, k, s
+
+    blocks%n = size(case%body)
+    do i = 1, size(case%drop)
+      blocks%n = blocks%n + case%drop(i)%count
+    end do
+    blocks%shapes = shapes
+    call allocate_state(blocks)
+    do s = 1, size(shapes)
+      blocks%inverse_inertia(:, :, s) = inverse3(shapes(s)%inertia)
+    end do
+    do b = 1, size(case%body)
+      blocks%shape(b) = shape_number(shapes, case%body(b)%shape)
+      blocks%fixed(b) = case%body(b)%fixed
+      blocks%release_time(b) = case%body(b)%release_time
+      blocks%given_v(:, b) = case%body(b)%velocity
+      blocks%given_omega(:, b) = case%body(b)%angular_velocity
+      blocks%x(:, b) = case%body(b)%position
+      blocks%q(:, b) = normalised(case%body(b)%quaternion)
+    end do
+    b = size(case%body)
+    do i = 1, size(case%drop)
+      do k = 1, case%drop(i)%count
+        b = b + 1
+        blocks%shape(b) = shape_number(shapes, case%drop(i)%shape)
+        blocks%release_time(b) = case%drop(i)%first_time + real(k - 1, wp)*case%drop(i)%interval
+        blocks%given_v(:, b) = case%drop(i)%velocity
+        call draw_drop(case%drop(i), k, blocks%x(:, b), blocks%q(:, b))
+      end do
+    end do
+    do b = 1, blocks%n
+      blocks%mass(b) = shapes(blocks%shape(b))%density*shapes(blocks%shape(b))%volume
+      if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
+    end do
+    do b = 1, size(case%body)
+      if (blocks%release_time(b) <= 0.0_wp) call release_body(0.0_wp, b, blocks)
+    end do
+  end subroutine blocks_init
+
+  !> Allocate all arrays over bodies, at rest and without forces.
+  subroutine allocate_state(blocks)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: n
+
+    n = blocks%n
+    allocate (blocks%inverse_inertia(3, 3, size(blocks%shapes)), source=0.0_wp)
+    allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
+    allocate (blocks%fixed(n), blocks%present(n), source=.false.)
+    allocate (blocks%mass(n), blocks%release_time(n), source=0.0_wp)
+    allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), source=0.0_wp)
+    allocate (blocks%given_v(3, n), blocks%given_omega(3, n), source=0.0_wp)
+    allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
+    allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
+    allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
+  end subroutine allocate_state
+
+  !> Number of the shape of that name; zero if there is none.
+  pure function shape_number(shapes, name) result(s)
+    type(shape_t), intent(in) :: shapes(:)
+    character(*), intent(in) :: name
+    integer :: s
+
+    do s = size(shapes), 1, -1
+      if (shapes(s)%name == name) return
+    end do
+  end function shape_number
+
+  !> Release body b with its given velocity.
+  pure subroutine release_body(time, b, blocks)
+    real(wp), intent(in) :: time   !! [s]
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%present(b) = .true.
+    blocks%release_time(b) = time
+    blocks%v(:, b) = blocks%given_v(:, b)
+    blocks%omega(:, b) = blocks%given_omega(:, b)
+    call set_momentum(b, blocks)
+    blocks%v_start(:, b) = blocks%v(:, b)
+    blocks%l_start(:, b) = blocks%l(:, b)
+  end subroutine release_body
+
+  !> Angular momentum of body b from its angular velocity.
+  pure subroutine set_momentum(b, blocks)
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: inertia(3, 3)
+
+    inertia = space_tensor(blocks%q(:, b), blocks%shapes(blocks%shape(b))%inertia)
+    blocks%l(:, b) = matmul(inertia, blocks%omega(:, b))
+  end subroutine set_momentum
+
+  !> Remember v and l at the start of a fluid step.
+  pure subroutine begin_step(blocks)
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%v_start = blocks%v
+    blocks%l_start = blocks%l
+  end subroutine begin_step
+
+  !> Move the bodies for a time dt with their present v and l; fixed bodies at their given rates.
+  !!
+  !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the whole
+  !! step. `omega` belongs to the new attitude afterwards.
+  pure subroutine drift(dt, blocks)
+    real(wp), intent(in) :: dt   !! [s]
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: omega(3), half_way(4)
+    integer :: b
+
+    do b = 1, blocks%n
+      if (.not. blocks%present(b)) cycle
+      if (blocks%fixed(b)) then
+        call drift_prescribed(dt, b, blocks)
+        cycle
+      end if
+      associate (inverse => blocks%inverse_inertia(:, :, blocks%shape(b)), l => blocks%l(:, b), q => blocks%q(:, b))
+        blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
+        omega = angular_velocity(q, l, inverse)
+        half_way = quaternion_product(quaternion_exp(0.5_wp*dt*omega), q)
+        omega = angular_velocity(half_way, l, inverse)
+        q = normalised(quaternion_product(quaternion_exp(dt*omega), q))
+        blocks%omega(:, b) = angular_velocity(q, l, inverse)
+      end associate
+    end do
+  end subroutine drift
+
+  !> Move a fixed body for a time dt at its constant given rate.
+  pure subroutine drift_prescribed(dt, b, blocks)
+    real(wp), intent(in) :: dt   !! [s]
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
+    if (all(abs(blocks%omega(:, b)) <= 0.0_wp)) return
+    blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), blocks%q(:, b)))
+    call set_momentum(b, blocks)
+  end subroutine drift_prescribed
+
+  !> Angular velocity of a body with angular momentum l, space frame [rad/s].
+  pure function angular_velocity(q, l, inverse) result(omega)
+    real(wp), intent(in) :: q(4), l(3)      !! attitude, [kg m2/s]
+    real(wp), intent(in) :: inverse(3, 3)   !! inverse inertia, body axes [1/(kg m2)]
+    real(wp) :: omega(3)
+    real(wp) :: r(3, 3)
+
+    r = rotation_matrix(q)
+    omega = matmul(r, matmul(inverse, matmul(l, r)))
+  end function angular_velocity
+
+  !> A tensor given in body axes, in space axes: R t R^T.
+  pure function space_tensor(q, t) result(s)
+    real(wp), intent(in) :: q(4), t(3, 3)
+    real(wp) :: s(3, 3)
+    real(wp) :: r(3, 3)
+
+    r = rotation_matrix(q)
+    s = matmul(r, matmul(t, transpose(r)))
+  end function space_tensor
+
+  !> Change v and l of the free present bodies by an impulse: gravity and the given means act for dt.
+  pure subroutine kick(gravity, dt, force, torque, blocks)
+    real(wp), intent(in) :: gravity(3)                !! [m/s2]
+    real(wp), intent(in) :: dt                        !! [s]
+    real(wp), intent(in) :: force(:, :), torque(:, :) !! (3, n) [N], [N m]
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      blocks%v(:, b) = blocks%v(:, b) + dt*(gravity + force(:, b)/blocks%mass(b))
+      blocks%l(:, b) = blocks%l(:, b) + dt*torque(:, b)
+      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), blocks%inverse_inertia(:, :, blocks%shape(b)))
+    end do
+  end subroutine kick
+
+  !> Velocities at the end of a fluid step from those at its start, the mean contact forces of the
+  !! substeps and the fluid forces of this step, which are stored.
+  pure subroutine set_velocity_after_fluid(gravity, dt, force, torque, blocks)
+    real(wp), intent(in) :: gravity(3)                !! [m/s2]
+    real(wp), intent(in) :: dt                        !! [s]
+    real(wp), intent(in) :: force(:, :), torque(:, :) !! (3, n) mean over the step [N], [N m]
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    blocks%fluid_force = force
+    blocks%fluid_torque = torque
+    do b = 1, blocks%n
+      if (blocks%fixed(b)) cycle
+      blocks%v(:, b) = blocks%v_start(:, b)
+      blocks%l(:, b) = blocks%l_start(:, b)
+    end do
+    call kick(gravity, dt, force + blocks%contact_force, torque + blocks%contact_torque, blocks)
+  end subroutine set_velocity_after_fluid
+
+  !> Kinetic energy of the free present bodies [J].
+  pure function kinetic_energy(blocks) result(energy)
+    type(blocks_t), intent(in) :: blocks
+    real(wp) :: energy
+    integer :: b
+
+    energy = 0.0_wp
+    do b = 1, blocks%n
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      energy = energy + 0.5_wp*blocks%mass(b)*dot_product(blocks%v(:, b), blocks%v(:, b)) &
+        + 0.5_wp*dot_product(blocks%l(:, b), blocks%omega(:, b))
+    end do
+  end function kinetic_energy
+
+  !> Potential energy -M g.x of the free bodies, zero at the origin [J].
+  !!
+  !! Bodies not yet released count too, so that a release makes no jump.
+  pure function potential_energy(gravity, blocks) result(energy)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    type(blocks_t), intent(in) :: blocks
+    real(wp) :: energy
+    integer :: b
+
+    energy = 0.0_wp
+    do b = 1, blocks%n
+      if (blocks%fixed(b)) cycle
+      energy = energy - blocks%mass(b)*dot_product(gravity, blocks%x(:, b))
+    end do
+  end function potential_energy
 
 end module rigid_body_m

@@ -1,0 +1,50 @@
+!> The random part of a drop: where and how each of its blocks starts.
+!!
+!! Every number depends on (seed, index of the block within its drop, k) alone, so it is the same on
+!! every machine, in any order, and whether or not other drops exist.
+module drops_m
+  use kinds_m, only: wp, pi
+  use case_types_m, only: drop_input_t
+  use vectors_m, only: quaternion_from_axis, quaternion_product, normalised
+  use random_counter_m, only: uniform, random_rotation
+  implicit none
+  private
+  public :: draw_drop
+
+  integer, parameter :: k_shift = 101   !! k_shift .. k_shift+2: shift along x, y, z
+  integer, parameter :: k_tilt = 111    !! angle; k_tilt+1, k_tilt+2: axis
+
+contains
+
+  !> Starting pose of block number `index` of a drop.
+  pure subroutine draw_drop(drop, index, x, q)
+    type(drop_input_t), intent(in) :: drop
+    integer, intent(in) :: index       !! 1 .. drop%count
+    real(wp), intent(out) :: x(3)      !! centre of mass [m]
+    real(wp), intent(out) :: q(4)      !! attitude
+    real(wp) :: angle
+    integer :: d
+
+    do d = 1, 3
+      x(d) = drop%position(d) + drop%spread(d)*(2*uniform(drop%seed, index, k_shift + d - 1) - 1.0_wp)
+    end do
+    if (drop%orientation == 'random') then
+      q = random_rotation(drop%seed, index)
+    else
+      angle = uniform(drop%seed, index, k_tilt)*drop%tilt_deg*pi/180.0_wp
+      q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), normalised(drop%quaternion))
+    end if
+  end subroutine draw_drop
+
+  !> A unit vector, uniform over the sphere: the height is uniform and so is the azimuth.
+  pure function random_axis(seed, index) result(axis)
+    integer, intent(in) :: seed, index
+    real(wp) :: axis(3)
+    real(wp) :: height, azimuth
+
+    height = 2*uniform(seed, index, k_tilt + 1) - 1.0_wp
+    azimuth = 2*pi*uniform(seed, index, k_tilt + 2)
+    axis = [sqrt(1.0_wp - height**2)*[cos(azimuth), sin(azimuth)], height]
+  end function random_axis
+
+end module drops_m

@@ -1,0 +1,277 @@
+!> Who is near whom: boxes sorted into bins, and pairs of bodies whose bounding spheres come close.
+module neighbours_m
+  use kinds_m, only: wp
+  implicit none
+  private
+  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift, reserve
+
+  !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
+  type :: bins_t
+    integer :: n(3) = 0                      !! bins in each direction
+    real(wp) :: low(3) = 0.0_wp              !! lower corner of the block [m]
+    real(wp) :: high(3) = 0.0_wp             !! upper corner of the block [m]
+    real(wp) :: size(3) = 1.0_wp             !! of a bin [m]
+    integer, allocatable :: first(:)         !! (bins + 1): items of bin c are first(c) : first(c+1)-1
+    integer, allocatable :: item(:)          !! item numbers, ascending within a bin
+  contains
+    procedure :: place => bins_place
+    procedure :: number => bins_number
+  end type bins_t
+
+  !> Pairs of bodies that are near one another, a > b, sorted by a, then b.
+  type :: pair_list_t
+    integer :: n = 0
+    integer, allocatable :: a(:), b(:)       !! bodies
+    real(wp), allocatable :: shift(:, :)     !! (3, n) to add to the position of b: its periodic image near a [m]
+    integer, allocatable, private :: cell(:, :), chain(:), head(:)   !! work: cell of a body, linked lists
+  end type pair_list_t
+
+  !> Make room for at least n entries, by doubling; the entries present are kept.
+  interface reserve
+    procedure :: reserve_integer, reserve_real, reserve_vector
+  end interface reserve
+
+contains
+
+  !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
+  !!
+  !! The size grows where the block would hold more than `most_bins`.
+  subroutine bins_build(low, high, size_wanted, bins)
+    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
+    real(wp), intent(in) :: size_wanted             !! [m]
+    type(bins_t), intent(out) :: bins
+    integer, parameter :: most_bins = 200000
+    integer :: i, j, k, c, m, pass, a(3), b(3)
+    real(wp) :: extent(3), edge
+    integer, allocatable :: next(:)
+
+    bins%low = minval(low, 2)
+    bins%high = maxval(high, 2)
+    extent = bins%high - bins%low
+    edge = size_wanted
+    do while (product(extent/edge + 1.0_wp) > real(most_bins, wp))
+      edge = 1.25_wp*edge
+    end do
+    bins%n = max(1, ceiling(extent/edge))
+    bins%size = merge(extent/real(bins%n, wp), edge, extent > 0.0_wp)
+    allocate (bins%first(product(bins%n) + 1), next(product(bins%n)), source=0)
+    do pass = 1, 2   ! count, then fill
+      do m = 1, size(low, 2)
+        a = bins%place(low(:, m))
+        b = bins%place(high(:, m))
+        do k = a(3), b(3)
+          do j = a(2), b(2)
+            do i = a(1), b(1)
+              c = bins%number([i, j, k])
+              if (pass == 2) bins%item(next(c)) = m
+              next(c) = next(c) + 1
+            end do
+          end do
+        end do
+      end do
+      if (pass == 2) exit
+      bins%first(1) = 1
+      do c = 1, size(next)
+        bins%first(c + 1) = bins%first(c) + next(c)
+      end do
+      allocate (bins%item(bins%first(size(bins%first)) - 1))
+      next = bins%first(:size(next))
+    end do
+  end subroutine bins_build
+
+  !> Bin that holds the point x, 1..n in each direction; points outside go to the nearest bin.
+  pure function bins_place(self, x) result(p)
+    class(bins_t), intent(in) :: self
+    real(wp), intent(in) :: x(3)   !! [m]
+    integer :: p(3)
+
+    p = int(min(max((x - self%low)/self%size, 0.0_wp), real(self%n - 1, wp))) + 1
+  end function bins_place
+
+  !> Number of the bin at place p, 1..product(n).
+  pure function bins_number(self, p) result(c)
+    class(bins_t), intent(in) :: self
+    integer, intent(in) :: p(3)
+    integer :: c
+
+    c = p(1) + self%n(1)*(p(2) - 1 + self%n(2)*(p(3) - 1))
+  end function bins_number
+
+  !> All pairs of active bodies closer than the sum of their radii plus `skin`; linear in the number of bodies.
+  !!
+  !! Of a periodic direction only the nearest image is looked at: bodies are shorter than half a period.
+  subroutine near_pairs(x, radius, active, period, skin, pairs)
+    real(wp), intent(in) :: x(:, :)     !! (3, n) centres [m]
+    real(wp), intent(in) :: radius(:)   !! (n) bounding spheres [m]
+    logical, intent(in) :: active(:)    !! (n) looked at
+    real(wp), intent(in) :: period(3)   !! length of the domain, 0 where it is not periodic [m]
+    real(wp), intent(in) :: skin        !! [m]
+    type(pair_list_t), intent(inout) :: pairs
+    integer :: a, b, i, j, k, c(3), reach(2, 3), cells(3), begin
+    real(wp) :: d(3), shift(3)
+
+    pairs%n = 0
+    if (count(active) < 2) return
+    call sort_bodies(x, radius, active, period, skin, cells, pairs)
+    do a = 1, size(radius)
+      if (.not. active(a)) cycle
+      begin = pairs%n + 1
+      reach(1, :) = -1
+      reach(2, :) = 1
+      where (period > 0.0_wp .and. cells < 3) reach(1, :) = 1 - cells
+      where (period > 0.0_wp .and. cells < 3) reach(2, :) = 0
+      do k = reach(1, 3), reach(2, 3)
+        do j = reach(1, 2), reach(2, 2)
+          do i = reach(1, 1), reach(2, 1)
+            c = pairs%cell(:, a) + [i, j, k]
+            where (period > 0.0_wp) c = modulo(c, cells)
+            if (any(c < 0) .or. any(c >= cells)) cycle
+            b = pairs%head(1 + c(1) + cells(1)*(c(2) + cells(2)*c(3)))
+            do while (b > 0)
+              if (b < a) then
+                d = x(:, b) - x(:, a)
+                shift = nearest_shift(period, d)
+                d = d + shift
+                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) call add_pair(a, b, shift, pairs)
+              end if
+              b = pairs%chain(b)
+            end do
+          end do
+        end do
+      end do
+      call sort_partners(begin, pairs)
+    end do
+  end subroutine near_pairs
+
+  !> What to add to the distance d so that it points to the nearest periodic image [m].
+  pure function nearest_shift(period, d) result(shift)
+    real(wp), intent(in) :: period(3)   !! length of the domain, 0 where it is not periodic [m]
+    real(wp), intent(in) :: d(3)        !! [m]
+    real(wp) :: shift(3)
+    integer :: i
+
+    shift = 0.0_wp
+    do i = 1, 3
+      if (period(i) > 0.0_wp) shift(i) = -period(i)*anint(d(i)/period(i))
+    end do
+  end function nearest_shift
+
+  !> Put the bodies into cells no smaller than the reach of the largest pair.
+  subroutine sort_bodies(x, radius, active, period, skin, cells, pairs)
+    real(wp), intent(in) :: x(:, :), radius(:), period(3), skin
+    logical, intent(in) :: active(:)
+    integer, intent(out) :: cells(3)   !! cells in each direction
+    type(pair_list_t), intent(inout) :: pairs
+    real(wp) :: low(3), high(3), edge(3), reach
+    integer :: a, c, d, most
+
+    low = huge(1.0_wp)
+    high = -huge(1.0_wp)
+    do a = 1, size(radius)
+      if (.not. active(a)) cycle
+      low = min(low, x(:, a))
+      high = max(high, x(:, a))
+    end do
+    where (period > 0.0_wp)
+      low = 0.0_wp
+      high = period
+    end where
+    reach = 2*maxval(radius, active) + skin
+    most = max(1, nint((8.0_wp*size(radius))**(1.0_wp/3.0_wp)))
+    do d = 1, 3
+      cells(d) = min(max(1, int(min((high(d) - low(d))/reach, real(most, wp)))), most)
+    end do
+    edge = max((high - low)/real(cells, wp), tiny(1.0_wp))
+    if (.not. allocated(pairs%chain)) then
+      allocate (pairs%chain(size(radius)), pairs%cell(3, size(radius)))
+      allocate (pairs%head(max(1, nint((8.0_wp*size(radius))**(1.0_wp/3.0_wp)))**3))
+    end if
+    pairs%head(:product(cells)) = 0
+    do a = size(radius), 1, -1
+      if (.not. active(a)) cycle
+      pairs%cell(:, a) = floor((x(:, a) - low)/edge)
+      where (period > 0.0_wp)
+        pairs%cell(:, a) = modulo(pairs%cell(:, a), cells)
+      elsewhere
+        pairs%cell(:, a) = min(pairs%cell(:, a), cells - 1)
+      end where
+      c = 1 + pairs%cell(1, a) + cells(1)*(pairs%cell(2, a) + cells(2)*pairs%cell(3, a))
+      pairs%chain(a) = pairs%head(c)
+      pairs%head(c) = a
+    end do
+  end subroutine sort_bodies
+
+  !> Append a pair to the list.
+  subroutine add_pair(a, b, shift, pairs)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: shift(3)
+    type(pair_list_t), intent(inout) :: pairs
+
+    pairs%n = pairs%n + 1
+    call reserve(pairs%n, pairs%a)
+    call reserve(pairs%n, pairs%b)
+    call reserve(pairs%n, pairs%shift)
+    pairs%a(pairs%n) = a
+    pairs%b(pairs%n) = b
+    pairs%shift(:, pairs%n) = shift
+  end subroutine add_pair
+
+  !> Sort the pairs from `begin` on, all of one body, by partner.
+  pure subroutine sort_partners(begin, pairs)
+    integer, intent(in) :: begin
+    type(pair_list_t), intent(inout) :: pairs
+    integer :: i, j, b
+    real(wp) :: shift(3)
+
+    do i = begin + 1, pairs%n
+      b = pairs%b(i)
+      shift = pairs%shift(:, i)
+      j = i - 1
+      do while (j >= begin)
+        if (pairs%b(j) < b) exit
+        pairs%b(j + 1) = pairs%b(j)
+        pairs%shift(:, j + 1) = pairs%shift(:, j)
+        j = j - 1
+      end do
+      pairs%b(j + 1) = b
+      pairs%shift(:, j + 1) = shift
+    end do
+  end subroutine sort_partners
+
+  subroutine reserve_integer(n, a)
+    integer, intent(in) :: n
+    integer, allocatable, intent(inout) :: a(:)
+    integer, allocatable :: longer(:)
+
+    if (.not. allocated(a)) allocate (a(max(n, 16)))
+    if (n <= size(a)) return
+    allocate (longer(max(n, 2*size(a))))
+    longer(:size(a)) = a
+    call move_alloc(longer, a)
+  end subroutine reserve_integer
+
+  subroutine reserve_real(n, a)
+    integer, intent(in) :: n
+    real(wp), allocatable, intent(inout) :: a(:)
+    real(wp), allocatable :: longer(:)
+
+    if (.not. allocated(a)) allocate (a(max(n, 16)))
+    if (n <= size(a)) return
+    allocate (longer(max(n, 2*size(a))))
+    longer(:size(a)) = a
+    call move_alloc(longer, a)
+  end subroutine reserve_real
+
+  subroutine reserve_vector(n, a)
+    integer, intent(in) :: n
+    real(wp), allocatable, intent(inout) :: a(:, :)   !! (3, :)
+    real(wp), allocatable :: longer(:, :)
+
+    if (.not. allocated(a)) allocate (a(3, max(n, 16)))
+    if (n <= size(a, 2)) return
+    allocate (longer(3, max(n, 2*size(a, 2))))
+    longer(:, :size(a, 2)) = a
+    call move_alloc(longer, a)
+  end subroutine reserve_vector
+
+end module neighbours_m
