@@ -11,8 +11,10 @@ module parallel_m
   use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request, operator(==)
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
+  use mpi_f08, only: MPI_INFO_NULL
   use mpi_f08, only: MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use kinds_m, only: wp, sp, i8
   use exact_bins_m, only: bin_size, merge_bins
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
@@ -23,6 +25,7 @@ module parallel_m
   public :: is_root, nproc, my_rank, set_threads, get_threads
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
+  public :: set_file_access, set_collective
 
   integer, parameter :: least_cells = 4   !! every process has so many in each direction that is cut
 
@@ -598,5 +601,21 @@ contains
 
     call MPI_Bcast(x, size(x), MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
   end subroutine broadcast_reals
+
+  !> Let all processes open a file together: property list of its access, as an HDF5 identifier.
+  subroutine set_file_access(access, status)
+    integer(i8), intent(in) :: access
+    integer, intent(out) :: status   !! < 0: failed
+
+    call h5pset_fapl_mpio_f(access, MPI_COMM_WORLD%MPI_VAL, MPI_INFO_NULL%MPI_VAL, status)
+  end subroutine set_file_access
+
+  !> Let all processes write a dataset together: property list of the transfer.
+  subroutine set_collective(transfer, status)
+    integer(i8), intent(in) :: transfer
+    integer, intent(out) :: status   !! < 0: failed
+
+    call h5pset_dxpl_mpio_f(transfer, H5FD_MPIO_COLLECTIVE_F, status)
+  end subroutine set_collective
 
 end module parallel_m

@@ -13,6 +13,7 @@ module parallel_m
   public :: is_root, nproc, my_rank, set_threads, get_threads
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
+  public :: set_file_access, set_collective
 
   logical, save :: wraps(3) = .false.   !! periodic directions of the last `decompose`
 
@@ -267,5 +268,21 @@ contains
 
     x = x
   end subroutine broadcast_reals
+
+  !> Let all processes open a file together: property list of its access, as an HDF5 identifier.
+  subroutine set_file_access(access, status)
+    integer(i8), intent(in) :: access
+    integer, intent(out) :: status   !! < 0: failed
+
+    status = merge(0, -1, access >= 0)   ! one process opens files as ever
+  end subroutine set_file_access
+
+  !> Let all processes write a dataset together: property list of the transfer.
+  subroutine set_collective(transfer, status)
+    integer(i8), intent(in) :: transfer
+    integer, intent(out) :: status   !! < 0: failed
+
+    status = merge(0, -1, transfer >= 0)   ! one process writes as ever
+  end subroutine set_collective
 
 end module parallel_m
