@@ -1,0 +1,388 @@
+!> Touches of the contact spheres of the T-type model with one another and with the plane walls.
+!!
+!! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved by half the
+!! skin. Touches come out in an order that does not depend on when the list was made.
+module contact_spheres_m
+  use kinds_m, only: wp
+  use vectors_m, only: rotation_matrix
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, reserve
+  use touches_m, only: touch_t, reserve_touches
+  implicit none
+  private
+  public :: contact_spheres_t, contact_spheres_init, find_sphere_touches
+
+  !> The spheres of a shape in bins, to find those near a point.
+  type :: sphere_set_t
+    type(bins_t) :: bins
+    real(wp) :: reach = 0.0_wp     !! of the sphere about the centre of mass that holds them all [m]
+    real(wp) :: largest = 0.0_wp   !! largest radius [m]
+  end type sphere_set_t
+
+  type :: contact_spheres_t
+    real(wp) :: skin = 0.0_wp                  !! [m]
+    real(wp) :: smallest = 0.0_wp              !! smallest diameter of a sphere: the d_s that limits the substep [m]
+    type(sphere_set_t), allocatable :: set(:)  !! (shapes)
+    real(wp), allocatable :: reach(:)          !! (bodies) [m]
+    !> Spheres that may touch before the list is made anew, body by body.
+    integer, allocatable :: slot_of(:)         !! slot of a sphere, counted through all bodies; 0: not listed
+    integer, allocatable :: offset(:)          !! (bodies) number of spheres of the bodies before
+    integer :: n_slots = 0
+    integer, allocatable :: body(:), sphere(:) !! (slots)
+    real(wp), allocatable :: centre(:, :)      !! (3, slots) in space [m]
+    real(wp), allocatable :: radius(:)         !! (slots) [m]
+    !> Candidates: entries first(p) : first(p+1)-1 belong to body pair p.
+    integer :: n_pairs = 0
+    integer, allocatable :: pair_a(:), pair_b(:), first(:)   !! pair_b < 0: a wall
+    real(wp), allocatable :: shift(:, :)       !! (3, pairs) to the image of b near a [m]
+    integer :: n_candidates = 0
+    integer, allocatable :: i(:), j(:)         !! slots of the sphere of a and of b
+    !> Poses at which the list was made.
+    logical :: listed = .false.
+    logical, allocatable :: present(:)
+    real(wp), allocatable :: x(:, :), q(:, :)
+    real(wp), allocatable :: turn(:, :, :)     !! (3, 3, bodies) body to space
+    type(pair_list_t) :: near
+  end type contact_spheres_t
+
+contains
+
+  !> Sort the spheres of all shapes and size the lists.
+  subroutine contact_spheres_init(blocks, self)
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(out) :: self
+    real(wp), parameter :: skin_share = 0.5_wp   !! of the smallest radius
+    integer :: s, b
+
+    self%smallest = huge(1.0_wp)
+    allocate (self%set(size(blocks%shapes)))
+    do s = 1, size(blocks%shapes)
+      associate (shape => blocks%shapes(s))
+        self%set(s)%largest = maxval(shape%sphere_radius)
+        self%set(s)%reach = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
+        self%smallest = min(self%smallest, 2*minval(shape%sphere_radius))
+        call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, self%set(s)%bins)
+      end associate
+    end do
+    self%skin = 0.5_wp*skin_share*self%smallest
+    allocate (self%reach(blocks%n), self%offset(blocks%n), self%present(blocks%n))
+    allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
+    s = 0
+    do b = 1, blocks%n
+      self%offset(b) = s
+      s = s + size(blocks%shapes(blocks%shape(b))%sphere_radius)
+      self%reach(b) = self%set(blocks%shape(b))%reach
+    end do
+    allocate (self%slot_of(s), source=0)
+  end subroutine contact_spheres_init
+
+  !> All touches at the present poses.
+  subroutine find_sphere_touches(walls, blocks, self, touches)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(inout) :: self
+    type(touch_t), intent(inout) :: touches
+    integer :: p, s, b
+
+    do b = 1, blocks%n
+      if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
+    end do
+    if (moved_too_far(self, blocks)) call make_list(walls, blocks, self)
+    do s = 1, self%n_slots
+      b = self%body(s)
+      associate (c => blocks%shapes(blocks%shape(b))%sphere_centre(:, self%sphere(s)), r => self%turn(:, :, b))
+        self%centre(:, s) = blocks%x(:, b) + r(:, 1)*c(1) + r(:, 2)*c(2) + r(:, 3)*c(3)
+      end associate
+    end do
+    touches%n = 0
+    call reserve_touches(self%n_candidates, touches)
+    do p = 1, self%n_pairs
+      if (self%pair_b(p) < 0) then
+        call touch_wall(walls, blocks, self, p, touches)
+      else
+        call touch_body(blocks, self, p, touches)
+      end if
+    end do
+  end subroutine find_sphere_touches
+
+  !> Whether the list of candidates has to be made anew.
+  pure function moved_too_far(self, blocks) result(yes)
+    type(contact_spheres_t), intent(in) :: self
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+    real(wp) :: dx(3), dq(4)
+    integer :: b
+
+    yes = .true.
+    if (.not. self%listed) return
+    do b = 1, blocks%n
+      if (blocks%present(b) .neqv. self%present(b)) return
+      if (.not. blocks%present(b)) cycle
+      dx = blocks%x(:, b) - self%x(:, b)
+      dq = blocks%q(:, b) - self%q(:, b)
+      ! a turn by phi moves |dq| = 2 sin(phi/4), a point at distance r by no more than 4 r sin(phi/4)
+      if (norm2(dx) + 2*self%reach(b)*norm2(dq) > 0.5_wp*self%skin) return
+    end do
+    yes = .false.
+  end function moved_too_far
+
+  !> List the sphere pairs that may touch before a body has moved by half the skin.
+  subroutine make_list(walls, blocks, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(inout) :: self
+    integer :: a, p, w
+
+    do p = 1, self%n_slots
+      self%slot_of(self%offset(self%body(p)) + self%sphere(p)) = 0
+    end do
+    self%n_slots = 0
+    self%n_pairs = 0
+    self%n_candidates = 0
+    call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%skin, self%near)
+    p = 1
+    do a = 1, blocks%n
+      if (.not. blocks%present(a)) cycle
+      if (.not. blocks%fixed(a)) then
+        do w = 1, walls%n
+          call list_wall(walls, blocks, a, w, self)
+        end do
+      end if
+      do while (p <= self%near%n)
+        if (self%near%a(p) /= a) exit
+        if (.not. (blocks%fixed(a) .and. blocks%fixed(self%near%b(p)))) call list_body(blocks, p, self)
+        p = p + 1
+      end do
+    end do
+    call reserve(self%n_pairs + 1, self%first)
+    self%first(self%n_pairs + 1) = self%n_candidates + 1
+    self%listed = .true.
+    self%present = blocks%present
+    self%x = blocks%x
+    self%q = blocks%q
+  end subroutine make_list
+
+  !> Begin a pair of bodies, or of a body and a wall.
+  subroutine add_pair(a, b, shift, self)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: shift(3)   !! to the image of b near a [m]
+    type(contact_spheres_t), intent(inout) :: self
+
+    self%n_pairs = self%n_pairs + 1
+    call reserve(self%n_pairs, self%pair_a)
+    call reserve(self%n_pairs, self%pair_b)
+    call reserve(self%n_pairs, self%first)
+    call reserve(self%n_pairs, self%shift)
+    self%pair_a(self%n_pairs) = a
+    self%pair_b(self%n_pairs) = b
+    self%first(self%n_pairs) = self%n_candidates + 1
+    self%shift(:, self%n_pairs) = shift
+  end subroutine add_pair
+
+  !> Append a candidate to the last pair.
+  subroutine add_candidate(i, j, self)
+    integer, intent(in) :: i, j   !! slots; j = 0 for a wall
+    type(contact_spheres_t), intent(inout) :: self
+
+    self%n_candidates = self%n_candidates + 1
+    call reserve(self%n_candidates, self%i)
+    call reserve(self%n_candidates, self%j)
+    self%i(self%n_candidates) = i
+    self%j(self%n_candidates) = j
+  end subroutine add_candidate
+
+  !> Slot of a sphere; the sphere gets one if it has none.
+  subroutine take_slot(blocks, b, sphere, self, slot)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b, sphere
+    type(contact_spheres_t), intent(inout) :: self
+    integer, intent(out) :: slot
+
+    slot = self%slot_of(self%offset(b) + sphere)
+    if (slot > 0) return
+    self%n_slots = self%n_slots + 1
+    slot = self%n_slots
+    self%slot_of(self%offset(b) + sphere) = slot
+    call reserve(slot, self%body)
+    call reserve(slot, self%sphere)
+    call reserve(slot, self%centre)
+    call reserve(slot, self%radius)
+    self%body(slot) = b
+    self%sphere(slot) = sphere
+    self%radius(slot) = blocks%shapes(blocks%shape(b))%sphere_radius(sphere)
+  end subroutine take_slot
+
+  !> Spheres of body a near wall w.
+  subroutine list_wall(walls, blocks, a, w, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, w
+    type(contact_spheres_t), intent(inout) :: self
+    real(wp) :: beyond, n(3)
+    integer :: i, slot
+
+    beyond = dot_product(walls%normal(:, w), blocks%x(:, a)) - walls%offset(w) + self%skin
+    if (beyond + self%reach(a) <= 0.0_wp) return
+    n = matmul(walls%normal(:, w), self%turn(:, :, a))
+    call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self)
+    associate (shape => blocks%shapes(blocks%shape(a)))
+      do i = 1, size(shape%sphere_radius)
+        if (beyond + dot_product(n, shape%sphere_centre(:, i)) + shape%sphere_radius(i) <= 0.0_wp) cycle
+        call take_slot(blocks, a, i, self, slot)
+        call add_candidate(slot, 0, self)
+      end do
+    end associate
+  end subroutine list_wall
+
+  !> Sphere pairs of near pair p of bodies, in the order of the spheres of a, then of b.
+  subroutine list_body(blocks, p, self)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: p
+    type(contact_spheres_t), intent(inout) :: self
+    real(wp) :: d(3), d_a(3), c(3), turn(3, 3)
+    integer :: a, b, i
+
+    a = self%near%a(p)
+    b = self%near%b(p)
+    d = blocks%x(:, b) + self%near%shift(:, p) - blocks%x(:, a)
+    d_a = matmul(d, self%turn(:, :, a))
+    turn = matmul(transpose(self%turn(:, :, b)), self%turn(:, :, a))
+    call add_pair(a, b, self%near%shift(:, p), self)
+    associate (shape => blocks%shapes(blocks%shape(a)))
+      do i = 1, size(shape%sphere_radius)
+        c = shape%sphere_centre(:, i) - d_a
+        if (dot_product(c, c) >= (self%reach(b) + shape%sphere_radius(i) + self%skin)**2) cycle
+        call list_sphere(blocks, a, i, b, matmul(turn, c), self)
+      end do
+    end associate
+  end subroutine list_body
+
+  !> Spheres of body b near sphere i of body a, whose centre is c in the axes of b.
+  subroutine list_sphere(blocks, a, i, b, c, self)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, i, b
+    real(wp), intent(in) :: c(3)   !! [m]
+    type(contact_spheres_t), intent(inout) :: self
+    real(wp) :: reach, d(3)
+    integer :: low(3), high(3), kx, ky, kz, bin, m, j, begin, slot_i, slot_j
+
+    begin = self%n_candidates + 1
+    associate (set => self%set(blocks%shape(b)), shape => blocks%shapes(blocks%shape(b)))
+      reach = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
+      if (any(c + reach + set%largest < set%bins%low) .or. any(c - reach - set%largest > set%bins%high)) return
+      low = set%bins%place(c - reach - set%largest)
+      high = set%bins%place(c + reach + set%largest)
+      do kz = low(3), high(3)
+        do ky = low(2), high(2)
+          do kx = low(1), high(1)
+            bin = set%bins%number([kx, ky, kz])
+            do m = set%bins%first(bin), set%bins%first(bin + 1) - 1
+              j = set%bins%item(m)
+              d = shape%sphere_centre(:, j) - c
+              if (dot_product(d, d) >= (reach + shape%sphere_radius(j))**2) cycle
+              call take_slot(blocks, a, i, self, slot_i)
+              call take_slot(blocks, b, j, self, slot_j)
+              call add_candidate(slot_i, slot_j, self)
+            end do
+          end do
+        end do
+      end do
+    end associate
+    call sort_by_sphere(self%sphere, self%j(begin:self%n_candidates))
+  end subroutine list_sphere
+
+  !> Sort slots of one body by sphere number.
+  pure subroutine sort_by_sphere(sphere, slot)
+    integer, intent(in) :: sphere(:)
+    integer, intent(inout) :: slot(:)
+    integer :: k, m, s
+
+    do k = 2, size(slot)
+      s = slot(k)
+      m = k - 1
+      do while (m >= 1)
+        if (sphere(slot(m)) < sphere(s)) exit
+        slot(m + 1) = slot(m)
+        m = m - 1
+      end do
+      slot(m + 1) = s
+    end do
+  end subroutine sort_by_sphere
+
+  !> Touches of pair p, a body and a wall. The contact lies on the wall.
+  subroutine touch_wall(walls, blocks, self, p, touches)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(in) :: self
+    integer, intent(in) :: p
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: depth
+    integer :: c, s, w, t
+
+    w = findloc_wall(walls, self%pair_b(p))
+    do c = self%first(p), self%first(p + 1) - 1
+      s = self%i(c)
+      depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) + self%radius(s)
+      if (depth <= 0.0_wp) cycle
+      t = touches%n + 1
+      touches%n = t
+      touches%a(t) = self%pair_a(p)
+      touches%b(t) = self%pair_b(p)
+      touches%key(t) = self%sphere(s)
+      touches%normal(:, t) = walls%normal(:, w)
+      touches%arm_a(:, t) = self%centre(:, s) - blocks%x(:, self%pair_a(p)) &
+        + (self%radius(s) - depth)*walls%normal(:, w)
+      touches%arm_b(:, t) = 0.0_wp
+      touches%depth(t) = depth
+      touches%weight(t) = 1.0_wp
+      touches%length(t) = 2*self%radius(s)
+    end do
+  end subroutine touch_wall
+
+  !> Place of a wall in the list of walls.
+  pure function findloc_wall(walls, number) result(w)
+    type(walls_t), intent(in) :: walls
+    integer, intent(in) :: number   !! -6..-1
+    integer :: w
+
+    do w = 1, walls%n
+      if (walls%number(w) == number) return
+    end do
+  end function findloc_wall
+
+  !> Touches of pair p of bodies. The contact lies in the middle of the overlap.
+  subroutine touch_body(blocks, self, p, touches)
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(in) :: self
+    integer, intent(in) :: p
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: d(3), shift(3), square, distance, reach
+    integer :: c, i, j, t
+
+    shift = self%shift(:, p)
+    do c = self%first(p), self%first(p + 1) - 1
+      i = self%i(c)
+      j = self%j(c)
+      reach = self%radius(i) + self%radius(j)
+      d = self%centre(:, j) + shift - self%centre(:, i)
+      square = dot_product(d, d)
+      if (square >= reach**2) cycle
+      distance = sqrt(square)
+      t = touches%n + 1
+      touches%n = t
+      touches%a(t) = self%pair_a(p)
+      touches%b(t) = self%pair_b(p)
+      touches%key(t) = self%sphere(i)
+      touches%normal(:, t) = d/max(distance, tiny(1.0_wp))
+      touches%depth(t) = reach - distance
+      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*touches%depth(t))*touches%normal(:, t)
+      touches%arm_a(:, t) = d - blocks%x(:, self%pair_a(p))
+      touches%arm_b(:, t) = d - (blocks%x(:, self%pair_b(p)) + shift)
+      touches%weight(t) = 1.0_wp
+      touches%length(t) = 2*min(self%radius(i), self%radius(j))
+    end do
+  end subroutine touch_body
+
+end module contact_spheres_m

@@ -1,0 +1,627 @@
+!> Contact forces of all blocks and the substeps in which they act.
+!!
+!! Each substep moves the bodies half way, finds what touches, changes the velocities, and moves them
+!! the other half, so that springs are second order in time and a free fall is exact.
+module contacts_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use vectors_m, only: cross
+  use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
+  use walls_m, only: walls_t, floor_wall
+  use neighbours_m, only: reserve
+  use touches_m, only: touch_t
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
+    stored_energy, normal_force, tangential_force, tangential_slip
+  implicit none
+  private
+  public :: contacts_t, contacts_init, move_blocks, contact_report_t, most_substeps
+
+  integer, parameter :: most_substeps = 1000000   !! of one fluid step; beyond, the motion has gone wrong
+
+  !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches.
+  !!
+  !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere slides
+  !! from a sphere of the partner to the next, so that resting blocks do not creep.
+  type :: springs_t
+    integer :: n = 0
+    integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `touch_t`
+    real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
+    real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m^gamma]
+  end type springs_t
+
+  !> Touches with one key and one partner act on one tangential spring.
+  type :: groups_t
+    integer :: n = 0
+    integer, allocatable :: first(:)             !! (n + 1) touches first(g) : first(g+1)-1
+    real(wp), allocatable :: normal(:, :)        !! (3, n) mean, unit [-]
+    real(wp), allocatable :: arm_a(:, :), arm_b(:, :)   !! (3, n) mean contact point [m]
+  end type groups_t
+
+  !> The law at work at each touch.
+  type :: response_t
+    real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
+    real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
+    real(wp), allocatable :: decay(:)            !! eta of the pair over twice its effective mass [1/s]
+    real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair, at its first touch [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (-6:n) sum over the pairs of a free body, else 0 [1/s2]
+  end type response_t
+
+  type :: contacts_t
+    type(contact_law_t) :: law
+    real(wp) :: substep_ratio = 0.0_wp           !! [-]
+    real(wp) :: longest_substep = 0.0_wp         !! twentieth of the contact time [s]
+    real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
+    type(springs_t) :: springs                   !! the memory: part of the state of a run
+    type(springs_t) :: before                    !! work: springs of the substep before
+    type(contact_spheres_t) :: spheres
+    type(touch_t) :: touches
+    type(groups_t) :: groups
+    type(response_t) :: response
+    !> Partners -6..-1 (walls) and 1..n (bodies) alike.
+    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n)
+    real(wp), allocatable :: inverse_mass(:)             !! (-6:n), 0 for walls and fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) space frame, 0 likewise [1/(kg m2)]
+    real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -6:n) of this substep [N], [N m]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -6:n) their integrals over the step [N s], [N m s]
+    integer :: n_met = 0
+    integer, allocatable :: met_a(:), met_b(:)           !! pairs that touched in this step, sorted
+  end type contacts_t
+
+  !> What happened in the substeps of one fluid step.
+  type :: contact_report_t
+    integer :: substeps = 0
+    integer :: info = 0                 !! 0; 1: more than `most_substeps` would be needed, or a speed is not a number
+    real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
+    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m]
+  end type contact_report_t
+
+contains
+
+  !> The contact law of a case, without any touch yet.
+  subroutine contacts_init(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(out) :: contacts
+    integer :: n
+
+    call contact_law_init(input, contacts%law)
+    contacts%substep_ratio = input%substep_ratio
+    contacts%longest_substep = input%contact_time/20.0_wp
+    contacts%courant_max = input%courant_max
+    call contact_spheres_init(blocks, contacts%spheres)
+    n = blocks%n
+    allocate (contacts%v(3, -6:n), contacts%omega(3, -6:n), contacts%force(3, -6:n), contacts%torque(3, -6:n), &
+      contacts%impulse(3, -6:n), contacts%twist(3, -6:n), source=0.0_wp)
+    allocate (contacts%inverse_mass(-6:n), contacts%inverse_inertia(3, 3, -6:n), source=0.0_wp)
+    allocate (contacts%response%frequency2(-6:n), source=0.0_wp)
+    call reserve_springs(1, contacts%springs)
+    call reserve_springs(1, contacts%before)
+  end subroutine contacts_init
+
+  !> Move the blocks through one fluid step under gravity, the last fluid forces and contact.
+  !!
+  !! The mean contact forces and torques of the step are left in `blocks`, and v and l at its start in
+  !! `v_start` and `l_start`.
+  subroutine move_blocks(walls, gravity, dt, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(out) :: report
+    real(wp) :: left, dt_b, limit
+
+    call begin_step(blocks)
+    contacts%impulse = 0.0_wp
+    contacts%twist = 0.0_wp
+    contacts%n_met = 0
+    call know_partners(walls, blocks, contacts)
+    call find_touches(walls, blocks, contacts)
+    left = dt
+    do while (left > 0.0_wp)
+      limit = substep_limit(contacts, blocks, dt)
+      if (.not. left < limit*real(most_substeps, wp)) then
+        report%info = 1
+        return
+      end if
+      dt_b = left/real(max(1, ceiling(left/limit*(1.0_wp - 1.0e-9_wp))), wp)
+      left = merge(left - dt_b, 0.0_wp, dt_b < left)
+      report%substeps = report%substeps + 1
+      call substep(walls, gravity, dt_b, contacts, blocks, report)
+    end do
+    blocks%contact_force = contacts%impulse(:, 1:)/dt
+    blocks%contact_torque = contacts%twist(:, 1:)/dt
+    call count_partners(contacts, blocks)
+    call find_touches(walls, blocks, contacts)
+    report%energy = elastic_energy(contacts)
+  end subroutine move_blocks
+
+  !> One substep: half drift, contact, half drift.
+  subroutine substep(walls, gravity, dt_b, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3), dt_b   !! [m/s2, s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(inout) :: report
+
+    call drift(0.5_wp*dt_b, blocks)
+    call find_touches(walls, blocks, contacts)
+    call note_partners(contacts)
+    call match_springs(contacts)
+    call know_motion(blocks, contacts)
+    call stretch_springs(0.5_wp*dt_b, contacts)
+    call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
+    call know_motion(blocks, contacts)
+    call sum_forces(dt_b, contacts, report)
+    contacts%impulse = contacts%impulse + dt_b*contacts%force
+    contacts%twist = contacts%twist + dt_b*contacts%torque
+    call kick([0.0_wp, 0.0_wp, 0.0_wp], dt_b, contacts%force(:, 1:), contacts%torque(:, 1:), blocks)
+    call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
+    call know_motion(blocks, contacts)
+    call stretch_springs(0.5_wp*dt_b, contacts)
+    call drift(0.5_wp*dt_b, blocks)
+  end subroutine substep
+
+  !> Longest substep allowed now [s].
+  !!
+  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the Courant limit of eq. (6)
+  !! with the highest relative speed any two bodies can have, and the stability limit: the highest
+  !! frequency of the touching bodies is no higher than the sum over the pairs of two touching bodies.
+  pure function substep_limit(contacts, blocks, dt) result(limit)
+    type(contacts_t), intent(in) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: dt   !! fluid step [s]
+    real(wp) :: limit
+    real(wp), parameter :: stable = 0.5_wp   !! frequency times substep; 2 is the bound of stability
+    real(wp) :: speed, fastest(2), highest, pair
+    integer :: b, t
+
+    limit = min(contacts%substep_ratio*dt, contacts%longest_substep)
+    fastest = 0.0_wp
+    do b = 1, blocks%n
+      if (.not. blocks%present(b)) cycle
+      speed = norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b))*contacts%spheres%reach(b)
+      if (.not. speed <= fastest(2)) fastest(2) = speed
+      if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
+    end do
+    speed = sum(fastest)
+    if (.not. speed*limit <= contacts%courant_max*contacts%spheres%smallest) &
+      limit = contacts%courant_max*contacts%spheres%smallest/speed
+    highest = 0.0_wp
+    associate (touches => contacts%touches, f2 => contacts%response%frequency2)
+      do t = 1, touches%n
+        pair = contacts%response%pair_frequency2(t)
+        highest = max(highest, pair + max(0.0_wp, f2(touches%a(t)) - pair) + max(0.0_wp, f2(touches%b(t)) - pair))
+      end do
+    end associate
+    if (highest*limit**2 > stable**2) limit = stable/sqrt(highest)
+  end function substep_limit
+
+  !> Masses of all partners and the velocity of the walls.
+  pure subroutine know_partners(walls, blocks, contacts)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: w, b
+
+    do w = 1, walls%n
+      contacts%v(:, walls%number(w)) = walls%velocity(:, w)
+    end do
+    do b = 1, blocks%n
+      contacts%inverse_mass(b) = merge(0.0_wp, 1.0_wp/blocks%mass(b), blocks%fixed(b))
+    end do
+  end subroutine know_partners
+
+  !> Velocities of the bodies as partners.
+  pure subroutine know_motion(blocks, contacts)
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+
+    contacts%v(:, 1:) = blocks%v
+    contacts%omega(:, 1:) = blocks%omega
+  end subroutine know_motion
+
+  !> Find what touches at the present poses, and how each touch responds.
+  subroutine find_touches(walls, blocks, contacts)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: b, first, last
+
+    call find_sphere_touches(walls, blocks, contacts%spheres, contacts%touches)
+    call form_groups(contacts%touches, contacts%groups)
+    contacts%response%frequency2 = 0.0_wp
+    if (contacts%touches%n == 0) return
+    do b = 1, blocks%n
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      contacts%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), blocks%inverse_inertia(:, :, blocks%shape(b)))
+    end do
+    associate (r => contacts%response, n => contacts%touches%n)
+      call reserve(n, r%k)
+      call reserve(n, r%eta)
+      call reserve(n, r%decay)
+      call reserve(n, r%pair_frequency2)
+    end associate
+    first = 1
+    do while (first <= contacts%touches%n)
+      last = last_of_pair(contacts%touches, first)
+      call respond(first, last, contacts)
+      first = last + 1
+    end do
+  end subroutine find_touches
+
+  !> Last touch of the pair of bodies whose first touch is given.
+  pure function last_of_pair(touches, first) result(last)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first
+    integer :: last
+
+    do last = first, touches%n - 1
+      if (touches%a(last + 1) /= touches%a(first) .or. touches%b(last + 1) /= touches%b(first)) return
+    end do
+    last = touches%n
+  end function last_of_pair
+
+  !> Stiffness and damping of the touches `first:last` of one pair of bodies.
+  !!
+  !! Stiffness belongs to each touch alone. Damping is shared: N touches that act together must damp
+  !! like one. Seen along the normal n_i of touch i the pair has the stiffness
+  !! K_i = sum_j k_j (n_i.n_j)^2 and, at the mean of the contact points with the same weights, the
+  !! effective mass m_i; then eta_i = (k_i/K_i) 2 zeta sqrt(K_i m_i).
+  pure subroutine respond(first, last, contacts)
+    integer, intent(in) :: first, last
+    type(contacts_t), intent(inout) :: contacts
+    real(wp) :: weights(6), points(3, 6), nn(6), arm(3), total, inverse, k, omega2, highest, stiffness
+    integer :: a, b, t
+
+    associate (touches => contacts%touches, law => contacts%law, r => contacts%response)
+      a = touches%a(first)
+      b = touches%b(first)
+      k = normal_constant(law, 1.0_wp/(contacts%inverse_mass(a) + contacts%inverse_mass(b)))
+      weights = 0.0_wp
+      points = 0.0_wp
+      do t = first, last
+        nn = touches%weight(t)*square(touches%normal(:, t))
+        weights = weights + nn
+        points = points + spread(touches%arm_a(:, t), 2, 6)*spread(nn, 1, 3)
+      end do
+      highest = 0.0_wp
+      do t = first, last
+        nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
+        total = dot_product(nn, weights)
+        arm = matmul(points, nn)/total
+        inverse = inverse_effective_mass(contacts, a, arm, touches%normal(:, t)) &
+          + inverse_effective_mass(contacts, b, arm + (touches%arm_b(:, t) - touches%arm_a(:, t)), touches%normal(:, t))
+        stiffness = k*law%gamma_n*touches%depth(t)**(law%gamma_n - 1.0_wp)
+        omega2 = stiffness*total*inverse
+        r%k(t) = touches%weight(t)*k
+        if (law%constants) then
+          r%eta(t) = touches%weight(t)*law%eta_n
+          r%decay(t) = 0.5_wp*law%eta_n*total*inverse
+        else
+          r%eta(t) = r%k(t)*2*law%damping_ratio/sqrt(omega2)
+          r%decay(t) = law%damping_ratio*sqrt(omega2)
+        end if
+        highest = max(highest, omega2)
+      end do
+      r%pair_frequency2(first:last) = highest
+      if (contacts%inverse_mass(a) > 0.0_wp) r%frequency2(a) = r%frequency2(a) + highest
+      if (contacts%inverse_mass(b) > 0.0_wp) r%frequency2(b) = r%frequency2(b) + highest
+    end associate
+  end subroutine respond
+
+  !> The products n_x n_x, n_y n_y, n_z n_z, n_y n_z, n_z n_x, n_x n_y.
+  pure function square(n) result(nn)
+    real(wp), intent(in) :: n(3)
+    real(wp) :: nn(6)
+
+    nn = [n*n, n([2, 3, 1])*n([3, 1, 2])]
+  end function square
+
+  !> One over the mass a partner sets against a push along n at the given arm [1/kg].
+  pure function inverse_effective_mass(contacts, b, arm, n) result(inverse)
+    type(contacts_t), intent(in) :: contacts
+    integer, intent(in) :: b
+    real(wp), intent(in) :: arm(3), n(3)
+    real(wp) :: inverse
+    real(wp) :: lever(3)
+
+    inverse = contacts%inverse_mass(b)
+    if (inverse <= 0.0_wp) return
+    lever = cross(arm, n)
+    inverse = inverse + dot_product(lever, matmul(contacts%inverse_inertia(:, :, b), lever))
+  end function inverse_effective_mass
+
+  !> Gather the touches of each key and partner; mean normal and point weighted by overlap.
+  subroutine form_groups(touches, groups)
+    type(touch_t), intent(in) :: touches
+    type(groups_t), intent(inout) :: groups
+    real(wp) :: w, total
+    integer :: t, g, last
+
+    groups%n = 0
+    call reserve(touches%n + 1, groups%first)
+    call reserve(touches%n, groups%normal)
+    call reserve(touches%n, groups%arm_a)
+    call reserve(touches%n, groups%arm_b)
+    t = 1
+    do while (t <= touches%n)
+      g = groups%n + 1
+      groups%n = g
+      groups%first(g) = t
+      do last = t, touches%n - 1
+        if (touches%key(last + 1) /= touches%key(t) .or. touches%b(last + 1) /= touches%b(t) &
+          .or. touches%a(last + 1) /= touches%a(t)) exit
+      end do
+      groups%normal(:, g) = touches%normal(:, t)
+      groups%arm_a(:, g) = touches%arm_a(:, t)
+      groups%arm_b(:, g) = touches%arm_b(:, t)
+      if (last > t) then
+        total = sum(touches%weight(t:last)*touches%depth(t:last))
+        groups%arm_a(:, g) = matmul(touches%arm_a(:, t:last), touches%weight(t:last)*touches%depth(t:last))/total
+        groups%arm_b(:, g) = groups%arm_a(:, g) + (touches%arm_b(:, t) - touches%arm_a(:, t))
+        groups%normal(:, g) = matmul(touches%normal(:, t:last), touches%weight(t:last)*touches%depth(t:last))
+        w = norm2(groups%normal(:, g))
+        if (w > epsilon(w)*total) then
+          groups%normal(:, g) = groups%normal(:, g)/w
+        else
+          groups%normal(:, g) = touches%normal(:, t)
+        end if
+      end if
+      t = last + 1
+    end do
+    groups%first(groups%n + 1) = touches%n + 1
+  end subroutine form_groups
+
+  !> Give each group its spring: the one in memory turned into the present tangent plane, or a new one.
+  subroutine match_springs(contacts)
+    type(contacts_t), intent(inout) :: contacts
+    integer :: g, m, t
+
+    associate (touches => contacts%touches, groups => contacts%groups, old => contacts%before, new => contacts%springs)
+      call reserve_springs(new%n, old)
+      old%n = new%n
+      old%a(:old%n) = new%a(:old%n)
+      old%b(:old%n) = new%b(:old%n)
+      old%key(:old%n) = new%key(:old%n)
+      old%xi(:, :old%n) = new%xi(:, :old%n)
+      call reserve_springs(groups%n, new)
+      new%n = groups%n
+      m = 1
+      do g = 1, groups%n
+        t = groups%first(g)
+        new%a(g) = touches%a(t)
+        new%b(g) = touches%b(t)
+        new%key(g) = touches%key(t)
+        new%xi(:, g) = 0.0_wp
+        do while (m <= old%n)
+          if (.not. comes_before(old%a(m), old%b(m), old%key(m), new%a(g), new%b(g), new%key(g))) exit
+          m = m + 1
+        end do
+        if (m > old%n) cycle
+        if (old%a(m) == new%a(g) .and. old%b(m) == new%b(g) .and. old%key(m) == new%key(g)) &
+          new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
+      end do
+    end associate
+  end subroutine match_springs
+
+  !> Order of springs and touches: by body, partner, key.
+  pure function comes_before(a1, b1, key1, a2, b2, key2) result(yes)
+    integer, intent(in) :: a1, b1, key1, a2, b2, key2
+    logical :: yes
+
+    if (a1 /= a2) then
+      yes = a1 < a2
+    else if (b1 /= b2) then
+      yes = b1 < b2
+    else
+      yes = key1 < key2
+    end if
+  end function comes_before
+
+  !> The vector xi turned into the plane normal to n, its length kept.
+  pure function turned_into_plane(xi, n) result(turned)
+    real(wp), intent(in) :: xi(3), n(3)
+    real(wp) :: turned(3)
+    real(wp) :: length
+
+    turned = xi - dot_product(xi, n)*n
+    length = norm2(turned)
+    if (length > 0.0_wp) turned = turned*(norm2(xi)/length)
+  end function turned_into_plane
+
+  !> Let the springs follow the present tangential velocities for a time dt.
+  pure subroutine stretch_springs(dt, contacts)
+    real(wp), intent(in) :: dt   !! [s]
+    type(contacts_t), intent(inout) :: contacts
+    real(wp) :: v(3)
+    integer :: g
+
+    associate (groups => contacts%groups, springs => contacts%springs)
+      do g = 1, groups%n
+        v = relative_velocity(contacts, springs%a(g), springs%b(g), groups%arm_a(:, g), groups%arm_b(:, g))
+        springs%xi(:, g) = springs%xi(:, g) + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
+      end do
+    end associate
+  end subroutine stretch_springs
+
+  !> Velocity of partner b relative to body a at a contact: v_r of the paper, partner minus self [m/s].
+  pure function relative_velocity(contacts, a, b, arm_a, arm_b) result(v)
+    type(contacts_t), intent(in) :: contacts
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
+    real(wp) :: v(3)
+
+    v = (contacts%v(:, b) + cross(contacts%omega(:, b), arm_b)) &
+      - (contacts%v(:, a) + cross(contacts%omega(:, a), arm_a))
+  end function relative_velocity
+
+  !> Contact forces and torques of this substep on all bodies.
+  !!
+  !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
+  !! F = (k d - eta v_n)/(1 + eta dt/(2 m)), the implicit midpoint rule.
+  pure subroutine sum_forces(dt, contacts, report)
+    real(wp), intent(in) :: dt   !! [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(contact_report_t), intent(inout) :: report
+    real(wp) :: v(3), normal(3), v_n, force_n, sum_n, decay, eta
+    integer :: g, t, a, b
+
+    contacts%force = 0.0_wp
+    contacts%torque = 0.0_wp
+    associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, r => contacts%response)
+      do g = 1, groups%n
+        a = touches%a(groups%first(g))
+        b = touches%b(groups%first(g))
+        sum_n = 0.0_wp
+        decay = 0.0_wp
+        eta = 0.0_wp
+        do t = groups%first(g), groups%first(g + 1) - 1
+          normal = touches%normal(:, t)
+          v = relative_velocity(contacts, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
+          v_n = dot_product(v, normal)
+          force_n = normal_force(r%k(t), law%gamma_n, r%eta(t), touches%depth(t), v_n)/(1.0_wp + r%decay(t)*dt)
+          call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
+          sum_n = sum_n + force_n
+          decay = max(decay, r%decay(t))
+          eta = max(eta, r%eta(t))
+          report%courant_max = max(report%courant_max, abs(v_n)*dt/touches%length(t))
+          report%overlap_max = max(report%overlap_max, touches%depth(t))
+        end do
+        call rub(g, sum_n, eta, 1.0_wp + decay*dt, contacts)
+      end do
+    end associate
+  end subroutine sum_forces
+
+  !> Tangential force of one group, no larger than friction allows.
+  pure subroutine rub(g, force_n, eta_n, implicit, contacts)
+    integer, intent(in) :: g
+    real(wp), intent(in) :: force_n    !! sum of the normal forces [N]
+    real(wp), intent(in) :: eta_n      !! normal damping of the group [N s/m]
+    real(wp), intent(in) :: implicit   !! 1 + eta dt/(2 m): damping acts in the middle of the substep
+    type(contacts_t), intent(inout) :: contacts
+    real(wp) :: v(3), f(3), k, k_n, eta, bound, size_f
+    integer :: t, a, b
+
+    associate (groups => contacts%groups, springs => contacts%springs, law => contacts%law)
+      a = springs%a(g)
+      b = springs%b(g)
+      t = groups%first(g)
+      k_n = contacts%response%k(t)
+      k = tangential_constant(law, k_n, contacts%touches%weight(t))
+      springs%k(g) = k
+      eta = contacts%touches%weight(t)*law%eta_t
+      if (.not. law%constants) eta = eta_n*(k/k_n)
+      bound = force_n*merge(law%wall_friction, law%friction, b < 0)
+      v = relative_velocity(contacts, a, b, groups%arm_a(:, g), groups%arm_b(:, g))
+      v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
+      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/implicit
+      size_f = norm2(f)
+      if (size_f > bound) then
+        f = f*(bound/size_f)
+        springs%xi(:, g) = tangential_slip(k, law%gamma_t, eta, f*implicit, v)
+      end if
+      call act(a, b, f, groups%arm_a(:, g), groups%arm_b(:, g), contacts)
+    end associate
+  end subroutine rub
+
+  !> A force on body a at a contact, and its reaction on partner b.
+  pure subroutine act(a, b, f, arm_a, arm_b, contacts)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: f(3), arm_a(3), arm_b(3)   !! [N], [m]
+    type(contacts_t), intent(inout) :: contacts
+
+    contacts%force(:, a) = contacts%force(:, a) + f
+    contacts%force(:, b) = contacts%force(:, b) - f
+    contacts%torque(:, a) = contacts%torque(:, a) + cross(arm_a, f)
+    contacts%torque(:, b) = contacts%torque(:, b) - cross(arm_b, f)
+  end subroutine act
+
+  !> Energy in the normal springs at the present poses and in the tangential springs [J].
+  pure function elastic_energy(contacts) result(energy)
+    type(contacts_t), intent(in) :: contacts
+    real(wp) :: energy
+    integer :: t, g
+
+    energy = 0.0_wp
+    associate (touches => contacts%touches, r => contacts%response, law => contacts%law, springs => contacts%springs)
+      do t = 1, touches%n
+        energy = energy + stored_energy(r%k(t), law%gamma_n, touches%depth(t))
+      end do
+      do g = 1, springs%n
+        energy = energy + stored_energy(springs%k(g), law%gamma_t, norm2(springs%xi(:, g)))
+      end do
+    end associate
+  end function elastic_energy
+
+  !> Add the pairs that touch now to those that touched in this step.
+  subroutine note_partners(contacts)
+    type(contacts_t), intent(inout) :: contacts
+    integer :: t, m, a, b
+
+    associate (touches => contacts%touches)
+      m = 1
+      t = 1
+      do while (t <= touches%n)
+        a = touches%a(t)
+        b = touches%b(t)
+        do while (m <= contacts%n_met)
+          if (.not. comes_before(contacts%met_a(m), contacts%met_b(m), 0, a, b, 0)) exit
+          m = m + 1
+        end do
+        if (.not. met(contacts, m, a, b)) then
+          call reserve(contacts%n_met + 1, contacts%met_a)
+          call reserve(contacts%n_met + 1, contacts%met_b)
+          contacts%met_a(m + 1:contacts%n_met + 1) = contacts%met_a(m:contacts%n_met)
+          contacts%met_b(m + 1:contacts%n_met + 1) = contacts%met_b(m:contacts%n_met)
+          contacts%met_a(m) = a
+          contacts%met_b(m) = b
+          contacts%n_met = contacts%n_met + 1
+        end if
+        t = last_of_pair(touches, t) + 1
+      end do
+    end associate
+  end subroutine note_partners
+
+  !> Whether entry m of the pairs met is the pair (a, b).
+  pure function met(contacts, m, a, b) result(yes)
+    type(contacts_t), intent(in) :: contacts
+    integer, intent(in) :: m, a, b
+    logical :: yes
+
+    yes = m <= contacts%n_met
+    if (yes) yes = contacts%met_a(m) == a .and. contacts%met_b(m) == b
+  end function met
+
+  !> Number of partners each body met in this step, and whether the floor was one of them.
+  pure subroutine count_partners(contacts, blocks)
+    type(contacts_t), intent(in) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    integer :: m, a, b
+
+    blocks%contacts = 0
+    blocks%on_floor = 0
+    do m = 1, contacts%n_met
+      a = contacts%met_a(m)
+      b = contacts%met_b(m)
+      blocks%contacts(a) = blocks%contacts(a) + 1
+      if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
+      if (b == floor_wall) blocks%on_floor(a) = 1
+    end do
+  end subroutine count_partners
+
+  !> Make room for at least n springs.
+  subroutine reserve_springs(n, springs)
+    integer, intent(in) :: n
+    type(springs_t), intent(inout) :: springs
+
+    call reserve(n, springs%a)
+    call reserve(n, springs%b)
+    call reserve(n, springs%key)
+    call reserve(n, springs%k)
+    call reserve(n, springs%xi)
+  end subroutine reserve_springs
+
+end module contacts_m

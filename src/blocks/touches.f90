@@ -1,0 +1,42 @@
+!> The one list of touches that every contact model fills and the contact forces are worked out from.
+module touches_m
+  use kinds_m, only: wp
+  use neighbours_m, only: reserve
+  implicit none
+  private
+  public :: touch_t, reserve_touches
+
+  !> Touches of one moment, sorted by a, then b, then key.
+  !!
+  !! Body a has a higher number than its partner b: another body, or a wall (-6..-1, see `walls_m`).
+  type :: touch_t
+    integer :: n = 0
+    integer, allocatable :: a(:), b(:)     !! (n) body and partner
+    integer, allocatable :: key(:)         !! (n) the touching sphere or surface point of a; of b: negative
+    real(wp), allocatable :: arm_a(:, :)   !! (3, n) from the centre of a to the contact [m]
+    real(wp), allocatable :: arm_b(:, :)   !! (3, n) from the centre of b (its nearest image) to the contact [m]
+    real(wp), allocatable :: normal(:, :)  !! (3, n) unit vector from a to b [-]
+    real(wp), allocatable :: depth(:)      !! (n) overlap d_n > 0 [m]
+    real(wp), allocatable :: weight(:)     !! (n) share of the stiffness of the law that acts here [-]
+    real(wp), allocatable :: length(:)     !! (n) d_s of the contact Courant number, eq. (6) [m]
+  end type touch_t
+
+contains
+
+  !> Make room for at least n touches.
+  subroutine reserve_touches(n, touches)
+    integer, intent(in) :: n
+    type(touch_t), intent(inout) :: touches
+
+    call reserve(n, touches%a)
+    call reserve(n, touches%b)
+    call reserve(n, touches%key)
+    call reserve(n, touches%arm_a)
+    call reserve(n, touches%arm_b)
+    call reserve(n, touches%normal)
+    call reserve(n, touches%depth)
+    call reserve(n, touches%weight)
+    call reserve(n, touches%length)
+  end subroutine reserve_touches
+
+end module touches_m

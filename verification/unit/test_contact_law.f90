@@ -1,0 +1,101 @@
+!> The contact law: closed form of the impact, its inversion, forces of one touch.
+program test_contact_law
+  use kinds_m, only: wp, pi
+  use check_m, only: check, finish_checks
+  use case_types_m, only: contact_input_t
+  use contact_law_m, only: contact_law_t, contact_law_init, restitution_of, impact_duration, &
+    damping_ratio_of, normal_constant, tangential_constant, stored_energy, &
+    normal_force, tangential_force, tangential_slip
+  implicit none
+
+  call check_closed_form()
+  call check_integrated_impact()
+  call check_constants()
+  call check_forces()
+  call finish_checks()
+
+contains
+
+  !> Model B (never pulls) of the reference table D2_linear_spring_dashpot.csv, integrated there.
+  subroutine check_closed_form()
+    real(wp), parameter :: zeta(7) = [0.01_wp, 0.1_wp, 0.2_wp, 0.3_wp, 0.5_wp, 0.7_wp, 0.9_wp]
+    real(wp), parameter :: e(7) = [0.9692647505_wp, 0.7440793977_wp, 0.5717400276_wp, &
+      0.4509754529_wp, 0.2984360592_wp, 0.2102845644_wp, 0.1552827475_wp]
+    real(wp), parameter :: t(7) = [3.1217484116_wp, 2.9560753247_wp, 2.7953544407_wp, &
+      2.6544745638_wp, 2.4183991523_wp, 2.2275622815_wp, 2.0694529405_wp]
+    real(wp), parameter :: asked(6) = [0.02_wp, 0.1_wp, 0.3_wp, 0.5_wp, 0.9_wp, 0.999_wp]
+
+    call check('restitution of the table', maxval(abs(restitution_of(zeta) - e)), 0.0_wp, 1.0e-10_wp)
+    call check('duration of the table', maxval(abs(impact_duration(zeta) - t)), 0.0_wp, 1.0e-9_wp)
+    call check('undamped duration', impact_duration(0.0_wp), pi, 1.0e-14_wp)
+    call check('critical damping', restitution_of(1.0_wp), exp(-2.0_wp), 1.0e-15_wp)
+    call check('smooth at zeta = 1', maxval(abs(restitution_of([1.0_wp - 1.0e-6_wp, 1.0_wp + 1.0e-6_wp]) &
+      - exp(-2.0_wp)*(1.0_wp - [-1, 1]*4.0e-6_wp/3))), 0.0_wp, 1.0e-11_wp)
+    call check('the inverse is one', maxval(abs(restitution_of(damping_ratio_of(asked)) - asked)), &
+      0.0_wp, 1.0e-13_wp)
+    call check('e = 0.1 is overdamped', damping_ratio_of(0.1_wp), 1.243_wp, 1.0e-3_wp)
+    call check('no damping at e = 1', damping_ratio_of(1.0_wp) <= 0.0_wp)
+  end subroutine check_closed_form
+
+  !> The closed form against an impact followed in small steps with the force of the law itself.
+  subroutine check_integrated_impact()
+    real(wp), parameter :: zeta(3) = [0.4_wp, 1.0_wp, 3.0_wp]
+    integer, parameter :: steps = 40000
+    real(wp) :: d, v, f, dt
+    integer :: i, m
+
+    do m = 1, size(zeta)
+      dt = 4.0_wp/real(steps, wp)
+      d = 0.0_wp
+      v = 1.0_wp
+      do i = 1, steps
+        d = d + 0.5_wp*dt*v
+        f = normal_force(1.0_wp, 1.0_wp, 2*zeta(m), d, -v)
+        v = v - dt*f/(1.0_wp + merge(zeta(m)*dt, 0.0_wp, f > 0.0_wp))
+        d = d + 0.5_wp*dt*v
+      end do
+      call check('impact followed in time', -v, restitution_of(zeta(m)), 1.0e-4_wp)
+    end do
+  end subroutine check_integrated_impact
+
+  !> Stiffness and damping found from restitution and contact time, and constants as given.
+  subroutine check_constants()
+    type(contact_input_t) :: input
+    type(contact_law_t) :: law
+    real(wp) :: k
+
+    input%restitution = 1.0_wp
+    input%contact_time = 1.0e-3_wp
+    call contact_law_init(input, law)
+    k = normal_constant(law, 0.25_wp)
+    call check('half a period is the contact time', pi*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
+    input%restitution = 0.3_wp
+    call contact_law_init(input, law)
+    k = normal_constant(law, 0.25_wp)
+    call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
+    call check('tangential stiffness', tangential_constant(law, k, 1.0_wp), 2*k/7, 1.0e-9_wp*k)
+    input%law = 'constants'
+    call contact_law_init(input, law)
+    call check('given k_n', normal_constant(law, 0.25_wp), input%k_n, 0.0_wp)
+    call check('given k_t', tangential_constant(law, 5.0_wp, 0.5_wp), 0.5_wp*input%k_t, 0.0_wp)
+  end subroutine check_constants
+
+  !> Equations (1) and (2) for one touch.
+  subroutine check_forces()
+    real(wp) :: f(3), xi(3), v(3)
+
+    call check('spring alone', normal_force(1.0e5_wp, 1.5_wp, 10.0_wp, 1.0e-4_wp, 0.0_wp), 0.1_wp, 1.0e-15_wp)
+    call check('closing adds', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, -0.2_wp), 12.0_wp, 1.0e-13_wp)
+    call check('never pulls', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, 2.0_wp), 0.0_wp, 0.0_wp)
+    call check('energy of the spring', stored_energy(3.0_wp, 1.0_wp, 2.0_wp), 6.0_wp, 1.0e-15_wp)
+    xi = [3.0e-5_wp, -4.0e-5_wp, 0.0_wp]
+    v = [0.1_wp, 0.2_wp, 0.0_wp]
+    f = tangential_force(1.0e5_wp, 1.0_wp, 10.0_wp, xi, v)
+    call check('tangential force', maxval(abs(f - [4.0_wp, -2.0_wp, 0.0_wp])), 0.0_wp, 1.0e-13_wp)
+    f = tangential_force(1.0e5_wp, 1.5_wp, 0.0_wp, xi, v)
+    call check('its power law', norm2(f), 1.0e5_wp*(5.0e-5_wp)**1.5_wp, 1.0e-12_wp)
+    call check('slip undoes the force', maxval(abs(tangential_slip(1.0e5_wp, 1.5_wp, 2.0_wp, &
+      tangential_force(1.0e5_wp, 1.5_wp, 2.0_wp, xi, v), v) - xi)), 0.0_wp, 1.0e-17_wp)
+  end subroutine check_forces
+
+end program test_contact_law
