@@ -2,7 +2,7 @@
 !!
 !! A polyhedron is kept as its corners and, for each corner, the three corners it is joined to.
 !! Cutting by a plane decides once per corner (`n.x <= d` is kept, so nothing is lost or counted
-!! twice when corners lie on the plane), puts new corners on the edges that cross and closes the cut;
+!! twice when corners lie on the plane), puts new corners on the edges that cross and joins them;
 !! only signs enter the topology. Source: corner graph of Powell & Abel (2015), arXiv 1412.4941.
 module polyhedron_m
   use kinds_m, only: wp
@@ -26,7 +26,7 @@ module polyhedron_m
 
 contains
 
-  !> Volume of a tetrahedron, positive if 2, 3, 4 turn counter-clockwise as seen from opposite 1 [m3].
+  !> Volume of a tetrahedron, positive if 2, 3, 4 turn clockwise as seen from 1 [m3].
   pure function tet_volume(corner) result(volume)
     real(wp), intent(in) :: corner(3, 4)   !! [m]
     real(wp) :: volume
@@ -70,7 +70,7 @@ contains
     end do
   end subroutine sort_by_side
 
-  !> Share of the edge from a corner at height a up to one at height b that lies below the plane [-].
+  !> Share below the plane of the edge from height a up to height b [-].
   pure function share_below(a, b) result(t)
     real(wp), intent(in) :: a   !! <= 0
     real(wp), intent(in) :: b   !! > 0
@@ -232,7 +232,7 @@ contains
     end do
   end subroutine cut_polyhedron_by_box
 
-  !> Remove the corners of positive height: new corners where edges cross zero, joined by a new face.
+  !> Remove the corners of positive height; new corners where edges cross zero, joined in a face.
   pure subroutine cut_at_heights(p, s)
     type(polyhedron_t), intent(inout) :: p
     real(wp), intent(in) :: s(max_corners)   !! height of each corner above the plane [any]

@@ -5,21 +5,76 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t
+  public :: shape_t, surface_of_tets
 
   type :: shape_t
     character(name_length) :: name = '', kind = ''
     real(wp) :: density = 0.0_wp               !! [kg/m3]
     real(wp) :: volume = 0.0_wp                !! [m3]
     real(wp) :: inertia(3, 3) = 0.0_wp         !! about the centroid, body axes [kg m2]
-    real(wp) :: radius = 0.0_wp                !! of the sphere about the centroid that holds the block [m]
-    real(wp) :: smallest_edge = 0.0_wp         !! [m]
+    real(wp) :: radius = 0.0_wp                !! of the sphere about the centroid that holds the
+                                               !! block and its contact spheres [m]
+    real(wp) :: smallest_edge = 0.0_wp         !! of the form, not of its tetrahedra; sphere:
+                                               !! its diameter [m]
     real(wp), allocatable :: point(:, :)       !! (3, n) corners relative to the centroid [m]
     integer, allocatable :: tet(:, :)          !! (4, n) corners, positive volume
-    integer, allocatable :: triangle(:, :)     !! (3, n) surface, seen counter-clockwise from outside
+    integer, allocatable :: triangle(:, :)     !! (3, n) surface, counter-clockwise from outside
     integer, allocatable :: triangle_tet(:)    !! (n) the tetrahedron behind each surface triangle
+    !> The same body in the fewest parts, for the flow: tetrahedra (4, n), and the surface as closed
+    !! net of flat convex polygons. Polygon m has the corners `facet_point(facet(m):facet(m+1)-1)`,
+    !! counter-clockwise from outside; each edge belongs to two polygons.
+    integer, allocatable :: flow_tet(:, :)
+    integer, allocatable :: facet(:), facet_point(:)
     real(wp), allocatable :: sphere_centre(:, :)  !! (3, n) contact spheres [m]
     real(wp), allocatable :: sphere_radius(:)     !! (n) [m]
   end type shape_t
+
+  !> Corners of the face opposite each corner of a tetrahedron of positive volume, outward.
+  integer, parameter :: opposite(3, 4) = reshape([2, 3, 4, 1, 4, 3, 1, 2, 4, 1, 3, 2], [3, 4])
+
+contains
+
+  !> The faces that belong to one tetrahedron only, and that tetrahedron.
+  pure subroutine surface_of_tets(n_point, tet, triangle, triangle_tet)
+    integer, intent(in) :: n_point
+    integer, intent(in) :: tet(:, :)                  !! (4, n), positive volume
+    integer, allocatable, intent(out) :: triangle(:, :)   !! (3, m) counter-clockwise from outside
+    integer, allocatable, intent(out) :: triangle_tet(:)  !! (m)
+    integer :: face(3, 4*size(tet, 2)), next(4*size(tet, 2)), head(n_point)
+    logical :: single(4*size(tet, 2))
+    integer :: f, g, m
+
+    head = 0       ! faces are chained by their smallest corner
+    single = .true.
+    do f = 1, size(face, 2)
+      face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
+      m = minval(face(:, f))
+      g = head(m)
+      do while (g > 0)
+        if (same_corners(face(:, f), face(:, g))) then
+          single(f) = .false.
+          single(g) = .false.
+        end if
+        g = next(g)
+      end do
+      next(f) = head(m)
+      head(m) = f
+    end do
+    allocate (triangle(3, count(single)), triangle_tet(count(single)))
+    m = 0
+    do f = 1, size(face, 2)
+      if (.not. single(f)) cycle
+      m = m + 1
+      triangle(:, m) = face(:, f)
+      triangle_tet(m) = (f - 1)/4 + 1
+    end do
+  end subroutine surface_of_tets
+
+  pure function same_corners(a, b) result(same)
+    integer, intent(in) :: a(3), b(3)
+    logical :: same
+
+    same = any(a(1) == b) .and. any(a(2) == b) .and. any(a(3) == b)
+  end function same_corners
 
 end module tet_mesh_m

@@ -1,0 +1,305 @@
+!> The built-in blocks as tetrahedra: hexapod, cube, box, sphere.
+!!
+!! Blocks made of cubes are cut into smaller cuboids and each of these into five tetrahedra,
+!! mirrored from one to the next so that they fit. With an even `refinement` the cut has every
+!! symmetry of the cube, with an odd one those of the regular tetrahedron.
+module shapes_builtin_m
+  use kinds_m, only: wp, pi
+  use case_types_m, only: shape_input_t
+  use tet_mesh_m, only: shape_t, surface_of_tets
+  use vectors_m, only: cross
+  use mass_properties_m, only: volume_and_centroid, inertia_about_origin
+  use contact_sphere_placement_m, only: place_at_centroids, place_one_sphere
+  implicit none
+  private
+  public :: make_shape, max_refinement
+
+  integer, parameter :: max_refinement = 8
+  integer, parameter :: sphere_frequency = 4   !! parts of an icosahedron edge per refinement
+
+  !> The five tetrahedra of a cuboid; corner 1 + a + 2b + 4c is the upper one in x, y, z where
+  !! a, b, c = 1. The second set is the mirror image, for every other cuboid.
+  integer, parameter :: five_tets(4, 5, 0:1) = reshape([ &
+    1, 2, 3, 5, 4, 3, 2, 8, 6, 2, 5, 8, 7, 5, 3, 8, 2, 3, 5, 8, &
+    2, 1, 6, 4, 3, 1, 4, 7, 5, 1, 7, 6, 8, 6, 7, 4, 1, 4, 7, 6], [4, 5, 2])
+
+  !> Corners of the lower and upper face of a cuboid in each direction, outward.
+  integer, parameter :: cuboid_face(4, 2, 3) = reshape([ &
+    1, 5, 7, 3, 2, 4, 8, 6, 1, 2, 6, 5, 3, 7, 8, 4, 1, 3, 4, 2, 5, 6, 8, 7], [4, 2, 3])
+
+contains
+
+  !> The block a `&shape` group asks for; `message` is empty, or says what is wrong.
+  subroutine make_shape(input, shape, message)
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(out) :: shape
+    character(:), allocatable, intent(out) :: message
+    integer, parameter :: single(1, 1, 1) = 1
+
+    message = problem_with(input)
+    if (len(message) > 0) return
+    shape%name = input%name
+    shape%kind = input%kind
+    shape%density = input%density
+    select case (trim(input%kind))
+    case ('hexapod')
+      call build_cuboids(hexapod_cubes(), spread(input%size(1), 1, 3), &
+                         input%refinement*[1, 1, 1], shape)
+      shape%smallest_edge = input%size(1)
+    case ('cube')
+      call build_cuboids(single, spread(input%size(1), 1, 3), input%refinement*[1, 1, 1], shape)
+      shape%smallest_edge = input%size(1)
+    case ('box')
+      call build_cuboids(single, input%size, &
+                         input%refinement*max(1, nint(input%size/minval(input%size))), shape)
+      shape%smallest_edge = minval(input%size)
+    case ('sphere')
+      call build_sphere(0.5_wp*input%size(1), sphere_frequency*input%refinement, shape)
+      shape%smallest_edge = input%size(1)
+    end select
+    call finish_shape(shape)
+    if (trim(input%kind) == 'sphere') then
+      call place_one_sphere(0.5_wp*input%size(1), shape)
+    else
+      call place_at_centroids(shape)
+    end if
+    shape%radius = max(maxval(norm2(shape%point, 1)), &
+                       maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius))
+  end subroutine make_shape
+
+  !> What is wrong with a `&shape` group; empty if nothing is.
+  pure function problem_with(input) result(message)
+    type(shape_input_t), intent(in) :: input
+    character(:), allocatable :: message
+    integer :: n_size
+
+    message = ''
+    n_size = 1
+    select case (trim(input%kind))
+    case ('hexapod', 'cube', 'sphere')
+    case ('box')
+      n_size = 3
+    case ('cylinder', 'tetrapod', 'dolos', 'reef_cube', 'file')
+      message = 'kind = '''//trim(input%kind)//''' is not available yet'
+      return
+    case default
+      message = 'kind = '''//trim(input%kind)//''' is unknown: hexapod, cube, box or sphere'
+      return
+    end select
+    if (any(input%size(:n_size) <= 0.0_wp)) message = 'size must be positive [m]'
+    if (input%density <= 0.0_wp) message = 'density must be positive [kg/m3]'
+    if (input%refinement < 1 .or. input%refinement > max_refinement) &
+      message = 'refinement must be 1 to 8'
+    if (trim(input%spheres) /= 'centroid') &
+      message = 'spheres = '''//trim(input%spheres)//''' is not available yet'
+  end function problem_with
+
+  !> Occupied places of a hexapod in a block of 3 x 3 x 3 cubes.
+  pure function hexapod_cubes() result(full)
+    integer :: full(3, 3, 3)
+
+    full = 0
+    full(:, 2, 2) = 1
+    full(2, :, 2) = 1
+    full(2, 2, :) = 1
+  end function hexapod_cubes
+
+  !> Tetrahedra and facets of a body made of equal cuboids on a lattice, centred at the origin.
+  pure subroutine build_cuboids(full, edge, parts, shape)
+    integer, intent(in) :: full(:, :, :)   !! 1 where a cuboid stands
+    real(wp), intent(in) :: edge(3)        !! of a cuboid [m]
+    integer, intent(in) :: parts(3)        !! smaller cuboids along each edge
+    type(shape_t), intent(inout) :: shape
+    integer, allocatable :: number(:, :, :)
+    integer :: n(3), fine(3), i, j, k, m
+
+    n = [size(full, 1), size(full, 2), size(full, 3)]
+    fine = n*parts
+    allocate (number(0:fine(1), 0:fine(2), 0:fine(3)), source=0)
+    allocate (shape%tet(4, 5*sum(full)*product(parts)), shape%flow_tet(4, 5*sum(full)))
+    do k = 1, fine(3)
+      do j = 1, fine(2)
+        do i = 1, fine(1)
+          if (full(1 + (i - 1)/parts(1), 1 + (j - 1)/parts(2), 1 + (k - 1)/parts(3)) == 0) cycle
+          number(i - 1:i, j - 1:j, k - 1:k) = 1
+        end do
+      end do
+    end do
+    allocate (shape%point(3, sum(number)))
+    m = 0
+    do k = 0, fine(3)
+      do j = 0, fine(2)
+        do i = 0, fine(1)
+          if (number(i, j, k) == 0) cycle
+          m = m + 1
+          number(i, j, k) = m
+          shape%point(:, m) = edge*(real([i, j, k], wp)/real(parts, wp) - 0.5_wp*real(n, wp))
+        end do
+      end do
+    end do
+    call cut_into_tets(full, parts, number, shape%tet)
+    call cut_into_tets(full, [1, 1, 1], number(::parts(1), ::parts(2), ::parts(3)), shape%flow_tet)
+    call cuboid_facets(full, number(::parts(1), ::parts(2), ::parts(3)), shape)
+  end subroutine build_cuboids
+
+  !> Five tetrahedra in every part of the cuboids present.
+  pure subroutine cut_into_tets(full, parts, number, tet)
+    integer, intent(in) :: full(:, :, :), parts(3)
+    integer, intent(in) :: number(0:, 0:, 0:)   !! of the lattice points
+    integer, intent(out) :: tet(:, :)           !! (4, 5*parts present)
+    integer :: corner(8), i, j, k, m, t
+
+    m = 0
+    do k = 1, ubound(number, 3)
+      do j = 1, ubound(number, 2)
+        do i = 1, ubound(number, 1)
+          if (full(1 + (i - 1)/parts(1), 1 + (j - 1)/parts(2), 1 + (k - 1)/parts(3)) == 0) cycle
+          corner = reshape(number(i - 1:i, j - 1:j, k - 1:k), [8])
+          do t = 1, 5
+            m = m + 1
+            tet(:, m) = corner(five_tets(:, t, mod(i + j + k, 2)))
+          end do
+        end do
+      end do
+    end do
+  end subroutine cut_into_tets
+
+  !> The free faces of the cuboids.
+  pure subroutine cuboid_facets(full, number, shape)
+    integer, intent(in) :: full(:, :, :)
+    integer, intent(in) :: number(0:, 0:, 0:)   !! of the lattice points
+    type(shape_t), intent(inout) :: shape
+    integer :: around(0:size(full, 1) + 1, 0:size(full, 2) + 1, 0:size(full, 3) + 1)
+    integer :: face(4, 6*sum(full)), corner(8), i, j, k, d, s, m, c(3)
+
+    around = 0
+    around(1:size(full, 1), 1:size(full, 2), 1:size(full, 3)) = full
+    m = 0
+    do k = 1, size(full, 3)
+      do j = 1, size(full, 2)
+        do i = 1, size(full, 1)
+          if (full(i, j, k) == 0) cycle
+          corner = reshape(number(i - 1:i, j - 1:j, k - 1:k), [8])
+          do d = 1, 3
+            do s = 1, 2
+              c = [i, j, k]
+              c(d) = c(d) + 2*s - 3
+              if (around(c(1), c(2), c(3)) == 1) cycle
+              m = m + 1
+              face(:, m) = corner(cuboid_face(:, s, d))
+            end do
+          end do
+        end do
+      end do
+    end do
+    shape%facet = [(1 + 4*i, i=0, m)]
+    shape%facet_point = reshape(face(:, 1:m), [4*m])
+  end subroutine cuboid_facets
+
+  !> A sphere: an icosahedron with each face cut into frequency**2 triangles, blown up.
+  !!
+  !! The corners stand slightly outside the sphere so that the volume is the true one: mass and
+  !! buoyancy are right. Each tetrahedron goes from the centre to a triangle.
+  pure subroutine build_sphere(radius, frequency, shape)
+    real(wp), intent(in) :: radius          !! [m]
+    integer, intent(in) :: frequency        !! parts of an edge of the icosahedron
+    type(shape_t), intent(inout) :: shape
+    real(wp) :: vertex(3, 12), direction(3), volume
+    real(wp) :: point(3, 10*frequency**2 + 3)
+    integer :: face(3, 20), number(0:frequency, 0:frequency), n_point, n_tet, f, i, j
+
+    call make_icosahedron(vertex, face)
+    point(:, 1) = 0.0_wp
+    n_point = 1
+    n_tet = 0
+    allocate (shape%tet(4, 20*frequency**2))
+    do f = 1, 20
+      do j = 0, frequency
+        do i = 0, frequency - j
+          direction = matmul(vertex(:, face(:, f)), real([frequency - i - j, i, j], wp))
+          call find_or_add(direction/norm2(direction), point, n_point, number(i, j))
+        end do
+      end do
+      do j = 0, frequency - 1
+        do i = 0, frequency - j - 1
+          n_tet = n_tet + 1
+          shape%tet(:, n_tet) = [1, number(i, j), number(i + 1, j), number(i, j + 1)]
+          if (i + j == frequency - 1) cycle
+          n_tet = n_tet + 1
+          shape%tet(:, n_tet) = [1, number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]
+        end do
+      end do
+    end do
+    call volume_and_centroid(point, shape%tet, volume, direction)
+    shape%point = point*(radius*(4.0_wp*pi/(3.0_wp*volume))**(1.0_wp/3.0_wp))
+  end subroutine build_sphere
+
+  !> Corners (edge 2) and outward faces of an icosahedron.
+  pure subroutine make_icosahedron(vertex, face)
+    real(wp), intent(out) :: vertex(3, 12)
+    integer, intent(out) :: face(3, 20)
+    real(wp), parameter :: golden = 0.5_wp*(1.0_wp + sqrt(5.0_wp))
+    integer :: d, s, t, a, b, c, m
+
+    m = 0
+    do d = 0, 2
+      do s = -1, 1, 2
+        do t = -1, 1, 2
+          m = m + 1
+          vertex(:, m) = cshift([0.0_wp, real(s, wp), golden*real(t, wp)], d)
+        end do
+      end do
+    end do
+    m = 0
+    do a = 1, 12
+      do b = a + 1, 12
+        do c = b + 1, 12
+          if (.not. (joined(a, b) .and. joined(b, c) .and. joined(c, a))) cycle
+          m = m + 1
+          face(:, m) = [a, b, c]
+          if (dot_product(vertex(:, a), cross(vertex(:, b), vertex(:, c))) < 0.0_wp) &
+            face(:, m) = [a, c, b]
+        end do
+      end do
+    end do
+  contains
+    pure logical function joined(i, j)
+      integer, intent(in) :: i, j
+
+      joined = norm2(vertex(:, i) - vertex(:, j)) < 2.1_wp
+    end function joined
+  end subroutine make_icosahedron
+
+  !> Number of a point of the unit sphere, added to the list if it is new.
+  pure subroutine find_or_add(x, point, n_point, number)
+    real(wp), intent(in) :: x(3)
+    real(wp), intent(inout) :: point(:, :)
+    integer, intent(inout) :: n_point
+    integer, intent(out) :: number
+    real(wp), parameter :: same = 1.0e-8_wp   !! far below the spacing of the points [-]
+
+    do number = 2, n_point
+      if (maxval(abs(point(:, number) - x)) < same) return
+    end do
+    n_point = n_point + 1
+    number = n_point
+    point(:, number) = x
+  end subroutine find_or_add
+
+  !> Mass, surface and, where the flow has no coarser parts, its parts.
+  pure subroutine finish_shape(shape)
+    type(shape_t), intent(inout) :: shape
+    real(wp) :: centroid(3)
+    integer :: m
+
+    call volume_and_centroid(shape%point, shape%tet, shape%volume, centroid)
+    shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
+    shape%inertia = inertia_about_origin(shape%point, shape%tet, shape%density)
+    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
+    if (allocated(shape%flow_tet)) return
+    shape%flow_tet = shape%tet
+    shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
+    shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+  end subroutine finish_shape
+
+end module shapes_builtin_m

@@ -1,0 +1,252 @@
+!> The built-in shapes: closed conforming meshes, symmetry, contact spheres, messages.
+program test_shapes
+  use kinds_m, only: wp, pi
+  use check_m, only: check, finish_checks
+  use case_types_m, only: shape_input_t
+  use tet_mesh_m, only: shape_t
+  use polyhedron_m, only: tet_volume
+  use shapes_builtin_m, only: make_shape
+  implicit none
+
+  call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 1, 24)
+  call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, 144)
+  call check_kind('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 3, -1)
+  call check_kind('cube', [0.03_wp, 0.0_wp, 0.0_wp], 1, 4)
+  call check_kind('box', [0.01_wp, 0.03_wp, 0.05_wp], 2, -1)
+  call check_kind('sphere', [0.06_wp, 0.0_wp, 0.0_wp], 1, 1)
+  call check_kind('sphere', [0.06_wp, 0.0_wp, 0.0_wp], 2, 1)
+  call hexapod_sizes()
+  call hexapod_symmetry()
+  call sphere_sizes()
+  call refusals()
+  call finish_checks()
+
+contains
+
+  subroutine build(kind, size, refinement, shape)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3)
+    integer, intent(in) :: refinement
+    type(shape_t), intent(out) :: shape
+    type(shape_input_t) :: input
+    character(:), allocatable :: message
+
+    input%name = kind
+    input%kind = kind
+    input%size = size
+    input%refinement = refinement
+    call make_shape(input, shape, message)
+    call check(kind//' is built', message == '')
+  end subroutine build
+
+  !> Properties every mesh must have; `n_spheres` < 0 where the number is not stated.
+  subroutine check_kind(kind, size_m, refinement, n_spheres)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size_m(3)
+    integer, intent(in) :: refinement, n_spheres
+    type(shape_t) :: s
+    real(wp) :: area(3), total, smallest, flow_total, x(3, 4)
+    integer :: t, m, k
+
+    call build(kind, size_m, refinement, s)
+    smallest = huge(1.0_wp)
+    flow_total = 0.0_wp
+    do t = 1, size(s%tet, 2)
+      smallest = min(smallest, tet_volume(s%point(:, s%tet(:, t))))
+    end do
+    call check(kind//': tetrahedra of positive volume', smallest > 1e-6_wp*s%volume)
+    smallest = huge(1.0_wp)
+    do t = 1, size(s%flow_tet, 2)
+      smallest = min(smallest, tet_volume(s%point(:, s%flow_tet(:, t))))
+      flow_total = flow_total + tet_volume(s%point(:, s%flow_tet(:, t)))
+    end do
+    call check(kind//': the parts for the flow fill the block', flow_total, s%volume, &
+               1e-14_wp*s%volume)
+    call check(kind//': and have positive volume', smallest > 1e-6_wp*s%volume)
+
+    area = 0.0_wp
+    total = 0.0_wp
+    do t = 1, size(s%triangle, 2)
+      x(:, 1) = 0.0_wp
+      x(:, 2:4) = s%point(:, s%triangle(:, t))
+      total = total + tet_volume(x)
+      area = area + area_vector(x(:, 2:4))
+    end do
+    call check(kind//': the surface is closed', area, [0.0_wp, 0.0_wp, 0.0_wp], 1e-17_wp)
+    call check(kind//': the surface encloses the volume', total, s%volume, 1e-13_wp*s%volume)
+    call check(kind//': each surface triangle is a face of its tetrahedron', faces_match(s))
+
+    area = 0.0_wp
+    total = 0.0_wp
+    do m = 1, size(s%facet) - 1
+      do k = s%facet(m) + 1, s%facet(m + 1) - 2
+        x(:, 1) = 0.0_wp
+        x(:, 2:4) = s%point(:, s%facet_point([s%facet(m), k, k + 1]))
+        total = total + tet_volume(x)
+        area = area + area_vector(x(:, 2:4))
+      end do
+    end do
+    call check(kind//': the facets are closed', area, [0.0_wp, 0.0_wp, 0.0_wp], 1e-17_wp)
+    call check(kind//': the facets enclose the volume', total, s%volume, 1e-13_wp*s%volume)
+    call check(kind//': each edge of the facets joins two of them', edges_paired(s))
+    call check(kind//': the centroid is the origin', weighted_centroid(s), &
+               [0.0_wp, 0.0_wp, 0.0_wp], 1e-16_wp)
+    call check(kind//': the radius holds all corners', all(norm2(s%point, 1) <= s%radius))
+    if (n_spheres >= 0) call check(kind//': contact spheres', size(s%sphere_radius), n_spheres)
+    if (kind /= 'sphere') call check_spheres(kind, s)
+  end subroutine check_kind
+
+  !> One sphere of equal volume per tetrahedron under the surface, at its centroid.
+  subroutine check_spheres(kind, s)
+    character(*), intent(in) :: kind
+    type(shape_t), intent(in) :: s
+    real(wp) :: x(3, 4)
+    integer :: m, t
+    logical :: good
+
+    good = .true.
+    m = 0
+    do t = 1, size(s%tet, 2)
+      if (.not. any(s%triangle_tet == t)) cycle
+      m = m + 1
+      x = s%point(:, s%tet(:, t))
+      good = good .and. all(abs(s%sphere_centre(:, m) - sum(x, 2)/4) < 1e-17_wp)
+      good = good .and. abs(4*pi/3*s%sphere_radius(m)**3/tet_volume(x) - 1) < 1e-14_wp
+    end do
+    call check(kind//': spheres of equal volume at the centroids', &
+               good .and. m == size(s%sphere_radius))
+  end subroutine check_spheres
+
+  pure function area_vector(x) result(a)
+    real(wp), intent(in) :: x(3, 3)
+    real(wp) :: a(3), u(3), v(3)
+
+    u = x(:, 2) - x(:, 1)
+    v = x(:, 3) - x(:, 1)
+    a = 0.5_wp*[u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
+  end function area_vector
+
+  pure function weighted_centroid(s) result(x)
+    type(shape_t), intent(in) :: s
+    real(wp) :: x(3)
+    integer :: t
+
+    x = 0.0_wp
+    do t = 1, size(s%tet, 2)
+      x = x + tet_volume(s%point(:, s%tet(:, t)))*sum(s%point(:, s%tet(:, t)), 2)/(4*s%volume)
+    end do
+  end function weighted_centroid
+
+  pure function faces_match(s) result(good)
+    type(shape_t), intent(in) :: s
+    logical :: good
+    integer :: m, v
+
+    good = .true.
+    do m = 1, size(s%triangle, 2)
+      do v = 1, 3
+        good = good .and. any(s%tet(:, s%triangle_tet(m)) == s%triangle(v, m))
+      end do
+    end do
+  end function faces_match
+
+  !> Every directed edge of the facets is met exactly once the other way round.
+  pure function edges_paired(s) result(good)
+    type(shape_t), intent(in) :: s
+    logical :: good
+    integer, allocatable :: net(:, :)
+    integer :: m, k, a, b, n
+
+    n = size(s%point, 2)
+    allocate (net(n, n), source=0)
+    good = .true.
+    do m = 1, size(s%facet) - 1
+      do k = s%facet(m), s%facet(m + 1) - 1
+        a = s%facet_point(k)
+        b = s%facet_point(merge(s%facet(m), k + 1, k == s%facet(m + 1) - 1))
+        net(a, b) = net(a, b) + 1
+        good = good .and. net(a, b) == 1
+      end do
+    end do
+    good = good .and. all(net == transpose(net))
+  end function edges_paired
+
+  subroutine hexapod_sizes()
+    type(shape_t) :: s
+    real(wp), parameter :: d = 0.02_wp
+
+    call build('hexapod', [d, 0.0_wp, 0.0_wp], 2, s)
+    call check('hexapod: volume 7 d^3', s%volume, 7*d**3, 1e-13_wp*7*d**3)
+    call check('hexapod: 280 tetrahedra', size(s%tet, 2), 280)
+    call check('hexapod: 35 of them for the flow', size(s%flow_tet, 2), 35)
+    call check('hexapod: 30 facets', size(s%facet) - 1, 30)
+    call check('hexapod: 240 surface triangles', size(s%triangle, 2), 240)
+    call check('hexapod: smallest edge', s%smallest_edge, d, 0.0_wp)
+    call check('hexapod: farthest corner', maxval(norm2(s%point, 1)), d*sqrt(2.75_wp), 1e-17_wp)
+  end subroutine hexapod_sizes
+
+  !> Turning an even mesh by a quarter about z, or mirroring it, maps spheres on spheres.
+  subroutine hexapod_symmetry()
+    type(shape_t) :: s
+    real(wp) :: x(3)
+    integer :: m
+    logical :: turned, mirrored
+
+    call build('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, s)
+    turned = .true.
+    mirrored = .true.
+    do m = 1, size(s%sphere_radius)
+      x = s%sphere_centre(:, m)
+      turned = turned .and. is_centre(s, [-x(2), x(1), x(3)])
+      mirrored = mirrored .and. is_centre(s, [-x(1), x(2), x(3)])
+    end do
+    call check('hexapod: spheres keep their places in a quarter turn', turned)
+    call check('hexapod: spheres keep their places in a mirror', mirrored)
+  end subroutine hexapod_symmetry
+
+  pure logical function is_centre(s, y)
+    type(shape_t), intent(in) :: s
+    real(wp), intent(in) :: y(3)
+
+    is_centre = any(abs(s%sphere_centre(1, :) - y(1)) + abs(s%sphere_centre(2, :) - y(2)) + &
+                    abs(s%sphere_centre(3, :) - y(3)) < 1e-15_wp)
+  end function is_centre
+
+  !> True volume, one sphere of the true radius, corners outside by a second-order distance.
+  subroutine sphere_sizes()
+    type(shape_t) :: s
+    real(wp) :: outside(2)
+    integer :: r
+    real(wp), parameter :: a = 0.03_wp
+
+    do r = 1, 2
+      call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
+      call check('sphere: true volume', s%volume, 4*pi/3*a**3, 1e-13_wp*a**3)
+      call check('sphere: 20 (4 r)^2 triangles', size(s%triangle, 2), 20*(4*r)**2)
+      call check('sphere: touches with its true radius', s%sphere_radius(1), a, 0.0_wp)
+      outside(r) = maxval(norm2(s%point, 1))/a - 1
+    end do
+    call check('sphere: corners stand out by 1.2 and 0.3 per cent', outside, &
+               [1.15e-2_wp, 2.9e-3_wp], 1e-4_wp)
+    call check('sphere: second order in the refinement', outside(1)/outside(2), 4.0_wp, 0.2_wp)
+  end subroutine sphere_sizes
+
+  subroutine refusals()
+    type(shape_input_t) :: input
+    type(shape_t) :: s
+    character(:), allocatable :: message
+
+    input%size = 0.02_wp
+    input%kind = 'cubo'
+    call make_shape(input, s, message)
+    call check('unknown kind is refused', index(message, 'unknown') > 0)
+    input%kind = 'dolos'
+    call make_shape(input, s, message)
+    call check('a later kind is not available yet', index(message, 'not available yet') > 0)
+    input%kind = 'cube'
+    input%size(1) = -1.0_wp
+    call make_shape(input, s, message)
+    call check('negative size is refused', index(message, 'size') > 0)
+  end subroutine refusals
+
+end program test_shapes
