@@ -1,0 +1,1 @@
+"""Read, check and draw the results of mics."""

@@ -1,0 +1,196 @@
+"""Plain geometry of tetrahedra, triangles, edges and attitudes; every array is in metres."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+def rotation_matrix(q: Array) -> Array:
+    """Rotations (..., 3, 3) from body axes to space of quaternions `q` (..., 4) = w, x, y, z."""
+    w, x, y, z = np.moveaxis(
+        np.asarray(q, float) / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0
+    )
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_product(a: Array, b: Array) -> Array:
+    """Hamilton product of two quaternions w, x, y, z: the rotation b, then the rotation a."""
+    v = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return np.concatenate([[a[0] * b[0] - a[1:] @ b[1:]], v])
+
+
+def quaternion_from_axis(axis: Array, angle_deg: float) -> Array:
+    """Quaternion w, x, y, z of a turn by `angle_deg` about `axis`."""
+    half = np.radians(angle_deg) / 2
+    return np.concatenate([[np.cos(half)], np.sin(half) * axis / np.linalg.norm(axis)])
+
+
+def attitude_change_deg(q: Array, q0: Array) -> Array:
+    """Angle in degrees of the rotation from `q0` (4) to each of `q` (..., 4)."""
+    vector = np.linalg.norm(
+        q0[0] * q[..., 1:] - q[..., :1] * q0[1:] + np.cross(q[..., 1:], q0[1:]), axis=-1
+    )
+    return np.asarray(np.degrees(2 * np.arctan2(vector, np.abs(q @ q0))))
+
+
+def place(points: Array, position: Array, q: Array) -> Array:
+    """Points (n, 3) in body axes as points in space, for a body at `position` with attitude `q`."""
+    return np.asarray(points @ rotation_matrix(q).T + position)
+
+
+def tet_volumes(corner: Array) -> Array:
+    """Signed volumes of tetrahedra `corner` (k, 4, 3) [m3]."""
+    a = corner[:, 1:] - corner[:, :1]
+    return np.asarray(np.einsum("ki,ki->k", a[:, 0], np.cross(a[:, 1], a[:, 2])) / 6)
+
+
+def inside_tets(points: Array, corner: Array, tolerance: float = 1e-12) -> NDArray[np.bool_]:
+    """Which of `points` (n, 3) lie in any of the tetrahedra `corner` (k, 4, 3)."""
+    inside = np.zeros(len(points), bool)
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    near = np.all((points >= low.min(axis=0)) & (points <= high.max(axis=0)), axis=1)
+    left = np.flatnonzero(near)
+    inverse = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
+    for k in range(len(corner)):
+        here = points[left]
+        boxed = np.flatnonzero(np.all((here >= low[k]) & (here <= high[k]), axis=1))
+        share = (here[boxed] - corner[k, 0]) @ inverse[k].T
+        found = (share.min(axis=1, initial=1.0) >= -tolerance) & (
+            share.sum(axis=1) <= 1 + tolerance
+        )
+        inside[left[boxed[found]]] = True
+        left = np.delete(left, boxed[found])
+    return inside
+
+
+def distance_to_triangles(points: Array, triangle: Array) -> Array:
+    """Distance [m] of each of `points` (n, 3) to the nearest of the triangles (m, 3, 3)."""
+    result = np.empty(len(points))
+    chunk = max(1, 400_000 // max(1, len(triangle)))
+    for start in range(0, len(points), chunk):
+        p = points[start : start + chunk, None, :]
+        result[start : start + chunk] = np.sqrt(_squared_to_triangles(p, triangle).min(axis=1))
+    return result
+
+
+def _squared_to_triangles(p: Array, triangle: Array) -> Array:
+    """Squared distances (n, m) of points (n, 1, 3) to triangles (m, 3, 3)."""
+    a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
+    normal = np.cross(b - a, c - a)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    height = np.einsum("nmj,mj->nm", p - a, normal)
+    in_prism = np.ones(height.shape, bool)
+    squared = np.full(height.shape, np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        side = end - start
+        in_prism &= np.einsum("nmj,mj->nm", p - start, np.cross(normal, side)) >= 0
+        share = np.einsum("nmj,mj->nm", p - start, side) / np.einsum("mj,mj->m", side, side)
+        foot = start + np.clip(share, 0, 1)[..., None] * side
+        squared = np.minimum(squared, ((p - foot) ** 2).sum(axis=2))
+    return np.where(in_prism, height**2, squared)
+
+
+def distance_between_segments(first: Array, second: Array) -> float:
+    """Least distance [m] between any segment of `first` (n, 2, 3) and any of `second` (m, 2, 3)."""
+    p, u = first[:, None, 0], first[:, None, 1] - first[:, None, 0]
+    q, v = second[None, :, 0], second[None, :, 1] - second[None, :, 0]
+    r = p - q
+    a, e, b = (u * u).sum(-1), (v * v).sum(-1), (u * v).sum(-1)
+    c, f = (u * r).sum(-1), (v * r).sum(-1)
+    determinant = a * e - b * b
+    skew = determinant > 1e-12 * a * e
+    s = np.where(skew, np.clip((b * f - c * e) / np.where(skew, determinant, 1), 0, 1), 0.0)
+    t = np.clip((b * s + f) / e, 0, 1)
+    s = np.clip((b * t - c) / a, 0, 1)
+    return float(np.sqrt(((r + s[..., None] * u - t[..., None] * v) ** 2).sum(-1).min()))
+
+
+def below_plane(corner: Array, level: float) -> tuple[float, Array]:
+    """Volume [m3] and first moment [m4] about the origin of the part of tets below z = `level`.
+
+    `corner` (k, 4, 3) are tetrahedra of positive volume. A cut tetrahedron is split into the
+    cone from one of its low corners over the parts of its faces below the plane and the cut.
+    """
+    volume, moment = 0.0, np.zeros(3)
+    height = corner[..., 2] - level
+    whole = height.max(axis=1) <= 0
+    v = tet_volumes(corner[whole])
+    volume += v.sum()
+    moment += (v[:, None] * corner[whole].mean(axis=1)).sum(axis=0)
+    for tet, h in zip(corner, height, strict=True):
+        if h.min() < 0 < h.max():
+            apex = tet[np.argmin(h)]
+            polygons = [_cut_polygon(tet[face], h[face]) for face in _TET_FACES]
+            for polygon in [*polygons, _lid(polygons, level)]:
+                for b, c in zip(polygon[1:-1], polygon[2:], strict=True):
+                    piece = np.array([[apex, polygon[0], b, c]])
+                    piece_volume = abs(float(tet_volumes(piece)[0]))
+                    volume += piece_volume
+                    moment += piece_volume * piece[0].mean(axis=0)
+    return float(volume), moment
+
+
+def _cut_polygon(points: Array, height: Array) -> list[Array]:
+    """The part of a polygon where `height` <= 0, corners in order."""
+    kept: list[Array] = []
+    for k in range(len(points)):
+        n = (k + 1) % len(points)
+        if height[k] <= 0:
+            kept.append(points[k])
+        if height[k] * height[n] < 0:
+            share = height[k] / (height[k] - height[n])
+            kept.append(points[k] + share * (points[n] - points[k]))
+    return kept if len(kept) >= 3 else []
+
+
+def _lid(polygons: list[list[Array]], level: float) -> list[Array]:
+    """Corners of the cut face, in order around it."""
+    found = [p for polygon in polygons for p in polygon if abs(p[2] - level) < 1e-12]
+    unique: list[Array] = []
+    for p in found:
+        if all(np.linalg.norm(p - other) > 1e-13 for other in unique):
+            unique.append(p)
+    if len(unique) < 3:
+        return []
+    centre = np.mean(unique, axis=0)
+    return sorted(unique, key=lambda p: np.arctan2(p[1] - centre[1], p[0] - centre[0]))
+
+
+def feature_edges(points: Array, triangles: IntArray, cosine: float = 0.9999) -> IntArray:
+    """Edges (m, 2) of a surface whose two triangles do not lie in one plane."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    owners: dict[tuple[int, int], list[int]] = {}
+    for t, triangle in enumerate(triangles):
+        for k in range(3):
+            i, j = sorted((int(triangle[k]), int(triangle[(k + 1) % 3])))
+            owners.setdefault((i, j), []).append(t)
+    kept = [
+        edge
+        for edge, faces in owners.items()
+        if len(faces) != 2 or normal[faces[0]] @ normal[faces[1]] < cosine
+    ]
+    return np.array(kept, dtype=np.int64).reshape(-1, 2)
+
+
+def surface_samples(points: Array, triangles: IntArray, spacing: float) -> Array:
+    """Points on every triangle no farther apart than `spacing` [m], corners and edges included."""
+    corner = points[triangles]
+    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max()
+    n = max(1, int(np.ceil(longest / spacing)))
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    keep = i + j <= n
+    weight = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
+    samples = np.einsum("wk,mkj->mwj", weight, corner).reshape(-1, 3)
+    _, first = np.unique(np.round(samples / (1e-9 * longest)), axis=0, return_index=True)
+    return np.asarray(samples[first])

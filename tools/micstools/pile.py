@@ -1,0 +1,235 @@
+"""The paper's words on its figures 5 to 7, checked on a run.
+
+Every finding is seen or not seen, with the figures behind it. Geometry is that of the true
+shapes; a contact counts where the gap is at most `REACH`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from micstools.geometry import attitude_change_deg, below_plane
+from micstools.overlap import overlap, present_bodies, touches
+from micstools.reader import Run
+
+REACH = 5e-4  # [m] blocks nearer than this touch
+REST_SPEED = 5e-3  # [m/s]
+TURN_LIMIT = 5.0  # [degrees]
+LEVEL_BAND = 0.01  # share of the rise
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One statement, whether the run shows it, and the figures."""
+
+    statement: str
+    seen: bool
+    figures: str
+
+
+@dataclass(frozen=True)
+class Level:
+    """Rise of the water against the rise that the submerged volume demands [m]."""
+
+    start: float
+    found: float
+    demanded: float
+
+    @property
+    def error(self) -> float:
+        """Relative error of the rise."""
+        return (self.found - self.start) / (self.demanded - self.start) - 1
+
+
+def findings(run: Run) -> list[Finding]:
+    """Everything that can be said about the run so far."""
+    found = [turning(run), *first_block(run), walls(run), at_rest(run), pattern(run), depth(run)]
+    if run.field_times.size and run.value("fluid", "water_level", None) is not None:
+        found.append(level(run))
+    return found
+
+
+def telling_times(run: Run) -> list[float]:
+    """Times [s] worth a picture: the first block on its way down (figure 5), shortly before each
+    further drop (figure 6) and the end."""
+    b = run.bodies
+    released = np.sort(b.release_time[b.dropped])
+    released = released[released <= b.time[-1]]
+    if not released.size:
+        return [float(t) for t in np.linspace(b.time[0], b.time[-1], 5)]
+    drawn = run.field_times if run.field_times.size else b.time
+    before = [drawn[drawn < t - 1e-9].max(initial=drawn[0]) for t in released[1:]]
+    first = released[0] + np.array([0.0, 0.1, 0.2, 0.3, 0.5])
+    wanted = np.concatenate([first, before, drawn[-1:]])
+    nearest = [drawn[np.abs(drawn - t).argmin()] for t in wanted]
+    return [float(t) for t in np.unique(nearest)]
+
+
+def turning_before_touch(run: Run) -> dict[int, float]:
+    """Largest turn [degrees] of each dropped block between its release and its first touch."""
+    b = run.bodies
+    turns = {}
+    for k in b.dropped:
+        after = np.flatnonzero(b.time >= b.release_time[k] - 1e-12)
+        touched = np.flatnonzero(b.contacts[after, k] > 0)
+        free = after[: touched[0]] if touched.size else after
+        if free.size:
+            q = b.quaternion[free, k]
+            turns[int(k)] = float(attitude_change_deg(q, q[0]).max())
+    return turns
+
+
+def turning(run: Run) -> Finding:
+    """The paper on figure 5: no change of attitude is seen while a block falls."""
+    turns = turning_before_touch(run)
+    worst = max(turns.values(), default=np.nan)
+    figures = ", ".join(f"body {k}: {turn:.2f}" for k, turn in turns.items())
+    statement = f"attitude changes less than {TURN_LIMIT:g} degrees before the first touch"
+    return Finding(statement, bool(worst < TURN_LIMIT), f"degrees, {figures}")
+
+
+def first_block(run: Run) -> list[Finding]:
+    """The paper on figure 5: the block stops in touch with the fixed blocks and a wall."""
+    b = run.bodies
+    if b.dropped.size == 0:
+        return []
+    first = int(b.dropped[0])
+    rows = {"at the end": len(b.time) - 1}
+    if b.dropped.size > 1 and b.release_time[b.dropped[1]] <= b.time[-1]:
+        before = int(np.flatnonzero(b.time < b.release_time[b.dropped[1]])[-1])
+        rows = {"before the second is dropped": before, **rows}
+    found = []
+    for when, row in rows.items():
+        seen = touches(run, row, REACH)
+        on_fixed = [k for k in seen.of(first) if b.fixed[k]]
+        sides = [side for side in seen.walls_of(first) if not side.startswith("z")]
+        speed = float(np.linalg.norm(b.velocity[row, first]))
+        found.append(
+            Finding(
+                f"the first block lies on fixed blocks and a wall {when}",
+                bool(on_fixed) and bool(sides),
+                f"t = {b.time[row]:.3f} s: fixed blocks {on_fixed}, walls {sides}, "
+                f"speed {1e3 * speed:.2f} mm/s",
+            )
+        )
+    return found
+
+
+def walls(run: Run) -> Finding:
+    """The paper on figure 7: the blocks pile up in touch with the front and the back wall."""
+    seen = touches(run, len(run.bodies.time) - 1, REACH)
+    by_side = {s: [k for k, side in seen.walls if side == s] for s in ("y_min", "y_max")}
+    figures = ", ".join(f"{side}: blocks {blocks}" for side, blocks in by_side.items())
+    statement = "blocks of the final pile touch the front and the back wall"
+    return Finding(statement, all(by_side.values()), figures)
+
+
+def at_rest(run: Run) -> Finding:
+    """The blocks come to rest."""
+    b = run.bodies
+    speed = np.linalg.norm(b.velocity[-1], axis=1)
+    worst = float(speed[b.dropped].max(initial=0.0))
+    out = int((~b.present(-1)).sum())
+    figures = f"fastest {1e3 * worst:.3f} mm/s at t = {b.time[-1]:.3f} s"
+    if out:
+        figures += f", {out} blocks not released yet"
+    statement = f"all blocks at rest in the end (speed < {1e3 * REST_SPEED:g} mm/s)"
+    return Finding(statement, worst < REST_SPEED and not out, figures)
+
+
+def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
+    """Pattern of the pile, and the dropped blocks that touch the floor.
+
+    'A': every dropped block lies above the floor, on the fixed ones; 'B': one of them came down
+    to the floor, which then carries four; 'other': more than one, or not all are released.
+    """
+    b = run.bodies
+    row = row % len(b.time)
+    seen = touches(run, row, REACH)
+    low = [int(k) for k in b.dropped if "z_min" in seen.walls_of(k)]
+    if not b.present(row).all() or len(low) > 1:
+        return "other", low
+    return ("B" if low else "A"), low
+
+
+def pattern(run: Run) -> Finding:
+    """The paper on figure 6 (e): all dropped blocks lie on the three of the floor, pattern A."""
+    kind, low = classify(run)
+    statement = "all dropped blocks lie on the fixed ones (pattern A)"
+    return Finding(statement, kind == "A", f"pattern {kind}; dropped blocks on the floor: {low}")
+
+
+def depth(run: Run, limit: float = 1e-3) -> Finding:
+    """True overlap of the final pile."""
+    found = overlap(run)
+    pairs = {f"{i}-{j}": d for (i, j), d in found.blocks.items()}
+    pairs |= {f"{k}-{side}": d for (k, side), d in found.walls.items()}
+    worst = max(pairs, key=lambda key: pairs[key], default="none")
+    figures = f"largest {1e3 * found.largest:.4f} mm ({worst}), {len(pairs)} overlapping pairs"
+    statement = f"true overlap of the pile below {1e3 * limit:g} mm"
+    return Finding(statement, found.largest < limit, figures)
+
+
+def submerged_volume(run: Run, row: int, level: float) -> float:
+    """Volume [m3] of the released bodies below the height `level` [m]."""
+    bodies = present_bodies(run, row)
+    return sum(below_plane(body.tets, level)[0] for body in bodies.values())
+
+
+def demanded_level(run: Run, row: int) -> float:
+    """Height [m] at which the liquid of the start stands around the bodies of a row."""
+    size = run.grid.high - run.grid.low
+    area, floor = float(size[0] * size[1]), float(run.grid.low[2])
+    start = float(run.value("fluid", "water_level", floor))
+    placed_by_case = len(run.parameters.get("body", []))  # the dropped ones raise the level
+    at_start = {k: body for k, body in present_bodies(run, 0).items() if k < placed_by_case}
+    inside = sum(below_plane(body.tets, start)[0] for body in at_start.values())
+    liquid = area * (start - floor) - inside
+    level = start
+    for _ in range(200):  # converges because the blocks cross only a part of the surface
+        before, level = level, floor + (liquid + submerged_volume(run, row, level)) / area
+        if abs(level - before) < 1e-12:
+            break
+    return level
+
+
+def measured_level(run: Run, t: float, guess: float) -> float:
+    """Mean height [m] of the surface at time `t` [s], over the columns without solid near it.
+
+    Only the cells within five cells of `guess` [m] are summed, so bubbles under blocks and drops
+    on the walls do not count.
+    """
+    fields, grid = run.fields(t), run.grid
+    step = float(grid.spacing[2])
+    middle = int((guess - grid.low[2]) / step)
+    low, high = max(0, middle - 5), min(len(grid.z) - 1, middle + 6)
+    free = fields.solid[low:high].max(axis=0) < 1e-6
+    if not free.any():
+        raise ValueError("no column is free of solid near the surface")
+    columns = fields.liquid[low:high].sum(axis=0, dtype=np.float64)[free]
+    return float(grid.z[low] + step * columns.mean())
+
+
+def water_level(run: Run) -> Level:
+    """Level at the last written field."""
+    t = float(run.field_times[-1])
+    demanded = demanded_level(run, run.bodies.row(t))
+    start = float(run.value("fluid", "water_level", 0.0))
+    return Level(start, measured_level(run, t, demanded), demanded)
+
+
+def level(run: Run) -> Finding:
+    """Final level against the rise that the submerged volume demands."""
+    found = water_level(run)
+    figures = (
+        f"level {1e3 * found.found:.3f} mm, demanded {1e3 * found.demanded:.3f} mm, "
+        f"rise off by {100 * found.error:.2f} %"
+    )
+    statement = f"final level within {100 * LEVEL_BAND:g} % of the rise the blocks demand"
+    return Finding(statement, abs(found.error) < LEVEL_BAND, figures)
+
+
+def report(found: list[Finding]) -> str:
+    """The findings as lines of text."""
+    lines = [f"{'yes' if f.seen else 'no ':3}  {f.statement}\n     {f.figures}" for f in found]
+    return "\n".join(lines)

@@ -1,0 +1,144 @@
+"""Diagrams of a run with matplotlib; every function returns a figure or writes one file."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from micstools.geometry import Array
+from micstools.reader import Run
+from micstools.scene import DROPPED
+
+Panel = Callable[[Axes, Run], None]
+
+
+def history(run: Run) -> Figure:
+    """Heights, speeds, forces, liquid, energies and the work of the solver against time."""
+    matplotlib.rcParams.update({"font.size": 9, "axes.titlesize": 10, "axes.grid": True})
+    matplotlib.rcParams.update({"grid.alpha": 0.3, "axes.spines.top": False})
+    panels: list[Panel] = []
+    if run.bodies.dropped.size:
+        panels += [_heights, _speeds]
+    if run.bodies.n:
+        panels += [_fluid_force, _contact_force] if run.field_times.size else [_contact_force]
+        panels += [_overlap]
+    if np.isfinite(run.series.liquid_volume).any():
+        panels += [_liquid, _divergence]
+    panels += [_energies, _steps]
+    if np.isfinite(run.series.solver_iterations).any():
+        panels.append(_solver)
+    rows = (len(panels) + 1) // 2
+    figure = Figure(figsize=(11, 2.4 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2, sharex=True, squeeze=False).ravel()
+    for axis, panel in zip(axes, panels, strict=False):
+        panel(axis, run)
+    for axis in axes[len(panels) :]:
+        axis.set_visible(False)
+    for axis in axes[max(0, len(panels) - 2) : len(panels)]:
+        axis.set_xlabel("time [s]")
+        axis.tick_params(labelbottom=True)
+    title = run.value("run", "title", "") or run.folder.name
+    figure.suptitle(str(title).strip())
+    return figure
+
+
+def _each_block(axis: Axes, run: Run, values: Array, title: str) -> None:
+    """One line per dropped block, from its release on; `values` (T, N)."""
+    time = run.bodies.time
+    for order, k in enumerate(run.bodies.dropped):
+        here = time >= run.bodies.release_time[k] - 1e-12
+        colour = DROPPED[order % len(DROPPED)]
+        axis.plot(time[here], values[here, k], color=colour, lw=1, label=f"{order + 1}")
+    axis.set_title(title, loc="left")
+
+
+def _heights(axis: Axes, run: Run) -> None:
+    _each_block(axis, run, 1e3 * run.bodies.position[..., 2], "height of the centroid [mm]")
+    axis.legend(title="block", ncols=3, fontsize=7, title_fontsize=7, loc="upper right")
+
+
+def _speeds(axis: Axes, run: Run) -> None:
+    _each_block(axis, run, np.linalg.norm(run.bodies.velocity, axis=2), "speed [m/s]")
+
+
+def _fluid_force(axis: Axes, run: Run) -> None:
+    _each_block(axis, run, run.bodies.fluid_force[..., 2], "vertical force of the fluid [N]")
+
+
+def _contact_force(axis: Axes, run: Run) -> None:
+    force = np.linalg.norm(run.bodies.contact_force, axis=2)
+    _each_block(axis, run, force, "contact force [N]")
+    axis.set_yscale("symlog", linthresh=1.0)
+    axis.set_ylim(bottom=0)
+
+
+def _overlap(axis: Axes, run: Run) -> None:
+    axis.plot(run.series.time, 1e3 * run.series.max_overlap, color="#2e4057", lw=0.8)
+    axis.set_title("largest overlap [mm]", loc="left")
+
+
+def _liquid(axis: Axes, run: Run) -> None:
+    axis.plot(run.series.time, run.series.liquid_volume_drift, color="#00798c", lw=0.8)
+    axis.set_title("drift of the liquid volume [-]", loc="left")
+
+
+def _divergence(axis: Axes, run: Run) -> None:
+    axis.semilogy(run.series.time, _positive(run.series.divergence_max), color="#00798c", lw=0.8)
+    tolerance = float(run.value("numerics", "divergence_tolerance", 1e-6))
+    axis.axhline(tolerance, color="#d1495b", lw=0.8, ls="--")
+    axis.set_title("largest divergence [1/s], tolerance dashed", loc="left")
+
+
+def _energies(axis: Axes, run: Run) -> None:
+    s = run.series
+    for values, label, colour in (
+        (s.kinetic_energy_bodies, "kinetic, blocks", "#d1495b"),
+        (s.kinetic_energy_fluid, "kinetic, fluid", "#00798c"),
+        (s.contact_energy, "contact", "#edae49"),
+    ):
+        if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0:
+            axis.plot(s.time, 1e3 * values, color=colour, lw=1, label=label)
+    axis.legend(fontsize=7)
+    axis.set_title("energy [mJ]", loc="left")
+
+
+def _steps(axis: Axes, run: Run) -> None:
+    axis.plot(run.series.time[1:], 1e3 * run.series.dt[1:], color="#6a4c93", lw=0.8)
+    axis.set_ylim(bottom=0)
+    axis.set_title("time step [ms]", loc="left")
+
+
+def _solver(axis: Axes, run: Run) -> None:
+    s = run.series
+    axis.plot(s.time, s.solver_iterations, color="#6a4c93", lw=0.6, label="iterations")
+    axis.plot(s.time, s.pressure_passes, color="#edae49", lw=0.8, label="pressure passes")
+    axis.legend(fontsize=7)
+    axis.set_title("pressure solver, per step", loc="left")
+
+
+def _positive(values: Array) -> Array:
+    """Values for a logarithmic axis: what is not positive is left out."""
+    return np.where(np.asarray(values, float) > 0, values, np.nan)
+
+
+def contact_sheet(pictures: list[Path], path: Path, columns: int, width: int = 420) -> Path:
+    """All pictures, made small, on one sheet; the rows have the height of their tallest picture."""
+    small = []
+    for picture in pictures:
+        with Image.open(picture) as full:
+            size = (width, round(full.height * width / full.width))
+            small.append(full.convert("RGB").resize(size, Image.Resampling.LANCZOS))
+    rows = [small[k : k + columns] for k in range(0, len(small), columns)]
+    heights = [max(image.height for image in row) for row in rows]
+    sheet = Image.new("RGB", (columns * width, sum(heights)), "white")
+    top = 0
+    for row, height in zip(rows, heights, strict=True):
+        for column, image in enumerate(row):
+            sheet.paste(image, (column * width, top))
+        top += height
+    sheet.save(path)
+    return path

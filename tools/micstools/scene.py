@@ -1,0 +1,311 @@
+"""Pictures of tank, water and blocks, drawn off screen with pyvista.
+
+pyvista is imported when the first picture is made: without the system's OpenGL libraries it ends
+the process instead of raising an error, so `missing_libraries` has to be asked first.
+"""
+
+import ctypes
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools.geometry import Array, IntArray
+from micstools.overlap import present_bodies
+from micstools.reader import Fields, Run
+from micstools.shapes import Shape
+
+Plotter = Any  # pyvista.Plotter, which is imported late
+WATER = "#7fb8e6"
+FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
+DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
+VIEWS = ("front", "side")
+
+
+@dataclass(frozen=True)
+class Style:
+    """Size and contents of a picture."""
+
+    width: int = 1200  # [pixels]
+    arrows: bool = True
+    water: bool = True
+    label: bool = True
+
+
+def missing_libraries() -> str:
+    """Why nothing can be drawn on this machine and what to install; empty where all is there."""
+    if not sys.platform.startswith("linux"):
+        return ""
+    wanted = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
+    missing = [package for library, package in wanted.items() if not _loads(library)]
+    if not missing:
+        return ""
+    return f"drawing needs OpenGL libraries that are not here: apt-get install {' '.join(missing)}"
+
+
+def require_libraries() -> None:
+    """End the program with exit code 1 and the command to run where nothing can be drawn."""
+    problem = missing_libraries()
+    if problem:
+        print(problem, file=sys.stderr)
+        raise SystemExit(1)
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def picture(run: Run, t: float, view: str, path: Path, style: Style | None = None) -> Path:
+    """Draw the run at time `t` [s] seen from the `front` (along +y) or the `side` (along -x).
+
+    With fluid the picture is that of the written field nearest to `t`.
+    """
+    style = style or Style()
+    fields = run.fields(t) if run.field_times.size else None
+    t = t if fields is None else fields.time
+    low, high = run.grid.low, run.grid.high
+    camera = camera_for(low, high, view)
+    width = style.width if view == "front" else int(0.55 * style.width)
+    plotter = _plotter(width, int(width * camera.aspect))
+    row = run.bodies.row(t)
+    _add_blocks(plotter, run, row)
+    _add_tank(plotter, low, high)
+    label = f"t = {run.bodies.time[row]:.2f} s"
+    if fields is not None:
+        if style.water:
+            _add_water(plotter, run, fields)
+        if style.arrows:
+            fastest = _add_arrows(plotter, run, fields, view)
+            label += f"   longest arrow {fastest:.2f} m/s" if fastest else ""
+    if style.label:
+        size = max(7, int(width / 90))
+        plotter.add_text(
+            label, position=(0.02, 0.955), viewport=True, font_size=size, color="black"
+        )
+    _look(plotter, camera)
+    plotter.screenshot(str(path))
+    plotter.close()
+    return path
+
+
+def _plotter(width: int, height: int) -> Plotter:
+    import pyvista as pv
+    import vtk
+
+    vtk.vtkObject.GlobalWarningDisplayOff()
+    plotter: Plotter = pv.Plotter(off_screen=True, window_size=[width, height])
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_depth_peeling(8)
+    return plotter
+
+
+def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
+    order = {int(k): n for n, k in enumerate(run.bodies.dropped)}
+    still = 0
+    for k, body in present_bodies(run, row).items():
+        if k in order:
+            colour = DROPPED[order[k] % len(DROPPED)]
+        else:
+            colour = FIXED[still % len(FIXED)]
+            still += 1
+        plotter.add_mesh(
+            _surface(body.points, body.shape),
+            color=colour,
+            smooth_shading=False,
+            ambient=0.35,
+            diffuse=0.75,
+            specular=0.1,
+        )
+        plotter.add_mesh(_edges(body.points, body.shape), color="#303030", line_width=1.5)
+
+
+def _surface(points: Array, shape: Shape) -> Any:
+    import pyvista as pv
+
+    threes = np.full((len(shape.triangles), 1), 3)
+    return pv.PolyData(points, faces=np.hstack([threes, shape.triangles]).ravel())
+
+
+def _edges(points: Array, shape: Shape) -> Any:
+    return _lines(points, shape.edges)
+
+
+def _lines(points: Array, edges: IntArray) -> Any:
+    import pyvista as pv
+
+    return pv.PolyData(points, lines=np.hstack([np.full((len(edges), 1), 2), edges]).ravel())
+
+
+def _add_tank(plotter: Plotter, low: Array, high: Array) -> None:
+    import pyvista as pv
+
+    bounds = np.stack([low, high], axis=1).ravel()
+    plotter.add_mesh(pv.Box(bounds=bounds).extract_all_edges(), color="#505050", line_width=2)
+    height = high[2] - low[2]
+    floor = pv.Box(bounds=[*bounds[:4], low[2] - 0.012 * height, low[2] - 0.002 * height])
+    plotter.add_mesh(floor, color="#e8e4dc", ambient=0.4)
+
+
+def _point_grid(run: Run, fields: Fields) -> Any:
+    """The cell values on points: the centres of the cells and the sides of the tank."""
+    import pyvista as pv
+
+    faces = zip(run.grid.faces, run.grid.centres, strict=True)
+    grid = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) for f, c in faces))
+    for name in ("liquid", "solid"):
+        grid.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
+    return grid
+
+
+def _add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
+    """The water surface where no solid is, and the body of water as a faint tint."""
+    grid = _point_grid(run, fields)
+    if not fields.liquid.min() < 0.5 < fields.liquid.max():
+        return
+    surface = grid.contour([0.5], scalars="liquid")
+    if surface.n_points:
+        surface = surface.clip_scalar(scalars="solid", value=0.5)
+    if surface.n_points:
+        plotter.add_mesh(
+            surface,
+            color=WATER,
+            opacity=0.6,
+            smooth_shading=True,
+            specular=0.6,
+            specular_power=30,
+        )
+    water = grid.clip_scalar(scalars="liquid", value=0.5, invert=False).extract_surface(
+        algorithm="dataset_surface"
+    )
+    plotter.add_mesh(water, color=WATER, opacity=0.12, lighting=False)
+
+
+def _add_arrows(plotter: Plotter, run: Run, fields: Fields, view: str) -> float:
+    """Velocity of the water in the middle plane that faces the viewer; the largest [m/s]."""
+    import pyvista as pv
+
+    axis = 1 if view == "front" else 0
+    x, y, z = run.grid.centres
+    here = [x, y, z]
+    middle = len(here[axis]) // 2
+    here[axis] = here[axis][middle : middle + 1]
+    points = np.stack(np.meshgrid(*reversed(here), indexing="ij")[::-1], axis=-1)
+    cut = [slice(None)] * 3
+    cut[2 - axis] = slice(middle, middle + 1)
+    index = tuple(cut)
+    velocity = fields.velocity[index].astype(float)
+    velocity[..., axis] = 0.0
+    wet = (fields.liquid[index] > 0.5) & (fields.solid[index] < 0.01)
+    every = np.zeros(wet.shape, bool)
+    every[tuple(slice(None, None, 1 if n == 1 else max(1, round(n / 20))) for n in wet.shape)] = (
+        True
+    )
+    chosen = wet & every
+    speed = np.linalg.norm(velocity, axis=-1)
+    fastest = float(speed[chosen].max(initial=0.0))
+    chosen &= speed > 0.02 * fastest
+    if fastest < 1e-4 or not chosen.any():
+        return 0.0
+    arrows = pv.PolyData(points[chosen])
+    arrows["velocity"] = velocity[chosen]
+    glyphs = arrows.glyph(
+        orient="velocity",
+        scale="velocity",
+        factor=0.1 * float(run.grid.high[2] - run.grid.low[2]) / fastest,
+        geom=pv.Arrow(tip_length=0.3, tip_radius=0.09, shaft_radius=0.025),
+    )
+    plotter.add_mesh(glyphs, color="#1d3557", ambient=0.5)
+    return fastest
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the viewer stands so that the whole tank fills the picture."""
+
+    focus: Array  # (3) [m]
+    position: Array  # (3) [m]
+    angle: float  # of view, vertical [degrees]
+    aspect: float  # height of the picture over its width
+
+
+def camera_for(low: Array, high: Array, view: str) -> Camera:
+    """Camera that sees the box from the `front` or the `side`, slightly from above."""
+    front = view == "front"
+    towards = np.array([0.0, -1.0, 0.22]) if front else np.array([1.0, 0.0, 0.12])
+    half_width = 0.16 if front else 0.06  # tangent of half the angle of view across
+    towards = towards / np.linalg.norm(towards)
+    right = np.cross([0.0, 0.0, 1.0], towards)
+    right = right / np.linalg.norm(right)
+    axes = np.stack([right, np.cross(towards, right), towards])
+    ends = np.stack([low, high])
+    corner = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i, j, k in np.ndindex(2, 2, 2)])
+    focus = (low + high) / 2
+    for _ in range(3):  # shifts the focus until the picture is centred
+        across, up, near = axes @ (corner - focus).T
+        distance = float((np.abs(across) / half_width + near).max()) * 1.04
+        height = up / (distance - near)
+        middle = (height.max() + height.min()) / 2
+        half_height = 1.13 * (height.max() - height.min()) / 2
+        focus = focus + axes[1] * distance * (middle + 0.08 * half_height)  # room for the label
+    angle = 2 * np.degrees(np.arctan(half_height))
+    return Camera(focus, focus + distance * towards, float(angle), float(half_height / half_width))
+
+
+def _look(plotter: Plotter, camera: Camera) -> None:
+    plotter.camera.focal_point = camera.focus
+    plotter.camera.position = camera.position
+    plotter.camera.up = (0, 0, 1)
+    plotter.camera.view_angle = camera.angle
+    plotter.reset_camera_clipping_range()
+
+
+def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
+    """The paper's figure 1: polygons, tetrahedra and contact spheres of a shape, side by side."""
+    import pyvista as pv
+
+    plotter = _shape_plotter(width)
+    for column, title in enumerate(("polygons", "tetrahedra", "contact spheres")):
+        plotter.subplot(0, column)
+        plotter.set_background("white")
+        plotter.add_text(title, position=(0.05, 0.92), viewport=True, font_size=11, color="black")
+        if column == 0:
+            plotter.add_mesh(_surface(shape.points, shape), color="#c9a66b", ambient=0.25)
+            plotter.add_mesh(_edges(shape.points, shape), color="#303030", line_width=2)
+        elif column == 1:
+            ends = np.sort(shape.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]], axis=2)
+            wires = np.unique(ends.reshape(-1, 2), axis=0)
+            plotter.add_mesh(_lines(shape.points, wires), color="#1d3557", line_width=1.2)
+        else:
+            cloud = pv.PolyData(shape.sphere_centre)
+            cloud["diameter"] = 2 * shape.sphere_radius
+            ball = pv.Sphere(radius=0.5, theta_resolution=20, phi_resolution=20)
+            plotter.add_mesh(
+                cloud.glyph(scale="diameter", orient=False, geom=ball),
+                color="#c9a66b",
+                smooth_shading=True,
+                ambient=0.25,
+            )
+        plotter.view_vector((-0.75, -1.0, 0.55), viewup=(0, 0, 1))
+        plotter.camera.zoom(1.15)
+    plotter.screenshot(str(path))
+    plotter.close()
+    return path
+
+
+def _shape_plotter(width: int) -> Plotter:
+    import pyvista as pv
+    import vtk
+
+    vtk.vtkObject.GlobalWarningDisplayOff()
+    plotter = pv.Plotter(
+        off_screen=True, shape=(1, 3), window_size=[width, width // 3], border=False
+    )
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter

@@ -1,0 +1,50 @@
+"""Gaps and depths of true shapes at places where they are known."""
+
+import numpy as np
+import pytest
+
+from micstools.geometry import quaternion_from_axis
+from micstools.overlap import Placed, depth, gap, wall_gaps
+from micstools.shapes import cube, hexapod
+
+UPRIGHT = np.array([1.0, 0, 0, 0])
+WALLS = {f"{axis}_{end}": "no_slip" for axis in "xyz" for end in ("min", "max")}
+
+
+def at(shape, x: float, y: float, z: float, q=UPRIGHT) -> Placed:
+    return Placed(shape, np.array([x, y, z]), q)
+
+
+def test_gap_of_two_faces_two_edges_and_a_corner() -> None:
+    d, c = 0.02, cube(0.02)
+    assert gap(at(c, 0, 0, 0), at(c, 0, 0.004, d + 1e-4)) == pytest.approx(1e-4, rel=1e-9)
+    on_edge = quaternion_from_axis(np.array([1.0, 0, 0]), 45.0)
+    across = quaternion_from_axis(np.array([0.0, 1, 0]), 45.0)
+    half = d / np.sqrt(2)
+    found = gap(at(c, 0, 0, 0, on_edge), at(c, 0.003, 0.002, 2 * half + 3e-4, across))
+    assert found == pytest.approx(3e-4, rel=1e-9)
+    turn = np.degrees(np.arccos(1 / np.sqrt(3)))
+    on_corner = quaternion_from_axis(np.array([1.0, -1, 0]), turn)
+    found = gap(at(c, 0, 0, 0), at(c, 0.001, 0, d / 2 + np.sqrt(3) / 2 * d + 2e-4, on_corner))
+    assert found == pytest.approx(2e-4, rel=1e-9)
+
+
+def test_depth_of_faces_and_of_a_leg() -> None:
+    c, h = cube(0.02), hexapod(0.02)
+    assert depth(at(c, 0, 0, 0), at(c, 0.001, 0.002, 0.0197)) == pytest.approx(3e-4)
+    assert depth(at(h, 0, 0, 0), at(h, 0, 0.05999, 0)) == pytest.approx(1e-5)
+    assert depth(at(h, 0, 0, 0), at(h, 0, 0.0601, 0)) == 0.0
+
+
+def test_hexapods_lying_in_one_anothers_notches_are_apart() -> None:
+    h = hexapod(0.02)
+    beside = at(h, 0.0201, 0.0201, 0.0201)  # every leg in a notch of the other
+    assert depth(at(h, 0, 0, 0), beside) == 0.0
+    assert gap(at(h, 0, 0, 0), beside) == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_walls_give_signed_gaps_and_open_sides_none() -> None:
+    low, high = np.zeros(3), np.array([0.3, 0.1, 0.2])
+    body = at(hexapod(0.02), 0.15, 0.029, 0.0305)
+    gaps = wall_gaps(body, low, high, WALLS | {"z_max": "open", "x_max": "periodic"})
+    assert gaps == pytest.approx({"x_min": 0.12, "y_min": -1e-3, "y_max": 0.041, "z_min": 5e-4})

@@ -1,0 +1,104 @@
+"""The findings on piles whose truth is known."""
+
+import numpy as np
+import pytest
+from synthetic import UPRIGHT, Motion
+
+from micstools import pile
+
+
+def places(*first: tuple[float, float, float]) -> list:
+    return [(np.array(xyz), UPRIGHT) for xyz in first]
+
+
+def test_turning_counts_only_what_happens_before_the_first_touch(make_run) -> None:
+    run = make_run(Motion(turn_in_fall=3.0, t_end=7.0, field_step=7.0))
+    turns = pile.turning_before_touch(run)
+    assert list(turns) == [3, 4, 5, 6, 7, 8]
+    assert max(turns.values()) == pytest.approx(3.0, abs=0.3)
+    assert pile.turning(run).seen
+    assert not pile.turning(make_run(Motion(turn_in_fall=8.0, t_end=7.0, field_step=7.0))).seen
+
+
+def test_first_block_on_a_fixed_block_and_a_wall(make_run) -> None:
+    top = 0.0288675 * 2  # highest corners of a fixed block
+    on_fixed = (0.09, 0.0698, top + 0.0302)
+    run = make_run(Motion(places=places(on_fixed, (0.25, 0.05, 0.12)), t_end=3.0, field_step=3.0))
+    before, end = pile.first_block(run)
+    assert before.seen and end.seen
+    assert "fixed blocks [0], walls ['y_max']" in before.figures
+    free = make_run(Motion(places=places((0.09, 0.05, 0.12)), t_end=2.0, field_step=2.0))
+    assert [f.seen for f in pile.first_block(free)] == [False]
+
+
+@pytest.mark.parametrize(
+    ("heights", "kind"), [((0.12, 0.12), "A"), ((0.0301, 0.12), "B"), ((0.03, 0.0303), "other")]
+)
+def test_patterns(make_run, heights: tuple[float, float], kind: str) -> None:
+    ends = places((0.031, 0.05, heights[0]), (0.269, 0.05, heights[1]))
+    run = make_run(Motion(places=ends, t_end=3.0, field_step=3.0))
+    assert pile.classify(run)[0] == kind
+    assert pile.pattern(run).seen == (kind == "A")
+
+
+def test_a_pile_with_blocks_still_to_come_is_no_pattern(make_run) -> None:
+    run = make_run(Motion(t_end=2.5, field_step=2.5))
+    assert pile.classify(run)[0] == "other"
+    assert not pile.at_rest(run).seen
+
+
+def test_front_and_back_walls(make_run) -> None:
+    ends = places((0.06, 0.0303, 0.12), (0.2, 0.0697, 0.12))
+    run = make_run(Motion(places=ends, t_end=3.0, field_step=3.0))
+    found = pile.walls(run)
+    assert found.seen
+    assert found.figures == "y_min: blocks [3], y_max: blocks [4]"
+    only_front = make_run(Motion(places=ends[:1], t_end=2.0, field_step=2.0))
+    assert not pile.walls(only_front).seen
+
+
+def test_moving_blocks_are_not_at_rest(make_run) -> None:
+    still = make_run(Motion(places=places((0.06, 0.05, 0.12)), t_end=2.0, field_step=2.0))
+    assert pile.at_rest(still).seen
+    moving = make_run(Motion(places=places((0.06, 0.05, 0.12)), t_end=0.4, field_step=0.4))
+    assert not pile.at_rest(moving).seen
+
+
+def test_depth_names_the_pair(make_run) -> None:
+    ends = places((0.06, 0.05, 0.12), (0.1195, 0.05, 0.12))
+    found = pile.depth(make_run(Motion(places=ends, t_end=3.0, field_step=3.0)))
+    assert found.seen
+    assert found.figures.startswith("largest 0.5000 mm (3-4)")
+
+
+def test_level_follows_the_submerged_volume(make_run) -> None:
+    per_block = 7 * 0.02**3 / 0.03
+    ends = places((0.06, 0.05, 0.1), (0.2, 0.05, 0.1))
+    rise = 2 * per_block
+    motion = Motion(places=ends, t_end=7.0, field_step=7.0, final_level=0.15 + rise, wave=0.0)
+    run = make_run(motion)
+    found = pile.water_level(run)
+    assert found.demanded == pytest.approx(0.15 + rise, rel=1e-12)
+    assert found.found == pytest.approx(0.15 + rise, abs=1e-8)
+    assert pile.level(run).seen
+
+
+def test_level_with_a_block_through_the_surface(make_run) -> None:
+    run = make_run(Motion(places=places((0.06, 0.05, 0.15)), t_end=2.0, field_step=2.0))
+    level = pile.demanded_level(run, -1)
+    below = pile.submerged_volume(run, -1, level)
+    assert level * 0.03 - below == pytest.approx(0.15 * 0.03 - 3 * 56e-6, rel=1e-12)
+    assert not pile.level(run).seen
+
+
+def test_telling_times_are_written_times(loose_pile) -> None:
+    times = pile.telling_times(loose_pile)
+    assert set(times) <= set(loose_pile.field_times)
+    assert times[-1] == 8.0
+    assert {0.0, 0.5, 1.5, 2.5, 3.5, 4.5} <= set(times)
+
+
+def test_report_says_yes_and_no(loose_pile) -> None:
+    text = pile.report(pile.findings(loose_pile))
+    assert "yes  attitude changes less than 5 degrees" in text
+    assert "no   blocks of the final pile touch" in text

@@ -1,0 +1,97 @@
+"""The reader against files as the program writes them, finished, growing and missing."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from synthetic import THREE_LEGS, Motion, write_run
+
+from micstools.reader import Run
+
+
+def test_bodies_and_series_share_their_rows(loose_pile: Run) -> None:
+    b, s = loose_pile.bodies, loose_pile.series
+    assert b.position.shape == (401, 9, 3)
+    assert np.array_equal(b.time, s.time)
+    assert b.shape == ["hexapod"] * 9
+    assert b.fixed.tolist() == [True] * 3 + [False] * 6
+    assert b.dropped.tolist() == [3, 4, 5, 6, 7, 8]
+    assert b.quaternion[0, 0] == pytest.approx(THREE_LEGS)
+
+
+def test_shapes_grid_and_parameters(loose_pile: Run) -> None:
+    assert loose_pile.shapes["hexapod"].volume == pytest.approx(56e-6)
+    assert loose_pile.grid.spacing == pytest.approx([0.005] * 3)
+    assert loose_pile.grid.high == pytest.approx([0.3, 0.1, 0.2])
+    assert len(loose_pile.parameters["body"]) == 3
+    assert loose_pile.value("fluid", "water_level", None) == 0.15
+    assert loose_pile.value("fluid", "no_such_name", 7.0) == 7.0
+    assert loose_pile.sides["z_max"] == "open"
+    assert loose_pile.sides["x_min"] == "no_slip"
+
+
+def test_fields_are_those_of_the_nearest_frame(loose_pile: Run) -> None:
+    fields = loose_pile.fields(2.2)
+    assert fields.time == 2.0
+    assert fields.liquid.shape == (40, 20, 60)
+    assert fields.velocity.shape == (40, 20, 60, 3)
+    assert fields.liquid[0].min() == 1.0
+    assert fields.liquid[-1].max() == 0.0
+
+
+def test_points_of_a_body_are_in_space(loose_pile: Run) -> None:
+    assert loose_pile.points(0, 0)[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_incomplete_rows_and_frames_are_left_out(loose_pile: Run, tmp_path: Path) -> None:
+    folder = shutil.copytree(loose_pile.folder, tmp_path / "growing")
+    with h5py.File(folder / "run.h5", "a") as h5:
+        for name in ("position", "quaternion"):
+            values = h5[f"bodies/{name}"][:-1]
+            del h5[f"bodies/{name}"]
+            h5[f"bodies/{name}"] = values
+    with h5py.File(folder / "fields.vtkhdf", "a") as h5:
+        h5["VTKHDF/Steps"].attrs["NSteps"] = 3
+    run = Run(folder)
+    assert len(run.bodies.time) == len(run.bodies.position) == 400
+    assert run.field_times.tolist() == [0.0, 0.5, 1.0]
+
+
+def test_refresh_sees_what_was_written_since(tmp_path: Path) -> None:
+    run = Run(write_run(tmp_path / "run", Motion(t_end=1.0)))
+    assert run.bodies.time[-1] == pytest.approx(1.0)
+    write_run(tmp_path / "run", Motion(t_end=2.0))
+    assert run.bodies.time[-1] == pytest.approx(1.0)
+    run.refresh()
+    assert run.bodies.time[-1] == pytest.approx(2.0)
+
+
+def test_a_writer_that_holds_the_file_does_not_stop_the_reader(loose_pile: Run) -> None:
+    with h5py.File(loose_pile.folder / "run.h5", "a", locking=False):
+        assert Run(loose_pile.folder).bodies.n == 9
+
+
+def test_the_newest_restart_file_is_read(tmp_path: Path, loose_pile: Run) -> None:
+    folder = shutil.copytree(loose_pile.folder, tmp_path / "run")
+    with pytest.raises(FileNotFoundError):
+        Run(folder).restart()
+    for name, value in (("b", 1.0), ("a", 2.0)):
+        with h5py.File(folder / f"restart-{name}.h5", "w") as h5:
+            h5["flow/liquid"] = np.full((2, 3), value)
+    assert Run(folder).restart()["flow/liquid"].max() == 2.0
+
+
+def test_a_folder_without_results_says_so(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"no run\.h5"):
+        Run(tmp_path)
+
+
+def test_a_run_without_fluid_has_no_fields(tmp_path: Path, loose_pile: Run) -> None:
+    folder = shutil.copytree(loose_pile.folder, tmp_path / "dry")
+    (folder / "fields.vtkhdf").unlink()
+    run = Run(folder)
+    assert run.field_times.size == 0
+    with pytest.raises(ValueError, match="no fields"):
+        run.fields(0.0)
