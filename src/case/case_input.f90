@@ -25,7 +25,7 @@ module case_input_m
   real(wp), parameter :: most_cells = real(huge(0), wp)   !! cells are counted in default integers
   real(wp), parameter :: most_steps = 1.0e9_wp
   real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
-  integer, parameter :: most_drops = 100000, finest_shape = 16
+  integer, parameter :: most_drops = 100000, finest_shape = 8
 
 contains
 
@@ -129,7 +129,24 @@ contains
     case default; error stop 'visit_group: a group of the list has no procedure'
     end select
     call v%finish()
+    if (.not. v%all_good()) call mark_faulty(case, name, n)
   end subroutine visit_group
+
+  !> Remember that a group is faulty, so that later checks leave it alone.
+  subroutine mark_faulty(case, name, n)
+    type(case_t), intent(inout) :: case
+    character(*), intent(in) :: name
+    integer, intent(in) :: n
+
+    select case (name)
+    case ('grid'); case%grid%faulty = .true.
+    case ('boundary'); case%boundary%faulty = .true.
+    case ('water'); case%water(n)%faulty = .true.
+    case ('shape'); case%shape(n)%faulty = .true.
+    case ('body'); case%body(n)%faulty = .true.
+    case ('drop'); case%drop(n)%faulty = .true.
+    end select
+  end subroutine mark_faulty
 
   !> Groups that hold required variables and are not there at all.
   subroutine read_missing_groups(n, v, case)
@@ -573,10 +590,7 @@ contains
     integer :: d, i
 
     call check_names(case, v%problems)
-    do i = 1, list%n
-      if (list%group(i)%name == 'boundary') call v%start_reading(list%group(i))
-      if (list%group(i)%name == 'boundary' .and. .not. v%all_good()) return
-    end do
+    if (case%grid%faulty .or. case%boundary%faulty) return
     do i = 1, list%n
       if (list%group(i)%name == 'grid') exit
     end do

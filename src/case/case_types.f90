@@ -30,6 +30,7 @@ module case_types_m
     integer :: cells(3) = 0                         !! required
     real(wp) :: length(3) = absent                  !! required [m]
     real(wp) :: origin(3) = 0.0_wp                  !! [m]
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type grid_input_t
 
   !> First index: 1 lower side, 2 upper side; last index: x, y, z.
@@ -37,6 +38,7 @@ module case_types_m
     character(name_length) :: kind(2, 3) = reshape([character(name_length) :: &
       'no_slip', 'no_slip', 'no_slip', 'no_slip', 'no_slip', 'open'], [2, 3])
     real(wp) :: velocity(3, 2, 3) = 0.0_wp          !! wall or inflow velocity [m/s]
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type boundary_input_t
 
   type :: fluid_t
@@ -52,6 +54,7 @@ module case_types_m
   type :: water_t
     real(wp) :: min(3) = absent, max(3) = absent    !! a box of liquid at t = 0 [m]
     integer :: line = 0                             !! of the case file, where the group begins
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type water_t
 
   type :: numerics_t
@@ -91,6 +94,7 @@ module case_types_m
     character(name_length) :: spheres = 'centroid'
     real(wp) :: sphere_spacing = 0.0_wp             !! [m]
     integer :: line = 0                             !! of the case file, where the group begins
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type shape_input_t
 
   type :: body_input_t
@@ -103,6 +107,7 @@ module case_types_m
     logical :: fixed = .false.
     real(wp) :: release_time = 0.0_wp               !! [s]
     integer :: line = 0                             !! of the case file, where the group begins
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type body_input_t
 
   type :: drop_input_t
@@ -117,6 +122,7 @@ module case_types_m
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1
     integer :: line = 0                             !! of the case file, where the group begins
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type drop_input_t
 
   type :: bed_input_t

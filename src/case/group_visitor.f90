@@ -24,6 +24,7 @@ module group_visitor_m
     type(problems_t) :: problems           !! what a reading visitor has found
     type(group_text_t) :: group            !! the group being read
     integer, private :: n_known = 0
+    integer, private :: n_before = 0       !! problems before this group
     character(name_length), private :: known(most_variables) = ''
   contains
     procedure :: start_reading, start_writing, finish
@@ -46,6 +47,7 @@ contains
     self%writing = .false.
     self%group = group
     self%n_known = 0
+    self%n_before = self%problems%n
   end subroutine start_reading
 
   !> Begin to write a group.
@@ -104,7 +106,7 @@ contains
     logical :: yes
     integer :: i
 
-    yes = .not. self%group%faulty
+    yes = .not. self%group%faulty .and. self%problems%n == self%n_before
     do i = 1, self%group%n
       yes = yes .and. .not. self%group%assignment(i)%faulty
     end do

@@ -352,7 +352,7 @@ contains
     call expect(base//a//'''cube'' size=1 density=0 scale=0 refinement=0 sphere_spacing=-1/', &
       '&shape density = 0: must be positive [kg/m3] (line 3)|' &
       //'&shape scale = 0: must be positive [-] (line 3)|' &
-      //'&shape refinement = 0: must lie between 1 and 16 (line 3)|' &
+      //'&shape refinement = 0: must lie between 1 and 8 (line 3)|' &
       //'&shape sphere_spacing = -1: must not be negative [m] (line 3)')
     call expect(base//'&shape name='''' kind=''cube'' size=1/', '&shape name = '''': '//rule)
     call expect(base//'&shape name=''a/b'' kind=''cube'' size=1/', '&shape name = ''a/b'': '//rule)
