@@ -1,0 +1,96 @@
+!> Starting HDF5 the way this program needs it, and the reason of its last failure in plain words.
+module hdf5_reason_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_char, c_null_char, c_funptr, &
+    c_funloc, c_loc, c_f_pointer, c_null_ptr, c_associated
+  use hdf5, only: h5open_f, h5close_f, h5eset_auto_f, h5dont_atexit_f
+  implicit none
+  private
+  public :: hdf5_start, hdf5_stop, hdf5_reason
+
+  integer, parameter :: longest_reason = 512
+
+  !> What HDF5 notes about one level of a failed call.
+  type, bind(c) :: record_t
+    integer(c_int64_t) :: class, major, minor
+    integer(c_int) :: line
+    type(c_ptr) :: function_name, file_name, description
+  end type record_t
+
+  interface
+    integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: name(*), value(*)
+      integer(c_int), value :: overwrite
+    end function c_setenv
+
+    !> Walk the stack of errors; `upward` begins at the innermost.
+    integer(c_int) function h5e_walk(stack, direction, visit, data) bind(c, name='H5Ewalk2')
+      import :: c_int, c_int64_t, c_funptr, c_ptr
+      integer(c_int64_t), value :: stack
+      integer(c_int), value :: direction
+      type(c_funptr), value :: visit
+      type(c_ptr), value :: data
+    end function h5e_walk
+  end interface
+
+contains
+
+  !> Start HDF5: without file locks, so that a run can be read while it goes on; without its own
+  !! messages; without a routine at exit, because we close our files ourselves. May be called again.
+  subroutine hdf5_start(status)
+    integer, intent(out) :: status   !! < 0: failed
+    integer :: ignored
+
+    status = -1
+    if (c_setenv('HDF5_USE_FILE_LOCKING'//c_null_char, 'FALSE'//c_null_char, 1_c_int) /= 0) return
+    call h5dont_atexit_f(ignored)   ! fails when HDF5 is already there
+    call h5open_f(status)
+    if (status >= 0) call h5eset_auto_f(0, status)
+  end subroutine hdf5_start
+
+  !> End HDF5; every file has been closed.
+  subroutine hdf5_stop(status)
+    integer, intent(out) :: status
+
+    call h5close_f(status)
+  end subroutine hdf5_stop
+
+  !> Why the last call of HDF5 failed: the system's words if it was the system, else those of HDF5.
+  function hdf5_reason() result(reason)
+    character(:), allocatable :: reason
+    character(longest_reason), target :: found
+    character(*), parameter :: mark = "error message = '"
+    integer(c_int) :: status
+    integer :: first
+
+    found = ''
+    status = h5e_walk(0_c_int64_t, 0_c_int, c_funloc(keep_innermost), c_loc(found))
+    reason = trim(found)
+    if (status /= 0 .or. len(reason) == 0) reason = 'unknown reason'
+    first = index(reason, mark)
+    if (first == 0) return
+    reason = reason(first + len(mark):)
+    reason = reason(:index(reason//"'", "'") - 1)
+  end function hdf5_reason
+
+  !> Copy the description of level 0, the innermost, into the text that `data` points to.
+  function keep_innermost(level, record, data) result(status) bind(c)
+    integer(c_int), value :: level
+    type(record_t), intent(in) :: record
+    type(c_ptr), value :: data
+    integer(c_int) :: status
+    character(longest_reason), pointer :: found
+    character(kind=c_char), pointer :: letter(:)
+    integer :: i
+
+    status = 0
+    if (level /= 0 .or. .not. c_associated(record%description)) return
+    call c_f_pointer(data, found)
+    call c_f_pointer(record%description, letter, [longest_reason])
+    do i = 1, longest_reason
+      if (letter(i) == c_null_char) exit
+      found(i:i) = letter(i)
+    end do
+  end function keep_innermost
+
+end module hdf5_reason_m
