@@ -91,7 +91,8 @@ contains
     call cluster_samples(0.5_wp*shape%smallest_edge, solid)
   end subroutine prepare
 
-  !> Points on the surface: its corners, along its edges, and inside its triangles.
+  !> Points on the surface: its corners, along its edges, and inside its triangles; and the centre of
+  !! mass, since of two equal blocks in one place no surface point lies below the other's surface.
   !!
   !! Sharp edges carry sixteen points per smallest edge, because two crossing edges touch at one
   !! point only; the rest of the surface carries four.
@@ -101,6 +102,7 @@ contains
     type(solid_t), intent(inout) :: solid
     real(wp), parameter :: per_edge_sharp = 16.0_wp, per_edge_flat = 4.0_wp
     real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between the normals of coplanar triangles
+    real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: normal(:, :)
     logical, allocatable :: on_surface(:)
@@ -120,6 +122,10 @@ contains
     do pass = 1, 2   ! count, then fill
       total = size(solid%corner, 2)
       if (pass == 2) solid%sample(:, :total) = solid%corner
+      if (inside(solid, centre)) then
+        total = total + 1
+        if (pass == 2) solid%sample(:, total) = centre
+      end if
       do e = 1, n_edges
         p(:, 1:2) = shape%point(:, edge(1:2, e))
         spacing = shape%smallest_edge/per_edge_sharp
