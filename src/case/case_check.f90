@@ -1,0 +1,395 @@
+!> Checks of a case that need geometry: bodies inside the tank and apart, room for the drops.
+!!
+!! They measure with the true shapes and the rule of a release (`room_for`): a body has room where
+!! nothing reaches deeper into it than 1 % of its size. Groups that `read_case` found faulty are left
+!! out, so these problems can be listed together with those.
+module case_check_m
+  use kinds_m, only: wp
+  use errors_m, only: problems_t, to_text
+  use vectors_m, only: norm
+  use case_types_m, only: case_t, body_input_t, drop_input_t
+  use case_input_m, only: side_name
+  use value_text_m, only: quoted_text
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init
+  use drops_m, only: draw_drop
+  use walls_m, only: walls_t, walls_init
+  use neighbours_m, only: nearest_shift
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
+  implicit none
+  private
+  public :: make_shapes, check_case
+
+  integer, parameter :: most_reported = 20   !! pairs of overlapping bodies named one by one
+
+  !> The bodies of a case in their starting places, and one place more to try drops in.
+  type :: scene_t
+    type(blocks_t) :: blocks            !! bodies 1..n of the case, and n+1
+    type(walls_t) :: walls, no_walls    !! the latter with the periods only
+    type(overlap_t) :: overlap
+    integer :: n = 0
+    integer, allocatable :: line(:)     !! (n) lines of the bodies in the case file
+    logical, allocatable :: held(:)     !! (n) fixed and never moved
+    logical, allocatable :: outside(:)  !! (n) reported as outside the tank
+  end type scene_t
+
+contains
+
+  !> The shapes of a case; a faulty one stays empty (volume 0).
+  subroutine make_shapes(case, shapes, problems)
+    type(case_t), intent(in) :: case
+    type(shape_t), allocatable, intent(out) :: shapes(:)
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: message
+    integer :: s
+
+    allocate (shapes(size(case%shape)))
+    do s = 1, size(case%shape)
+      if (case%shape(s)%faulty) cycle
+      call make_shape(case%shape(s), shapes(s), message)
+      if (len(message) > 0) call problems%add_message('&shape '//message, case%shape(s)%line)
+    end do
+  end subroutine make_shapes
+
+  !> Everything about a case that needs the shapes of its bodies.
+  subroutine check_case(case, shapes, problems)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! from `make_shapes`, one for each `&shape`
+    type(problems_t), intent(inout) :: problems
+    type(scene_t) :: scene
+    integer :: i
+
+    if (case%grid%faulty .or. case%boundary%faulty) return
+    call check_water(case, problems)
+    if (case%run%physics == 'fluid') return
+    call check_lengths(case, shapes, problems)
+    call set_scene(case, shapes, scene)
+    if (.not. allocated(scene%line)) return
+    call check_places(case, scene, problems)
+    call check_pairs(scene, problems)
+    do i = 1, size(case%drop)
+      if (.not. case%drop(i)%faulty) call check_drop(case, case%drop(i), scene, problems)
+    end do
+  end subroutine check_case
+
+  !> Boxes of liquid must reach into the tank.
+  subroutine check_water(case, problems)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: problems
+    integer :: i
+
+    do i = 1, size(case%water)
+      if (case%water(i)%faulty) cycle
+      if (any(case%water(i)%min >= case%grid%origin + case%grid%length) .or. &
+          any(case%water(i)%max <= case%grid%origin)) then
+        call problems%add_message('&water min = '//vector_text(case%water(i)%min)//', max = ' &
+          //vector_text(case%water(i)%max)//': lies outside the tank', case%water(i)%line)
+      end if
+    end do
+  end subroutine check_water
+
+  !> No shape in use is longer than half a period.
+  subroutine check_lengths(case, shapes, problems)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(problems_t), intent(inout) :: problems
+    real(wp) :: length
+    integer :: s, d
+
+    do s = 1, size(shapes)
+      if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s)%name)) cycle
+      length = longest_line(shapes(s))
+      do d = 1, 3
+        if (case%boundary%kind(1, d) /= 'periodic' .or. length <= 0.5_wp*case%grid%length(d)) cycle
+        call problems%add_message('&shape name = '//quoted_text(trim(shapes(s)%name))//': ' &
+          //short(length)//' m long, must not be more than half the period ' &
+          //to_text(case%grid%length(d))//' m between '//side_name(1, d)//' and '//side_name(2, d), &
+          case%shape(s)%line)
+      end do
+    end do
+  end subroutine check_lengths
+
+  !> Does a body or a drop have this shape?
+  pure function in_use(case, name) result(yes)
+    type(case_t), intent(in) :: case
+    character(*), intent(in) :: name
+    logical :: yes
+
+    yes = any(case%body%shape == name) .or. any(case%drop%shape == name)
+  end function in_use
+
+  !> Largest distance between two points of a shape [m].
+  pure function longest_line(shape) result(length)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: length
+    integer :: i
+
+    if (shape%kind == 'sphere') then
+      length = 2*shape%sphere_radius(1)
+      return
+    end if
+    length = 0.0_wp
+    do i = 1, size(shape%point, 2)
+      length = max(length, maxval(sum((shape%point(:, i:) - spread(shape%point(:, i), 2, &
+        size(shape%point, 2) - i + 1))**2, 1)))
+    end do
+    length = sqrt(length)
+  end function longest_line
+
+  !> Put the good bodies of a case into a scene; without good shapes it stays empty.
+  subroutine set_scene(case, shapes, scene)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(scene_t), intent(out) :: scene
+    type(case_t) :: good          ! the good bodies and one more, no drops
+    type(shape_t), allocatable :: made(:)
+    logical :: use_it(size(case%body))
+    integer :: s, n
+
+    n = count(shapes%volume > 0.0_wp)
+    if (n == 0) return
+    allocate (made(n))
+    n = 0
+    do s = 1, size(shapes)
+      if (.not. shapes(s)%volume > 0.0_wp) cycle
+      n = n + 1
+      made(n) = shapes(s)
+    end do
+    do n = 1, size(case%body)
+      use_it(n) = .not. case%body(n)%faulty .and. any(made%name == case%body(n)%shape)
+    end do
+    scene%n = count(use_it)
+    allocate (good%body(scene%n + 1), good%drop(0))
+    good%body(:scene%n) = pack(case%body, use_it)
+    good%body(scene%n + 1)%shape = made(1)%name
+    good%body(scene%n + 1)%position = 0.0_wp
+    call blocks_init(good, made, scene%blocks)
+    call overlap_init(made, scene%n + 1, scene%overlap)
+    call walls_init(case%grid, case%boundary, scene%walls)
+    scene%no_walls%period = scene%walls%period
+    allocate (scene%line(scene%n), scene%held(scene%n), scene%outside(scene%n))
+    scene%line = good%body(:scene%n)%line
+    scene%outside = .false.
+    do n = 1, scene%n
+      scene%held(n) = good%body(n)%fixed .and. all(abs(good%body(n)%velocity) <= 0.0_wp) &
+        .and. all(abs(good%body(n)%angular_velocity) <= 0.0_wp)
+    end do
+  end subroutine set_scene
+
+  !> Every body lies inside the tank; through an open top it may stick out.
+  subroutine check_places(case, scene, problems)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(inout) :: scene
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: where_to
+    integer :: b
+
+    scene%blocks%present = .false.
+    do b = 1, scene%n
+      where_to = way_out(case, scene, b)
+      scene%outside(b) = len(where_to) > 0
+      if (scene%outside(b)) then
+        call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b))//': ' &
+                                  //where_to//'; a body must lie inside the tank', scene%line(b))
+      end if
+    end do
+  end subroutine check_places
+
+  !> How body b lies outside the tank: behind a wall, or its centre beyond a side without a wall other
+  !! than the top. Empty if it does not.
+  function way_out(case, scene, b) result(text)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: b
+    character(:), allocatable :: text
+    type(walls_t) :: one
+    real(wp) :: depth, deepest, beyond
+    integer :: w, s, d
+
+    text = ''
+    if (.not. room_for(scene%walls, scene%blocks, b, scene%overlap)) then
+      deepest = 0.0_wp
+      do w = 1, scene%walls%n
+        one%n = 1
+        one%normal(:, 1) = scene%walls%normal(:, w)
+        one%offset(1) = scene%walls%offset(w)
+        depth = wall_depth(scene%blocks%shapes(scene%blocks%shape(b)), scene%blocks%x(:, b), &
+                           scene%blocks%q(:, b), one)
+        if (depth <= deepest) cycle
+        deepest = depth
+        s = 2 - mod(-scene%walls%number(w), 2)
+        d = (1 - scene%walls%number(w))/2
+        text = 'reaches '//short(depth)//' m through the wall '//side_name(s, d)
+      end do
+      return
+    end if
+    do d = 1, 3
+      do s = 1, 2
+        select case (case%boundary%kind(s, d))
+        case ('open', 'inflow', 'outflow')
+          beyond = scene%blocks%x(d, b) - case%grid%origin(d)
+          if (s == 2) beyond = case%grid%length(d) - beyond
+          if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
+            text = 'its centre lies '//short(-beyond)//' m beyond '//side_name(s, d)
+          end if
+        end select
+      end do
+    end do
+  end function way_out
+
+  !> Bodies do not overlap at the start; one that is released later finds no held body in its place.
+  subroutine check_pairs(scene, problems)
+    type(scene_t), intent(inout) :: scene
+    type(problems_t), intent(inout) :: problems
+    integer :: a, b, n
+    real(wp) :: depth
+
+    n = 0
+    do b = 2, scene%n
+      do a = 1, b - 1
+        if (.not. together(scene, a, b)) cycle
+        depth = pair_depth(scene, a, b)
+        if (depth <= 0.0_wp) cycle
+        n = n + 1
+        if (n > most_reported) cycle
+        call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b)) &
+          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//short(depth) &
+          //' m; bodies must lie apart at the start', scene%line(b))
+      end do
+    end do
+    if (n > most_reported) then
+      call problems%add_message('&body: '//to_text(n - most_reported) &
+                                //' more pairs of bodies overlap')
+    end if
+  end subroutine check_pairs
+
+  !> Must bodies a and b lie apart where they start?
+  pure function together(scene, a, b) result(yes)
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: a, b
+    logical :: yes
+
+    associate (time => scene%blocks%release_time)
+      yes = (time(a) <= 0.0_wp .and. time(b) <= 0.0_wp) &
+        .or. (scene%held(a) .and. time(a) <= time(b)) .or. (scene%held(b) .and. time(b) <= time(a))
+    end associate
+    yes = yes .and. .not. (scene%outside(a) .or. scene%outside(b))
+  end function together
+
+  !> Depth of bodies a and b in one another if it is more than a release allows, else zero [m].
+  function pair_depth(scene, a, b) result(depth)
+    type(scene_t), intent(inout) :: scene
+    integer, intent(in) :: a, b
+    real(wp) :: depth
+    real(wp) :: d(3), reach
+
+    depth = 0.0_wp
+    associate (blocks => scene%blocks)
+      d = blocks%x(:, a) - blocks%x(:, b)
+      d = d + nearest_shift(scene%walls%period, d)
+      reach = blocks%shapes(blocks%shape(a))%radius + blocks%shapes(blocks%shape(b))%radius
+      if (norm(d) >= reach) return
+      blocks%present = .false.
+      blocks%present(a) = .true.
+      if (room_for(scene%no_walls, blocks, b, scene%overlap)) then
+        blocks%present(a) = .false.
+        blocks%present(b) = .true.
+        if (room_for(scene%no_walls, blocks, a, scene%overlap)) return
+      end if
+      depth = overlap_depth(blocks%shapes(blocks%shape(a)), blocks%x(:, b) + d, blocks%q(:, a), &
+                            blocks%shapes(blocks%shape(b)), blocks%x(:, b), blocks%q(:, b))
+    end associate
+  end function pair_depth
+
+  !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose place
+  !! lies in a wall or a held body could wait for ever, so it is a problem now.
+  subroutine check_drop(case, drop, scene, problems)
+    type(case_t), intent(in) :: case
+    type(drop_input_t), intent(in) :: drop
+    type(scene_t), intent(inout) :: scene
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: reason, first
+    integer :: b, k, n
+
+    b = scene%n + 1
+    scene%blocks%shape(b) = findloc_name(scene%blocks%shapes, drop%shape)
+    if (scene%blocks%shape(b) == 0) return
+    n = 0
+    first = ''
+    do k = 1, drop%count
+      call draw_drop(drop, k, scene%blocks%x(:, b), scene%blocks%q(:, b))
+      scene%blocks%release_time(b) = drop%first_time + real(k - 1, wp)*drop%interval
+      reason = hindrance(case, scene, b)
+      if (len(reason) == 0) cycle
+      n = n + 1
+      if (n > 1) cycle
+      first = reason
+      if (drop%count > 1) first = 'block '//to_text(k)//' at '//vector_text(scene%blocks%x(:, b)) &
+        //' '//reason
+    end do
+    if (n == 0) return
+    first = first//'; it could never be released'
+    if (n > 1) first = first//'; '//to_text(n)//' of '//to_text(drop%count) &
+      //' blocks have such places'
+    call problems%add_message('&drop position = '//vector_text(drop%position)//': '//first, drop%line)
+  end subroutine check_drop
+
+  !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
+  function hindrance(case, scene, b) result(text)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(inout) :: scene
+    integer, intent(in) :: b
+    character(:), allocatable :: text
+    integer :: a
+
+    scene%blocks%present = .false.
+    text = way_out(case, scene, b)
+    if (len(text) > 0) return
+    do a = 1, scene%n
+      scene%blocks%present(a) = scene%held(a) .and. .not. scene%outside(a) &
+        .and. scene%blocks%release_time(a) <= scene%blocks%release_time(b)
+    end do
+    if (room_for(scene%no_walls, scene%blocks, b, scene%overlap)) return
+    text = 'lies inside a fixed body'
+    do a = 1, scene%n
+      if (.not. scene%held(a) .or. scene%outside(a)) cycle
+      if (scene%blocks%release_time(a) > scene%blocks%release_time(b)) cycle
+      if (pair_depth(scene, a, b) <= 0.0_wp) cycle
+      text = 'lies inside the fixed &body on line '//to_text(scene%line(a))
+      exit
+    end do
+  end function hindrance
+
+  !> Number of the shape of that name; 0 if there is none.
+  pure function findloc_name(shapes, name) result(s)
+    type(shape_t), intent(in) :: shapes(:)
+    character(*), intent(in) :: name
+    integer :: s
+
+    do s = size(shapes), 1, -1
+      if (shapes(s)%name == name) return
+    end do
+  end function findloc_name
+
+  !> Three numbers between commas.
+  pure function vector_text(x) result(text)
+    real(wp), intent(in) :: x(3)
+    character(:), allocatable :: text
+
+    text = to_text(x(1))//', '//to_text(x(2))//', '//to_text(x(3))
+  end function vector_text
+
+  !> A length with three digits.
+  pure function short(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+    character(16) :: buffer
+    real(wp) :: rounded
+
+    write (buffer, '(es16.2e3)') x
+    read (buffer, *) rounded
+    text = to_text(rounded)
+  end function short
+
+end module case_check_m
