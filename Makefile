@@ -42,17 +42,20 @@ help:
 	@echo 'make clean    remove what make has built'
 	@echo 'Variables: OPT="-O2" for a portable binary, FC_SERIAL, FC_MPI, CASE'
 
+# `make V=1` shows whole commands.
+say = $(if $(V),,@echo '  $(1)';)
+
 $(binary): $$(OBJECTS_mics)
 	$(if $(OBJECTS_mics),,$(error src/mics.f90, the main program, is missing))
-	$(compiler) $(flags) -o $@ $^
+	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
 
 units: $(units)
 
 $(units): $(B)/%: $$(OBJECTS_$$*)
-	$(compiler) $(flags) -o $@ $^
+	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
 
 $(B)/%.o: %.f90 $(B)/settings
-	$(compiler) $(flags) -J$(B) -c -o $@ $<
+	$(call say,FC $@)$(compiler) $(flags) -J$(B) -c -o $@ $<
 
 # Compiler and flags; a change rebuilds everything. The compiler is tried, not trusted to exist.
 tried = $(shell echo '$(compiler) $(flags)' | cmp -s - $@ || \

@@ -1,0 +1,192 @@
+!> The options of the program.
+module command_line_m
+  use errors_m, only: problems_t
+  use value_text_m, only: nearest_name, parse_integer, value_ok
+  implicit none
+  private
+  public :: options_t, argument_t, read_command_line, parse_arguments, print_help
+
+  type :: options_t
+    logical :: check = .false.       !! read, validate, print the plan, write nothing
+    logical :: quiet = .false.       !! no progress table
+    logical :: version = .false.
+    logical :: help = .false.
+    integer :: threads = 0           !! 0: not given
+    character(:), allocatable :: case_file   !! empty: standard input
+    character(:), allocatable :: restart     !! restart file, empty: not given
+    character(:), allocatable :: output      !! folder, empty: as the case says
+  end type options_t
+
+  !> One word of the command line.
+  type :: argument_t
+    character(:), allocatable :: text
+  end type argument_t
+
+  character(*), parameter :: known(7) = [character(9) :: '--check', '--restart', '--output', &
+    '--threads', '--quiet', '--version', '--help']
+
+contains
+
+  !> Options given to this run; what is wrong with them goes into `problems`.
+  subroutine read_command_line(options, problems)
+    type(options_t), intent(out) :: options
+    type(problems_t), intent(inout) :: problems
+    type(argument_t) :: arguments(command_argument_count())
+    integer :: i, length
+
+    do i = 1, size(arguments)
+      call get_command_argument(i, length=length)
+      allocate (character(length) :: arguments(i)%text)
+      call get_command_argument(i, arguments(i)%text)
+    end do
+    call parse_arguments(arguments, options, problems)
+  end subroutine read_command_line
+
+  !> Options from the words of a command line.
+  subroutine parse_arguments(arguments, options, problems)
+    type(argument_t), intent(in) :: arguments(:)
+    type(options_t), intent(out) :: options
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: word, value
+    integer :: i, equals
+    logical :: has_value
+
+    options%case_file = ''
+    options%restart = ''
+    options%output = ''
+    i = 0
+    do while (i < size(arguments))
+      i = i + 1
+      word = arguments(i)%text
+      if (index(word, '-') /= 1 .or. word == '-') then
+        call take_file(word, options, problems)
+        cycle
+      end if
+      equals = index(word, '=')
+      has_value = equals > 0
+      value = ''
+      if (has_value) then
+        value = word(equals + 1:)
+        word = word(:equals - 1)
+      else if (wants_value(word) .and. i < size(arguments)) then
+        if (index(arguments(i + 1)%text, '--') /= 1) then
+          i = i + 1
+          value = arguments(i)%text
+          has_value = .true.
+        end if
+      end if
+      call take_option(word, has_value, value, options, problems)
+    end do
+  end subroutine parse_arguments
+
+  !> Does the option need a word behind it?
+  pure logical function wants_value(word)
+    character(*), intent(in) :: word
+
+    select case (word)
+    case ('--restart', '--output', '--threads'); wants_value = .true.
+    case default; wants_value = .false.
+    end select
+  end function wants_value
+
+  !> A word that is not an option: the case file.
+  subroutine take_file(word, options, problems)
+    character(*), intent(in) :: word
+    type(options_t), intent(inout) :: options
+    type(problems_t), intent(inout) :: problems
+
+    if (len(options%case_file) > 0) then
+      call problems%add_message("two case files given, '"//options%case_file//"' and '"//word//"'")
+    else if (len(word) == 0) then
+      call problems%add_message('the name of the case file is empty')
+    else if (word /= '-') then
+      options%case_file = word
+    end if
+  end subroutine take_file
+
+  !> One option with its value, if it has one.
+  subroutine take_option(word, has_value, value, options, problems)
+    character(*), intent(in) :: word, value
+    logical, intent(in) :: has_value
+    type(options_t), intent(inout) :: options
+    type(problems_t), intent(inout) :: problems
+
+    if (all(known /= word)) then
+      call problems%add_message("unknown option '"//word//"'; the nearest is " &
+        //nearest_name(word, known)//' (see --help)')
+      return
+    end if
+    if (has_value .and. .not. wants_value(word)) then
+      call problems%add_message("option "//word//" takes no value, got '"//value//"'")
+      return
+    end if
+    if (wants_value(word) .and. len(value) == 0) then
+      call problems%add_message('option '//word//' needs '//what_value(word)//' behind it')
+      return
+    end if
+    select case (word)
+    case ('--check'); options%check = .true.
+    case ('--quiet'); options%quiet = .true.
+    case ('--version'); options%version = .true.
+    case ('--help'); options%help = .true.
+    case ('--restart'); options%restart = value
+    case ('--output'); options%output = value
+    case ('--threads'); call take_threads(value, options, problems)
+    end select
+  end subroutine take_option
+
+  pure function what_value(word) result(what)
+    character(*), intent(in) :: word
+    character(:), allocatable :: what
+
+    select case (word)
+    case ('--restart'); what = 'a file name'
+    case ('--output'); what = 'a folder'
+    case default; what = 'a number'
+    end select
+  end function what_value
+
+  subroutine take_threads(value, options, problems)
+    character(*), intent(in) :: value
+    type(options_t), intent(inout) :: options
+    type(problems_t), intent(inout) :: problems
+    integer, parameter :: most = 1024
+    integer :: n, info
+
+    n = 0
+    call parse_integer(value, n, info)
+    if (info /= value_ok .or. n < 1 .or. n > most) then
+      call problems%add('--threads', value, 'must be a whole number from 1 to 1024')
+    else
+      options%threads = n
+    end if
+  end subroutine take_threads
+
+  !> How to use the program.
+  subroutine print_help(unit)
+    integer, intent(in) :: unit
+    character(*), parameter :: lines(*) = [character(80) :: &
+      'Concrete blocks dropped into water: fluid and rigid bodies in three dimensions.', &
+      '', &
+      'Usage:  mics [options] [case.nml]     without a file name the case is read from', &
+      '                                      standard input: mics < case.nml', &
+      '', &
+      '  --check         read and validate the case, print the plan, write nothing', &
+      '  --restart FILE  go on from a restart file', &
+      '  --output DIR    folder for the results, instead of the one named in the case', &
+      '  --threads N     threads (default OMP_NUM_THREADS, else all cores;', &
+      '                  1 for each process under mpirun)', &
+      '  --quiet         no progress table', &
+      '  --version       version and how the program was built', &
+      '  --help          this text', &
+      '', &
+      'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
+      '            130 or 143 ended by a signal after writing a restart file.']
+    integer :: i
+
+    do i = 1, size(lines)
+      write (unit, '(a)') trim(lines(i))
+    end do
+  end subroutine print_help
+
+end module command_line_m

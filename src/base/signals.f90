@@ -1,0 +1,52 @@
+!> SIGINT and SIGTERM set a flag; the time loop looks at it and ends in good order.
+module signals_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
+  use kinds_m, only: wp
+  use parallel_m, only: global_max
+  implicit none
+  private
+  public :: catch_signals, signal_caught
+  public :: signal_interrupt, signal_terminate
+
+  integer, parameter :: signal_interrupt = 2    !! the number POSIX systems give SIGINT
+  integer, parameter :: signal_terminate = 15   !! and SIGTERM
+
+  integer(c_int), volatile, save :: caught = 0
+
+  interface
+    function c_signal(number, handler) bind(c, name='signal') result(previous)
+      import :: c_int, c_funptr
+      integer(c_int), value :: number
+      type(c_funptr), value :: handler
+      type(c_funptr) :: previous
+    end function c_signal
+  end interface
+
+contains
+
+  !> From now on the two signals only set a flag. Call it after `parallel_init`.
+  subroutine catch_signals()
+    type(c_funptr) :: previous
+
+    previous = c_signal(int(signal_interrupt, c_int), c_funloc(remember))
+    previous = c_signal(int(signal_terminate, c_int), c_funloc(remember))
+  end subroutine catch_signals
+
+  !> The signal that any process caught, or zero; all processes call this and get the same answer.
+  function signal_caught() result(number)
+    integer :: number
+    real(wp) :: largest(1)
+
+    largest = real(caught, wp)
+    call global_max(largest)
+    number = nint(largest(1))
+  end function signal_caught
+
+  !> The handler.
+  subroutine remember(number) bind(c)
+    integer(c_int), value :: number
+
+    caught = number
+  end subroutine remember
+
+end module signals_m

@@ -1,0 +1,64 @@
+!> Options: every form understood, every mistake named with the nearest option.
+program test_command_line
+  use check_m, only: check, finish_checks
+  use command_line_m, only: options_t, argument_t, parse_arguments
+  use errors_m, only: problems_t
+  implicit none
+  type(options_t) :: options
+  type(problems_t) :: problems
+
+  call parse('')
+  call check('nothing given', options%case_file == '' .and. options%output == '' &
+    .and. options%restart == '' .and. options%threads == 0 .and. problems%n == 0)
+  call check('all off', .not. any([options%check, options%quiet, options%version, options%help]))
+  call parse('--check --quiet --version --help')
+  call check('switches', all([options%check, options%quiet, options%version, options%help]) &
+    .and. problems%n == 0)
+  call parse('--restart a.h5 --output=out --threads 3 case.nml')
+  call check('values', options%restart == 'a.h5' .and. options%output == 'out' &
+    .and. options%threads == 3 .and. options%case_file == 'case.nml' .and. problems%n == 0)
+  call parse('-')
+  call check('standard input', options%case_file == '' .and. problems%n == 0)
+  call refused('--chek', "unknown option '--chek'; the nearest is --check (see --help)")
+  call refused('--thread=2', "unknown option '--thread'; the nearest is --threads (see --help)")
+  call refused('-output', "unknown option '-output'; the nearest is --output (see --help)")
+  call refused('--threads many', "--threads = 'many': must be a whole number from 1 to 1024")
+  call refused('--threads 0', "--threads = '0': must be a whole number from 1 to 1024")
+  call refused('--threads 2.5', "--threads = '2.5': must be a whole number from 1 to 1024")
+  call refused('--restart', 'option --restart needs a file name behind it')
+  call refused('--output --quiet', 'option --output needs a folder behind it')
+  call refused('--quiet=yes', "option --quiet takes no value, got 'yes'")
+  call refused('a.nml b.nml', "two case files given, 'a.nml' and 'b.nml'")
+  call parse('--chek --threads x')
+  call check('all problems at once', problems%n, 2)
+  call finish_checks()
+
+contains
+
+  !> Parse the words of a line.
+  subroutine parse(line)
+    character(*), intent(in) :: line
+    type(argument_t), allocatable :: arguments(:)
+    type(problems_t) :: none
+    integer :: first, last
+
+    allocate (arguments(0))
+    first = 1
+    do while (first <= len(line))
+      last = index(line(first:)//' ', ' ') + first - 2
+      arguments = [arguments, argument_t(line(first:last))]
+      first = last + 2
+    end do
+    problems = none
+    call parse_arguments(arguments, options, problems)
+  end subroutine parse
+
+  subroutine refused(line, message)
+    character(*), intent(in) :: line, message
+
+    call parse(line)
+    call check(line//' refused', problems%n, 1)
+    if (problems%n == 1) call check(line//': message', problems%message(1) == message)
+  end subroutine refused
+
+end program test_command_line
