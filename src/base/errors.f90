@@ -173,7 +173,7 @@ contains
       text = trim(adjustl(buffer))
       return
     end if
-    do digits = 1, 17
+    do digits = merge(17, 1, abs(value) > 0.1_wp*huge(value)), 17   ! rounding up may overflow
       write (form, '(a, i0, a)') '(es40.', digits - 1, 'e3)'
       write (buffer, form) value
       read (buffer, *, iostat=info) again
