@@ -216,13 +216,17 @@ class Run:
         frame = int(np.abs(self.field_times - t).argmin())
         return self._read("fields.vtkhdf", lambda h5: _read_fields(h5, frame))
 
-    def restart(self) -> dict[str, Any]:
-        """Every dataset of the newest restart file by its path, in double precision."""
-        names = [n for n in ("restart-a.h5", "restart-b.h5") if (self.folder / n).is_file()]
-        if not names:
+    @property
+    def restart_files(self) -> list[str]:
+        """Names of the restart files, the oldest first."""
+        found = [p for p in self.folder.glob("restart-[ab].h5") if p.is_file()]
+        return [p.name for p in sorted(found, key=lambda p: p.stat().st_mtime_ns)]
+
+    def restart(self, name: str | None = None) -> dict[str, Any]:
+        """Every dataset of a restart file, by default the newest, by its path; doubles stay so."""
+        if name is None and not self.restart_files:
             raise FileNotFoundError(f"{self.folder} holds no restart file")
-        newest = max(names, key=lambda n: (self.folder / n).stat().st_mtime_ns)
-        return self._read(newest, _everything)
+        return self._read(name or self.restart_files[-1], _everything)
 
     def points(self, body: int, row: int) -> Array:
         """Corners of a body in space (n, 3) [m]."""

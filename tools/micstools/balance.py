@@ -1,0 +1,59 @@
+"""Numbers recomputed from the double-precision state of a restart file.
+
+Nothing here trusts what the program reports of itself: divergence comes from the face data,
+liquid from the cells.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from micstools.geometry import Array
+from micstools.reader import Grid, Run
+
+State = dict[str, Any]
+
+
+def faces(state: State, name: str, grid: Grid, periodic: tuple[bool, ...]) -> list[Array]:
+    """A face quantity as three arrays (z, y, x), one cell longer in their own direction.
+
+    In the file element (d, k, j, i) is the lower face of cell (i, j, k) in direction d. In a
+    periodic direction the last face is the first one again.
+    """
+    stored = np.asarray(state[name])
+    shape = [len(f) - 1 for f in reversed(grid.faces)]
+    found = []
+    for d in range(3):
+        axis, values = 2 - d, stored[d]
+        own = tuple(slice(0, n + (a == axis and not periodic[d])) for a, n in enumerate(shape))
+        values = values[own]
+        if periodic[d]:
+            values = np.concatenate([values, np.take(values, [0], axis=axis)], axis=axis)
+        found.append(values)
+    return found
+
+
+def divergence(run: Run, state: State) -> Array:
+    """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
+    cells that have no open face and so no fluid that moves."""
+    h = run.grid.spacing
+    periodic = tuple(run.sides[f"{axis}_min"] == "periodic" for axis in "xyz")
+    data = [
+        faces(state, f"flow/{name}", run.grid, periodic) for name in ("open", "uf", "solid_flux")
+    ]
+    outflow = np.zeros([len(f) - 1 for f in reversed(run.grid.faces)])
+    openness = np.zeros_like(outflow)
+    for d, (share, velocity, solid) in enumerate(zip(*data, strict=True)):
+        area, axis = h.prod() / h[d], 2 - d
+        outflow += np.diff(share * area * velocity + solid, axis=axis)
+        n = share.shape[axis] - 1
+        for side in (0, 1):
+            openness += np.take(share, range(side, side + n), axis=axis)
+    return np.where(openness > 0, outflow / h.prod(), 0.0)
+
+
+def liquid_between(run: Run, state: State, axis: int, low: float, high: float) -> float:
+    """Volume of liquid [m3] in the cells whose centres lie between two coordinates [m]."""
+    here = (run.grid.centres[axis] > low) & (run.grid.centres[axis] < high)
+    cells = np.compress(here, np.asarray(state["flow/liquid"]), axis=2 - axis)
+    return float(cells.sum(dtype=np.longdouble))

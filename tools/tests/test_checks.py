@@ -1,0 +1,84 @@
+"""The tables of checks, and the balances recomputed from a restart state."""
+
+import numpy as np
+import pytest
+
+from micstools import balance, buoyancy
+from micstools.checks import Checks
+from micstools.overlap import Placed
+from micstools.reader import Grid
+from micstools.shapes import box
+
+
+def test_checks_hold_fail_and_are_never_empty(capsys) -> None:
+    good = Checks("good")
+    good.close("mass", 1.001, 1.0, 2e-3)
+    good.below("drift", -1e-12, 1e-9)
+    good.true("there", True)
+    assert good.report() == 0
+    for bad in (
+        lambda c: c.close("mass", 1.003, 1.0, 2e-3),
+        lambda c: c.below("drift", -1e-8, 1e-9),
+        lambda c: c.below("drift", float("nan"), 1e-9),
+        lambda c: c.true("there", False),
+    ):
+        checks = Checks("bad")
+        bad(checks)
+        assert checks.report() == 1
+    assert Checks("empty").report() == 1
+    assert "FAILED" in capsys.readouterr().out
+
+
+class FakeRun:
+    """Grid and sides only."""
+
+    grid = Grid(np.linspace(0, 0.4, 5), np.linspace(0, 0.3, 4), np.linspace(0, 0.1, 3))
+    sides = {f"{a}_{e}": "no_slip" for a in "xyz" for e in ("min", "max")}
+
+
+def linear_flow(run: FakeRun, gradient: tuple[float, float, float]) -> dict[str, np.ndarray]:
+    """Face velocity u = a x, v = b y, w = c z with all faces open."""
+    nx, ny, nz = 4, 3, 2
+    uf = np.zeros((3, nz + 1, ny + 1, nx + 1))
+    for d, (f, rate) in enumerate(zip(run.grid.faces, gradient, strict=True)):
+        shape = [1, 1, 1]
+        shape[2 - d] = len(f)
+        uf[d] += rate * f.reshape(shape)
+    return {"flow/uf": uf, "flow/open": np.ones_like(uf), "flow/solid_flux": np.zeros_like(uf)}
+
+
+def test_divergence_of_a_linear_flow() -> None:
+    run = FakeRun()
+    state = linear_flow(run, (1.0, 2.0, -2.5))
+    found = balance.divergence(run, state)
+    assert found.shape == (2, 3, 4)
+    assert found == pytest.approx(np.full((2, 3, 4), 0.5), rel=1e-12)
+    state["flow/open"][1] = 0.0
+    state["flow/solid_flux"][1] = 2.0 * run.grid.y[:, None] * 0.1 * 0.05
+    assert balance.divergence(run, state) == pytest.approx(np.full((2, 3, 4), 0.5), rel=1e-12)
+    state["flow/open"][:] = 0.0
+    assert np.abs(balance.divergence(run, state)).max() == 0.0
+
+
+def test_divergence_closes_periodic_directions() -> None:
+    run = FakeRun()
+    run.sides = run.sides | {"x_min": "periodic", "x_max": "periodic"}
+    state = linear_flow(run, (0.0, 0.0, 0.0))
+    state["flow/uf"][0, :, :, 0] = 3.0
+    state["flow/uf"][0, :, :, -1] = 99.0  # not a face of its own
+    found = balance.divergence(run, state)[0, 0]
+    assert found == pytest.approx([-30.0, 0.0, 0.0, 30.0], rel=1e-12)
+
+
+def test_liquid_of_one_basin() -> None:
+    run = FakeRun()
+    state = {"flow/liquid": np.arange(24.0).reshape(2, 3, 4)}
+    assert balance.liquid_between(run, state, 0, 0.0, 0.1) == 0 + 4 + 8 + 12 + 16 + 20
+    assert balance.liquid_between(run, state, 2, 0.05, 0.1) == sum(range(12, 24))
+
+
+def test_displaced_mass_and_moment_of_a_floating_box() -> None:
+    body = Placed(box((0.1, 0.1, 0.1)), np.array([1.0, 2.0, 0.04]), np.array([1.0, 0, 0, 0]))
+    mass, moment = buoyancy.displaced(body, 0.02, 1000.0, 1.0)
+    assert mass == pytest.approx(1000 * 0.1**2 * 0.03 + 0.1**2 * 0.07, rel=1e-12)
+    assert moment == pytest.approx([0, 0, 999 * 0.1**2 * 0.03 * -0.035], abs=1e-15)

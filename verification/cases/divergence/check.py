@@ -1,0 +1,27 @@
+"""The face velocity that the next step uses is free of divergence, solids included.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+
+def check(runs: list[Run]) -> Checks:
+    """Recompute the divergence from the faces of every restart file, while a block moves."""
+    checks = Checks("divergence")
+    for run in runs:
+        moving = float(abs(run.bodies.velocity[:, -1, 2]).max())
+        checks.true("the block moves", moving > 0.1, f"{moving:.3f} m/s")
+        checks.true("restart files are there", len(run.restart_files) == 2)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

@@ -1,0 +1,35 @@
+"""A block as heavy as the water around it stays.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+BAND = 1e-6  # of the speed that free fall would give in the same time
+
+
+def check(runs: list[Run]) -> Checks:
+    """Largest speed and turning of the block at any row."""
+    checks = Checks("neutrally buoyant hexapod")
+    for run in runs:
+        b = run.bodies
+        free_fall = 9.81 * float(b.time[-1])
+        size = run.shapes[b.shape[0]].radius
+        speed = float(np.linalg.norm(b.velocity[:, 0], axis=1).max())
+        turning = float(np.linalg.norm(b.angular_velocity[:, 0], axis=1).max())
+        checks.below("speed / that of free fall", speed / free_fall, BAND)
+        checks.below("speed of the rim by turning / that", turning * size / free_fall, BAND)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

@@ -1,0 +1,36 @@
+"""Still water stays still, and its pressure carries the displaced weight.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.buoyancy import buoyancy_rows  # noqa: E402
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+SPEED_BAND = {1e-6: 1e-6, 1e-10: 1e-9}  # divergence tolerance [1/s]: largest speed [m/s]
+
+
+def check(runs: list[Run]) -> Checks:
+    """Speeds at all written times and in the final state; forces on the blocks at the end."""
+    checks = Checks("still water")
+    for run in runs:
+        tolerance = float(run.value("numerics", "divergence_tolerance", 1e-6))
+        written = max(float(np.abs(run.fields(t).velocity).max()) for t in run.field_times)
+        final = float(np.abs(run.restart()["flow/u"]).max())
+        name = run.folder.name
+        checks.below(f"{name}: largest speed at any time [m/s]", written, SPEED_BAND[tolerance])
+        checks.below(f"{name}: largest speed at the end [m/s]", final, SPEED_BAND[tolerance])
+        buoyancy_rows(run, checks)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

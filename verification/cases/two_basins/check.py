@@ -1,0 +1,45 @@
+"""Each of two parted basins keeps its own liquid while a block falls into one.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.balance import liquid_between  # noqa: E402
+from micstools.checks import DRIFT_BAND, Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+
+def check(runs: list[Run]) -> Checks:
+    """Liquid of each basin in every restart file against the volume of the start."""
+    checks = Checks("two basins")
+    for run in runs:
+        level = float(run.value("fluid", "water_level", 0.0))
+        width = run.grid.high[1] - run.grid.low[1]
+        wall = run.points(0, 0)[:, 0]
+        block = run.points(1, 0)[:, 2]
+        checks.true("the block starts above the water", bool(block.min() > level))
+        ends = np.array([run.grid.low[0], wall.min(), wall.max(), run.grid.high[0]])
+        middle = (wall.min() + wall.max()) / 2
+        for name in run.restart_files:
+            state = run.restart(name)
+            for basin, (a, b, low, high) in {
+                "left": (ends[0], ends[1], ends[0], middle),
+                "right": (ends[2], ends[3], middle, ends[3]),
+            }.items():
+                expected = (b - a) * width * level
+                found = liquid_between(run, state, 0, low, high)
+                checks.close(f"{basin} basin in {name} [m3]", found, expected, DRIFT_BAND)
+        lowest = float(run.bodies.position[-1, 1, 2])
+        checks.true("the block is under water in the end", lowest < 0.5 * level, f"{lowest:.4f} m")
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

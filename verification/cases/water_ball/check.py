@@ -1,0 +1,40 @@
+"""A water ball in a uniform stream keeps the velocity of the stream.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+BAND = 1e-10  # of the speed of the stream
+
+
+def check(runs: list[Run]) -> Checks:
+    """Velocity of cells and faces in the final state against that of the start."""
+    checks = Checks("water ball in a uniform stream")
+    for run in runs:
+        stream = np.array(run.value("fluid", "velocity", [0.0] * 3), float)
+        speed = float(np.linalg.norm(stream))
+        state = run.restart()
+        nx, ny, nz = (len(f) - 1 for f in run.grid.faces)
+        for name in ("flow/u", "flow/uf"):
+            found = np.asarray(state[name])[:, :nz, :ny, :nx]
+            worst = float(np.abs(found - stream[:, None, None, None]).max()) / speed
+            checks.below(f"change of {name} / speed", worst, BAND)
+        liquid = run.fields(run.field_times[-1]).liquid
+        checks.true(
+            "water and air are still there", bool(liquid.max() > 0.99 and liquid.min() < 0.01)
+        )
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

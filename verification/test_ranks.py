@@ -1,0 +1,30 @@
+"""Any number of ranks and threads gives the same bits, and so does a restart."""
+
+from pathlib import Path
+
+import pytest
+from run_cases import CASES, ROOT, Machine, run
+from same_bits import differences
+
+SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
+MACHINES = {
+    "two threads": Machine(SERIAL, threads=2),
+    "one rank": Machine(PARALLEL, ranks=1),
+    "two ranks": Machine(PARALLEL, ranks=2),
+    "two ranks of two threads": Machine(PARALLEL, ranks=2, threads=2),
+}
+
+
+@pytest.fixture(scope="module", params=["coupled", "stream", "dry"])
+def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The result of one thread of the serial program."""
+    output = tmp_path_factory.mktemp("ranks") / request.param
+    run(CASES / "ranks" / f"{request.param}.nml", output, Machine(SERIAL, threads=1))
+    return output
+
+
+@pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES.keys())
+def test_same_bits(reference: Path, machine: Machine, tmp_path: Path) -> None:
+    """Compare every dataset and attribute of every result file."""
+    run(CASES / "ranks" / f"{reference.name}.nml", tmp_path / "run", machine)
+    assert differences(reference, tmp_path / "run") == []
