@@ -84,7 +84,7 @@ include $(B)/depend.mk
 endif
 
 deps:
-	@tools/deps.sh
+	@FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
 
 run: deps
 	@$(MAKE) --no-print-directory

@@ -117,7 +117,7 @@ contains
       return
     end if
     if (has_value .and. .not. wants_value(word)) then
-      call problems%add_message("option "//word//" takes no value, got '"//value//"'")
+      call problems%add_message('option '//word//" takes no value, got '"//value//"'")
       return
     end if
     if (wants_value(word) .and. len(value) == 0) then
@@ -132,6 +132,7 @@ contains
     case ('--restart'); options%restart = value
     case ('--output'); options%output = value
     case ('--threads'); call take_threads(value, options, problems)
+    case default; error stop 'take_option: an option is known but not handled'
     end select
   end subroutine take_option
 

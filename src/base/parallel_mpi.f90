@@ -29,11 +29,11 @@ module parallel_m
 
   integer, parameter :: least_cells = 4   !! every process has so many in each direction that is cut
 
-  integer, save :: n_processes = 1, rank = 0
-  integer, save :: neighbour(2, 3) = MPI_PROC_NULL  !! rank below and above in each direction
-  logical, save :: wraps(3) = .false.   !! periodic and not cut
-  type(MPI_Datatype), save :: bins_type !! one set of bins of an order-free sum
-  type(MPI_Op), save :: bins_sum
+  integer :: n_processes = 1, rank = 0
+  integer :: neighbour(2, 3) = MPI_PROC_NULL  !! rank below and above in each direction
+  logical :: wraps(3) = .false.   !! periodic and not cut
+  type(MPI_Datatype) :: bins_type !! one set of bins of an order-free sum
+  type(MPI_Op) :: bins_sum
 
   !> Buffers of the layers going out and coming in, lower and upper side; they only grow.
   type :: layers_t
@@ -42,7 +42,7 @@ module parallel_m
     integer, allocatable :: integers(:, :)
   end type layers_t
 
-  type(layers_t), save, asynchronous :: going, coming
+  type(layers_t), asynchronous :: going, coming
 
   !> Fill the halos of a block with `width` halo cells on every side.
   !!
@@ -67,6 +67,7 @@ module parallel_m
   interface
     integer(c_int) function c_usleep(microseconds) bind(c, name='usleep')
       import :: c_int
+      implicit none
       integer(c_int), value :: microseconds
     end function c_usleep
   end interface
@@ -554,7 +555,9 @@ contains
   !> The operation of `global_sum_bins`, in the form MPI asks for.
   subroutine add_bins(from, into, length, datatype)
     type(c_ptr), value :: from, into
+    ! allow(C061)
     integer :: length
+    ! allow(C061)
     type(MPI_Datatype) :: datatype
     integer(i8), pointer :: part(:, :), bins(:, :)
     integer :: m

@@ -15,7 +15,7 @@ module parallel_m
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
   public :: set_file_access, set_collective
 
-  logical, save :: wraps(3) = .false.   !! periodic directions of the last `decompose`
+  logical :: wraps(3) = .false.   !! periodic directions of the last `decompose`
 
   !> Fill the halos of a block with `width` halo cells on every side.
   !!
@@ -40,11 +40,13 @@ module parallel_m
   interface
     subroutine c_exit(code) bind(c, name='exit')
       import :: c_int
+      implicit none
       integer(c_int), value :: code
     end subroutine c_exit
 
     integer(c_int) function c_usleep(microseconds) bind(c, name='usleep')
       import :: c_int
+      implicit none
       integer(c_int), value :: microseconds
     end function c_usleep
   end interface

@@ -11,11 +11,12 @@ module signals_m
   integer, parameter :: signal_interrupt = 2    !! the number POSIX systems give SIGINT
   integer, parameter :: signal_terminate = 15   !! and SIGTERM
 
-  integer(c_int), volatile, save :: caught = 0
+  integer(c_int), volatile :: caught = 0
 
   interface
     function c_signal(number, handler) bind(c, name='signal') result(previous)
       import :: c_int, c_funptr
+      implicit none
       integer(c_int), value :: number
       type(c_funptr), value :: handler
       type(c_funptr) :: previous

@@ -18,8 +18,8 @@ module timers_m
     integer :: calls = 0
   end type phase_t
 
-  type(phase_t), save :: phase(max_timers)
-  integer, save :: n_phases = 0
+  type(phase_t) :: phase(max_timers)
+  integer :: n_phases = 0
 
 contains
 

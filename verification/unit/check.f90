@@ -6,7 +6,7 @@ module check_m
   private
   public :: check, finish_checks
 
-  integer, save :: n_passed = 0, n_failed = 0
+  integer :: n_passed = 0, n_failed = 0
 
   !> One check: of a condition, of equal integers, or of reals within an absolute tolerance.
   interface check

@@ -12,6 +12,7 @@ program test_timers_signals
   interface
     integer(c_int) function c_raise(number) bind(c, name='raise')
       import :: c_int
+      implicit none
       integer(c_int), value :: number
     end function c_raise
   end interface

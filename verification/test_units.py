@@ -1,0 +1,43 @@
+"""Runs every unit program: optimised, with all run-time checks, and some on several processes.
+
+A program that holds the comment line `! ranks: 2 4` is also run by mpirun on 2 and on 4 processes.
+"""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "verification" / "unit").glob("test_*.f90"))
+
+
+def ranks(source: Path) -> list[int]:
+    """Process counts that the source asks for."""
+    found = re.search(r"^! ranks:([ \d]+)$", source.read_text(), re.MULTILINE)
+    return [int(word) for word in found[1].split()] if found else []
+
+
+def run(command: list[str | Path], folder: Path) -> None:
+    """Run a unit program; its output is shown when it fails."""
+    done = subprocess.run(
+        command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, f"\n{done.stdout}\n{done.stderr}"
+    assert re.search(r"^[1-9]\d* passed, 0 failed$", done.stdout, re.MULTILINE), done.stdout
+
+
+@pytest.mark.parametrize("build", ["serial", "serial-debug"])
+@pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
+def test_unit(source: Path, build: str, tmp_path: Path) -> None:
+    run([ROOT / "build" / build / source.stem], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("source", "n"),
+    [pytest.param(source, n, id=f"{source.stem}-{n}") for source in SOURCES for n in ranks(source)],
+)
+def test_unit_on_ranks(source: Path, n: int, tmp_path: Path) -> None:
+    program = ROOT / "build" / "mpi" / source.stem
+    run(["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(n), program], tmp_path)
