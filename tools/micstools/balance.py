@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from micstools.geometry import Array
+from micstools.overlap import WALL_KINDS
 from micstools.reader import Grid, Run
 
 State = dict[str, Any]
@@ -35,9 +36,14 @@ def faces(state: State, name: str, grid: Grid, periodic: tuple[bool, ...]) -> li
 
 def divergence(run: Run, state: State) -> Array:
     """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
-    cells that have no open face and so no fluid that moves."""
+    cells that have no open face but walls of the tank and so no fluid that moves."""
     h = run.grid.spacing
     periodic = tuple(run.sides[f"{axis}_min"] == "periodic" for axis in "xyz")
+    walls = {
+        (d, end): run.sides[f"{axis}_{('min', 'max')[end]}"] in WALL_KINDS
+        for d, axis in enumerate("xyz")
+        for end in (0, 1)
+    }
     data = [
         faces(state, f"flow/{name}", run.grid, periodic) for name in ("open", "uf", "solid_flux")
     ]
@@ -46,9 +52,13 @@ def divergence(run: Run, state: State) -> Array:
     for d, (share, velocity, solid) in enumerate(zip(*data, strict=True)):
         area, axis = h.prod() / h[d], 2 - d
         outflow += np.diff(share * area * velocity + solid, axis=axis)
-        n = share.shape[axis] - 1
-        for side in (0, 1):
-            openness += np.take(share, range(side, side + n), axis=axis)
+        for end in (0, 1):
+            beyond = np.moveaxis(share, axis, 0)
+            if walls[d, end]:
+                beyond = beyond.copy()
+                beyond[-end] = 0.0
+            n = len(beyond) - 1
+            openness += np.moveaxis(beyond[end : end + n], 0, axis)
     return np.where(openness > 0, outflow / h.prod(), 0.0)
 
 
