@@ -1,8 +1,8 @@
 !> Checks of a case that need geometry: bodies inside the tank and apart, room for the drops.
 !!
 !! They measure with the true shapes and the rule of a release (`room_for`): a body has room where
-!! nothing reaches deeper into it than 1 % of its size. Groups that `read_case` found faulty are left
-!! out, so these problems can be listed together with those.
+!! nothing reaches deeper into it than 1 % of its size. Groups that `read_case` found faulty are
+!! left out, so these problems can be listed together with those.
 module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text
@@ -103,8 +103,9 @@ contains
       do d = 1, 3
         if (case%boundary%kind(1, d) /= 'periodic' .or. length <= 0.5_wp*case%grid%length(d)) cycle
         call problems%add_message('&shape name = '//quoted_text(trim(shapes(s)%name))//': ' &
-          //short(length)//' m long, must not be more than half the period ' &
-          //to_text(case%grid%length(d))//' m between '//side_name(1, d)//' and '//side_name(2, d), &
+          //brief(length)//' m long, must not be more than half the period ' &
+          //to_text(case%grid%length(d))//' m between '//side_name(1, d) &
+          //' and '//side_name(2, d), &
           case%shape(s)%line)
       end do
     end do
@@ -196,8 +197,8 @@ contains
     end do
   end subroutine check_places
 
-  !> How body b lies outside the tank: behind a wall, or its centre beyond a side without a wall other
-  !! than the top. Empty if it does not.
+  !> How body b lies outside the tank: behind a wall, or its centre beyond a side without a wall
+  !! other than the top. Empty if it does not.
   function way_out(case, scene, b) result(text)
     type(case_t), intent(in) :: case
     type(scene_t), intent(in) :: scene
@@ -220,7 +221,7 @@ contains
         deepest = depth
         s = 2 - mod(-scene%walls%number(w), 2)
         d = (1 - scene%walls%number(w))/2
-        text = 'reaches '//short(depth)//' m through the wall '//side_name(s, d)
+        text = 'reaches '//brief(depth)//' m through the wall '//side_name(s, d)
       end do
       return
     end if
@@ -231,7 +232,7 @@ contains
           beyond = scene%blocks%x(d, b) - case%grid%origin(d)
           if (s == 2) beyond = case%grid%length(d) - beyond
           if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
-            text = 'its centre lies '//short(-beyond)//' m beyond '//side_name(s, d)
+            text = 'its centre lies '//brief(-beyond)//' m beyond '//side_name(s, d)
           end if
         end select
       end do
@@ -254,7 +255,7 @@ contains
         n = n + 1
         if (n > most_reported) cycle
         call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b)) &
-          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//short(depth) &
+          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth) &
           //' m; bodies must lie apart at the start', scene%line(b))
       end do
     end do
@@ -302,8 +303,8 @@ contains
     end associate
   end function pair_depth
 
-  !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose place
-  !! lies in a wall or a held body could wait for ever, so it is a problem now.
+  !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose
+  !! place lies in a wall or a held body could wait for ever, so it is a problem now.
   subroutine check_drop(case, drop, scene, problems)
     type(case_t), intent(in) :: case
     type(drop_input_t), intent(in) :: drop
@@ -332,7 +333,8 @@ contains
     first = first//'; it could never be released'
     if (n > 1) first = first//'; '//to_text(n)//' of '//to_text(drop%count) &
       //' blocks have such places'
-    call problems%add_message('&drop position = '//vector_text(drop%position)//': '//first, drop%line)
+    call problems%add_message('&drop position = '//vector_text(drop%position)//': '//first, &
+      drop%line)
   end subroutine check_drop
 
   !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
@@ -381,7 +383,7 @@ contains
   end function vector_text
 
   !> A length with three digits.
-  pure function short(x) result(text)
+  pure function brief(x) result(text)
     real(wp), intent(in) :: x
     character(:), allocatable :: text
     character(16) :: buffer
@@ -390,6 +392,6 @@ contains
     write (buffer, '(es16.2e3)') x
     read (buffer, *) rounded
     text = to_text(rounded)
-  end function short
+  end function brief
 
 end module case_check_m

@@ -400,7 +400,7 @@ contains
     class(group_visitor_t), intent(inout) :: self
     integer, intent(in) :: i, least, most
     logical :: yes
-    character(:), allocatable :: what, word
+    character(:), allocatable :: what
     integer :: j
 
     associate (a => self%group%assignment(i))
@@ -410,11 +410,11 @@ contains
       if (most > least) what = what//' to '//to_text(most)
       what = ' given, '//what//' needed'
       what = to_text(a%n)//trim(merge(' value ', ' values', a%n == 1))//what
-      do j = a%n, 2, -1
+      do j = 2, a%n
         if (a%value(j)%quoted .or. .not. looks_like_name(a%value(j)%text)) cycle
-        word = printable(a%value(j)%text)
+        what = what//'; is an ''='' missing after '//printable(a%value(j)%text)//'?'
+        exit
       end do
-      if (allocated(word)) what = what//'; is an ''='' missing after '//word//'?'
     end associate
     call self%fault(i, what)
   end function count_is

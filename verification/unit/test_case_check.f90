@@ -14,7 +14,8 @@ program test_case_check
     //'&grid cells = 6, 2, 4 length = 0.3, 0.1, 0.2 /'//lf &
     //'&shape name = ''c'' kind = ''cube'' size = 0.02 /'//lf
   character(*), parameter :: ball = '&shape name = ''s'' kind = ''sphere'' size = 0.02 /'//lf
-  character(*), parameter :: cross_block = '&shape name = ''h'' kind = ''hexapod'' size = 0.02 /'//lf
+  character(*), parameter :: cross_block = '&shape name = ''h'' kind = ''hexapod'' size = 0.02 ' &
+    //'/'//lf
   character(*), parameter :: inside = '; a body must lie inside the tank'
   character(*), parameter :: apart = '; bodies must lie apart at the start'
   character(*), parameter :: never = '; it could never be released'
@@ -30,22 +31,29 @@ contains
 
   subroutine test_walls()
     call expect(tank//'&body shape=''c'' position=0.01, 0.01, 0.01 /', '')
-    call expect(tank//'&body shape=''c'' position=0.01, 0.01, 0.0099 /', '')   ! 1 % of 20 mm is 0.2 mm
+    ! 1 % of 20 mm is 0.2 mm
+    call expect(tank//'&body shape=''c'' position=0.01, 0.01, 0.0099 /', '')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.0095 /', &
-      '&body position = 0.1, 0.05, 0.0095: reaches 0.0005 m through the wall z_min'//inside//' (line 4)')
+      '&body position = 0.1, 0.05, 0.0095: reaches 0.0005 m through the wall z_min'//inside &
+      //' (line 4)')
     call expect(tank//'&body shape=''c'' position=0.32, 0.05, 0.1 /', &
-      '&body position = 0.32, 0.05, 0.1: reaches 0.03 m through the wall x_max'//inside//' (line 4)')
+      '&body position = 0.32, 0.05, 0.1: reaches 0.03 m through the wall x_max'//inside &
+      //' (line 4)')
     call expect(tank//'&body shape=''c'' position=0.1, 0.012, 0.1 axis=0,0,1 angle_deg=45 /', &
-      '&body position = 0.1, 0.012, 0.1: reaches 0.00214 m through the wall y_min'//inside//' (line 4)')
-    call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.2 /', '')       ! half out of the open top
+      '&body position = 0.1, 0.012, 0.1: reaches 0.00214 m through the wall y_min'//inside &
+      //' (line 4)')
+    ! half out of the open top
+    call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.2 /', '')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.5 /', '')       ! above it
     call expect(tank//'&boundary z_max=''slip''/ &body shape=''c'' position=0.1, 0.05, 0.2 /', &
       '&body position = 0.1, 0.05, 0.2: reaches 0.01 m through the wall z_max'//inside//' (line 4)')
     call expect(tank//'&boundary x_min=''open''/ &body shape=''c'' position=-0.005, 0.05, 0.1 /', &
-      '&body position = -0.005, 0.05, 0.1: its centre lies 0.005 m beyond x_min'//inside//' (line 4)')
+      '&body position = -0.005, 0.05, 0.1: its centre lies 0.005 m beyond x_min'//inside &
+      //' (line 4)')
     call expect(tank//'&boundary x_min=''open''/ &body shape=''c'' position=0.005, 0.05, 0.1 /', '')
     call expect(tank//ball//'&body shape=''s'' position=0.1, 0.05, 0.009 /', &
-      '&body position = 0.1, 0.05, 0.009: reaches 0.001 m through the wall z_min'//inside//' (line 5)')
+      '&body position = 0.1, 0.05, 0.009: reaches 0.001 m through the wall z_min'//inside &
+      //' (line 5)')
     call expect(tank//'&run2/ &body shape=''c'' position=9,9,9 release_time=5 fixed=t /', &
       '&run2: unknown group, nearest known: &run (line 4)|' &
       //'&body position = 9, 9, 9: reaches 8.91 m through the wall y_max'//inside//' (line 4)')
@@ -61,20 +69,25 @@ contains
       //'&body shape=''c'' position=0.12, 0.05, 0.05 /'//lf, '')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.05 /'//lf &
       //'&body shape=''c'' position=0.115, 0.05, 0.05 /'//lf, &
-      '&body position = 0.115, 0.05, 0.05: overlaps the &body on line 4 by 0.005 m'//apart//' (line 5)')
+      '&body position = 0.115, 0.05, 0.05: overlaps the &body on line 4 by 0.005 m'//apart &
+      //' (line 5)')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.05 fixed=t/'//lf &
       //'&body shape=''c'' position=0.1, 0.05, 0.05 fixed=t/', &
-      '&body position = 0.1, 0.05, 0.05: overlaps the &body on line 4 by 0.01 m'//apart//' (line 5)')
+      '&body position = 0.1, 0.05, 0.05: overlaps the &body on line 4 by 0.01 m'//apart &
+      //' (line 5)')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.05 /'//lf &
-      //'&body shape=''c'' position=0.1, 0.05, 0.05 release_time=0.5/', '')   ! the first may move away
+      ! the first may move away
+      //'&body shape=''c'' position=0.1, 0.05, 0.05 release_time=0.5/', '')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.05 fixed=t velocity=1,0,0/'//lf &
       //'&body shape=''c'' position=0.1, 0.05, 0.05 release_time=0.5/', '')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.05 fixed=t/'//lf &
       //'&body shape=''c'' position=0.1, 0.05, 0.05 release_time=0.5/', &
-      '&body position = 0.1, 0.05, 0.05: overlaps the &body on line 4 by 0.01 m'//apart//' (line 5)')
+      '&body position = 0.1, 0.05, 0.05: overlaps the &body on line 4 by 0.01 m'//apart &
+      //' (line 5)')
     call expect(tank//ball//'&body shape=''s'' position=0.1, 0.05, 0.05 /'//lf &
       //'&body shape=''s'' position=0.1, 0.065, 0.05 /', &
-      '&body position = 0.1, 0.065, 0.05: overlaps the &body on line 5 by 0.005 m'//apart//' (line 6)')
+      '&body position = 0.1, 0.065, 0.05: overlaps the &body on line 5 by 0.005 m'//apart &
+      //' (line 6)')
     ! crosses that interlock do not overlap, though their bounding spheres do
     call expect(tank//cross_block//'&body shape=''h'' position=0.1, 0.05, 0.05 /'//lf &
       //'&body shape=''h'' position=0.141, 0.05, 0.091/', '')
@@ -86,9 +99,11 @@ contains
 
     call expect(tank//held//'&drop shape=''c'' position=0.1, 0.05, 0.03 count=6/', '')
     call expect(tank//held//'&drop shape=''c'' position=0.1, 0.05, 0.025/', &
-      '&drop position = 0.1, 0.05, 0.025: lies inside the fixed &body on line 4'//never//' (line 5)')
+      '&drop position = 0.1, 0.05, 0.025: lies inside the fixed &body on line 4'//never &
+      //' (line 5)')
     call expect(tank//held//'&drop shape=''c'' position=0.1, 0.05, 0.025 count=3/', &
-      '&drop position = 0.1, 0.05, 0.025: block 1 at 0.1, 0.05, 0.025 lies inside the fixed &body on' &
+      '&drop position = 0.1, 0.05, 0.025: block 1 at 0.1, 0.05, 0.025 lies inside the fixed ' &
+      //'&body on' &
       //' line 4'//never//'; 3 of 3 blocks have such places (line 5)')
     call expect(tank//'&body shape=''c'' position=0.1, 0.05, 0.01 /'//lf &
       //'&drop shape=''c'' position=0.1, 0.05, 0.02/', '')
@@ -108,12 +123,14 @@ contains
     character(*), parameter :: around = '&boundary y_min=''periodic'' y_max=''periodic''/'//lf
 
     call expect(tank//cross_block//around//'&body shape=''h'' position=0.15, 0.05, 0.1/', &
-      '&shape name = ''h'': 0.0663 m long, must not be more than half the period 0.1 m between y_min' &
+      '&shape name = ''h'': 0.0663 m long, must not be more than half the period 0.1 m between ' &
+      //'y_min' &
       //' and y_max (line 4)')
     call expect(tank//cross_block//around//'&body shape=''c'' position=0.15, 0.0, 0.1/', '')
     call expect(tank//around//'&body shape=''c'' position=0.15, 0.001, 0.1/'//lf &
       //'&body shape=''c'' position=0.15, 0.095, 0.1/', &
-      '&body position = 0.15, 0.095, 0.1: overlaps the &body on line 5 by 0.006 m'//apart//' (line 6)')
+      '&body position = 0.15, 0.095, 0.1: overlaps the &body on line 5 by 0.006 m'//apart &
+      //' (line 6)')
   end subroutine test_periods
 
   !> Problems of the text and of the geometry come together; faulty groups are left alone.
@@ -125,11 +142,15 @@ contains
       '&shape size = -1: must be positive [m] (line 4)|' &
       //'&body position = 9, 9: 2 values given, 3 needed (line 6)|' &
       //'&drop shape = ''x'': no &shape has this name, nearest known: ''c'' (line 7)|' &
-      //'&body position = -1, 0.05, 0.1: reaches 1.01 m through the wall x_min'//inside//' (line 8)')
-    call expect('&run t_end=1/ &grid cells=4,4,4 length=1,1,-1/'//lf//'&shape name=''c'' kind=''cube''' &
-      //' size=0.02/ &body shape=''c'' position=9,9,9/', '&grid length = 1, 1, -1: must be positive [m]' &
+      //'&body position = -1, 0.05, 0.1: reaches 1.01 m through the wall x_min'//inside &
+      //' (line 8)')
+    call expect('&run t_end=1/ &grid cells=4,4,4 length=1,1,-1/'//lf &
+      //'&shape name=''c'' kind=''cube''' &
+      //' size=0.02/ &body shape=''c'' position=9,9,9/', &
+      '&grid length = 1, 1, -1: must be positive [m]' &
       //' (line 1)')
-    call expect('', '&run t_end: missing, required: the simulated time [s] (there is no group &run)' &
+    call expect('', '&run t_end: missing, required: the simulated time [s] (there is no group ' &
+      //'&run)' &
       //'|&grid cells: missing, required: how many cells in x, y, z (there is no group &grid)' &
       //'|&grid length: missing, required: the length of the tank in x, y, z [m]' &
       //' (there is no group &grid)')

@@ -1,5 +1,5 @@
-!> Every group of a case: defaults, values, attitudes, the way back to text, and dozens of bad inputs,
-!! each with exactly the messages it must give.
+!> Every group of a case: defaults, values, attitudes, the way back to text, and dozens of bad
+!! inputs, each with exactly the messages it must give.
 program test_case_input
   use check_m, only: check, finish_checks
   use kinds_m, only: wp, pi
@@ -43,7 +43,8 @@ contains
     call check('physics', case%run%physics == 'coupled')
     call check('output', case%run%output == 'mics-out' .and. case%run%title == '')
     call check('run', [case%run%dt, case%run%cfl_max, case%run%field_interval, &
-      case%run%history_interval, case%run%restart_interval, case%run%rest_speed, case%run%rest_time], &
+      case%run%history_interval, case%run%restart_interval, case%run%rest_speed, &
+      case%run%rest_time], &
       [1.0e-2_wp, 0.5_wp, 0.1_wp, 0.0_wp, 1.0_wp, 1.0e-3_wp, 0.5_wp], 0.0_wp)
     call check('cells', all(case%grid%cells == [6, 2, 4]))
     call check('sides', all(case%boundary%kind(:, :2) == 'no_slip') &
@@ -58,7 +59,8 @@ contains
       .and. case%numerics%preconditioner == 'multigrid')
     call check('contact', case%contact%model == 'spheres' .and. case%contact%law == 'restitution' &
                .and. case%contact%sleep)
-    call check('no groups', size(case%water) + size(case%shape) + size(case%body) + size(case%drop), 0)
+    call check('no ' &
+      //'groups', size(case%water) + size(case%shape) + size(case%body) + size(case%drop), 0)
   end subroutine test_defaults
 
   !> Values arrive where they belong; each repeated group starts from the defaults.
@@ -69,7 +71,8 @@ contains
     call read_case('&drop shape=''b'' position=1,2,3 count=4 first_time=5 interval=6 spread=3*.1' &
       //' tilt_deg=7 velocity=0,0,-1 seed=-8 /'//lf//cube// &
       '&shape name=''b'' kind=''box'' size=0.1, 0.2 0.3 density=2400 refinement=3 /'//lf// &
-      '&body shape=''b'' position=3*0.1 velocity=1,2,3 angular_velocity=4,5,6 fixed=T release_time=2/' &
+      '&body shape=''b'' position=3*0.1 velocity=1,2,3 angular_velocity=4,5,6 fixed=T ' &
+      //'release_time=2/' &
       //lf//'&body shape=''c'' position=3*0.2 /'//lf//'&water min=3*0 max=3*0.1 /'//lf// &
       '&boundary x_min=''periodic'' x_max="periodic" z_max=''slip''/', case, problems)
     call check('good case', problems%n, 0)
@@ -87,7 +90,8 @@ contains
     call check('motion', [case%body(1)%velocity, case%body(1)%angular_velocity, &
       case%body(1)%release_time], [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp, 2.0_wp], 0.0_wp)
     call check('second body starts from defaults', .not. case%body(2)%fixed &
-      .and. all(abs(case%body(2)%velocity) <= 0.0_wp) .and. abs(case%body(2)%release_time) <= 0.0_wp)
+      .and. all(abs(case%body(2)%velocity) <= 0.0_wp) &
+      .and. abs(case%body(2)%release_time) <= 0.0_wp)
     call check('lines', all([case%drop(1)%line, case%shape(1)%line, case%shape(2)%line, &
       case%body(1)%line, case%body(2)%line, case%water(1)%line] == [1, 4, 5, 6, 7, 8]))
     call check('periodic', all(case%boundary%kind(:, 1) == 'periodic'))
@@ -96,17 +100,23 @@ contains
   !> Quaternion, axis and angle.
   subroutine test_attitudes()
     call check('none', attitude(''), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
-    call check('normalised', attitude('quaternion=3,0,4,0'), [0.6_wp, 0.0_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
-    call check('tiny', attitude('quaternion=0,0,0,1e-30'), [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], 1.0e-15_wp)
+    call check('normalised', attitude('quaternion=3,0,4,0'), [0.6_wp, 0.0_wp, 0.8_wp, 0.0_wp], &
+      1.0e-15_wp)
+    call check('tiny', attitude('quaternion=0,0,0,1e-30'), [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], &
+      1.0e-15_wp)
     call check('quarter turn', attitude('axis=0,0,5 angle_deg=90'), &
                [sqrt(0.5_wp), 0.0_wp, 0.0_wp, sqrt(0.5_wp)], 1.0e-15_wp)
-    call check('no turn', attitude('axis=1,0,0 angle_deg=0'), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
+    call check('no turn', attitude('axis=1,0,0 angle_deg=0'), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], &
+      0.0_wp)
     call check('backwards', attitude('axis=1,1,1 angle_deg=-60'), &
                [cos(pi/6.0_wp), -sin(pi/6.0_wp)/sqrt([3.0_wp, 3.0_wp, 3.0_wp])], 1.0e-15_wp)
-    call expect(cube//'&body shape=''c'' position=3*0.05 quaternion=1,0,0,0 axis=1,0,0 angle_deg=4 /', &
-      '&body quaternion = 1, 0, 0, 0: give the quaternion, or axis with angle_deg, not both (line 4)')
+    call expect(cube//'&body shape=''c'' position=3*0.05 quaternion=1,0,0,0 axis=1,0,0 ' &
+      //'angle_deg=4 /', &
+      '&body quaternion = 1, 0, 0, 0: give the quaternion, or axis with angle_deg, not both ' &
+      //'(line 4)')
     call expect(cube//'&body shape=''c'' position=3*0.05 quaternion=1,0,0,0 angle_deg=4 /', &
-      '&body quaternion = 1, 0, 0, 0: give the quaternion, or axis with angle_deg, not both (line 4)')
+      '&body quaternion = 1, 0, 0, 0: give the quaternion, or axis with angle_deg, not both ' &
+      //'(line 4)')
     call expect(cube//'&body shape=''c'' position=3*0.05 axis=1,0,0/', &
       '&body axis = 1, 0, 0: needs angle_deg as well (line 4)')
     call expect(cube//'&drop shape=''c'' position=3*0.05 angle_deg=3/', &
@@ -117,8 +127,10 @@ contains
       '&body axis = 0.0, 0.0, 0.0: must not be zero (line 4)')
     call expect(cube//'&body shape=''c'' position=3*0.05 quaternion=1,0,0/', &
       '&body quaternion = 1, 0, 0: 3 values given, 4 needed (line 4)')
-    call expect(cube//'&drop shape=''c'' position=3*0.05 orientation=''random'' tilt_deg=3 axis=1,0,0' &
-      //' angle_deg=4/', '&drop axis = 1, 0, 0: has no meaning with orientation = ''random'' (line 4)|' &
+    call expect(cube//'&drop shape=''c'' position=3*0.05 orientation=''random'' tilt_deg=3 ' &
+      //'axis=1,0,0' &
+      //' angle_deg=4/', '&drop axis = 1, 0, 0: has no meaning with orientation = ''random'' ' &
+      //'(line 4)|' &
       //'&drop angle_deg = 4: has no meaning with orientation = ''random'' (line 4)|' &
       //'&drop tilt_deg = 3: has no meaning with orientation = ''random'' (line 4)')
   end subroutine test_attitudes
@@ -145,7 +157,8 @@ contains
       //'quaternion = 0.540625, 0.455768, -0.060003, -0.704554 /' &
       //'&body shape=''h'' position=3*1e20 axis=1,2,3 angle_deg=17 fixed=t/' &
       //'&shape name=''h'' kind=''hexapod'' size=.02 spheres=''centroid''/' &
-      //'&shape name=''b'' kind=''box'' size=.02,.03,.04/ &drop shape=''h'' position=1,2,3 tilt_deg=1/' &
+      //'&shape name=''b'' kind=''box'' size=.02,.03,.04/ &drop shape=''h'' position=1,2,3 ' &
+      //'tilt_deg=1/' &
       //'&drop shape=''h'' position=1,2,3 orientation=''random''/ &water min=3*0 max=3*1/' &
       //'&fluid water_level=0.1513 single_phase=f/ &contact sleep=f law=''constants''/' &
       //'&numerics coupling=''mics'' coupling_passes=3 divergence_tolerance=1d-10/', case, problems)
@@ -173,8 +186,10 @@ contains
   !> Required groups and variables.
   subroutine test_missing()
     character(*), parameter :: no_run = '&run t_end: missing, required: the simulated time [s]'
-    character(*), parameter :: no_grid = '&grid cells: missing, required: how many cells in x, y, z' &
-      //' (there is no group &grid)|&grid length: missing, required: the length of the tank in x, y, z' &
+    character(*), parameter :: no_grid = '&grid cells: missing, required: how many cells in x, ' &
+      //'y, z' &
+      //' (there is no group &grid)|&grid length: missing, required: the length of the tank in ' &
+      //'x, y, z' &
       //' [m] (there is no group &grid)'
 
     call expect('', no_run//' (there is no group &run)|'//no_grid)
@@ -200,14 +215,17 @@ contains
 
   !> Wrong types, wrong counts, unknown names.
   subroutine test_form_of_values()
-    call expect('&run t_end=1 tend=2/'//grid, '&run tend = 2: unknown variable, nearest known: t_end (line 1)')
+    call expect('&run t_end=1 tend=2/'//grid, '&run tend = 2: unknown variable, nearest known: ' &
+      //'t_end (line 1)')
     call expect('&run t_end=1 cell=2,3,4/'//grid, &
       '&run cell = 2, 3, 4: unknown variable, nearest known: title (line 1)')
     call expect('&run t_end=ten/'//grid, '&run t_end = ten: must be a number (line 1)')
-    call expect('&run t_end=''10''/'//grid, '&run t_end = ''10'': must be a number, without quotes (line 1)')
+    call expect('&run t_end=''10''/'//grid, '&run t_end = ''10'': must be a number, without ' &
+      //'quotes (line 1)')
     call expect('&run t_end=10s/'//grid, '&run t_end = 10s: must be a number (line 1)')
     call expect('&run t_end=nan/'//grid, '&run t_end = nan: must be a finite number (line 1)')
-    call expect('&run t_end=+Infinity/'//grid, '&run t_end = +Infinity: must be a finite number (line 1)')
+    call expect('&run t_end=+Infinity/'//grid, '&run t_end = +Infinity: must be a finite ' &
+      //'number (line 1)')
     call expect('&run t_end=1e31/'//grid, &
       '&run t_end = 1e31: must be 0 or between 1e-30 and 1e30 in size (line 1)')
     call expect('&run t_end=1, 2/'//grid, '&run t_end = 1, 2: 2 values given, 1 needed (line 1)')
@@ -227,7 +245,8 @@ contains
       '&run stop_when_settled = ''T'': must be .true. or .false. (line 1)')
     call expect(run//'&grid cells=6.0,2,4 length=3*1/', &
       '&grid cells = 6.0, 2, 4: value 1 must be a whole number (line 2)')
-    call expect(run//'&grid cells=6,2 length=3*1/', '&grid cells = 6, 2: 2 values given, 3 needed (line 2)')
+    call expect(run//'&grid cells=6,2 length=3*1/', &
+      '&grid cells = 6, 2: 2 values given, 3 needed (line 2)')
     call expect(run//'&grid cells=6,2,9999999999 length=3*1/', &
       '&grid cells = 6, 2, 9999999999: value 3 must be at most 2147483647 in size (line 2)')
     call expect(run//'&grid cells=6,2,4 length=0.3,,0.2/', &
@@ -235,7 +254,8 @@ contains
     call expect(run//'&grid cells=6,2,4 length=0.3,0.1,-nan/', &
       '&grid length = 0.3, 0.1, -nan: value 3 must be a finite number (line 2)')
     call expect(run//'&grid cells(1)=6 length=3*0.1/', &
-      '&grid cells: parts of a list cannot be set; write the whole list, cells = first, second, ...' &
+      '&grid cells: parts of a list cannot be set; write the whole list, cells = first, ' &
+      //'second, ...' &
       //' (line 2)')
   end subroutine test_form_of_values
 
@@ -243,7 +263,8 @@ contains
     call expect('&run t_end=1 dt=0/'//grid, '&run dt = 0: must be positive [s] (line 1)')
     call expect('&run t_end=1'//lf//'dt=-1/'//grid, '&run dt = -1: must be positive [s] (line 2)')
     call expect('&run t_end=0/'//grid, '&run t_end = 0: must be positive [s] (line 1)')
-    call expect('&run t_end=0.001/'//grid, '&run t_end = 0.001: must be at least dt = 0.01 s (line 1)')
+    call expect('&run t_end=0.001/'//grid, '&run t_end = 0.001: must be at least dt = 0.01 s ' &
+      //'(line 1)')
     call expect('&run t_end=1e20/'//grid, &
       '&run t_end = 1e20: must be at most 1e9 steps of dt = 0.01 s (line 1)')
     call expect('&run t_end=1 physics=''wet''/'//grid, &
@@ -253,10 +274,12 @@ contains
     call expect('&run t_end=1 physics=''''/'//grid, &
       '&run physics = '''': unknown, must be one of ''coupled'', ''fluid'', ''dry'' (line 1)')
     call expect('&run t_end=1 physics=''fluid dry''/'//grid, &
-      '&run physics = ''fluid dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'' (line 1)')
+      '&run physics = ''fluid dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'' ' &
+      //'(line 1)')
     call expect('&run t_end=1 cfl_max=-.1/'//grid, &
       '&run cfl_max = -.1: must not be negative [-]; 0 keeps dt fixed (line 1)')
-    call expect('&run t_end=1 output='' ''/'//grid, '&run output = '' '': must name a folder (line 1)')
+    call expect('&run t_end=1 output='' ''/'//grid, &
+      '&run output = '' '': must name a folder (line 1)')
     call expect('&run t_end=1 field_interval=-1 history_interval=-2 restart_interval=-3/'//grid, &
       '&run field_interval = -1: must not be negative [s]; 0 means never (line 1)|' &
       //'&run history_interval = -2: must not be negative [s]; 0 means every step (line 1)|' &
@@ -267,37 +290,44 @@ contains
     call expect(run//'&grid cells=0,2,4 length=3*1/', &
       '&grid cells = 0, 2, 4: must be 1 or more in each direction (line 2)')
     call expect(run//'&grid cells=2000000000,2000000000,2000000000 length=3*1/', &
-      '&grid cells = 2000000000, 2000000000, 2000000000: too many cells, at most 2147483647 in all' &
+      '&grid cells = 2000000000, 2000000000, 2000000000: too many cells, at most 2147483647 in ' &
+      //'all' &
       //' (line 2)')
-    call expect(run//'&grid cells=4,4,4 length=1,0,1/', '&grid length = 1, 0, 1: must be positive [m] (line 2)')
+    call expect(run//'&grid cells=4,4,4 length=1,0,1/', &
+      '&grid length = 1, 0, 1: must be positive [m] (line 2)')
     call expect(run//'&grid cells=4,4,4 length=3*1 origin=0,0,1e12/', &
       '&grid origin = 0, 0, 1e12: too far from zero: cell faces would lose their digits (line 2)')
     call expect(run//'&grid cells=4,1,4 length=3*1/', &
-      '&grid cells = 4, 1, 4: one cell in a direction makes the case 2-D, then y_min and y_max must' &
+      '&grid cells = 4, 1, 4: one cell in a direction makes the case 2-D, then y_min and y_max ' &
+      //'must' &
       //' both be ''slip'' or ''periodic'' (line 2)')
     call expect(run//'&grid cells=4,1,4 length=3*1/ &boundary y_min=''slip'' y_max=''slip''/', '')
   end subroutine test_run_and_grid
 
   subroutine test_sides()
     call expect(base//'&boundary x_min=''periodic''/', &
-      '&boundary x_min = ''periodic'': needs periodic on both sides, but x_max = ''no_slip'' (line 3)')
+      '&boundary x_min = ''periodic'': needs periodic on both sides, but x_max = ''no_slip'' ' &
+      //'(line 3)')
     call expect(base//'&boundary z_max=''periodic'' z_min=''slip''/', &
       '&boundary z_max = ''periodic'': needs periodic on both sides, but z_min = ''slip'' (line 3)')
-    call expect(base//'&boundary y_min=''no-slip''/', '&boundary y_min = ''no-slip'': unknown, must be' &
+    call expect(base//'&boundary y_min=''no-slip''/', &
+      '&boundary y_min = ''no-slip'': unknown, must be' &
       //' one of ''no_slip'', ''slip'', ''open'', ''periodic'' (line 3)')
     call expect(base//'&boundary left=''slip''/', &
       '&boundary left = ''slip'': unknown variable, nearest known: x_min (line 3)')
   end subroutine test_sides
 
   subroutine test_fluid_and_numerics()
-    call expect(base//'&fluid liquid_density=0 gas_density=-1 liquid_viscosity=-1 gas_viscosity=-1/', &
+    call expect(base//'&fluid liquid_density=0 gas_density=-1 liquid_viscosity=-1 ' &
+      //'gas_viscosity=-1/', &
       '&fluid liquid_density = 0: must be positive [kg/m3] (line 3)|' &
       //'&fluid gas_density = -1: must be positive [kg/m3] (line 3)|' &
       //'&fluid liquid_viscosity = -1: must not be negative [Pa s] (line 3)|' &
       //'&fluid gas_viscosity = -1: must not be negative [Pa s] (line 3)')
     call expect(base//'&fluid gravity=0,0,inf/', &
       '&fluid gravity = 0, 0, inf: value 3 must be a finite number (line 3)')
-    call expect(base//'&fluid gravity=9.81/', '&fluid gravity = 9.81: 1 value given, 3 needed (line 3)')
+    call expect(base//'&fluid gravity=9.81/', '&fluid gravity = 9.81: 1 value given, 3 needed ' &
+      //'(line 3)')
     call expect(base//'&water min=0,0,0 max=1,0,1/', &
       '&water max = 1, 0, 1: must be larger than min in every direction (line 3)')
     call expect(base//'&numerics coupling=''mix''/', &
@@ -311,7 +341,8 @@ contains
       //'&numerics divergence_tolerance = 0: must be positive [1/s] (line 3)|' &
       //'&numerics max_pressure_passes = 0: must lie between 1 and 1000 (line 3)')
     call expect(base//'&numerics pressure_solver=''bicgstab'' preconditioner=''jacobi''/', '')
-    call expect(base//'&numerics preconditioner=''ilu''/', '&numerics preconditioner = ''ilu'': unknown,' &
+    call expect(base//'&numerics preconditioner=''ilu''/', &
+      '&numerics preconditioner = ''ilu'': unknown,' &
       //' must be one of ''multigrid'', ''jacobi'', ''none'' (line 3)')
   end subroutine test_fluid_and_numerics
 
@@ -332,21 +363,25 @@ contains
       //'&contact eta_t = -1: must not be negative [N s/m] (line 3)|' &
       //'&contact friction = -1: must not be negative [-] (line 3)|' &
       //'&contact wall_friction = -1: must not be negative [-] (line 3)')
-    call expect(base//'&contact substep_ratio=0 courant_max=2/', '&contact substep_ratio = 0: '//share &
+    call expect(base//'&contact substep_ratio=0 courant_max=2/', '&contact substep_ratio = 0: ' &
+      //share &
       //'|&contact courant_max = 2: '//share)
   end subroutine test_contact
 
   subroutine test_shapes()
     character(*), parameter :: a = '&shape name=''a'' kind='
-    character(*), parameter :: rule = 'a name has 1 to 64 letters, digits or _ - . and does not begin' &
+    character(*), parameter :: rule = 'a name has 1 to 64 letters, digits or _ - . and does ' &
+      //'not begin' &
       //' with a point (line 3)'
 
     call expect(base//a//'''box'' size=1/', '&shape size = 1: 1 value given, 3 needed (line 3)')
-    call expect(base//a//'''cube'' size=1,1,1/', '&shape size = 1, 1, 1: 3 values given, 1 needed (line 3)')
+    call expect(base//a//'''cube'' size=1,1,1/', '&shape size = 1, 1, 1: 3 values given, 1 ' &
+      //'needed (line 3)')
     call expect(base//a//'''cube'' size=1,1,1,1/', &
       '&shape size = 1, 1, 1, 1: 4 values given, 1 needed (line 3)')
     call expect(base//a//'''cube'' size=-1/', '&shape size = -1: must be positive [m] (line 3)')
-    call expect(base//a//'''box'' size=1,0,1/', '&shape size = 1, 0, 1: must be positive [m] (line 3)')
+    call expect(base//a//'''box'' size=1,0,1/', '&shape size = 1, 0, 1: must be positive [m] ' &
+      //'(line 3)')
     call expect(base//a//'''ball'' size=1/', '&shape kind = ''ball'': unknown, must be one of' &
       //' ''hexapod'', ''cube'', ''box'', ''sphere'' (line 3)')
     call expect(base//a//'''cube'' size=1 density=0 scale=0 refinement=0 sphere_spacing=-1/', &
@@ -375,7 +410,8 @@ contains
     call expect(cube//'&body shape=''c'' position=3*0 fixed=0 release_time=-1/', &
       '&body fixed = 0: must be .true. or .false. (line 4)|' &
       //'&body release_time = -1: must not be negative [s] (line 4)')
-    call expect(cube//'&drop shape=''c'' position=3*0 count=0 first_time=-1 interval=-1 spread=0,-1,0' &
+    call expect(cube//'&drop shape=''c'' position=3*0 count=0 first_time=-1 interval=-1 ' &
+      //'spread=0,-1,0' &
       //' tilt_deg=181 seed=1.5/', '&drop seed = 1.5: must be a whole number (line 4)|' &
       //'&drop count = 0: must lie between 1 and 100000 (line 4)|' &
       //'&drop first_time = -1: must not be negative [s] (line 4)|' &
@@ -390,7 +426,8 @@ contains
 
   !> What the contract promises for later is refused as such.
   subroutine test_not_yet()
-    call expect(base//'&numerics momentum=''c_ismac'' advection=''upwind'' solid_fraction=''subcell''/', &
+    call expect(base//'&numerics momentum=''c_ismac'' advection=''upwind'' ' &
+      //'solid_fraction=''subcell''/', &
       '&numerics momentum = ''c_ismac'': not available yet, so far: ''conservative'' (line 3)|' &
       //'&numerics advection = ''upwind'': not available yet, so far: ''tvd5'' (line 3)|' &
       //'&numerics solid_fraction = ''subcell'': not available yet, so far: ''exact'' (line 3)')
@@ -408,10 +445,12 @@ contains
       '&contact model = ''surface'': not available yet, so far: ''spheres'' (line 3)')
     call expect(base//'&bed file=''a.stl''/', '&bed: this group is not available yet (line 3)')
     call expect(base//'&shape name=''a'' kind=''dolos'' size=1 spheres=''dense''/', &
-      '&shape kind = ''dolos'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ''sphere''' &
+      '&shape kind = ''dolos'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ' &
+      //'''sphere''' &
       //' (line 3)|&shape spheres = ''dense'': not available yet, so far: ''centroid'' (line 3)')
     call expect(base//'&shape name=''a'' kind=''file'' file=''a.msh''/', &
-      '&shape kind = ''file'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ''sphere''' &
+      '&shape kind = ''file'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ' &
+      //'''sphere''' &
       //' (line 3)|&shape file = ''a.msh'': not available yet (line 3)')
   end subroutine test_not_yet
 

@@ -115,7 +115,8 @@ contains
     call check('swap', edit_distance('lenght', 'length'), 1)
     call check('replace and delete', edit_distance('kitten', 'sitting'), 3)
     call check('empty', edit_distance('', 'abc'), 3)
-    call check('nearest', nearest_name('refinment', [character(12) :: 'name', 'refinement', 'size']) &
+    call check('nearest', nearest_name('refinment', [character(12) :: 'name', 'refinement', &
+      'size']) &
                == 'refinement')
     call check('nearest of none', nearest_name('a', [character(4) ::]) == '')
     call check('control characters', printable('a'//achar(7)//'b') == 'a?b')
@@ -160,7 +161,8 @@ contains
 
   !> Line ends of three systems count the same, and a byte-order mark is no text.
   subroutine test_line_ends()
-    character(*), parameter :: ends(3) = [character(2) :: achar(13)//achar(10), achar(10), achar(13)]
+    character(*), parameter :: ends(3) = [character(2) :: achar(13)//achar(10), achar(10), &
+      achar(13)]
     type(namelist_text_t) :: list
     type(problems_t) :: problems
     character(:), allocatable :: e
@@ -190,7 +192,8 @@ contains
     call expect('hello'//lf//'more'//lf//'&run/', 'text outside the groups: hello (line 1)')
     call expect('&run/ dt = 1'//lf//'t_end = 2'//lf//'/', &
                 'text outside the groups: dt = 1 ; &run has ended with its ''/'' (line 1)')
-    call expect('&run dt = 1, dt = 2/', '&run dt: given twice in one group, first on line 1 (line 1)')
+    call expect('&run dt = 1, dt = 2/', '&run dt: given twice in one group, first on line 1 ' &
+      //'(line 1)')
     call expect('&run'//lf//'DT = 1'//lf//'dt = 2/', &
                 '&run dt: given twice in one group, first on line 2 (line 3)')
     call expect('&run t_end 10 /', '&run t_end: no ''='' follows; write name = value (line 1)')

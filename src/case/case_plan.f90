@@ -1,0 +1,410 @@
+!> What `--check` prints: what a run of this case will do, before anything is done.
+module case_plan_m
+  use kinds_m, only: wp, i8
+  use errors_m, only: to_text
+  use case_types_m, only: case_t, shape_input_t, is_given
+  use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
+  use tet_mesh_m, only: shape_t
+  implicit none
+  private
+  public :: print_plan
+
+  integer, parameter :: label_width = 24      !! columns of the names
+  real(wp), parameter :: speed = 1.0_wp       !! at which time-step limits are quoted [m/s]
+
+  !> Memory of one cell with all its arrays: fields, solids, work arrays of the solvers [B].
+  real(wp), parameter :: bytes_per_cell = 1500.0_wp
+  real(wp), parameter :: bytes_per_piece = 1000.0_wp   !! of a tetrahedron or a sphere [B]
+  real(wp), parameter :: bytes_at_rest = 3.0e7_wp      !! program and libraries [B]
+  integer, parameter :: halo = 3                       !! cells beside the domain, on each side
+
+contains
+
+  !> Print the plan of a checked case.
+  subroutine print_plan(unit, case, shapes)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    logical :: wet, blocks
+
+    wet = case%run%physics /= 'dry'
+    blocks = case%run%physics /= 'fluid'
+    call print_run(unit, case)
+    call print_grid(unit, case, wet)
+    if (wet) call print_liquid(unit, case)
+    if (blocks) call print_shapes(unit, case, shapes)
+    if (blocks) call print_bodies(unit, case, shapes)
+    call print_steps(unit, case, shapes, wet, blocks)
+    call print_memory(unit, case, shapes, wet)
+    call print_files(unit, case, wet, blocks)
+  end subroutine print_plan
+
+  subroutine print_run(unit, case)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+
+    call heading(unit, 'Run')
+    if (len_trim(case%run%title) > 0) call entry(unit, 'title', case%run%title)
+    select case (case%run%physics)
+    case ('coupled'); call entry(unit, 'physics', 'coupled: water, air and blocks')
+    case ('fluid'); call entry(unit, 'physics', 'fluid: water and air, no blocks')
+    case ('dry'); call entry(unit, 'physics', 'dry: blocks alone')
+    end select
+    call entry(unit, 'simulated time', brief(case%run%t_end)//' s')
+    if (case%run%stop_when_settled) then
+      call entry(unit, 'ends early', 'when every block is slower than ' &
+        //brief(case%run%rest_speed) &
+                 //' m/s for '//brief(case%run%rest_time)//' s')
+    end if
+  end subroutine print_run
+
+  subroutine print_grid(unit, case, wet)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    logical, intent(in) :: wet
+    character(1), parameter :: axis(3) = ['x', 'y', 'z']
+    integer :: d
+
+    call heading(unit, 'Tank')
+    call entry(unit, 'length', triple(case%grid%length)//' m')
+    call entry(unit, 'lower corner', triple(case%grid%origin, ', ')//' m')
+    do d = 1, 3
+      call entry(unit, 'sides in '//axis(d), trim(case%boundary%kind(1, d))//' and ' &
+                 //trim(case%boundary%kind(2, d)))
+    end do
+    if (.not. wet) return
+    associate (n => case%grid%cells)
+      call entry(unit, 'cells', to_text(n(1))//' x '//to_text(n(2))//' x '//to_text(n(3))//' = ' &
+                 //to_text(product(n)))
+    end associate
+    call entry(unit, 'spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
+  end subroutine print_grid
+
+  subroutine print_liquid(unit, case)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    real(wp) :: height
+
+    call heading(unit, 'Fluid')
+    call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3, ' &
+               //brief(case%fluid%liquid_viscosity)//' Pa s')
+    if (case%fluid%single_phase) then
+      call entry(unit, 'liquid at the start', 'everywhere, single phase')
+      return
+    end if
+    call entry(unit, 'gas', brief(case%fluid%gas_density)//' kg/m3, ' &
+               //brief(case%fluid%gas_viscosity)//' Pa s')
+    if (is_given(case%fluid%water_level)) then
+      height = min(max(case%fluid%water_level - case%grid%origin(3), 0.0_wp), case%grid%length(3))
+      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; ' &
+                 //brief(height*case%grid%length(1)*case%grid%length(2)) &
+                 //' m3 below it, bodies included')
+    end if
+    if (size(case%water) > 0) then
+      call entry(unit, 'boxes of liquid', to_text(size(case%water)))
+    else if (.not. is_given(case%fluid%water_level)) then
+      call entry(unit, 'water level', 'none: no liquid at all')
+    end if
+  end subroutine print_liquid
+
+  !> A table with one line for each shape.
+  subroutine print_shapes(unit, case, shapes)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    character(*), parameter :: form = '(2x, a14, 1x, a8, 2(1x, a7), 4(1x, a12), 1x, a13)'
+    real(wp) :: mass, lift, g, diameter
+    integer :: s
+
+    if (size(shapes) == 0) return
+    call heading(unit, 'Shapes')
+    write (unit, form) left('name', 14), left('kind', 8), 'tets', 'spheres', 'sphere [m]', &
+      'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
+    g = norm2(case%fluid%gravity)
+    do s = 1, size(shapes)
+      mass = shapes(s)%density*shapes(s)%volume
+      lift = case%fluid%liquid_density*shapes(s)%volume
+      diameter = 2*minval(shapes(s)%sphere_radius)
+      write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 8), &
+        right(to_text(size(shapes(s)%tet, 2)), 7), &
+        right(to_text(size(shapes(s)%sphere_radius)), 7), &
+        right(brief(diameter), 12), right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
+        right(brief(mass*g), 12), right(brief((mass - lift)*g), 13)
+    end do
+  end subroutine print_shapes
+
+  subroutine print_bodies(unit, case, shapes)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    real(wp) :: rise, last   ! of the level [m], release [s]
+    integer :: i, n_fixed, n_drops
+
+    n_fixed = count(case%body%fixed)
+    n_drops = sum(case%drop%count)
+    call heading(unit, 'Bodies')
+    call entry(unit, 'fixed', to_text(n_fixed))
+    call entry(unit, 'free', to_text(size(case%body) - n_fixed))
+    if (n_drops == 0) then
+      call entry(unit, 'dropped', '0')
+      return
+    end if
+    last = 0.0_wp
+    rise = 0.0_wp
+    do i = 1, size(case%drop)
+      associate (drop => case%drop(i))
+        last = max(last, drop%first_time + real(drop%count - 1, wp)*drop%interval)
+        rise = rise + real(drop%count, wp)*volume_of(shapes, drop%shape)
+      end associate
+    end do
+    rise = rise/(case%grid%length(1)*case%grid%length(2))
+    call entry(unit, 'dropped', to_text(n_drops)//', the last one at '//brief(last)//' s')
+    if (last > case%run%t_end) call entry(unit, '', 'some are due only after the end of the run')
+    if (case%run%physics == 'dry' .or. case%fluid%single_phase) return
+    call entry(unit, 'water level', 'rises by '//brief(rise)//' m when all of them are under water')
+  end subroutine print_bodies
+
+  !> What limits the steps of the fluid and of the bodies.
+  subroutine print_steps(unit, case, shapes, wet, blocks)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    logical, intent(in) :: wet, blocks
+    real(wp) :: h
+
+    call heading(unit, 'Time steps')
+    call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
+               //count_text(case%run%t_end/case%run%dt)//' steps')
+    h = minval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
+    if (wet .and. maxval(case%grid%cells) > 1) then
+      if (case%run%cfl_max > 0.0_wp) then
+        call entry(unit, 'Courant limit', brief(case%run%cfl_max*h/speed)//' s at '//brief(speed) &
+                   //' m/s, Courant number '//brief(case%run%cfl_max))
+      else
+        call entry(unit, 'Courant limit', 'none, dt is kept')
+      end if
+      if (.not. case%fluid%single_phase) then
+        call entry(unit, 'liquid transport', brief(0.5_wp*h/speed)//' s at '//brief(speed) &
+                   //' m/s, half a cell a step')
+      end if
+    end if
+    if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes)
+  end subroutine print_steps
+
+  !> Limits of the body steps, and how far the lightest shape gives way.
+  subroutine print_body_steps(unit, case, shapes)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(contact_law_t) :: law
+    real(wp) :: ratio_step, time_step, courant_step, mass, k
+    integer :: s
+
+    ratio_step = case%contact%substep_ratio*case%run%dt
+    time_step = case%contact%contact_time/20.0_wp
+    courant_step = case%contact%courant_max*smallest_sphere(shapes)/speed
+    call entry(unit, 'body step', brief(min(ratio_step, time_step, courant_step)) &
+               //' s, the smallest of')
+    call entry(unit, '  share of dt', brief(ratio_step)//' s')
+    call entry(unit, '  contact time / 20', brief(time_step)//' s')
+    call entry(unit, '  contact Courant', brief(courant_step)//' s at '//brief(speed) &
+               //' m/s, C_s = '//brief(case%contact%courant_max))
+    call contact_law_init(case%contact, law)
+    do s = 1, size(shapes)
+      mass = shapes(s)%density*shapes(s)%volume
+      k = normal_constant(law, mass)
+      call entry(unit, 'stiffness on a wall', brief(k)//' N/m for '//trim(shapes(s)%name))
+      if (abs(case%contact%gamma_n - 1.0_wp) > 0.0_wp .and. law%constants) cycle
+      call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
+                 //' m/s, '//brief(mass*norm2(case%fluid%gravity)/k)//' m at rest')
+    end do
+  end subroutine print_body_steps
+
+  !> Estimate of the memory of all processes together.
+  subroutine print_memory(unit, case, shapes, wet)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    logical, intent(in) :: wet
+    real(wp) :: bytes, installed
+    integer :: s, pieces
+
+    bytes = bytes_at_rest
+    if (wet) bytes = bytes + bytes_per_cell*product(real(case%grid%cells + 2*halo, wp))
+    do s = 1, size(shapes)
+      pieces = size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius)
+      bytes = bytes + bytes_per_piece*real(pieces, wp)
+    end do
+    call heading(unit, 'Memory')
+    installed = installed_memory()
+    if (installed <= 0.0_wp) then
+      call entry(unit, 'about', size_text(bytes))
+    else if (bytes > installed) then
+      call entry(unit, 'about', size_text(bytes)//', MORE than the '//size_text(installed) &
+                 //' of this machine')
+    else
+      call entry(unit, 'about', size_text(bytes)//' of '//size_text(installed))
+    end if
+  end subroutine print_memory
+
+  !> Files to come, with upper bounds of their size (fields and surfaces are compressed).
+  subroutine print_files(unit, case, wet, blocks)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    logical, intent(in) :: wet, blocks
+    real(wp), parameter :: series_bytes = 16*8.0_wp   ! sixteen series
+    real(wp), parameter :: body_bytes = 27*8.0_wp     ! pose, motion, forces, contacts
+    real(wp), parameter :: cell_bytes = 6*4.0_wp      ! liquid, solid, pressure, velocity
+    real(wp) :: frames, rows
+    integer :: n
+
+    n = size(case%body) + sum(case%drop%count)
+    if (.not. blocks) n = 0
+    frames = 0.0_wp
+    if (case%run%field_interval > 0.0_wp) frames = 1.0_wp + case%run%t_end/case%run%field_interval
+    rows = 1.0_wp + case%run%t_end/max(case%run%dt, case%run%history_interval)
+    call heading(unit, 'Files in '//case%run%output)
+    call entry(unit, 'run.h5', 'history of '//to_text(n)//' bodies, '//count_text(rows) &
+               //' rows or more, '//size_text(rows*(series_bytes + body_bytes*real(n, wp))))
+    if (frames > 0.0_wp .and. wet) then
+      call entry(unit, 'fields.vtkhdf', count_text(frames)//' frames, at most ' &
+                 //size_text(frames*cell_bytes*product(real(case%grid%cells, wp))))
+    end if
+    if (frames > 0.0_wp .and. n > 0) then
+      call entry(unit, 'blocks.vtkhdf', count_text(frames)//' frames')
+    end if
+    if (case%run%restart_interval > 0.0_wp) then
+      call entry(unit, 'restart-a.h5, -b.h5', 'in turn, every ' &
+                 //brief(case%run%restart_interval)//' s')
+    else
+      call entry(unit, 'restart-a.h5', 'at the end')
+    end if
+  end subroutine print_files
+
+  !> Volume of the shape of that name [m3].
+  pure function volume_of(shapes, name) result(volume)
+    type(shape_t), intent(in) :: shapes(:)
+    character(*), intent(in) :: name
+    real(wp) :: volume
+
+    volume = sum(shapes%volume, shapes%name == name)
+  end function volume_of
+
+  !> Diameter of the smallest contact sphere of all shapes [m].
+  pure function smallest_sphere(shapes) result(diameter)
+    type(shape_t), intent(in) :: shapes(:)
+    real(wp) :: diameter
+    integer :: s
+
+    diameter = huge(diameter)
+    do s = 1, size(shapes)
+      diameter = min(diameter, 2*minval(shapes(s)%sphere_radius))
+    end do
+  end function smallest_sphere
+
+  !> Memory of this machine [B]; 0 where the system does not tell.
+  function installed_memory() result(bytes)
+    real(wp) :: bytes
+    character(80) :: row
+    integer :: unit, status
+    integer(i8) :: kilobytes
+
+    bytes = 0.0_wp
+    open (newunit=unit, file='/proc/meminfo', action='read', status='old', iostat=status)
+    if (status /= 0) return
+    do
+      read (unit, '(a)', iostat=status) row
+      if (status /= 0) exit
+      if (index(row, 'MemTotal:') /= 1) cycle
+      read (row(10:), *, iostat=status) kilobytes
+      if (status == 0) bytes = 1024.0_wp*real(kilobytes, wp)
+      exit
+    end do
+    close (unit)
+  end function installed_memory
+
+  subroutine heading(unit, text)
+    integer, intent(in) :: unit
+    character(*), intent(in) :: text
+
+    write (unit, '(a)') text
+  end subroutine heading
+
+  !> One line: a name and what is to be said about it.
+  subroutine entry(unit, name, text)
+    integer, intent(in) :: unit
+    character(*), intent(in) :: name, text
+
+    write (unit, '(2x, a, a)') left(name, label_width), trim(text)
+  end subroutine entry
+
+  !> Text with blanks behind it, cut or filled to a width.
+  pure function left(text, width) result(filled)
+    character(*), intent(in) :: text
+    integer, intent(in) :: width
+    character(width) :: filled
+
+    filled = text
+  end function left
+
+  !> Text with blanks in front of it.
+  pure function right(text, width) result(filled)
+    character(*), intent(in) :: text
+    integer, intent(in) :: width
+    character(width) :: filled
+
+    filled = text
+    filled = adjustr(filled)
+  end function right
+
+  !> A number with four digits.
+  pure function brief(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+    character(20) :: buffer
+    real(wp) :: rounded
+
+    write (buffer, '(es20.3e3)') x
+    read (buffer, *) rounded
+    text = to_text(rounded)
+  end function brief
+
+  !> Three numbers.
+  pure function triple(x, between) result(text)
+    real(wp), intent(in) :: x(3)
+    character(*), intent(in), optional :: between
+    character(:), allocatable :: text, gap
+
+    gap = ' x '
+    if (present(between)) gap = between
+    text = brief(x(1))//gap//brief(x(2))//gap//brief(x(3))
+  end function triple
+
+  !> A count that may be too large for an integer, rounded down with a little tolerance.
+  pure function count_text(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+
+    text = brief(x)
+    if (x < 1.0e9_wp) text = to_text(int(x*(1.0_wp + 1.0e-9_wp)))
+  end function count_text
+
+  !> An amount of memory or disk.
+  pure function size_text(bytes) result(text)
+    real(wp), intent(in) :: bytes
+    character(:), allocatable :: text
+    character(2), parameter :: prefix(4) = ['kB', 'MB', 'GB', 'TB']
+    real(wp) :: x
+    integer :: i
+
+    x = bytes/1.0e3_wp
+    do i = 1, 3
+      if (x < 999.5_wp) exit
+      x = x/1.0e3_wp
+    end do
+    text = brief(x)
+    if (x >= 10.0_wp) text = to_text(nint(x))
+    text = text//' '//prefix(min(i, 4))
+  end function size_text
+
+end module case_plan_m
