@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from run_cases import Machine, names, verify
 
 QUICK = {"buoyancy", "divergence", "neutral_hexapod", "two_basins", "water_ball"}

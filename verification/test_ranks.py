@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from run_cases import CASES, ROOT, Machine, run
 from same_bits import differences
 

@@ -65,5 +65,6 @@ def divergence(run: Run, state: State) -> Array:
 def liquid_between(run: Run, state: State, axis: int, low: float, high: float) -> float:
     """Volume of liquid [m3] in the cells whose centres lie between two coordinates [m]."""
     here = (run.grid.centres[axis] > low) & (run.grid.centres[axis] < high)
-    cells = np.compress(here, np.asarray(state["flow/liquid"]), axis=2 - axis)
+    liquid = np.asarray(state["flow/liquid"])
+    cells = np.compress(here, liquid.reshape(liquid.shape[-3:]), axis=2 - axis)
     return float(cells.sum(dtype=np.longdouble))

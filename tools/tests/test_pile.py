@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from synthetic import UPRIGHT, Motion
 
 from micstools import pile
+from synthetic import UPRIGHT, Motion
 
 
 def places(*first: tuple[float, float, float]) -> list:

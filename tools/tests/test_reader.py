@@ -6,9 +6,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from synthetic import THREE_LEGS, Motion, write_run
 
 from micstools.reader import Run
+from synthetic import THREE_LEGS, Motion, write_run
 
 
 def test_bodies_and_series_share_their_rows(loose_pile: Run) -> None:
