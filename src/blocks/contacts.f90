@@ -33,6 +33,7 @@ module contacts_m
   !> Touches with one key and one partner act on one tangential spring.
   type :: groups_t
     integer :: n = 0
+    logical, allocatable :: new(:)               !! (n) was not there in the substep before
     integer, allocatable :: first(:)             !! (n + 1) touches first(g) : first(g+1)-1
     real(wp), allocatable :: normal(:, :)        !! (3, n) mean, unit [-]
     real(wp), allocatable :: arm_a(:, :), arm_b(:, :)   !! (3, n) mean contact point [m]
@@ -343,6 +344,7 @@ contains
 
     groups%n = 0
     call reserve(touches%n + 1, groups%first)
+    call reserve(touches%n, groups%new)
     call reserve(touches%n, groups%normal)
     call reserve(touches%n, groups%arm_a)
     call reserve(touches%n, groups%arm_b)
@@ -396,13 +398,14 @@ contains
         new%b(g) = touches%b(t)
         new%key(g) = touches%key(t)
         new%xi(:, g) = 0.0_wp
+        groups%new(g) = .true.
         do while (m <= old%n)
           if (.not. comes_before(old%a(m), old%b(m), old%key(m), new%a(g), new%b(g), new%key(g))) exit
           m = m + 1
         end do
         if (m > old%n) cycle
-        if (old%a(m) == new%a(g) .and. old%b(m) == new%b(g) .and. old%key(m) == new%key(g)) &
-          new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
+        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%key(m) /= new%key(g)
+        if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
       end do
     end associate
   end subroutine match_springs
@@ -466,7 +469,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(contacts_t), intent(inout) :: contacts
     type(contact_report_t), intent(inout) :: report
-    real(wp) :: v(3), normal(3), v_n, force_n, sum_n, decay, eta
+    real(wp) :: v(3), normal(3), v_n, part, force_n, sum_n, decay, eta
     integer :: g, t, a, b
 
     contacts%force = 0.0_wp
@@ -482,7 +485,9 @@ contains
           normal = touches%normal(:, t)
           v = relative_velocity(contacts, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
           v_n = dot_product(v, normal)
-          force_n = normal_force(r%k(t), law%gamma_n, r%eta(t), touches%depth(t), v_n)/(1.0_wp + r%decay(t)*dt)
+          part = 1.0_wp
+          if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
+          force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n)/(1.0_wp + part*r%decay(t)*dt)
           call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
           sum_n = sum_n + force_n
           decay = max(decay, r%decay(t))
@@ -494,6 +499,18 @@ contains
       end do
     end associate
   end subroutine sum_forces
+
+  !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
+  !!
+  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a substep,
+  !! and may have begun up to a substep before.
+  pure function damped_part(depth, v_n, dt) result(part)
+    real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
+    real(wp) :: part
+
+    part = 1.0_wp
+    if (v_n < 0.0_wp) part = 0.5_wp + min(depth, -v_n*dt)/(-v_n*dt)
+  end function damped_part
 
   !> Tangential force of one group, no larger than friction allows.
   pure subroutine rub(g, force_n, eta_n, implicit, contacts)

@@ -28,7 +28,7 @@ module neighbours_m
 
   !> Make room for at least n entries, by doubling; the entries present are kept.
   interface reserve
-    procedure :: reserve_integer, reserve_real, reserve_vector
+    procedure :: reserve_integer, reserve_real, reserve_vector, reserve_logical
   end interface reserve
 
 contains
@@ -261,6 +261,18 @@ contains
     longer(:size(a)) = a
     call move_alloc(longer, a)
   end subroutine reserve_real
+
+  subroutine reserve_logical(n, a)
+    integer, intent(in) :: n
+    logical, allocatable, intent(inout) :: a(:)
+    logical, allocatable :: longer(:)
+
+    if (.not. allocated(a)) allocate (a(max(n, 16)))
+    if (n <= size(a)) return
+    allocate (longer(max(n, 2*size(a))))
+    longer(:size(a)) = a
+    call move_alloc(longer, a)
+  end subroutine reserve_logical
 
   subroutine reserve_vector(n, a)
     integer, intent(in) :: n

@@ -1,0 +1,99 @@
+!> The random part of a drop: reproducible, uniform, and as wide as asked.
+program test_drops
+  use kinds_m, only: wp, pi
+  use check_m, only: check, finish_checks
+  use case_types_m, only: drop_input_t
+  use vectors_m, only: rotate, quaternion_from_axis
+  use drops_m, only: draw_drop
+  implicit none
+
+  call check_shift()
+  call check_tilt()
+  call check_random()
+  call finish_checks()
+
+contains
+
+  !> Shifts fill their box evenly; the same index draws the same, another seed draws another.
+  subroutine check_shift()
+    integer, parameter :: n = 20000
+    type(drop_input_t) :: drop
+    real(wp) :: x(3), q(4), again(3), u(3, n), other(3)
+    integer :: i, k
+
+    drop%position = [1.0_wp, 2.0_wp, 3.0_wp]
+    call draw_drop(drop, 5, x, q)
+    call check('no spread, no shift', maxval(abs(x - drop%position)), 0.0_wp, 0.0_wp)
+    call check('given attitude', maxval(abs(q - [1, 0, 0, 0])), 0.0_wp, 0.0_wp)
+    drop%spread = [0.5_wp, 0.1_wp, 0.0_wp]
+    do i = 1, n
+      call draw_drop(drop, i, x, q)
+      u(:, i) = (x - drop%position)/max(drop%spread, 0.01_wp)
+    end do
+    call draw_drop(drop, 7, again, q)
+    call check('drawn again', maxval(abs((again - drop%position)/[0.5_wp, 0.1_wp, 0.01_wp] - u(:, 7))), 0.0_wp, 0.0_wp)
+    call check('no shift along z', maxval(abs(u(3, :))), 0.0_wp, 0.0_wp)
+    call check('within the spread', maxval(abs(u)) <= 1.0_wp .and. maxval(u(1, :)) > 0.999_wp)
+    ! standard errors at n = 20000: mean 0.0041, variance 0.0021; four of them
+    do k = 1, 2
+      call check('mean', sum(u(k, :))/real(n, wp), 0.0_wp, 0.016_wp)
+      call check('variance of a uniform number', sum(u(k, :)**2)/real(n, wp), 1.0_wp/3.0_wp, 0.009_wp)
+    end do
+    call check('x and y are independent', sum(u(1, :)*u(2, :))/real(n, wp), 0.0_wp, 0.01_wp)
+    call check('so are neighbours', sum(u(1, 2:)*u(1, :n - 1))/real(n, wp), 0.0_wp, 0.01_wp)
+    drop%seed = 2
+    call draw_drop(drop, 7, other, q)
+    call check('another seed', norm2(other - again) > 1.0e-6_wp)
+  end subroutine check_shift
+
+  !> Tilts of a given attitude: uniform angle up to the largest, axes in all directions.
+  subroutine check_tilt()
+    integer, parameter :: n = 20000
+    type(drop_input_t) :: drop
+    real(wp) :: x(3), q(4), given(4), up(3), angle, mean_angle, largest, axis(3), mean(3)
+    integer :: i
+
+    given = quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 1.0_wp)
+    drop%position = 0.0_wp
+    drop%quaternion = 3*given
+    drop%tilt_deg = 10.0_wp
+    mean_angle = 0.0_wp
+    largest = 0.0_wp
+    mean = 0.0_wp
+    do i = 1, n
+      call draw_drop(drop, i, x, q)
+      angle = 2*acos(min(1.0_wp, abs(dot_product(q, given))))*180.0_wp/pi
+      mean_angle = mean_angle + angle/real(n, wp)
+      largest = max(largest, angle)
+      up = rotate(given, [0.0_wp, 0.0_wp, 1.0_wp])
+      axis = rotate(q, [0.0_wp, 0.0_wp, 1.0_wp]) - up
+      mean = mean + axis/real(n, wp)
+    end do
+    call check('largest tilt', largest, 10.0_wp, 0.01_wp)
+    call check('mean tilt', mean_angle, 5.0_wp, 0.09_wp)   ! standard error 0.02
+    call check('to all sides', norm2(mean - dot_product(mean, up)*up), 0.0_wp, 0.002_wp)
+    call check('unit quaternion', norm2(q), 1.0_wp, 1.0e-15_wp)
+  end subroutine check_tilt
+
+  !> Random attitudes: a body axis points evenly to all sides.
+  subroutine check_random()
+    integer, parameter :: n = 20000
+    type(drop_input_t) :: drop
+    real(wp) :: x(3), q(4), axis(3), mean(3), square(3)
+    integer :: i
+
+    drop%position = 0.0_wp
+    drop%orientation = 'random'
+    mean = 0.0_wp
+    square = 0.0_wp
+    do i = 1, n
+      call draw_drop(drop, i, x, q)
+      axis = rotate(q, [0.0_wp, 0.6_wp, 0.8_wp])
+      mean = mean + axis/real(n, wp)
+      square = square + axis**2/real(n, wp)
+    end do
+    call check('no side preferred', maxval(abs(mean)), 0.0_wp, 0.016_wp)
+    call check('no direction preferred', maxval(abs(square - 1.0_wp/3.0_wp)), 0.0_wp, 0.009_wp)
+  end subroutine check_random
+
+end program test_drops
