@@ -42,13 +42,13 @@ class Machine:
         return [*start, str(self.program), "--quiet", *threads]
 
 
-def run(case: Path, output: Path, machine: Machine) -> float:
+def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     """Run one case file into a fresh folder; the seconds it took."""
     shutil.rmtree(output, ignore_errors=True)
     output.parent.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     done = subprocess.run(
-        [*machine.command, "--output", str(output), str(case)],
+        [*machine.command, *options, "--output", str(output), str(case)],
         env={**os.environ, **MPI_SETTINGS},
         stdin=subprocess.DEVNULL,
         capture_output=True,

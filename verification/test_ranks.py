@@ -1,4 +1,4 @@
-"""Any number of ranks and threads gives the same bits, and so does a restart."""
+"""Any number of ranks and threads gives the same bits."""
 
 from pathlib import Path
 
