@@ -1,14 +1,14 @@
-!> The plane of the liquid surface in one box cell: constant from the fraction and back, the liquid in
-!! a slab beside a face, the normal from the 27 cells around.
+!> The plane of the liquid surface in one box cell: constant from the fraction and back, the liquid
+!! in a slab beside a face, the normal from the 27 cells around.
 !!
-!! The liquid of a cell is the part of the box where `n.x <= d`; n points from the liquid to the gas.
-!! Scaling by the edges maps every box to the unit cube, `m = n*h`, and leaves all shares as they are;
-!! the `unit_*` forms work there. Normals need not have length one.
+!! The liquid of a cell is the part of the box where `n.x <= d`; n points from the liquid to the
+!! gas. Scaling by the edges maps every box to the unit cube, `m = n*h`, and leaves all shares as
+!! they are; the `unit_*` forms work there. Normals need not have length one.
 !!
 !! Source: the piecewise cubic of Scardovelli & Zaleski, J. Comput. Phys. 164 (2000). Written as a
-!! sum of cubes that never divides a difference by a small component, so that it keeps its digits for
-!! planes nearly parallel to faces; its inverse is closed where the piece is linear or quadratic and
-!! Newton's method on the cubic pieces.
+!! sum of cubes that never divides a difference by a small component, so that it keeps its digits
+!! for planes nearly parallel to faces; its inverse is closed where the piece is linear or quadratic
+!! and Newton's method on the cubic pieces.
 module plic_m
   use kinds_m, only: wp
   implicit none
@@ -20,7 +20,8 @@ module plic_m
 
 contains
 
-  !> Constant d of the plane `normal.x = d` that cuts the share `fraction` off the box (0,0,0)..h [m].
+  !> Constant d of the plane `normal.x = d` that cuts the share `fraction` off the box (0,0,0)..h
+  !! [m].
   pure function plane_constant(normal, fraction, h) result(d)
     real(wp), intent(in) :: normal(3)   !! from liquid to gas
     real(wp), intent(in) :: fraction    !! liquid share, 0..1 [-]
@@ -130,8 +131,9 @@ contains
 
   !> Share of the unit cube below the plane `s.x = b` for 0 <= s1 <= s2 <= s3, sum 1, b <= 1/2.
   !!
-  !! $$ V = \frac{b(b-s_1) + s_1^2/3}{2 s_2 s_3} - \frac{(b-s_2)_+^3 + (b-s_3)_+^3}{6 s_1 s_2 s_3} $$
-  !! between s1 and the point where the plane has passed the whole small face (linear from there on).
+  !! $$ V = \frac{b(b-s_1) + s_1^2/3}{2 s_2 s_3} - \frac{(b-s_2)_+^3 + (b-s_3)_+^3}{6 s_1 s_2 s_3}
+  !! $$ between s1 and the point where the plane has passed the whole small face (linear from there
+  !! on).
   pure function lower_half(s, b) result(volume)
     real(wp), intent(in) :: s(3), b
     real(wp) :: volume
@@ -223,8 +225,8 @@ contains
   !> Normal of the surface on the unit cube, from liquid to gas, from the liquid shares around.
   !!
   !! Mixed Youngs-centred: of the three height functions the one whose surface is flattest, unless
-  !! the gradient of Youngs (weights 1-2-1) is less aligned with an axis. Sizes add up to one; zero where
-  !! the shares show no direction. Multiply by 1/h for the direction in space of a box cell.
+  !! the gradient of Youngs (weights 1-2-1) is less aligned with an axis. Sizes add up to one; zero
+  !! where the shares show no direction. Multiply by 1/h for the direction in space of a box cell.
   !! Source: Aulisa, Manservisi, Scardovelli & Zaleski, J. Comput. Phys. 225 (2007).
   pure function unit_normal(c) result(m)
     real(wp), intent(in) :: c(-1:1, -1:1, -1:1)   !! liquid shares

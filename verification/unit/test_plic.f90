@@ -1,4 +1,5 @@
-!> The plane in a box cell: constant and volume are inverse, slabs add up, normals of planes are exact.
+!> The plane in a box cell: constant and volume are inverse, slabs add up, normals of planes are
+!! exact.
 program test_plic
   use kinds_m, only: wp, pi
   use plic_m, only: plane_constant, volume_below, liquid_in_slab, unit_constant, unit_volume, &

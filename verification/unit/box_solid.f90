@@ -1,0 +1,131 @@
+!> Axis-parallel boxes as solids in the grid, by exact intervals: a solid geometry that needs no
+!! bodies.
+module box_solid_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo, unit_step, side_slip, side_open, side_periodic
+  use parallel_m, only: decompose
+  use solid_geometry_m, only: solid_geometry_t
+  implicit none
+  private
+  public :: set_boxes, simple_grid
+
+  integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 2, 1, 3, 1, 3, 2], [3, 6])
+
+contains
+
+  !> Grid with slip walls, an open top and, if asked, periodic directions.
+  subroutine simple_grid(n, length, grid, periodic)
+    integer, intent(in) :: n(3)
+    real(wp), intent(in) :: length(3)   !! [m]
+    type(grid_t), intent(out) :: grid
+    logical, intent(in), optional :: periodic(3)
+    integer :: d
+
+    grid%n = n
+    grid%length = length
+    grid%h = length/real(n, wp)
+    grid%volume = product(grid%h)
+    grid%area = grid%volume/grid%h
+    grid%side = side_slip
+    grid%side(2, 3) = side_open
+    if (present(periodic)) grid%periodic = periodic
+    do d = 1, 3
+      if (grid%periodic(d)) grid%side(:, d) = side_periodic
+    end do
+    call decompose(n, grid%periodic, grid%lo, grid%hi, grid%at_side)
+  end subroutine simple_grid
+
+  !> Fill shares, open faces and tetrahedra of boxes that do not overlap.
+  subroutine set_boxes(grid, low, high, solid)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, boxes) [m]
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: i, j, k, d, b
+    real(wp) :: part(3), cover
+
+    call set_tetrahedra(low, high, solid)
+    solid%n_cut = 0
+    solid%cut = 0
+    do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
+      do j = grid%lo(2) - n_halo, grid%hi(2) + n_halo
+        do i = grid%lo(1) - n_halo, grid%hi(1) + n_halo
+          cover = 0.0_wp
+          do b = 1, size(low, 2)
+            cover = cover + product(inside([i, j, k], b))
+          end do
+          solid%alpha(i, j, k) = min(cover, 1.0_wp)
+          if (cover > 1.0_wp - 1.0e-12_wp) solid%alpha(i, j, k) = 1.0_wp
+          if (cover < 1.0e-13_wp) solid%alpha(i, j, k) = 0.0_wp
+          do d = 1, 3
+            cover = 0.0_wp
+            do b = 1, size(low, 2)
+              part = inside([i, j, k], b)
+              associate (x => grid%face(merge(i, merge(j, k, d == 2), d == 1), d))
+                part(d) = merge(1.0_wp, 0.0_wp, low(d, b) <= x .and. x <= high(d, b))
+              end associate
+              cover = cover + product(part)
+            end do
+            solid%open(i, j, k, d) = max(1.0_wp - cover, 0.0_wp)
+            if (solid%open(i, j, k, d) < 1.0e-9_wp) solid%open(i, j, k, d) = 0.0_wp
+          end do
+          if (solid%alpha(i, j, k) > 0.0_wp .and. solid%alpha(i, j, k) < 1.0_wp) call add_cut_cell([i, j, k])
+        end do
+      end do
+    end do
+  contains
+    !> Shares of the edges of a cell that lie in a box.
+    pure function inside(c, b) result(part)
+      integer, intent(in) :: c(3), b
+      real(wp) :: part(3)
+
+      part = max(min(grid%face(c + 1, [1, 2, 3]), high(:, b)) - max(grid%face(c, [1, 2, 3]), low(:, b)), 0.0_wp)
+      part = part/grid%h
+    end function inside
+
+    subroutine add_cut_cell(c)
+      integer, intent(in) :: c(3)
+      integer :: m, t
+
+      m = solid%n_cut + 1
+      if (m + 1 > size(solid%first)) solid%first = [solid%first, spread(0, 1, m + 1)]
+      solid%first(1) = 1
+      if (solid%first(m) + 6*size(low, 2) > size(solid%tet)) &
+        solid%tet = [solid%tet, spread(0, 1, size(solid%tet) + 6*size(low, 2))]
+      solid%first(m + 1) = solid%first(m)
+      do t = 1, 6*size(low, 2)
+        if (any(inside(c, (t + 5)/6) <= 0.0_wp)) cycle
+        solid%tet(solid%first(m + 1)) = t
+        solid%first(m + 1) = solid%first(m + 1) + 1
+      end do
+      solid%n_cut = m
+      solid%cut(c(1), c(2), c(3)) = m
+    end subroutine add_cut_cell
+  end subroutine set_boxes
+
+  !> Each box as six tetrahedra around its diagonal.
+  subroutine set_tetrahedra(low, high, solid)
+    real(wp), intent(in) :: low(:, :), high(:, :)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b, t, v, m
+    real(wp) :: x(3)
+
+    solid%n_tet = 6*size(low, 2)
+    if (size(solid%corner, 3) < solid%n_tet) then
+      deallocate (solid%corner)
+      allocate (solid%corner(3, 4, solid%n_tet))
+    end if
+    m = 0
+    do b = 1, size(low, 2)
+      do t = 1, 6
+        m = m + 1
+        x = low(:, b)
+        solid%corner(:, 1, m) = x
+        do v = 1, 3
+          x(path(v, t)) = high(path(v, t), b)
+          solid%corner(:, v + 1, m) = x
+        end do
+      end do
+    end do
+  end subroutine set_tetrahedra
+
+end module box_solid_m
