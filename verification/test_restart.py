@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from run_cases import CASES, ROOT, Machine, run
-from same_bits import contents, differences
 
 from micstools.reader import Run
+from run_cases import CASES, ROOT, Machine, run
+from same_bits import contents, differences
 
 RESULTS = ("run.h5", "fields.vtkhdf", "blocks.vtkhdf")
 
