@@ -56,26 +56,26 @@ contains
     real(wp), parameter :: skin_share = 0.5_wp   !! of the smallest radius
     integer :: s, b
 
-    self%smallest = huge(1.0_wp)
     allocate (self%set(size(blocks%shapes)))
     do s = 1, size(blocks%shapes)
       associate (shape => blocks%shapes(s))
         self%set(s)%largest = maxval(shape%sphere_radius)
         self%set(s)%reach = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
-        self%smallest = min(self%smallest, 2*minval(shape%sphere_radius))
         call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, self%set(s)%bins)
       end associate
     end do
-    self%skin = 0.5_wp*skin_share*self%smallest
     allocate (self%reach(blocks%n), self%offset(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
+    self%smallest = huge(1.0_wp)
     s = 0
     do b = 1, blocks%n
+      self%smallest = min(self%smallest, 2*minval(blocks%shapes(blocks%shape(b))%sphere_radius))
       self%offset(b) = s
       s = s + size(blocks%shapes(blocks%shape(b))%sphere_radius)
       self%reach(b) = self%set(blocks%shape(b))%reach
     end do
     allocate (self%slot_of(s), source=0)
+    if (blocks%n > 0) self%skin = 0.5_wp*skin_share*self%smallest
   end subroutine contact_spheres_init
 
   !> All touches at the present poses.
