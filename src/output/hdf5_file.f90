@@ -13,7 +13,7 @@ module hdf5_file_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_char, c_null_char
   use hdf5
   use kinds_m, only: wp, sp, i8
-  use parallel_m, only: is_root, set_file_access, set_collective
+  use parallel_m, only: is_root, set_file_access, set_collective, global_max
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   implicit none
   private
@@ -65,7 +65,7 @@ module hdf5_file_m
     generic :: read => read_reals, read_integers
     procedure :: new_blocks, write_block, read_block
     procedure :: new_column, open_column, resize, append, append_integers, append_block, read_row
-    procedure, private :: check, write_attribute, new_dataset, select, transfer_row
+    procedure, private :: check, agree, write_attribute, new_dataset, select, transfer_row
   end type h5_file_t
 
 contains
@@ -81,6 +81,19 @@ contains
     self%message = self%path//': cannot '//what//': '//hdf5_reason()
   end subroutine check
 
+  !> Trouble of one process of a shared file becomes that of all, so that none waits for it for ever.
+  subroutine agree(self)
+    class(h5_file_t), intent(inout) :: self
+    real(wp) :: worst(1)
+
+    if (.not. self%shared) return
+    worst = real(self%info, wp)
+    call global_max(worst)
+    if (worst(1) <= 0.0_wp .or. self%info /= 0) return
+    self%info = 1
+    self%message = self%path//': another process has had trouble with this file'
+  end subroutine agree
+
   !> Create an empty file; one that exists is overwritten.
   subroutine file_create(self, path, shared)
     class(h5_file_t), intent(inout) :: self
@@ -94,6 +107,7 @@ contains
     call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, status, access_prp=access)
     call self%check(status, 'create the file')
     call h5pclose_f(access, status)
+    call self%agree()
   end subroutine file_create
 
   !> Open a file that exists.
@@ -110,6 +124,7 @@ contains
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)
     call self%check(status, 'open the file')
     call h5pclose_f(access, status)
+    call self%agree()
   end subroutine file_open
 
   !> Start HDF5 and make the lists that say how the file is accessed.
@@ -153,6 +168,7 @@ contains
     call h5fclose_f(self%id, status)
     call self%check(status, 'close the file')
     self%id = -1
+    call self%agree()
   end subroutine file_close
 
   !> Hand everything written so far to the operating system.
@@ -163,6 +179,7 @@ contains
     if (self%info /= 0) return
     call h5fflush_f(self%id, H5F_SCOPE_LOCAL_F, status)
     call self%check(status, 'write')
+    call self%agree()
   end subroutine file_flush
 
   !> Create a group; the group around it must exist.
@@ -517,6 +534,7 @@ contains
     if (n > 0 .and. (is_root() .or. .not. self%shared)) call h5dwrite_f(id, mem_type, data, status)
     call self%check(status, 'write '//name)
     call h5dclose_f(id, status)
+    call self%agree()
   end subroutine write_whole
 
   !> Overwrite a dataset that `store` made; the shape stays.
@@ -620,6 +638,7 @@ contains
     call self%check(status, 'write '//name)
     call close_selection(there, here)
     call h5dclose_f(id, status)
+    call self%agree()
   end subroutine write_block
 
   !> Read the block `first : first + extent - 1` of a dataset of `new_blocks`.
@@ -642,6 +661,7 @@ contains
     call self%check(status, 'read '//name)
     call close_selection(there, here)
     call h5dclose_f(id, status)
+    call self%agree()
   end subroutine read_block
 
   !> Create a column without rows. Rows are `row` in shape, for h5py (rows, reversed row).
@@ -807,16 +827,19 @@ contains
     integer :: status
 
     call self%resize(column, int(column%extent(column%rank)) + 1)
-    if (n == 0 .or. (self%shared .and. .not. is_root())) return
-    first = 0
-    first(column%rank) = column%extent(column%rank) - 1
-    extent = column%extent
-    extent(column%rank) = 1
-    call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, here)
-    if (self%info /= 0) return
-    call h5dwrite_f(column%id, mem_type, data, status, here, there)
-    call self%check(status, 'write '//column%name)
-    call close_selection(there, here)
+    if (n > 0 .and. (is_root() .or. .not. self%shared)) then
+      first = 0
+      first(column%rank) = column%extent(column%rank) - 1
+      extent = column%extent
+      extent(column%rank) = 1
+      call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, here)
+      if (self%info == 0) then
+        call h5dwrite_f(column%id, mem_type, data, status, here, there)
+        call self%check(status, 'write '//column%name)
+        call close_selection(there, here)
+      end if
+    end if
+    call self%agree()
   end subroutine transfer_row
 
   !> Append a row of 32-bit reals of which this process gives the block `first : first + extent - 1`;
@@ -837,6 +860,7 @@ contains
     call h5dwrite_f(column%id, H5T_NATIVE_REAL, c_loc(a), status, here, there, self%collective)
     call self%check(status, 'write '//column%name)
     call close_selection(there, here)
+    call self%agree()
   end subroutine append_block
 
   !> Row number `row` (from 1) of a column of reals.

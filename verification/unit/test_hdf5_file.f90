@@ -1,4 +1,5 @@
 !> The HDF5 layer: what is written comes back, columns grow and shrink, trouble is named.
+! ranks: 2 3
 program test_hdf5_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use kinds_m, only: wp, sp
@@ -16,8 +17,8 @@ program test_hdf5_file
   call test_shared_blocks()
   call test_trouble()
   call remove(path)
+  call finish_checks()
   call parallel_final()
-  if (is_root()) call finish_checks()
 
 contains
 

@@ -1,0 +1,168 @@
+!> Time, step and what is due when: rows, frames, restart files, releases, the end.
+!!
+!! Output never changes the steps. A row or frame is written after the first step that reaches its due
+!! time, the multiples of its interval; a step is shortened only to land on a release or on the end.
+module clock_m
+  use kinds_m, only: wp
+  use case_types_m, only: run_t
+  implicit none
+  private
+  public :: clock_t, clock_init, clock_resume
+
+  real(wp), parameter :: same_time = 1.0e-12_wp   !! times closer than this are one [s]
+
+  type :: clock_t
+    real(wp) :: t = 0.0_wp          !! [s]
+    real(wp) :: dt = 0.0_wp         !! of the last step, then of the present one [s]
+    integer :: step = 0
+    integer :: n_rows = 0           !! due rows written so far: a row that only ends a run does not count
+    integer :: n_frames = 0         !! likewise
+    real(wp) :: rest_began = -1.0_wp   !! when all blocks came to rest [s]; < 0: they move
+    real(wp) :: t_end = 0.0_wp      !! [s]
+    real(wp) :: next_row = 0.0_wp, next_frame = 0.0_wp, next_restart = 0.0_wp   !! due times [s]
+    real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
+    logical :: settled = .false.    !! at rest for `rest_time`
+    type(run_t) :: run              !! intervals and the rule for settling
+  contains
+    procedure :: choose_step, advance, finished, note_speed
+    procedure :: row_due, frame_due, restart_due, row_done, frame_done, restart_done
+  end type clock_t
+
+contains
+
+  !> The clock at the start of a run: the first row and frame are due.
+  subroutine clock_init(run, clock)
+    type(run_t), intent(in) :: run
+    type(clock_t), intent(out) :: clock
+
+    clock%run = run
+    clock%t_end = run%t_end
+    if (run%restart_interval > 0.0_wp) clock%next_restart = run%restart_interval
+  end subroutine clock_init
+
+  !> Set the due times of a clock whose t, step and counts came from a restart file: what was due at t
+  !! or before has been written.
+  subroutine clock_resume(clock)
+    type(clock_t), intent(inout) :: clock
+
+    clock%next_row = next_multiple(clock%run%history_interval, clock%t)
+    clock%next_frame = next_multiple(clock%run%field_interval, clock%t)
+    clock%next_restart = next_multiple(clock%run%restart_interval, clock%t)
+  end subroutine clock_resume
+
+  !> First multiple of an interval that lies after t.
+  pure function next_multiple(interval, t) result(next)
+    real(wp), intent(in) :: interval, t   !! [s]
+    real(wp) :: next
+    real(wp) :: n   ! a whole number, perhaps beyond integers
+
+    next = t
+    if (interval <= 0.0_wp) return
+    n = aint(t/interval)
+    do while (n*interval <= t + same_time)
+      n = n + 1.0_wp
+    end do
+    next = n*interval
+  end function next_multiple
+
+  !> Choose dt and where the step ends: the longest dt allowed, or less to land on the next release or
+  !! on the end. The last two steps before a landing share the way, so that none is tiny.
+  pure subroutine choose_step(self, dt_allowed, next_release)
+    class(clock_t), intent(inout) :: self
+    real(wp), intent(in) :: dt_allowed     !! by stability and `&run dt` [s]
+    real(wp), intent(in) :: next_release   !! time of the next release after t; huge if there is none [s]
+    real(wp) :: landing, way
+
+    landing = self%t_end
+    if (next_release > self%t + same_time) landing = min(landing, next_release)
+    way = landing - self%t
+    if (way <= dt_allowed*(1.0_wp + 1.0e-9_wp) .or. way <= same_time) then
+      self%dt = way
+      self%t_next = landing
+    else
+      self%dt = dt_allowed
+      if (way < 2*dt_allowed*(1.0_wp - 1.0e-9_wp)) self%dt = 0.5_wp*way
+      self%t_next = self%t + self%dt
+    end if
+  end subroutine choose_step
+
+  !> The step is done.
+  pure subroutine advance(self)
+    class(clock_t), intent(inout) :: self
+
+    self%t = self%t_next
+    self%step = self%step + 1
+  end subroutine advance
+
+  !> Has the run reached its end, or settled?
+  pure function finished(self) result(yes)
+    class(clock_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%t >= self%t_end - same_time .or. self%settled
+  end function finished
+
+  !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
+  pure subroutine note_speed(self, speed, all_released)
+    class(clock_t), intent(inout) :: self
+    real(wp), intent(in) :: speed          !! largest of all free blocks [m/s]
+    logical, intent(in) :: all_released
+
+    if (.not. all_released .or. speed >= self%run%rest_speed) then
+      self%rest_began = -1.0_wp
+    else if (self%rest_began < 0.0_wp) then
+      self%rest_began = self%t
+    end if
+    self%settled = self%run%stop_when_settled .and. self%rest_began >= 0.0_wp &
+      .and. self%t - self%rest_began >= self%run%rest_time - same_time
+  end subroutine note_speed
+
+  !> Is a row due now?
+  pure function row_due(self) result(yes)
+    class(clock_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%t >= self%next_row - same_time
+  end function row_due
+
+  !> Is a frame due now?
+  pure function frame_due(self) result(yes)
+    class(clock_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%run%field_interval > 0.0_wp .and. self%t >= self%next_frame - same_time
+  end function frame_due
+
+  !> Is a restart file due now? (The one at the end of a run is not asked for here.)
+  pure function restart_due(self) result(yes)
+    class(clock_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%run%restart_interval > 0.0_wp .and. self%step > 0 &
+      .and. self%t >= self%next_restart - same_time
+  end function restart_due
+
+  !> A due row has been written.
+  pure subroutine row_done(self)
+    class(clock_t), intent(inout) :: self
+
+    self%n_rows = self%n_rows + 1
+    self%next_row = next_multiple(self%run%history_interval, self%t)
+  end subroutine row_done
+
+  !> A due frame has been written.
+  pure subroutine frame_done(self)
+    class(clock_t), intent(inout) :: self
+
+    self%n_frames = self%n_frames + 1
+    self%next_frame = next_multiple(self%run%field_interval, self%t)
+  end subroutine frame_done
+
+  !> A due restart file is about to be written: what is in it counts it as written.
+  pure subroutine restart_done(self)
+    class(clock_t), intent(inout) :: self
+
+    self%next_restart = next_multiple(self%run%restart_interval, self%t)
+  end subroutine restart_done
+
+end module clock_m

@@ -1,0 +1,264 @@
+!> The folder of the results: made or found fit, never at the cost of older results.
+!!
+!! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not empty is
+!! refused. Only the root process looks and acts; the outcome is told to all.
+module output_folder_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_char, c_ptr, c_null_char, c_associated
+  use errors_m, only: to_text, exit_ok, exit_input, exit_files
+  use parallel_m, only: is_root, broadcast
+  implicit none
+  private
+  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
+
+  character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', 'blocks.vtkhdf']
+
+  character(*), parameter :: refused = 'no permission, no room, or a part of the path is not a folder'
+
+  interface
+    integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: mode   ! mode_t is passed like an int
+    end function c_mkdir
+
+    integer(c_int) function c_access(path, mode) bind(c, name='access')
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: mode
+    end function c_access
+
+    integer(c_int) function c_rename(from, to) bind(c, name='rename')
+      import :: c_int, c_char
+      character(kind=c_char), intent(in) :: from(*), to(*)
+    end function c_rename
+
+    type(c_ptr) function c_opendir(path) bind(c, name='opendir')
+      import :: c_ptr, c_char
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_opendir
+
+    type(c_ptr) function c_readdir(folder) bind(c, name='readdir')
+      import :: c_ptr
+      type(c_ptr), value :: folder
+    end function c_readdir
+
+    integer(c_int) function c_closedir(folder) bind(c, name='closedir')
+      import :: c_int, c_ptr
+      type(c_ptr), value :: folder
+    end function c_closedir
+  end interface
+
+contains
+
+  !> Could `prepare_folder` use this folder? Nothing is changed. All processes call.
+  subroutine check_folder(path, code, message)
+    character(*), intent(in) :: path
+    integer, intent(out) :: code                           !! exit_ok or exit_input
+    character(:), allocatable, intent(out) :: message
+
+    message = ''
+    code = exit_ok
+    if (is_root()) then
+      if (.not. exists(path)) then
+        continue
+      else if (.not. is_folder(path)) then
+        message = '&run output = '''//path//''': is a file, must be a folder'
+      else if (.not. is_free(path)) then
+        message = '&run output = '''//path//''': the folder is not empty and holds no run.h5, ' &
+          //'must be new, empty, or that of an older run'
+      end if
+      if (len(message) > 0) code = exit_input
+    end if
+    call tell_all(code, message)
+  end subroutine check_folder
+
+  !> Make an empty folder for a new run; the results of an older run are renamed away first.
+  subroutine prepare_folder(path, code, message)
+    character(*), intent(in) :: path
+    integer, intent(out) :: code                           !! exit_ok, exit_input or exit_files
+    character(:), allocatable, intent(out) :: message      !! of trouble
+
+    call check_folder(path, code, message)
+    if (code /= exit_ok) return
+    if (is_root()) then
+      if (exists(trimmed(path)//'/run.h5')) call keep_old_results(trimmed(path), code, message)
+      if (code == exit_ok) call make_folder(trimmed(path), code, message)
+    end if
+    call tell_all(code, message)
+  end subroutine prepare_folder
+
+  !> Rename a folder to the first free DIR.bak-N.
+  subroutine keep_old_results(path, code, message)
+    character(*), intent(in) :: path
+    integer, intent(inout) :: code
+    character(:), allocatable, intent(inout) :: message
+    integer :: n
+
+    n = 1
+    do while (exists(path//'.bak-'//to_text(n)))
+      n = n + 1
+    end do
+    call rename_file(path, path//'.bak-'//to_text(n), code, message)
+    if (code /= 0) code = exit_files
+  end subroutine keep_old_results
+
+  !> Make a folder and those around it, as far as they are missing.
+  subroutine make_folder(path, code, message)
+    character(*), intent(in) :: path
+    integer, intent(inout) :: code
+    character(:), allocatable, intent(inout) :: message
+    integer, parameter :: all_may = int(o'777')   ! cut down by the user's mask
+    integer :: at
+
+    do at = 1, len(path)
+      if (at < len(path)) then
+        if (path(at + 1:at + 1) /= '/') cycle
+      end if
+      if (exists(path(:at))) cycle
+      if (c_mkdir(path(:at)//c_null_char, int(all_may, c_int)) == 0) cycle
+      message = path//': cannot make the folder: '//refused
+      code = exit_files
+      return
+    end do
+  end subroutine make_folder
+
+  !> Where a run that goes on from `restart` writes: the folder of that file, or, if `output` is not
+  !! empty, a new folder with copies of its results.
+  subroutine continue_folder(restart, output, path, code, message)
+    character(*), intent(in) :: restart, output
+    character(:), allocatable, intent(out) :: path         !! of the folder
+    integer, intent(out) :: code
+    character(:), allocatable, intent(out) :: message
+    integer :: i
+
+    code = exit_ok
+    message = ''
+    path = folder_of(restart)
+    if (len(output) == 0 .or. trimmed(output) == path) return
+    call prepare_folder(output, code, message)
+    if (code /= exit_ok) return
+    if (is_root()) then
+      do i = 1, size(result_file)
+        if (.not. exists(path//'/'//trim(result_file(i)))) cycle
+        call copy_file(path//'/'//trim(result_file(i)), trimmed(output)//'/'//trim(result_file(i)), code, message)
+        if (code /= exit_ok) exit
+      end do
+    end if
+    call tell_all(code, message)
+    path = trimmed(output)
+  end subroutine continue_folder
+
+  !> The root process tells code and message.
+  subroutine tell_all(code, message)
+    integer, intent(inout) :: code
+    character(:), allocatable, intent(inout) :: message
+
+    call broadcast(code)
+    call broadcast(message)
+  end subroutine tell_all
+
+  !> The folder that holds a file.
+  pure function folder_of(file) result(path)
+    character(*), intent(in) :: file
+    character(:), allocatable :: path
+
+    path = '.'
+    if (index(file, '/') > 0) path = trimmed(file(:index(file, '/', back=.true.)))
+  end function folder_of
+
+  !> A path without the slashes at its end.
+  pure function trimmed(path) result(short)
+    character(*), intent(in) :: path
+    character(:), allocatable :: short
+
+    short = trim(path)
+    do while (len(short) > 1 .and. short(len(short):) == '/')
+      short = short(:len(short) - 1)
+    end do
+  end function trimmed
+
+  function exists(path) result(yes)
+    character(*), intent(in) :: path
+    logical :: yes
+
+    yes = c_access(path//c_null_char, 0_c_int) == 0
+  end function exists
+
+  function is_folder(path) result(yes)
+    character(*), intent(in) :: path
+    logical :: yes
+
+    yes = exists(path//'/.')
+  end function is_folder
+
+  !> May a folder be used: empty, or to be renamed away?
+  function is_free(path) result(yes)
+    character(*), intent(in) :: path
+    logical :: yes
+
+    yes = exists(path//'/run.h5')
+    if (.not. yes) yes = is_empty(path)
+  end function is_free
+
+  !> Does a folder hold nothing but itself and its parent? One that cannot be read counts as full.
+  function is_empty(path) result(yes)
+    character(*), intent(in) :: path
+    logical :: yes
+    type(c_ptr) :: folder
+    integer :: n
+
+    yes = .false.
+    folder = c_opendir(path//c_null_char)
+    if (.not. c_associated(folder)) return
+    n = 0
+    do while (c_associated(c_readdir(folder)))
+      n = n + 1
+    end do
+    yes = n <= 2
+    if (c_closedir(folder) /= 0) yes = .false.
+  end function is_empty
+
+  !> Rename a file or folder; a file of the new name is replaced in one stroke.
+  subroutine rename_file(from, to, info, message)
+    character(*), intent(in) :: from, to
+    integer, intent(out) :: info   !! 0: done
+    character(:), allocatable, intent(inout) :: message
+
+    info = 0
+    if (c_rename(from//c_null_char, to//c_null_char) == 0) return
+    info = 1
+    message = from//': cannot rename it to '//to//': '//refused
+  end subroutine rename_file
+
+  !> Copy a file.
+  subroutine copy_file(from, to, code, message)
+    character(*), intent(in) :: from, to
+    integer, intent(inout) :: code
+    character(:), allocatable, intent(inout) :: message
+    integer, parameter :: chunk = 2**20
+    character(chunk) :: buffer
+    character(256) :: reason
+    integer :: source, target, info, part
+    integer :: n
+    integer(c_long) :: left, length
+
+    open (newunit=source, file=from, access='stream', status='old', action='read', iostat=info, iomsg=reason)
+    if (info == 0) then
+      inquire (unit=source, size=length)
+      open (newunit=target, file=to, access='stream', status='replace', iostat=info, iomsg=reason)
+      left = length
+      do while (left > 0 .and. info == 0)
+        n = int(min(left, int(chunk, c_long)))
+        read (source, iostat=info, iomsg=reason) buffer(:n)
+        if (info == 0) write (target, iostat=info, iomsg=reason) buffer(:n)
+        left = left - n
+      end do
+      if (info == 0) close (target, iostat=info, iomsg=reason)
+      close (source, iostat=part)
+    end if
+    if (info == 0) return
+    code = exit_files
+    message = from//': cannot copy it to '//to//': '//trim(reason)
+  end subroutine copy_file
+
+end module output_folder_m

@@ -1,0 +1,308 @@
+!> Restart files: the whole state in double precision, checksummed, exact on any number of processes.
+!!
+!! A file is written under a temporary name and renamed when it is complete, so a run that is killed
+!! while it writes leaves the older files whole. Layout (as h5py shows it; faces carry one layer more
+!! in each direction, element (d, k, j, i) is the lower face of cell (i, j, k) in direction d):
+!!
+!!     /            @format = 'mics-restart' @format_version @checksum @namelist @parameters @version
+!!     /clock       t dt step n_rows n_frames rest_began
+!!     /flow        u (3,nz,ny,nx)  p liquid room c alpha (1,nz,ny,nx)
+!!                  uf open (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
+!!     /blocks      position quaternion velocity angular_momentum ... (N,..)
+!!     /contacts    the tangential springs
+!!
+!! The volume flux through a face is open*area*uf + solid_flux.
+module restart_m
+  use kinds_m, only: wp
+  use parallel_m, only: is_root, broadcast, halo_exchange
+  use build_info_m, only: version, git_revision
+  use grid_m, only: grid_t, n_halo
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_body_m, only: blocks_t
+  use contacts_m, only: contacts_t
+  use clock_m, only: clock_t, clock_resume
+  use hdf5_file_m, only: h5_file_t
+  use output_folder_m, only: rename_file
+  use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
+  use state_visitors_m, only: checksum_visitor_t
+  implicit none
+  private
+  public :: write_restart, read_restart
+
+  character(*), parameter :: format_name = 'mics-restart'
+  integer, parameter :: format_version = 1
+
+  type, extends(state_visitor_t) :: writer_t
+    type(h5_file_t) :: file
+  contains
+    procedure :: cells => write_cells
+    procedure :: reals => write_reals
+    procedure :: integers => write_integers
+  end type writer_t
+
+  type, extends(state_visitor_t) :: reader_t
+    type(h5_file_t) :: file
+  contains
+    procedure :: cells => read_cells
+    procedure :: reals => read_reals
+    procedure :: integers => read_integers
+  end type reader_t
+
+contains
+
+  !> Write the state to `path`, all processes together.
+  subroutine write_restart(path, text, parameters, grid, clock, flow, solid, blocks, contacts, info, message)
+    character(*), intent(in) :: path
+    character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer, intent(out) :: info                   !! 0: written
+    character(:), allocatable, intent(out) :: message
+    type(writer_t) :: writer
+    type(checksum_visitor_t) :: checksum
+    character(*), parameter :: unfinished = '.part'
+    integer :: g
+
+    call visit_state(checksum, grid, clock, flow, solid, blocks, contacts)
+    associate (file => writer%file)
+      call file%create(path//unfinished, .true.)
+      call file%attribute('/', 'format', format_name)
+      call file%attribute('/', 'format_version', format_version)
+      call file%attribute('/', 'version', version)
+      call file%attribute('/', 'git_revision', git_revision)
+      call file%attribute('/', 'namelist', text)
+      call file%attribute('/', 'parameters', parameters)
+      do g = 1, size(state_groups)
+        call file%group(trim(state_groups(g)))
+      end do
+      call visit_state(writer, grid, clock, flow, solid, blocks, contacts)
+      call file%attribute('/', 'checksum', checksum%sum%text())
+      call file%close()
+    end associate
+    call finish_file(path//unfinished, path, writer%file, info, message)
+  end subroutine write_restart
+
+  !> Give a complete file its name, on the root process, and tell all of the outcome.
+  subroutine finish_file(unfinished, path, file, info, message)
+    character(*), intent(in) :: unfinished, path
+    type(h5_file_t), intent(in) :: file
+    integer, intent(out) :: info
+    character(:), allocatable, intent(out) :: message
+
+    message = ''
+    info = file%info
+    if (info /= 0) message = file%message
+    if (info == 0 .and. is_root()) call rename_file(unfinished, path, info, message)
+    call broadcast(info)
+  end subroutine finish_file
+
+  !> Read the state from `path`, all processes together, and check that it is whole and of this case.
+  !!
+  !! Afterwards the halos between processes are filled; those at the sides of the domain, and what
+  !! follows from the state, are the caller's.
+  subroutine read_restart(path, parameters, grid, clock, flow, solid, blocks, contacts, info, message)
+    character(*), intent(in) :: path
+    character(*), intent(in) :: parameters   !! all values of the case that goes on
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer, intent(out) :: info             !! 0: read; 1: the file is no good; 2: the case has changed
+    character(:), allocatable, intent(out) :: message
+    type(reader_t) :: reader
+    type(checksum_visitor_t) :: checksum
+    character(:), allocatable :: written
+
+    written = ''
+    associate (file => reader%file)
+      call file%open(path, .true., .false.)
+      call check_kind(file, parameters, info, message)
+      if (info == 0) call visit_state(reader, grid, clock, flow, solid, blocks, contacts)
+      if (info == 0) call file%read_attribute('/', 'checksum', written)
+      call file%close()
+      if (info /= 0) return
+      info = file%info
+      if (info /= 0) then
+        message = file%message
+        return
+      end if
+    end associate
+    call visit_state(checksum, grid, clock, flow, solid, blocks, contacts)
+    if (checksum%sum%text() /= written) then
+      info = 1
+      message = path//': damaged, its content does not have its checksum'
+      return
+    end if
+    if (clock%t_end < clock%t) then
+      info = 2
+      message = '&run t_end: the restart file is already past it'
+      return
+    end if
+    call clock_resume(clock)
+  end subroutine read_restart
+
+  !> Is this a restart file of this case?
+  subroutine check_kind(file, parameters, info, message)
+    type(h5_file_t), intent(inout) :: file
+    character(*), intent(in) :: parameters
+    integer, intent(out) :: info
+    character(:), allocatable, intent(out) :: message
+    character(:), allocatable :: kind, before
+    integer :: number
+
+    info = 1
+    call file%read_attribute('/', 'format', kind)
+    call file%read_attribute('/', 'format_version', number)
+    call file%read_attribute('/', 'parameters', before)
+    if (file%info /= 0) then
+      message = file%message
+    else if (kind /= format_name .or. number /= format_version) then
+      message = file%path//': not a restart file of this version'
+    else
+      message = first_change(before, parameters)
+      info = merge(0, 2, len(message) == 0)
+    end if
+  end subroutine check_kind
+
+  !> The first line in which two lists of all values differ, apart from those that may change.
+  function first_change(before, after) result(message)
+    character(*), intent(in) :: before, after
+    character(:), allocatable :: message
+    character(:), allocatable :: old, new
+    integer :: at_old, at_new
+
+    message = ''
+    at_old = 1
+    at_new = 1
+    do
+      call next_line(before, at_old, old)
+      call next_line(after, at_new, new)
+      if (old /= new) then
+        message = 'the case differs from that of the restart file: '//shown(new)//', was '//shown(old)
+        return
+      end if
+      if (len(old) == 0) return
+    end do
+  end function first_change
+
+  pure function shown(line) result(text)
+    character(*), intent(in) :: line
+    character(:), allocatable :: text
+
+    text = trim(adjustl(line))
+    if (len(text) == 0) text = 'nothing'
+  end function shown
+
+  !> The next line that must not change; empty at the end.
+  subroutine next_line(text, at, line)
+    character(*), intent(in) :: text
+    integer, intent(inout) :: at   !! where to go on
+    character(:), allocatable, intent(out) :: line
+    character(*), parameter :: free(*) = [character(16) :: 't_end', 'output', 'field_interval', &
+      'history_interval', 'restart_interval']
+    integer :: n
+
+    line = ''
+    do while (at <= len(text))
+      n = index(text(at:)//new_line('a'), new_line('a')) - 1
+      line = text(at:at + n - 1)
+      at = at + n + 1
+      if (len_trim(line) == 0) cycle
+      if (.not. any(free == adjustl(line(:max(0, index(line, '=') - 1))))) return
+      line = ''
+    end do
+  end subroutine next_line
+
+  subroutine write_cells(self, name, units, grid, faces, m, a)
+    class(writer_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    type(grid_t), intent(in) :: grid
+    logical, intent(in) :: faces
+    integer, intent(in) :: m
+    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
+                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
+                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), allocatable :: row(:)
+    integer :: first(3), last(3), d
+
+    call self%file%new_blocks(name, units, [grid%n + merge(1, 0, faces), m])
+    do d = 1, m
+      call owned_part(grid, faces, d, first, last)
+      allocate (row(product(last - first + 1)))
+      call pack_part(grid, a(:, :, :, d), first, last, row)
+      call self%file%write_block(name, [first, d], [last - first + 1, 1], row)
+      deallocate (row)
+    end do
+  end subroutine write_cells
+
+  subroutine write_reals(self, name, units, extent, a)
+    class(writer_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: extent(:)
+    real(wp), intent(inout) :: a(product(extent))
+
+    call self%file%store_shaped_reals(name, units, extent, a)
+  end subroutine write_reals
+
+  subroutine write_integers(self, name, extent, a)
+    class(writer_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: extent(:)
+    integer, intent(inout) :: a(product(extent))
+
+    call self%file%store_shaped_integers(name, '1', extent, a)
+  end subroutine write_integers
+
+  !> Faces on the upper side of a periodic domain are those on its lower side: the exchange fills them.
+  subroutine read_cells(self, name, units, grid, faces, m, a)
+    class(reader_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    type(grid_t), intent(in) :: grid
+    logical, intent(in) :: faces
+    integer, intent(in) :: m
+    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
+                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
+                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), allocatable :: row(:)
+    integer :: first(3), last(3), d
+
+    if (self%file%info /= 0) return
+    do d = 1, m
+      call owned_part(grid, faces, d, first, last)
+      allocate (row(product(last - first + 1)), source=0.0_wp)
+      call self%file%read_block(name, [first, d], [last - first + 1, 1], row)
+      call unpack_part(grid, row, first, last, a(:, :, :, d))
+      deallocate (row)
+      call halo_exchange(a(:, :, :, d), n_halo)
+    end do
+    if (self%file%info /= 0) self%file%message = self%file%message//' ['//units//']'
+  end subroutine read_cells
+
+  subroutine read_reals(self, name, units, extent, a)
+    class(reader_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: extent(:)
+    real(wp), intent(inout) :: a(product(extent))
+
+    if (self%file%info /= 0) return
+    call self%file%read(name, a)
+    if (self%file%info /= 0) self%file%message = self%file%message//' ['//units//']'
+  end subroutine read_reals
+
+  subroutine read_integers(self, name, extent, a)
+    class(reader_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: extent(:)
+    integer, intent(inout) :: a(product(extent))
+
+    call self%file%read(name, a)
+  end subroutine read_integers
+
+end module restart_m

@@ -1,0 +1,250 @@
+!> The one list of everything that a run must remember from step to step.
+!!
+!! `visit_state` shows each array to a visitor: the restart file is written and read, checksums are
+!! formed, numbers that are none are searched, and two states are compared, all by the same walk. An
+!! array that is missing here is missing in every one of them.
+!!
+!! Halo cells are not part of the state: whoever reads one fills them, and computes what follows from
+!! the state (density, viscosity, legs to the surfaces), before the next step.
+module state_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo, unit_step
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_body_m, only: blocks_t
+  use contacts_m, only: contacts_t
+  use neighbours_m, only: reserve
+  use clock_m, only: clock_t
+  implicit none
+  private
+  public :: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
+
+  !> Groups of the names below, in their order.
+  character(*), parameter :: state_groups(*) = &
+    [character(9) :: '/clock', '/flow', '/blocks', '/contacts']
+
+  integer, parameter :: most_springs = 100000000
+
+  type, abstract :: state_visitor_t
+  contains
+    procedure(visit_cells), deferred :: cells
+    procedure(visit_reals), deferred :: reals
+    procedure(visit_integers), deferred :: integers
+    procedure :: real_number, whole_number, logicals
+  end type state_visitor_t
+
+  abstract interface
+    !> An array over the cells or lower faces of the grid; every process shows its part.
+    subroutine visit_cells(self, name, units, grid, faces, m, a)
+      import :: state_visitor_t, grid_t, wp, n_halo
+      class(state_visitor_t), intent(inout) :: self
+      character(*), intent(in) :: name, units
+      type(grid_t), intent(in) :: grid
+      logical, intent(in) :: faces   !! component d lives on the lower faces of direction d
+      integer, intent(in) :: m       !! components
+      real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
+                                   grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
+                                   grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    end subroutine visit_cells
+
+    !> Reals that are the same on every process.
+    subroutine visit_reals(self, name, units, extent, a)
+      import :: state_visitor_t, wp
+      class(state_visitor_t), intent(inout) :: self
+      character(*), intent(in) :: name, units
+      integer, intent(in) :: extent(:)
+      real(wp), intent(inout) :: a(product(extent))
+    end subroutine visit_reals
+
+    !> Integers that are the same on every process.
+    subroutine visit_integers(self, name, extent, a)
+      import :: state_visitor_t
+      class(state_visitor_t), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: extent(:)
+      integer, intent(inout) :: a(product(extent))
+    end subroutine visit_integers
+  end interface
+
+contains
+
+  !> Show the whole state to a visitor, which may change it.
+  subroutine visit_state(visitor, grid, clock, flow, solid, blocks, contacts)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow            !! not allocated in a dry run
+    type(solid_geometry_t), intent(inout) :: solid !! likewise
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+
+    call visit_clock(visitor, clock)
+    if (allocated(flow%u)) call visit_flow(visitor, grid, flow, solid)
+    call visit_blocks(visitor, blocks)
+    call visit_contacts(visitor, contacts)
+  end subroutine visit_state
+
+  subroutine visit_clock(visitor, clock)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(clock_t), intent(inout) :: clock
+
+    call visitor%real_number('/clock/t', 's', clock%t)
+    call visitor%real_number('/clock/dt', 's', clock%dt)
+    call visitor%real_number('/clock/rest_began', 's', clock%rest_began)
+    call visitor%whole_number('/clock/step', clock%step)
+    call visitor%whole_number('/clock/n_rows', clock%n_rows)
+    call visitor%whole_number('/clock/n_frames', clock%n_frames)
+  end subroutine visit_clock
+
+  !> The open shares and solid shares follow from the poses of the blocks; they are here so that fluxes
+  !! and volumes can be summed from a restart file alone.
+  subroutine visit_flow(visitor, grid, flow, solid)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+
+    call visitor%cells('/flow/u', 'm/s', grid, .false., 3, flow%u)
+    call visitor%cells('/flow/p', 'Pa', grid, .false., 1, flow%p)
+    call visitor%cells('/flow/uf', 'm/s', grid, .true., 3, flow%uf)
+    call visitor%cells('/flow/solid_flux', 'm3/s', grid, .true., 3, flow%solid_flux)
+    call visitor%cells('/flow/liquid', 'm3', grid, .false., 1, flow%liquid)
+    call visitor%cells('/flow/room', 'm3', grid, .false., 1, flow%room)
+    call visitor%cells('/flow/c', '1', grid, .false., 1, flow%c)
+    call visitor%cells('/flow/alpha', '1', grid, .false., 1, solid%alpha)
+    call visitor%cells('/flow/open', '1', grid, .true., 3, solid%open)
+    call visitor%real_number('/flow/liquid_initial', 'm3', flow%liquid_initial)
+    call visitor%real_number('/flow/liquid_inflow', 'm3', flow%liquid_inflow)
+  end subroutine visit_flow
+
+  subroutine visit_blocks(visitor, blocks)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(blocks_t), intent(inout) :: blocks
+
+    associate (n => blocks%n)
+      if (n == 0) return
+      call visitor%logicals('/blocks/present', n, blocks%present)
+      call visitor%reals('/blocks/release_time', 's', [n], blocks%release_time)
+      call visitor%reals('/blocks/position', 'm', [3, n], blocks%x)
+      call visitor%reals('/blocks/quaternion', '1', [4, n], blocks%q)
+      call visitor%reals('/blocks/velocity', 'm/s', [3, n], blocks%v)
+      call visitor%reals('/blocks/angular_momentum', 'kg m2/s', [3, n], blocks%l)
+      call visitor%reals('/blocks/angular_velocity', 'rad/s', [3, n], blocks%omega)
+      call visitor%reals('/blocks/velocity_at_start', 'm/s', [3, n], blocks%v_start)
+      call visitor%reals('/blocks/angular_momentum_at_start', 'kg m2/s', [3, n], blocks%l_start)
+      call visitor%reals('/blocks/fluid_force', 'N', [3, n], blocks%fluid_force)
+      call visitor%reals('/blocks/fluid_torque', 'N m', [3, n], blocks%fluid_torque)
+      call visitor%reals('/blocks/contact_force', 'N', [3, n], blocks%contact_force)
+      call visitor%reals('/blocks/contact_torque', 'N m', [3, n], blocks%contact_torque)
+      call visitor%integers('/blocks/contacts', [n], blocks%contacts)
+      call visitor%integers('/blocks/on_floor', [n], blocks%on_floor)
+    end associate
+  end subroutine visit_blocks
+
+  !> The tangential springs, the only memory of the contacts.
+  subroutine visit_contacts(visitor, contacts)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(contacts_t), intent(inout) :: contacts
+
+    associate (s => contacts%springs)
+      call visitor%whole_number('/contacts/n', s%n)
+      if (s%n < 0 .or. s%n > most_springs) s%n = 0   ! a damaged file: its checksum will tell
+      call reserve(max(1, s%n), s%a)
+      call reserve(max(1, s%n), s%b)
+      call reserve(max(1, s%n), s%key)
+      call reserve(max(1, s%n), s%k)
+      call reserve(max(1, s%n), s%xi)
+      call visitor%integers('/contacts/a', [s%n], s%a)
+      call visitor%integers('/contacts/b', [s%n], s%b)
+      call visitor%integers('/contacts/key', [s%n], s%key)
+      call visitor%reals('/contacts/stretch', 'm', [3, s%n], s%xi)
+      call visitor%reals('/contacts/stiffness', 'N/m^gamma', [s%n], s%k)
+    end associate
+  end subroutine visit_contacts
+
+  subroutine real_number(self, name, units, x)
+    class(state_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    real(wp), intent(inout) :: x
+    real(wp) :: a(1)
+
+    a = x
+    call self%reals(name, units, [1], a)
+    x = a(1)
+  end subroutine real_number
+
+  subroutine whole_number(self, name, n)
+    class(state_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(inout) :: n
+    integer :: a(1)
+
+    a = n
+    call self%integers(name, [1], a)
+    n = a(1)
+  end subroutine whole_number
+
+  !> Logicals, shown as 0 and 1.
+  subroutine logicals(self, name, n, yes)
+    class(state_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: n
+    logical, intent(inout) :: yes(n)
+    integer :: a(n)
+
+    a = merge(1, 0, yes)
+    call self%integers(name, [n], a)
+    yes = a == 1
+  end subroutine logicals
+
+  !> The cells, or lower faces of direction d, that this process answers for: its own, and the upper
+  !! side of the domain if it touches it. Every face of the domain belongs to one process.
+  pure subroutine owned_part(grid, faces, d, first, last)
+    type(grid_t), intent(in) :: grid
+    logical, intent(in) :: faces
+    integer, intent(in) :: d
+    integer, intent(out) :: first(3), last(3)   !! global index
+
+    first = grid%lo
+    last = grid%hi
+    if (faces .and. grid%hi(d) == grid%n(d)) last = last + unit_step(:, d)
+  end subroutine owned_part
+
+  !> Elements first:last of an array with halo, in a row, x fastest.
+  pure subroutine pack_part(grid, a, first, last, row)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    integer, intent(in) :: first(3), last(3)
+    real(wp), intent(out) :: row(:)
+    integer :: j, k, n, at
+
+    n = last(1) - first(1) + 1
+    at = 0
+    do k = first(3), last(3)
+      do j = first(2), last(2)
+        row(at + 1:at + n) = a(first(1):last(1), j, k)
+        at = at + n
+      end do
+    end do
+  end subroutine pack_part
+
+  !> The reverse of `pack_part`.
+  pure subroutine unpack_part(grid, row, first, last, a)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: row(:)
+    integer, intent(in) :: first(3), last(3)
+    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
+    integer :: j, k, n, at
+
+    n = last(1) - first(1) + 1
+    at = 0
+    do k = first(3), last(3)
+      do j = first(2), last(2)
+        a(first(1):last(1), j, k) = row(at + 1:at + n)
+        at = at + n
+      end do
+    end do
+  end subroutine unpack_part
+
+end module state_m

@@ -1,0 +1,143 @@
+!> A state of every kind of array, each element another number, for the tests of output and restart.
+module sample_state_m
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use grid_m, only: grid_t, grid_init, n_halo
+  use fields_m, only: flow_t, flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init
+  use contacts_m, only: contacts_t, contacts_init
+  use clock_m, only: clock_t, clock_init
+  implicit none
+  private
+  public :: sample_t, make_sample, fill_cells
+
+  type :: sample_t
+    type(case_t) :: case
+    character(:), allocatable :: parameters
+    type(grid_t) :: grid
+    type(clock_t) :: clock
+    type(flow_t) :: flow
+    type(solid_geometry_t) :: solid
+    type(blocks_t) :: blocks
+    type(contacts_t) :: contacts
+  end type sample_t
+
+contains
+
+  !> A small tank with three blocks; `start` moves every number of the state.
+  subroutine make_sample(start, periodic, s)
+    real(wp), intent(in) :: start
+    logical, intent(in) :: periodic   !! in x
+    type(sample_t), intent(out) :: s
+    type(shape_t) :: shapes(2)
+    character(:), allocatable :: message
+    integer :: b
+
+    call make_case(periodic, s%case)
+    s%parameters = '&run'//new_line('a')//'  t_end = 2'//new_line('a')//'  dt = 0.01'//new_line('a')//'/' &
+      //new_line('a')
+    call make_shape(s%case%shape(1), shapes(1), message)
+    call make_shape(s%case%shape(2), shapes(2), message)
+    call grid_init(s%case%grid, s%case%boundary, s%grid)
+    call clock_init(s%case%run, s%clock)
+    call flow_init(s%grid, s%flow)
+    call solid_geometry_init(s%grid, s%solid)
+    call blocks_init(s%case, shapes, s%blocks)
+    call contacts_init(s%case%contact, s%blocks, s%contacts)
+    s%clock%t = 1.25_wp
+    s%clock%dt = 0.01_wp
+    s%clock%step = 130
+    s%clock%n_rows = 131
+    s%clock%n_frames = 13
+    call fill_cells(start + 0.1_wp, s%grid, 3, s%flow%u)
+    call fill_cells(start + 0.2_wp, s%grid, 1, s%flow%p)
+    call fill_cells(start + 0.3_wp, s%grid, 3, s%flow%uf)
+    call fill_cells(start + 0.4_wp, s%grid, 3, s%flow%solid_flux)
+    call fill_cells(start + 0.5_wp, s%grid, 1, s%flow%liquid)
+    call fill_cells(start + 0.6_wp, s%grid, 1, s%flow%room)
+    call fill_cells(start + 0.7_wp, s%grid, 1, s%flow%c)
+    call fill_cells(start + 0.8_wp, s%grid, 1, s%solid%alpha)
+    call fill_cells(start + 0.9_wp, s%grid, 3, s%solid%open)
+    s%flow%liquid_initial = start + 1.0_wp
+    s%flow%liquid_inflow = start + 2.0_wp
+    do b = 1, s%blocks%n
+      s%blocks%v(:, b) = start + [0.1_wp, 0.2_wp, 0.3_wp]*b
+      s%blocks%contact_force(:, b) = start + [1.1_wp, 1.2_wp, 1.3_wp]*b
+      s%blocks%contacts(b) = b
+    end do
+    call make_springs(start, s%contacts)
+  end subroutine make_sample
+
+  subroutine make_case(periodic, case)
+    logical, intent(in) :: periodic
+    type(case_t), intent(out) :: case
+    integer :: b
+
+    case%text = '&run t_end = 2 /'//new_line('a')
+    case%run%title = 'sample'
+    case%run%output = 'sample-out'
+    case%run%t_end = 2.0_wp
+    case%grid%cells = [16, 6, 20]
+    case%grid%length = [0.16_wp, 0.06_wp, 0.2_wp]
+    if (periodic) case%boundary%kind(:, 1) = 'periodic'
+    allocate (case%shape(2), case%body(3), case%drop(0), case%water(0))
+    case%shape(1)%name = 'block'
+    case%shape(1)%kind = 'box'
+    case%shape(1)%size = [0.02_wp, 0.015_wp, 0.01_wp]
+    case%shape(2)%name = 'hexapod'
+    case%shape(2)%kind = 'hexapod'
+    case%shape(2)%size(1) = 0.01_wp
+    do b = 1, 3
+      case%body(b)%shape = case%shape(merge(2, 1, b == 3))%name
+      case%body(b)%position = [0.04_wp*b, 0.03_wp, 0.1_wp]
+      case%body(b)%quaternion = [0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp]
+      case%body(b)%fixed = b == 1
+    end do
+    case%body(3)%release_time = 1.5_wp
+  end subroutine make_case
+
+  subroutine make_springs(start, contacts)
+    real(wp), intent(in) :: start
+    type(contacts_t), intent(inout) :: contacts
+    integer :: i
+
+    associate (s => contacts%springs)
+      s%n = 4
+      s%a = [2, 2, 3, 3]
+      s%b = [1, -1, 1, 2]
+      s%key = [7, 8, 9, 10]
+      s%k = [(start + 0.1_wp*i, i=1, 4)]
+      s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
+    end associate
+  end subroutine make_springs
+
+  !> Fill an array, halo included, with numbers that tell the cell of the domain: those of periodic
+  !! images are equal.
+  subroutine fill_cells(start, grid, m, a)
+    real(wp), intent(in) :: start
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: m
+    real(wp), intent(out) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
+                               grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
+                               grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    integer :: i, j, k, d, e, cell(3)
+
+    do d = 1, m
+      do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
+        do j = grid%lo(2) - n_halo, grid%hi(2) + n_halo
+          do i = grid%lo(1) - n_halo, grid%hi(1) + n_halo
+            cell = [i, j, k]
+            do e = 1, 3
+              if (grid%periodic(e)) cell(e) = modulo(cell(e) - 1, grid%n(e)) + 1
+            end do
+            a(i, j, k, d) = start + sin(1.0_wp*cell(1) + 100.0_wp*cell(2) + 10000.0_wp*cell(3) + 0.37_wp*d)
+          end do
+        end do
+      end do
+    end do
+  end subroutine fill_cells
+
+end module sample_state_m
