@@ -13,16 +13,17 @@ module contact_law_m
   public :: normal_force, tangential_force, tangential_slip
 
   type :: contact_law_t
-    logical :: constants = .false.         !! the constants are given, else found from the restitution
+    logical :: constants = .false.         !! constants are given, not found from the restitution
     real(wp) :: damping_ratio = 0.0_wp     !! zeta of the impact [-]
     real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) of the impact [1/s]
-    real(wp) :: k_n = 0.0_wp, gamma_n = 1.0_wp, eta_n = 0.0_wp   !! given constants [N/m^gamma, -, N s/m]
+    !> Given constants [N/m^gamma, -, N s/m].
+    real(wp) :: k_n = 0.0_wp, gamma_n = 1.0_wp, eta_n = 0.0_wp
     real(wp) :: k_t = 0.0_wp, gamma_t = 1.0_wp, eta_t = 0.0_wp
     real(wp) :: friction = 0.0_wp          !! Coulomb, body on body [-]
     real(wp) :: wall_friction = 0.0_wp     !! Coulomb, body on wall [-]
   end type contact_law_t
 
-  !> Tangential over normal stiffness: a sphere then swings along and across its contact with one frequency.
+  !> Tangential over normal stiffness: a sphere then swings along and across with one frequency.
   real(wp), parameter :: tangential_share = 2.0_wp/7.0_wp
 
 contains
@@ -51,8 +52,8 @@ contains
   !> Restitution of an impact on a linear spring and dashpot that never pulls.
   !!
   !! With m x'' + c x' + k x = 0, zeta = c/(2 sqrt(k m)) and time in units of sqrt(m/k) the force
-  !! vanishes at t = 2 acos(zeta)/sqrt(1 - zeta^2), and there -x'/v = exp(-zeta t); beyond zeta = 1 the
-  !! same with acosh and sqrt(zeta^2 - 1).
+  !! vanishes at t = 2 acos(zeta)/sqrt(1 - zeta^2), and there -x'/v = exp(-zeta t); beyond zeta = 1
+  !! the same with acosh and sqrt(zeta^2 - 1).
   elemental function restitution_of(zeta) result(e)
     real(wp), intent(in) :: zeta   !! damping ratio, >= 0 [-]
     real(wp) :: e
@@ -64,7 +65,7 @@ contains
   elemental function impact_duration(zeta) result(t)
     real(wp), intent(in) :: zeta   !! damping ratio, >= 0 [-]
     real(wp) :: t
-    real(wp), parameter :: small = 1.0e-8_wp   !! of |1 - zeta^2|; the series is exact to round-off there
+    real(wp), parameter :: small = 1.0e-8_wp   !! the series is exact to round-off below
     real(wp) :: s
 
     s = 1.0_wp - zeta**2
@@ -101,8 +102,8 @@ contains
     if (e >= 1.0_wp) zeta = 0.0_wp
   end function damping_ratio_of
 
-  !> Constant k_n of a touch of weight one: the same whatever else touches, so that the elastic energy
-  !! is a function of position only.
+  !> Constant k_n of a touch of weight one: the same whatever else touches, so that the elastic
+  !! energy is a function of position only.
   elemental function normal_constant(law, reduced_mass) result(k)
     type(contact_law_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]

@@ -1,7 +1,7 @@
 !> Touches of the contact spheres of the T-type model with one another and with the plane walls.
 !!
-!! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved by half the
-!! skin. Touches come out in an order that does not depend on when the list was made.
+!! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved by half
+!! the skin. Touches come out in an order that does not depend on when the list was made.
 module contact_spheres_m
   use kinds_m, only: wp
   use vectors_m, only: rotation_matrix
@@ -23,11 +23,11 @@ module contact_spheres_m
 
   type :: contact_spheres_t
     real(wp) :: skin = 0.0_wp                  !! [m]
-    real(wp) :: smallest = 0.0_wp              !! smallest diameter of a sphere: the d_s that limits the substep [m]
+    real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
     real(wp), allocatable :: reach(:)          !! (bodies) [m]
     !> Spheres that may touch before the list is made anew, body by body.
-    integer, allocatable :: slot_of(:)         !! slot of a sphere, counted through all bodies; 0: not listed
+    integer, allocatable :: slot_of(:)         !! slot of a sphere of all bodies; 0: not listed
     integer, allocatable :: offset(:)          !! (bodies) number of spheres of the bodies before
     integer :: n_slots = 0
     integer, allocatable :: body(:), sphere(:) !! (slots)
@@ -61,7 +61,8 @@ contains
       associate (shape => blocks%shapes(s))
         self%set(s)%largest = maxval(shape%sphere_radius)
         self%set(s)%reach = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
-        call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, self%set(s)%bins)
+        call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, &
+          self%set(s)%bins)
       end associate
     end do
     allocate (self%reach(blocks%n), self%offset(blocks%n), self%present(blocks%n))
@@ -92,7 +93,8 @@ contains
     if (moved_too_far(self, blocks)) call make_list(walls, blocks, self)
     do s = 1, self%n_slots
       b = self%body(s)
-      associate (c => blocks%shapes(blocks%shape(b))%sphere_centre(:, self%sphere(s)), r => self%turn(:, :, b))
+      associate (c => blocks%shapes(blocks%shape(b))%sphere_centre(:, self%sphere(s)), &
+        r => self%turn(:, :, b))
         self%centre(:, s) = blocks%x(:, b) + r(:, 1)*c(1) + r(:, 2)*c(2) + r(:, 3)*c(3)
       end associate
     end do
@@ -122,7 +124,7 @@ contains
       if (.not. blocks%present(b)) cycle
       dx = blocks%x(:, b) - self%x(:, b)
       dq = blocks%q(:, b) - self%q(:, b)
-      ! a turn by phi moves |dq| = 2 sin(phi/4), a point at distance r by no more than 4 r sin(phi/4)
+      ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
       if (norm2(dx) + 2*self%reach(b)*norm2(dq) > 0.5_wp*self%skin) return
     end do
     yes = .false.
@@ -152,7 +154,8 @@ contains
       end if
       do while (p <= self%near%n)
         if (self%near%a(p) /= a) exit
-        if (.not. (blocks%fixed(a) .and. blocks%fixed(self%near%b(p)))) call list_body(blocks, p, self)
+        if (.not. (blocks%fixed(a) .and. blocks%fixed(self%near%b(p)))) &
+          call list_body(blocks, p, self)
         p = p + 1
       end do
     end do
@@ -229,7 +232,8 @@ contains
     call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
-        if (beyond + dot_product(n, shape%sphere_centre(:, i)) + shape%sphere_radius(i) <= 0.0_wp) cycle
+        if (beyond + dot_product(n, shape%sphere_centre(:, i)) + shape%sphere_radius(i) <= 0.0_wp) &
+          cycle
         call take_slot(blocks, a, i, self, slot)
         call add_candidate(slot, 0, self)
       end do
@@ -271,7 +275,8 @@ contains
     begin = self%n_candidates + 1
     associate (set => self%set(blocks%shape(b)), shape => blocks%shapes(blocks%shape(b)))
       reach = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
-      if (any(c + reach + set%largest < set%bins%low) .or. any(c - reach - set%largest > set%bins%high)) return
+      if (any(c + reach + set%largest < set%bins%low) &
+        .or. any(c - reach - set%largest > set%bins%high)) return
       low = set%bins%place(c - reach - set%largest)
       high = set%bins%place(c + reach + set%largest)
       do kz = low(3), high(3)

@@ -1,7 +1,7 @@
 !> Contact forces of all blocks and the substeps in which they act.
 !!
-!! Each substep moves the bodies half way, finds what touches, changes the velocities, and moves them
-!! the other half, so that springs are second order in time and a free fall is exact.
+!! Each substep moves the bodies half way, finds what touches, changes the velocities, and moves
+!! them the other half, so that springs are second order in time and a free fall is exact.
 module contacts_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
@@ -15,19 +15,20 @@ module contacts_m
     stored_energy, normal_force, tangential_force, tangential_slip
   implicit none
   private
-  public :: contacts_t, contacts_init, move_blocks, contact_report_t, most_substeps
+  public :: contacts_t, contacts_init, move_blocks, contact_report_t
+  public :: springs_t, reserve_springs
 
-  integer, parameter :: most_substeps = 1000000   !! of one fluid step; beyond, the motion has gone wrong
+  integer, parameter :: most_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
   !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches.
   !!
-  !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere slides
-  !! from a sphere of the partner to the next, so that resting blocks do not creep.
+  !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere
+  !! slides from a sphere of the partner to the next, so that resting blocks do not creep.
   type :: springs_t
     integer :: n = 0
     integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `touch_t`
     real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
-    real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m^gamma]
+    real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
   end type springs_t
 
   !> Touches with one key and one partner act on one tangential spring.
@@ -43,9 +44,9 @@ module contacts_m
   type :: response_t
     real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
-    real(wp), allocatable :: decay(:)            !! eta of the pair over twice its effective mass [1/s]
-    real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair, at its first touch [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (-6:n) sum over the pairs of a free body, else 0 [1/s2]
+    real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
+    real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (-6:n) sum over the pairs of a free body [1/s2]
   end type response_t
 
   type :: contacts_t
@@ -61,10 +62,10 @@ module contacts_m
     type(response_t) :: response
     !> Partners -6..-1 (walls) and 1..n (bodies) alike.
     real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n)
-    real(wp), allocatable :: inverse_mass(:)             !! (-6:n), 0 for walls and fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) space frame, 0 likewise [1/(kg m2)]
+    real(wp), allocatable :: inverse_mass(:)             !! (-6:n) 0 for walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) likewise [1/(kg m2)]
     real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -6:n) of this substep [N], [N m]
-    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -6:n) their integrals over the step [N s], [N m s]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -6:n) of the step [N s], [N m s]
     integer :: n_met = 0
     integer, allocatable :: met_a(:), met_b(:)           !! pairs that touched in this step, sorted
   end type contacts_t
@@ -72,7 +73,7 @@ module contacts_m
   !> What happened in the substeps of one fluid step.
   type :: contact_report_t
     integer :: substeps = 0
-    integer :: info = 0                 !! 0; 1: more than `most_substeps` would be needed, or a speed is not a number
+    integer :: info = 0                 !! 1: it would take more than `most_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
     real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
     real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m]
@@ -93,8 +94,9 @@ contains
     contacts%courant_max = input%courant_max
     call contact_spheres_init(blocks, contacts%spheres)
     n = blocks%n
-    allocate (contacts%v(3, -6:n), contacts%omega(3, -6:n), contacts%force(3, -6:n), contacts%torque(3, -6:n), &
-      contacts%impulse(3, -6:n), contacts%twist(3, -6:n), source=0.0_wp)
+    allocate (contacts%v(3, -6:n), contacts%omega(3, -6:n), source=0.0_wp)
+    allocate (contacts%force(3, -6:n), contacts%torque(3, -6:n), source=0.0_wp)
+    allocate (contacts%impulse(3, -6:n), contacts%twist(3, -6:n), source=0.0_wp)
     allocate (contacts%inverse_mass(-6:n), contacts%inverse_inertia(3, 3, -6:n), source=0.0_wp)
     allocate (contacts%response%frequency2(-6:n), source=0.0_wp)
     call reserve_springs(1, contacts%springs)
@@ -103,8 +105,8 @@ contains
 
   !> Move the blocks through one fluid step under gravity, the last fluid forces and contact.
   !!
-  !! The mean contact forces and torques of the step are left in `blocks`, and v and l at its start in
-  !! `v_start` and `l_start`.
+  !! The mean contact forces and torques of the step are left in `blocks`, and v and l at its start
+  !! in `v_start` and `l_start`.
   subroutine move_blocks(walls, gravity, dt, contacts, blocks, report)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -167,9 +169,9 @@ contains
 
   !> Longest substep allowed now [s].
   !!
-  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the Courant limit of eq. (6)
-  !! with the highest relative speed any two bodies can have, and the stability limit: the highest
-  !! frequency of the touching bodies is no higher than the sum over the pairs of two touching bodies.
+  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the Courant limit of
+  !! eq. (6) with the highest relative speed any two bodies can have, and the stability limit: the
+  !! highest frequency is no higher than that of all pairs of two touching bodies taken together.
   pure function substep_limit(contacts, blocks, dt) result(limit)
     type(contacts_t), intent(in) :: contacts
     type(blocks_t), intent(in) :: blocks
@@ -194,7 +196,8 @@ contains
     associate (touches => contacts%touches, f2 => contacts%response%frequency2)
       do t = 1, touches%n
         pair = contacts%response%pair_frequency2(t)
-        highest = max(highest, pair + max(0.0_wp, f2(touches%a(t)) - pair) + max(0.0_wp, f2(touches%b(t)) - pair))
+        highest = max(highest, pair + max(0.0_wp, f2(touches%a(t)) - pair) &
+          + max(0.0_wp, f2(touches%b(t)) - pair))
       end do
     end associate
     if (highest*limit**2 > stable**2) limit = stable/sqrt(highest)
@@ -237,7 +240,8 @@ contains
     if (contacts%touches%n == 0) return
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      contacts%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), blocks%inverse_inertia(:, :, blocks%shape(b)))
+      contacts%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
+        blocks%inverse_inertia(:, :, blocks%shape(b)))
     end do
     associate (r => contacts%response, n => contacts%touches%n)
       call reserve(n, r%k)
@@ -260,7 +264,8 @@ contains
     integer :: last
 
     do last = first, touches%n - 1
-      if (touches%a(last + 1) /= touches%a(first) .or. touches%b(last + 1) /= touches%b(first)) return
+      if (touches%a(last + 1) /= touches%a(first)) return
+      if (touches%b(last + 1) /= touches%b(first)) return
     end do
     last = touches%n
   end function last_of_pair
@@ -274,7 +279,8 @@ contains
   pure subroutine respond(first, last, contacts)
     integer, intent(in) :: first, last
     type(contacts_t), intent(inout) :: contacts
-    real(wp) :: weights(6), points(3, 6), nn(6), arm(3), total, inverse, k, omega2, highest, stiffness
+    real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
+    real(wp) :: total, inverse, k, omega2, highest, stiffness
     integer :: a, b, t
 
     associate (touches => contacts%touches, law => contacts%law, r => contacts%response)
@@ -293,8 +299,9 @@ contains
         nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
         total = dot_product(nn, weights)
         arm = matmul(points, nn)/total
-        inverse = inverse_effective_mass(contacts, a, arm, touches%normal(:, t)) &
-          + inverse_effective_mass(contacts, b, arm + (touches%arm_b(:, t) - touches%arm_a(:, t)), touches%normal(:, t))
+        inverse = inverse_effective_mass(contacts, a, arm, touches%normal(:, t))
+        arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
+        inverse = inverse + inverse_effective_mass(contacts, b, arm, touches%normal(:, t))
         stiffness = k*law%gamma_n*touches%depth(t)**(law%gamma_n - 1.0_wp)
         omega2 = stiffness*total*inverse
         r%k(t) = touches%weight(t)*k
@@ -362,9 +369,11 @@ contains
       groups%arm_b(:, g) = touches%arm_b(:, t)
       if (last > t) then
         total = sum(touches%weight(t:last)*touches%depth(t:last))
-        groups%arm_a(:, g) = matmul(touches%arm_a(:, t:last), touches%weight(t:last)*touches%depth(t:last))/total
+        groups%arm_a(:, g) = matmul(touches%arm_a(:, t:last), &
+          touches%weight(t:last)*touches%depth(t:last))/total
         groups%arm_b(:, g) = groups%arm_a(:, g) + (touches%arm_b(:, t) - touches%arm_a(:, t))
-        groups%normal(:, g) = matmul(touches%normal(:, t:last), touches%weight(t:last)*touches%depth(t:last))
+        groups%normal(:, g) = matmul(touches%normal(:, t:last), &
+          touches%weight(t:last)*touches%depth(t:last))
         w = norm2(groups%normal(:, g))
         if (w > epsilon(w)*total) then
           groups%normal(:, g) = groups%normal(:, g)/w
@@ -377,12 +386,13 @@ contains
     groups%first(groups%n + 1) = touches%n + 1
   end subroutine form_groups
 
-  !> Give each group its spring: the one in memory turned into the present tangent plane, or a new one.
+  !> Give each group its spring: that in memory turned into the present plane, or a new one.
   subroutine match_springs(contacts)
     type(contacts_t), intent(inout) :: contacts
     integer :: g, m, t
 
-    associate (touches => contacts%touches, groups => contacts%groups, old => contacts%before, new => contacts%springs)
+    associate (touches => contacts%touches, groups => contacts%groups, old => contacts%before, &
+      new => contacts%springs)
       call reserve_springs(new%n, old)
       old%n = new%n
       old%a(:old%n) = new%a(:old%n)
@@ -400,7 +410,8 @@ contains
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
-          if (.not. comes_before(old%a(m), old%b(m), old%key(m), new%a(g), new%b(g), new%key(g))) exit
+          if (.not. comes_before(old%a(m), old%b(m), old%key(m), new%a(g), new%b(g), new%key(g))) &
+            exit
           m = m + 1
         end do
         if (m > old%n) cycle
@@ -444,13 +455,15 @@ contains
 
     associate (groups => contacts%groups, springs => contacts%springs)
       do g = 1, groups%n
-        v = relative_velocity(contacts, springs%a(g), springs%b(g), groups%arm_a(:, g), groups%arm_b(:, g))
-        springs%xi(:, g) = springs%xi(:, g) + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
+        v = relative_velocity(contacts, springs%a(g), springs%b(g), groups%arm_a(:, g), &
+          groups%arm_b(:, g))
+        springs%xi(:, g) = springs%xi(:, g) &
+          + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
       end do
     end associate
   end subroutine stretch_springs
 
-  !> Velocity of partner b relative to body a at a contact: v_r of the paper, partner minus self [m/s].
+  !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
   pure function relative_velocity(contacts, a, b, arm_a, arm_b) result(v)
     type(contacts_t), intent(in) :: contacts
     integer, intent(in) :: a, b
@@ -474,7 +487,8 @@ contains
 
     contacts%force = 0.0_wp
     contacts%torque = 0.0_wp
-    associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, r => contacts%response)
+    associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, &
+      r => contacts%response)
       do g = 1, groups%n
         a = touches%a(groups%first(g))
         b = touches%b(groups%first(g))
@@ -487,7 +501,8 @@ contains
           v_n = dot_product(v, normal)
           part = 1.0_wp
           if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-          force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n)/(1.0_wp + part*r%decay(t)*dt)
+          force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n) &
+            /(1.0_wp + part*r%decay(t)*dt)
           call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
           sum_n = sum_n + force_n
           decay = max(decay, r%decay(t))
@@ -502,8 +517,8 @@ contains
 
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
   !!
-  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a substep,
-  !! and may have begun up to a substep before.
+  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a
+  !! substep, and may have begun up to a substep before.
   pure function damped_part(depth, v_n, dt) result(part)
     real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
     real(wp) :: part
@@ -517,7 +532,7 @@ contains
     integer, intent(in) :: g
     real(wp), intent(in) :: force_n    !! sum of the normal forces [N]
     real(wp), intent(in) :: eta_n      !! normal damping of the group [N s/m]
-    real(wp), intent(in) :: implicit   !! 1 + eta dt/(2 m): damping acts in the middle of the substep
+    real(wp), intent(in) :: implicit   !! 1 + eta dt/(2 m): damping acts in mid-substep
     type(contacts_t), intent(inout) :: contacts
     real(wp) :: v(3), f(3), k, k_n, eta, bound, size_f
     integer :: t, a, b
@@ -563,7 +578,8 @@ contains
     integer :: t, g
 
     energy = 0.0_wp
-    associate (touches => contacts%touches, r => contacts%response, law => contacts%law, springs => contacts%springs)
+    associate (touches => contacts%touches, r => contacts%response, law => contacts%law, &
+      springs => contacts%springs)
       do t = 1, touches%n
         energy = energy + stored_energy(r%k(t), law%gamma_n, touches%depth(t))
       end do

@@ -26,13 +26,15 @@ contains
     integer :: d
 
     do d = 1, 3
-      x(d) = drop%position(d) + drop%spread(d)*(2*uniform(drop%seed, index, k_shift + d - 1) - 1.0_wp)
+      x(d) = drop%position(d) + drop%spread(d)*(2*uniform(drop%seed, index, k_shift + d - 1) &
+        - 1.0_wp)
     end do
     if (drop%orientation == 'random') then
       q = random_rotation(drop%seed, index)
     else
       angle = uniform(drop%seed, index, k_tilt)*drop%tilt_deg*pi/180.0_wp
-      q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), normalised(drop%quaternion))
+      q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), &
+        normalised(drop%quaternion))
     end if
   end subroutine draw_drop
 

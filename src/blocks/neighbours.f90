@@ -11,7 +11,7 @@ module neighbours_m
     real(wp) :: low(3) = 0.0_wp              !! lower corner of the block [m]
     real(wp) :: high(3) = 0.0_wp             !! upper corner of the block [m]
     real(wp) :: size(3) = 1.0_wp             !! of a bin [m]
-    integer, allocatable :: first(:)         !! (bins + 1): items of bin c are first(c) : first(c+1)-1
+    integer, allocatable :: first(:)   !! (bins + 1): items of bin c are first(c) : first(c+1)-1
     integer, allocatable :: item(:)          !! item numbers, ascending within a bin
   contains
     procedure :: place => bins_place
@@ -22,8 +22,9 @@ module neighbours_m
   type :: pair_list_t
     integer :: n = 0
     integer, allocatable :: a(:), b(:)       !! bodies
-    real(wp), allocatable :: shift(:, :)     !! (3, n) to add to the position of b: its periodic image near a [m]
-    integer, allocatable, private :: cell(:, :), chain(:), head(:)   !! work: cell of a body, linked lists
+    !> (3, n) what to add to the position of b to get its periodic image near a [m].
+    real(wp), allocatable :: shift(:, :)
+    integer, allocatable, private :: cell(:, :), chain(:), head(:)   !! work: linked lists
   end type pair_list_t
 
   !> Make room for at least n entries, by doubling; the entries present are kept.
@@ -97,9 +98,10 @@ contains
     c = p(1) + self%n(1)*(p(2) - 1 + self%n(2)*(p(3) - 1))
   end function bins_number
 
-  !> All pairs of active bodies closer than the sum of their radii plus `skin`; linear in the number of bodies.
+  !> All pairs of active bodies closer than the sum of their radii plus `skin`.
   !!
-  !! Of a periodic direction only the nearest image is looked at: bodies are shorter than half a period.
+  !! Work grows with the number of bodies, not of pairs. Of a periodic direction only the nearest
+  !! image is looked at: bodies are shorter than half a period.
   subroutine near_pairs(x, radius, active, period, skin, pairs)
     real(wp), intent(in) :: x(:, :)     !! (3, n) centres [m]
     real(wp), intent(in) :: radius(:)   !! (n) bounding spheres [m]
@@ -132,7 +134,8 @@ contains
                 d = x(:, b) - x(:, a)
                 shift = nearest_shift(period, d)
                 d = d + shift
-                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) call add_pair(a, b, shift, pairs)
+                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) &
+                  call add_pair(a, b, shift, pairs)
               end if
               b = pairs%chain(b)
             end do

@@ -2,8 +2,8 @@
 !!
 !! The measure is independent of the contact model: the depth of two blocks is the largest distance
 !! below the surface of one of a surface point of the other, points taken at the corners, along the
-!! edges and on the faces. Balls and walls are exact. Every result is a maximum over points, which no
-!! order of the work can change.
+!! edges and on the faces. Balls and walls are exact. Every result is a maximum over points, which
+!! no order of the work can change.
 module overlap_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm, inverse3, rotation_matrix
@@ -22,9 +22,10 @@ module overlap_m
     real(wp), allocatable :: corner(:, :)        !! (3, n) corners of the surface [m]
     real(wp), allocatable :: sample(:, :)        !! (3, n) surface points, cluster by cluster [m]
     integer, allocatable :: cluster(:)           !! (clusters + 1) first sample of each
-    real(wp), allocatable :: middle(:, :)        !! (3, clusters) bounding spheres of the clusters [m]
+    real(wp), allocatable :: middle(:, :)   !! (3, clusters) bounding spheres of the clusters [m]
     real(wp), allocatable :: reach(:)            !! (clusters) [m]
-    real(wp), allocatable :: to_tet(:, :, :)     !! (3, 3, tets) turns x - tet_origin into weights of corners 2..4
+    !> (3, 3, tets) turns x - tet_origin into the weights of corners 2 to 4 [1/m].
+    real(wp), allocatable :: to_tet(:, :, :)
     real(wp), allocatable :: tet_origin(:, :)    !! (3, tets) corner 1 [m]
     real(wp), allocatable :: face(:, :, :)       !! (3, 3, triangles) corners of the surface [m]
     type(bins_t) :: tets, faces                  !! the same in bins
@@ -91,8 +92,9 @@ contains
     call cluster_samples(0.5_wp*shape%smallest_edge, solid)
   end subroutine prepare
 
-  !> Points on the surface: its corners, along its edges, and inside its triangles; and the centre of
-  !! mass, since of two equal blocks in one place no surface point lies below the other's surface.
+  !> Points on the surface: its corners, along its edges, and inside its triangles; and the centre
+  !! of mass, since of two equal blocks in one place no surface point lies below the other's
+  !! surface.
   !!
   !! Sharp edges carry sixteen points per smallest edge, because two crossing edges touch at one
   !! point only; the rest of the surface carries four.
@@ -101,7 +103,7 @@ contains
     integer, intent(in) :: triangle(:, :)        !! (3, n) surface of the shape
     type(solid_t), intent(inout) :: solid
     real(wp), parameter :: per_edge_sharp = 16.0_wp, per_edge_flat = 4.0_wp
-    real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between the normals of coplanar triangles
+    real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between coplanar triangles
     real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: normal(:, :)
@@ -136,7 +138,8 @@ contains
         m = ceiling(norm(p(:, 2) - p(:, 1))/spacing*(1.0_wp - flat))
         do i = 1, m - 1
           total = total + 1
-          if (pass == 2) solid%sample(:, total) = p(:, 1) + (real(i, wp)/real(m, wp))*(p(:, 2) - p(:, 1))
+          if (pass == 2) solid%sample(:, total) = p(:, 1) &
+            + (real(i, wp)/real(m, wp))*(p(:, 2) - p(:, 1))
         end do
       end do
       do t = 1, size(triangle, 2)
@@ -145,7 +148,8 @@ contains
         do j = 1, m - 2
           do i = 1, m - 1 - j
             total = total + 1
-            if (pass == 2) solid%sample(:, total) = p(:, 1) + (real(i, wp)/real(m, wp))*(p(:, 2) - p(:, 1)) &
+            if (pass == 2) solid%sample(:, total) = p(:, 1) &
+              + (real(i, wp)/real(m, wp))*(p(:, 2) - p(:, 1)) &
               + (real(j, wp)/real(m, wp))*(p(:, 3) - p(:, 1))
           end do
         end do
@@ -165,7 +169,7 @@ contains
   !> Edges of a closed surface, each once: its two corners and the two triangles at it.
   pure subroutine surface_edges(triangle, edge, n)
     integer, intent(in) :: triangle(:, :)   !! (3, triangles)
-    integer, intent(out) :: edge(:, :)      !! (4, 3*triangles) filled up to n; second triangle 0 if there is none
+    integer, intent(out) :: edge(:, :)      !! (4, :) up to n; second triangle 0 if there is none
     integer, intent(out) :: n
     integer, allocatable :: head(:), chain(:)   ! edges by their lower corner
     integer :: t, c, a, b, e
@@ -212,8 +216,10 @@ contains
       if (last < i) cycle
       n = n + 1
       solid%cluster(n) = i
-      solid%middle(:, n) = 0.5_wp*(minval(solid%sample(:, i:last), 2) + maxval(solid%sample(:, i:last), 2))
-      solid%reach(n) = maxval(norm2(solid%sample(:, i:last) - spread(solid%middle(:, n), 2, last - i + 1), 1))
+      solid%middle(:, n) = 0.5_wp*(minval(solid%sample(:, i:last), 2) &
+        + maxval(solid%sample(:, i:last), 2))
+      solid%reach(n) = maxval(norm2(solid%sample(:, i:last) &
+        - spread(solid%middle(:, n), 2, last - i + 1), 1))
     end do
     solid%cluster(n + 1) = size(solid%sample, 2) + 1
   end subroutine cluster_samples
@@ -247,10 +253,11 @@ contains
     ball = 0.0_wp
     if (shape%kind == 'sphere') ball = shape%sphere_radius(1)
     depth = 0.0_wp
-    call deepen_wall(shape%point, ball, max(shape%radius, ball), x, rotation_matrix(q), walls, depth)
+    call deepen_wall(shape%point, ball, max(shape%radius, ball), x, rotation_matrix(q), walls, &
+      depth)
   end function wall_depth
 
-  !> Whether body c has room at its starting pose: nothing reaches deeper into it than 1 % of its size.
+  !> Whether body c has room where it is: nothing reaches deeper into it than 1 % of its size.
   function room_for(walls, blocks, c, overlap) result(free)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
@@ -259,7 +266,8 @@ contains
     logical :: free
     real(wp), parameter :: share = 0.01_wp   !! of the smallest edge
 
-    free = body_overlap(overlap, walls, blocks, c) <= share*blocks%shapes(blocks%shape(c))%smallest_edge
+    free = body_overlap(overlap, walls, blocks, c) &
+      <= share*blocks%shapes(blocks%shape(c))%smallest_edge
   end function room_for
 
   !> Largest depth of body c in the other present bodies and the walls [m].
@@ -281,7 +289,8 @@ contains
         d = blocks%x(:, c) - blocks%x(:, b)
         d = d - nearest_shift(walls%period, -d)
         if (norm(d) >= own%radius + overlap%solid(blocks%shape(b))%radius) cycle
-        call deepen_pair(own, turn, overlap%solid(blocks%shape(b)), rotation_matrix(blocks%q(:, b)), d, depth)
+        call deepen_pair(own, turn, overlap%solid(blocks%shape(b)), &
+          rotation_matrix(blocks%q(:, b)), d, depth)
       end do
     end associate
   end function body_overlap
@@ -302,7 +311,8 @@ contains
       associate (solid => overlap%solid(blocks%shape(a)))
         overlap%radius(a) = solid%radius
         if (.not. blocks%present(a) .or. blocks%fixed(a)) cycle
-        call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), overlap%turn(:, :, a), walls, depth)
+        call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
+          overlap%turn(:, :, a), walls, depth)
       end associate
     end do
     call near_pairs(blocks%x, overlap%radius, blocks%present, walls%period, 0.0_wp, overlap%pairs)
@@ -385,7 +395,7 @@ contains
     type(solid_t), intent(in) :: solid
     real(wp), intent(in) :: p(3)                        !! body axes [m]
     logical :: yes
-    real(wp), parameter :: round_off = 1.0e-12_wp       !! so that no point slips between two tetrahedra
+    real(wp), parameter :: round_off = 1.0e-12_wp   !! so that no point slips between two tetrahedra
     real(wp) :: d(3), w(3)
     integer :: c, i, t
 
@@ -402,8 +412,8 @@ contains
 
   !> Raise `depth` to the distance of an inner point from the surface, if that is larger.
   !!
-  !! The bins round the point are searched ring by ring, and no further than needed: the search ends as
-  !! soon as the surface is found nearer than `depth`, or nearer than what is left to search.
+  !! The bins round the point are searched ring by ring, and no further than needed: the search ends
+  !! as soon as the surface is found nearer than `depth`, or nearer than what is left to search.
   pure subroutine deepen_point(solid, p, depth)
     type(solid_t), intent(in) :: solid
     real(wp), intent(in) :: p(3)             !! body axes [m]

@@ -1,13 +1,16 @@
 !> State of the blocks and their equations of motion; the only place that moves them.
 !!
-!! $$ M \frac{dU}{dt} = F_{fluid} + F_{contact} + M g, \qquad \frac{dL}{dt} = T_{fluid} + T_{contact} $$
+!! $$ M \frac{dU}{dt} = F_{fluid} + F_{contact} + M g, \qquad
+!!    \frac{dL}{dt} = T_{fluid} + T_{contact} $$
 !!
 !! The state is (x, q, v, l) with l the angular momentum in space axes, so that a free body keeps l
-!! exactly and no gyroscopic term appears. A substep drifts for half its time, kicks, and drifts again.
+!! exactly and no gyroscopic term appears. A substep drifts for half its time, kicks, and drifts
+!! again.
 module rigid_body_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
-  use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, normalised
+  use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, &
+    normalised
   use tet_mesh_m, only: shape_t
   use drops_m, only: draw_drop
   implicit none
@@ -26,18 +29,19 @@ module rigid_body_m
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
     logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
-    real(wp), allocatable :: given_v(:, :)       !! (3, n) velocity at release; of fixed bodies for ever [m/s]
-    real(wp), allocatable :: given_omega(:, :)   !! (3, n) likewise, space frame [rad/s]
+    !> (3, n) at release, of fixed bodies for ever: velocity [m/s], and spin, space frame [rad/s].
+    real(wp), allocatable :: given_v(:, :), given_omega(:, :)
     real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass, never wrapped [m]
     real(wp), allocatable :: q(:, :)             !! (4, n) attitude w, x, y, z [-]
     real(wp), allocatable :: v(:, :)             !! (3, n) velocity [m/s]
     real(wp), allocatable :: l(:, :)             !! (3, n) angular momentum, space frame [kg m2/s]
     real(wp), allocatable :: omega(:, :)         !! (3, n) angular velocity, space frame [rad/s]
-    real(wp), allocatable :: v_start(:, :), l_start(:, :)   !! (3, n) v and l at the start of the fluid step
+    !> (3, n) v and l at the start of the fluid step.
+    real(wp), allocatable :: v_start(:, :), l_start(:, :)
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
     real(wp), allocatable :: fluid_force(:, :), fluid_torque(:, :)
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
-    integer, allocatable :: contacts(:)          !! (n) different partners touched during the last step
+    integer, allocatable :: contacts(:)   !! (n) different partners touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them
   end type blocks_t
 
@@ -97,7 +101,8 @@ contains
     allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
     allocate (blocks%fixed(n), blocks%present(n), source=.false.)
     allocate (blocks%mass(n), blocks%release_time(n), source=0.0_wp)
-    allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), source=0.0_wp)
+    allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
+      source=0.0_wp)
     allocate (blocks%given_v(3, n), blocks%given_omega(3, n), source=0.0_wp)
     allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
     allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
@@ -150,8 +155,8 @@ contains
 
   !> Move the bodies for a time dt with their present v and l; fixed bodies at their given rates.
   !!
-  !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the whole
-  !! step. `omega` belongs to the new attitude afterwards.
+  !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the
+  !! whole step. `omega` belongs to the new attitude afterwards.
   pure subroutine drift(dt, blocks)
     real(wp), intent(in) :: dt   !! [s]
     type(blocks_t), intent(inout) :: blocks
@@ -164,7 +169,8 @@ contains
         call drift_prescribed(dt, b, blocks)
         cycle
       end if
-      associate (inverse => blocks%inverse_inertia(:, :, blocks%shape(b)), l => blocks%l(:, b), q => blocks%q(:, b))
+      associate (inverse => blocks%inverse_inertia(:, :, blocks%shape(b)), l => blocks%l(:, b), &
+        q => blocks%q(:, b))
         blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
         omega = angular_velocity(q, l, inverse)
         half_way = quaternion_product(quaternion_exp(0.5_wp*dt*omega), q)
@@ -183,7 +189,8 @@ contains
 
     blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
     if (all(abs(blocks%omega(:, b)) <= 0.0_wp)) return
-    blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), blocks%q(:, b)))
+    blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), &
+      blocks%q(:, b)))
     call set_momentum(b, blocks)
   end subroutine drift_prescribed
 
@@ -208,7 +215,7 @@ contains
     s = matmul(r, matmul(t, transpose(r)))
   end function space_tensor
 
-  !> Change v and l of the free present bodies by an impulse: gravity and the given means act for dt.
+  !> Let gravity and the given forces and torques act on the free present bodies for a time dt.
   pure subroutine kick(gravity, dt, force, torque, blocks)
     real(wp), intent(in) :: gravity(3)                !! [m/s2]
     real(wp), intent(in) :: dt                        !! [s]
@@ -220,7 +227,8 @@ contains
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       blocks%v(:, b) = blocks%v(:, b) + dt*(gravity + force(:, b)/blocks%mass(b))
       blocks%l(:, b) = blocks%l(:, b) + dt*torque(:, b)
-      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), blocks%inverse_inertia(:, :, blocks%shape(b)))
+      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
+        blocks%inverse_inertia(:, :, blocks%shape(b)))
     end do
   end subroutine kick
 

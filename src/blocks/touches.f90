@@ -1,4 +1,4 @@
-!> The one list of touches that every contact model fills and the contact forces are worked out from.
+!> The one list of touches: every contact model fills it, and the contact forces come from it.
 module touches_m
   use kinds_m, only: wp
   use neighbours_m, only: reserve
@@ -12,12 +12,12 @@ module touches_m
   type :: touch_t
     integer :: n = 0
     integer, allocatable :: a(:), b(:)     !! (n) body and partner
-    integer, allocatable :: key(:)         !! (n) the touching sphere or surface point of a; of b: negative
+    integer, allocatable :: key(:)         !! (n) the touching sphere or point of a; of b: negative
     real(wp), allocatable :: arm_a(:, :)   !! (3, n) from the centre of a to the contact [m]
-    real(wp), allocatable :: arm_b(:, :)   !! (3, n) from the centre of b (its nearest image) to the contact [m]
+    real(wp), allocatable :: arm_b(:, :)   !! (3, n) from the (image of the) centre of b [m]
     real(wp), allocatable :: normal(:, :)  !! (3, n) unit vector from a to b [-]
     real(wp), allocatable :: depth(:)      !! (n) overlap d_n > 0 [m]
-    real(wp), allocatable :: weight(:)     !! (n) share of the stiffness of the law that acts here [-]
+    real(wp), allocatable :: weight(:)     !! (n) share of the stiffness of the law [-]
     real(wp), allocatable :: length(:)     !! (n) d_s of the contact Courant number, eq. (6) [m]
   end type touch_t
 

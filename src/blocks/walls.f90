@@ -10,7 +10,7 @@ module walls_m
 
   !> Sides that blocks can touch (`no_slip` and `slip`), and the periods of the others.
   !!
-  !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min, -4 y_max, -5 z_min, -6 z_max.
+  !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max.
   type :: walls_t
     integer :: n = 0
     integer :: number(6) = 0                !! -6..-1, ascending

@@ -25,11 +25,13 @@ contains
       2.6544745638_wp, 2.4183991523_wp, 2.2275622815_wp, 2.0694529405_wp]
     real(wp), parameter :: asked(6) = [0.02_wp, 0.1_wp, 0.3_wp, 0.5_wp, 0.9_wp, 0.999_wp]
 
-    call check('restitution of the table', maxval(abs(restitution_of(zeta) - e)), 0.0_wp, 1.0e-10_wp)
+    call check('restitution of the table', maxval(abs(restitution_of(zeta) - e)), 0.0_wp, &
+      1.0e-10_wp)
     call check('duration of the table', maxval(abs(impact_duration(zeta) - t)), 0.0_wp, 1.0e-9_wp)
     call check('undamped duration', impact_duration(0.0_wp), pi, 1.0e-14_wp)
     call check('critical damping', restitution_of(1.0_wp), exp(-2.0_wp), 1.0e-15_wp)
-    call check('smooth at zeta = 1', maxval(abs(restitution_of([1.0_wp - 1.0e-6_wp, 1.0_wp + 1.0e-6_wp]) &
+    call check('smooth at zeta = 1', &
+      maxval(abs(restitution_of([1.0_wp - 1.0e-6_wp, 1.0_wp + 1.0e-6_wp]) &
       - exp(-2.0_wp)*(1.0_wp - [-1, 1]*4.0e-6_wp/3))), 0.0_wp, 1.0e-11_wp)
     call check('the inverse is one', maxval(abs(restitution_of(damping_ratio_of(asked)) - asked)), &
       0.0_wp, 1.0e-13_wp)
@@ -72,7 +74,8 @@ contains
     input%restitution = 0.3_wp
     call contact_law_init(input, law)
     k = normal_constant(law, 0.25_wp)
-    call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
+    call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, &
+      1.0e-15_wp)
     call check('tangential stiffness', tangential_constant(law, k, 1.0_wp), 2*k/7, 1.0e-9_wp*k)
     input%law = 'constants'
     call contact_law_init(input, law)
@@ -84,9 +87,12 @@ contains
   subroutine check_forces()
     real(wp) :: f(3), xi(3), v(3)
 
-    call check('spring alone', normal_force(1.0e5_wp, 1.5_wp, 10.0_wp, 1.0e-4_wp, 0.0_wp), 0.1_wp, 1.0e-15_wp)
-    call check('closing adds', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, -0.2_wp), 12.0_wp, 1.0e-13_wp)
-    call check('never pulls', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, 2.0_wp), 0.0_wp, 0.0_wp)
+    call check('spring alone', normal_force(1.0e5_wp, 1.5_wp, 10.0_wp, 1.0e-4_wp, 0.0_wp), 0.1_wp, &
+      1.0e-15_wp)
+    call check('closing adds', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, -0.2_wp), &
+      12.0_wp, 1.0e-13_wp)
+    call check('never pulls', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, 2.0_wp), 0.0_wp, &
+      0.0_wp)
     call check('energy of the spring', stored_energy(3.0_wp, 1.0_wp, 2.0_wp), 6.0_wp, 1.0e-15_wp)
     xi = [3.0e-5_wp, -4.0e-5_wp, 0.0_wp]
     v = [0.1_wp, 0.2_wp, 0.0_wp]

@@ -24,7 +24,7 @@ program test_contacts
 
   real(wp), parameter :: d = 0.02_wp         !! diameter of the ball, edge of the cube [m]
   real(wp), parameter :: g = 9.81_wp         !! [m/s2]
-  real(wp), parameter :: dt = 2.0e-3_wp      !! twenty substeps of a twentieth of the contact time [s]
+  real(wp), parameter :: dt = 2.0e-3_wp   !! twenty substeps of a twentieth of the contact time [s]
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
   type(shape_t), allocatable :: shapes(:)
 
@@ -100,7 +100,8 @@ contains
     step_now = dt
     if (present(step)) step_now = step
     do i = 1, n
-      call move_blocks(world%walls, world%gravity, step_now, world%contacts, world%blocks, world%report)
+      call move_blocks(world%walls, world%gravity, step_now, world%contacts, world%blocks, &
+        world%report)
     end do
   end subroutine run
 
@@ -116,7 +117,8 @@ contains
       do phase = 0, 9
         call new_world(world, 1, 'ball')
         world%case%contact%restitution = e(m)
-        world%case%body(1)%position(3) = 0.5_wp*d + 0.8_wp*(1.0_wp + 0.1_wp*real(phase, wp))*1.0e-4_wp
+        world%case%body(1)%position(3) = 0.5_wp*d &
+          + 0.8_wp*(1.0_wp + 0.1_wp*real(phase, wp))*1.0e-4_wp
         world%case%body(1)%velocity(3) = -0.8_wp
         call start(world)
         call run(world, 4)
@@ -180,7 +182,8 @@ contains
           world%case%contact%restitution = e(m)
           world%case%body(1)%quaternion = q(:, pose)
           world%case%body(1)%velocity(3) = -0.8_wp
-          world%case%body(1)%position(3) = lowest(shapes(2), q(:, pose)) + 1.0e-4_wp + 2.0e-5_wp*real(phase, wp)
+          world%case%body(1)%position(3) = lowest(shapes(2), q(:, pose)) + 1.0e-4_wp &
+            + 2.0e-5_wp*real(phase, wp)
           call start(world)
           call run(world, 8)
           worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - e(m)))
@@ -230,7 +233,8 @@ contains
     call check('and goes on', world%blocks%v(1, 1), 5*v/7, 0.002_wp*v)
   end subroutine check_slip_to_roll
 
-  !> A cube on a slope of the floor: stays below the angle of friction, and slides as it should above.
+  !> A cube on a slope of the floor: stays below the angle of friction, and slides as it should
+  !! above.
   subroutine check_incline()
     real(wp), parameter :: mu = 0.4_wp
     type(world_t) :: world
@@ -273,10 +277,12 @@ contains
     call check('lies on the slab', world%blocks%contacts(2), 1)
     x = world%blocks%x(:, 2)
     call run(world, 250)
-    call check('does not creep on spheres', maxval(abs(world%blocks%x(:, 2) - x)), 0.0_wp, 1.0e-9_wp)
+    call check('does not creep on spheres', maxval(abs(world%blocks%x(:, 2) - x)), 0.0_wp, &
+      1.0e-9_wp)
     call check('the slab bears the cube', maxval(abs(world%blocks%contact_force(:, 1) &
       - world%blocks%mass(2)*world%gravity)), 0.0_wp, 1.0e-4_wp)
-    call check('action and reaction', maxval(abs(sum(world%blocks%contact_force, 2))), 0.0_wp, 0.0_wp)
+    call check('action and reaction', maxval(abs(sum(world%blocks%contact_force, 2))), 0.0_wp, &
+      0.0_wp)
   end subroutine check_incline_on_body
 
   !> Two cubes set one on the other come to rest; partners are counted; forces balance the weight.
@@ -298,12 +304,14 @@ contains
     weight = g*world%blocks%mass(1)
     change = world%blocks%mass(1)*(world%blocks%v - v)/dt
     change(3, :) = change(3, :) + weight
-    call check('M dU/dt = contact + M g', maxval(abs(change - world%blocks%contact_force)), 0.0_wp, 1.0e-12_wp)
+    call check('M dU/dt = contact + M g', maxval(abs(change - world%blocks%contact_force)), &
+      0.0_wp, 1.0e-12_wp)
     call run(world, 500)
     call check('at rest', maxval(abs(world%blocks%v)), 0.0_wp, 1.0e-9_wp)
     call check('on the floor', all(world%blocks%on_floor == [1, 0]))
     call check('partners', all(world%blocks%contacts == [2, 1]))
-    call check('weight on each', maxval(abs(world%blocks%contact_force(3, :) - weight)), 0.0_wp, 1.0e-8_wp)
+    call check('weight on each', maxval(abs(world%blocks%contact_force(3, :) - weight)), 0.0_wp, &
+      1.0e-8_wp)
     call check('no torque', maxval(abs(world%blocks%contact_torque)), 0.0_wp, 1.0e-10_wp)
     call check('energy of the springs', world%report%energy > 0.0_wp)
     call check('upright', abs(world%blocks%q(1, 2)), 1.0_wp, 1.0e-6_wp)
@@ -320,14 +328,17 @@ contains
     do b = 1, 4
       world%case%body(b)%position = 0.45_wp + 0.08_wp*real([mod(b, 2), b/2, 0], wp)
       world%case%body(b)%quaternion = random_rotation(1, b)
-      world%case%body(b)%velocity = 0.8_wp*(0.5_wp - (world%case%body(b)%position - 0.45_wp)/0.08_wp)
-      world%case%body(b)%angular_velocity = 10*[uniform(1, b, 11), uniform(1, b, 12), uniform(1, b, 13)]
+      world%case%body(b)%velocity = 0.8_wp*(0.5_wp &
+        - (world%case%body(b)%position - 0.45_wp)/0.08_wp)
+      world%case%body(b)%angular_velocity = 10*[uniform(1, b, 11), uniform(1, b, 12), &
+        uniform(1, b, 13)]
     end do
     call start(world)
     call total(world%blocks, p0, l0)
     call run(world, 60)
     call total(world%blocks, p, l)
-    call check('they met', kinetic_energy(world%blocks) < 0.9_wp*sum(world%blocks%mass)*0.5_wp*0.64_wp &
+    call check('they met', kinetic_energy(world%blocks) &
+      < 0.9_wp*sum(world%blocks%mass)*0.5_wp*0.64_wp &
       .and. world%contacts%springs%n >= 0)
     call check('momentum', maxval(abs(p - p0)), 0.0_wp, 1.0e-14_wp)
     call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, 1.0e-14_wp)
@@ -369,7 +380,8 @@ contains
         world%case%body(2)%quaternion = random_rotation(3, i)
         world%case%body(1)%velocity(3) = -0.5_wp
         world%case%body(2)%velocity(3) = -0.8_wp
-        world%case%body(1)%angular_velocity = 15*[uniform(1, i, 11), uniform(1, i, 12), uniform(1, i, 13)]
+        world%case%body(1)%angular_velocity = 15*[uniform(1, i, 11), uniform(1, i, 12), &
+          uniform(1, i, 13)]
         call start(world)
         energy = kinetic_energy(world%blocks)
         do n = 1, 40
@@ -385,8 +397,8 @@ contains
     end do
   end subroutine check_energy
 
-  !> The law with given constants, linear and with a power: a lasting contact of pi sqrt(m/k), and the
-  !! deepest overlap from the energy.
+  !> The law with given constants, linear and with a power: a lasting contact of pi sqrt(m/k), and
+  !! the deepest overlap from the energy.
   subroutine check_constants()
     type(world_t) :: world
     real(wp) :: deepest, m
@@ -410,7 +422,8 @@ contains
         deepest = max(deepest, world%report%overlap_max)
       end do
       associate (c => world%case%contact)
-        call check('deepest overlap', c%k_n*deepest**(c%gamma_n + 1)/(c%gamma_n + 1), 0.5_wp*m*0.25_wp, 1.0e-3_wp*m)
+        call check('deepest overlap', c%k_n*deepest**(c%gamma_n + 1)/(c%gamma_n + 1), &
+          0.5_wp*m*0.25_wp, 1.0e-3_wp*m)
       end associate
       call check('springs back', world%blocks%v(3, 1), 0.5_wp, 1.0e-3_wp)
     end do
@@ -433,7 +446,8 @@ contains
     call run(world, 20)
     call check('dragged by mu g', norm2(world%blocks%v(1:2, 1)), 0.4_wp*g*20*dt, 5.0e-3_wp)
     call run(world, 200)
-    call check('moves with the floor', maxval(abs(world%blocks%v(:, 1) - [0.2_wp, -0.1_wp, 0.0_wp])), &
+    call check('moves with the floor', &
+      maxval(abs(world%blocks%v(:, 1) - [0.2_wp, -0.1_wp, 0.0_wp])), &
       0.0_wp, 1.0e-6_wp)
     call new_world(world, 2, 'ball')
     world%case%contact%restitution = 0.5_wp
@@ -465,7 +479,8 @@ contains
     call run(outer, 10)
     call check('met', inner%blocks%v(1, 1) < -0.1_wp)
     call check('same velocities', maxval(abs(inner%blocks%v - outer%blocks%v)), 0.0_wp, 1.0e-10_wp)
-    call check('same spins', maxval(abs(inner%blocks%omega - outer%blocks%omega)), 0.0_wp, 1.0e-8_wp)
+    call check('same spins', maxval(abs(inner%blocks%omega - outer%blocks%omega)), 0.0_wp, &
+      1.0e-8_wp)
   end subroutine check_periodic_image
 
   !> A pile moves the same to the last bit however often the lists are made anew, and from the state
@@ -512,11 +527,14 @@ contains
     type(blocks_t), intent(in) :: a, b
     logical :: yes
 
-    yes = all(abs(a%x - b%x) <= 0.0_wp) .and. all(abs(a%q - b%q) <= 0.0_wp) .and. all(abs(a%v - b%v) <= 0.0_wp) &
-      .and. all(abs(a%l - b%l) <= 0.0_wp) .and. all(abs(a%contact_force - b%contact_force) <= 0.0_wp)
+    yes = all(abs(a%x - b%x) <= 0.0_wp) .and. all(abs(a%q - b%q) <= 0.0_wp) &
+      .and. all(abs(a%v - b%v) <= 0.0_wp) &
+      .and. all(abs(a%l - b%l) <= 0.0_wp) &
+      .and. all(abs(a%contact_force - b%contact_force) <= 0.0_wp)
   end function same
 
-  !> A speed beyond all bounds is reported, not followed; and the Courant limit shortens the substeps.
+  !> A speed beyond all bounds is reported, not followed; and the Courant limit shortens the
+  !! substeps.
   subroutine check_runaway()
     type(world_t) :: world
 

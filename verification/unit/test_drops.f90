@@ -31,13 +31,15 @@ contains
       u(:, i) = (x - drop%position)/max(drop%spread, 0.01_wp)
     end do
     call draw_drop(drop, 7, again, q)
-    call check('drawn again', maxval(abs((again - drop%position)/[0.5_wp, 0.1_wp, 0.01_wp] - u(:, 7))), 0.0_wp, 0.0_wp)
+    call check('drawn again', maxval(abs((again - drop%position)/[0.5_wp, 0.1_wp, 0.01_wp] &
+      - u(:, 7))), 0.0_wp, 0.0_wp)
     call check('no shift along z', maxval(abs(u(3, :))), 0.0_wp, 0.0_wp)
     call check('within the spread', maxval(abs(u)) <= 1.0_wp .and. maxval(u(1, :)) > 0.999_wp)
     ! standard errors at n = 20000: mean 0.0041, variance 0.0021; four of them
     do k = 1, 2
       call check('mean', sum(u(k, :))/real(n, wp), 0.0_wp, 0.016_wp)
-      call check('variance of a uniform number', sum(u(k, :)**2)/real(n, wp), 1.0_wp/3.0_wp, 0.009_wp)
+      call check('variance of a uniform number', sum(u(k, :)**2)/real(n, wp), 1.0_wp/3.0_wp, &
+        0.009_wp)
     end do
     call check('x and y are independent', sum(u(1, :)*u(2, :))/real(n, wp), 0.0_wp, 0.01_wp)
     call check('so are neighbours', sum(u(1, 2:)*u(1, :n - 1))/real(n, wp), 0.0_wp, 0.01_wp)

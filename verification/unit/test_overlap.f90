@@ -61,12 +61,14 @@ contains
     call check('corner on face', overlap_depth(shapes(1), origin, upright, shapes(1), &
       [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner), deep, 1.0e-14_wp)
     call check('and the other way round', overlap_depth(shapes(1), &
-      [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner, shapes(1), origin, upright), &
+      [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner, shapes(1), origin, &
+      upright), &
       deep, 1.0e-14_wp)
     ! each edge lies below the ridge of the other and is nearest to one of its two faces
     call check('edge across edge', overlap_depth(shapes(1), origin, edge, shapes(1), &
       [0.0_wp, 0.0_wp, d*sqrt(2.0_wp) - deep], across), deep/sqrt(2.0_wp), 1.0e-14_wp)
-    call check('cube in the notch of a hexapod', overlap_depth(shapes(3), origin, upright, shapes(1), &
+    call check('cube in the notch of a hexapod', &
+      overlap_depth(shapes(3), origin, upright, shapes(1), &
       [d - deep, d - 2*deep, 0.0_wp], upright), sqrt(5.0_wp)*deep, 1.0e-15_wp)
     call check('cube beside a leg', overlap_depth(shapes(3), origin, upright, shapes(1), &
       [d, d, 0.0_wp], upright), 0.0_wp, 1.0e-15_wp)
@@ -94,7 +96,8 @@ contains
   subroutine check_balls()
     call check('ball on ball', overlap_depth(shapes(2), origin, upright, shapes(2), &
       [0.0_wp, 0.6_wp*d, 0.7_wp*d], upright), d*(1.0_wp - sqrt(0.85_wp)), 1.0e-16_wp)
-    call check('ball on face', overlap_depth(shapes(2), [3.0e-3_wp, 0.0_wp, 0.9_wp*d], upright, shapes(1), &
+    call check('ball on face', overlap_depth(shapes(2), [3.0e-3_wp, 0.0_wp, 0.9_wp*d], upright, &
+      shapes(1), &
       origin, upright), 0.1_wp*d, 1.0e-16_wp)
     call check('ball at corner', overlap_depth(shapes(1), origin, upright, shapes(2), &
       0.5_wp*d + 0.25_wp*d*[1, 1, 1], upright), d*(0.5_wp - 0.25_wp*sqrt(3.0_wp)), 1.0e-16_wp)
@@ -112,14 +115,19 @@ contains
     case%boundary%velocity(:, 1, 3) = [0.5_wp, 0.0_wp, 7.0_wp]
     call walls_init(case%grid, case%boundary, walls)
     call check('five walls, the top is open', all(walls%number(:5) == [-5, -4, -3, -2, -1]))
-    call check('the floor slides in its plane', maxval(abs(walls%velocity(:, 1) - [0.5_wp, 0.0_wp, 0.0_wp])), &
+    call check('the floor slides in its plane', &
+      maxval(abs(walls%velocity(:, 1) - [0.5_wp, 0.0_wp, 0.0_wp])), &
       0.0_wp, 0.0_wp)
-    call check('cube in the floor', wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
+    call check('cube in the floor', &
+      wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
       2.0e-3_wp, 1.0e-15_wp)
-    call check('cube in the upper wall in x', wall_depth(shapes(1), [0.3_wp, 0.05_wp, 1.1_wp], upright, walls), &
+    call check('cube in the upper wall in x', &
+      wall_depth(shapes(1), [0.3_wp, 0.05_wp, 1.1_wp], upright, walls), &
       0.01_wp, 1.0e-15_wp)
-    call check('out of the open top', wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.5_wp], upright, walls), 0.0_wp, 0.0_wp)
-    call check('ball in the floor', wall_depth(shapes(2), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
+    call check('out of the open top', &
+      wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.5_wp], upright, walls), 0.0_wp, 0.0_wp)
+    call check('ball in the floor', &
+      wall_depth(shapes(2), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
       2.0e-3_wp, 1.0e-15_wp)
     case%boundary%kind(:, 2) = 'periodic'
     case%boundary%kind(2, 1) = 'slip'
@@ -128,7 +136,8 @@ contains
     call check('one period', maxval(abs(walls%period - [0.0_wp, 0.1_wp, 0.0_wp])), 0.0_wp, 0.0_wp)
   end subroutine check_walls
 
-  !> Largest overlap of a run: the largest of all pairs asked one by one; and the room for a new body.
+  !> Largest overlap of a run: the largest of all pairs asked one by one; and the room for a new
+  !! body.
   subroutine check_run()
     integer, parameter :: n = 12
     type(case_t) :: case
@@ -143,7 +152,8 @@ contains
     case%boundary%kind(:, 1) = 'periodic'
     do a = 1, n + 1
       case%body(a)%shape = merge('hexapod', 'cube   ', mod(a, 2) == 0)
-      case%body(a)%position = 0.03_wp + 0.14_wp*[uniform(2, a, 11), uniform(2, a, 12), uniform(2, a, 13)]
+      case%body(a)%position = 0.03_wp &
+        + 0.14_wp*[uniform(2, a, 11), uniform(2, a, 12), uniform(2, a, 13)]
       case%body(a)%quaternion = random_rotation(2, a)
     end do
     case%body(n + 1)%release_time = 1.0_wp
@@ -152,10 +162,12 @@ contains
     call overlap_init(shapes, blocks%n, overlap)
     expected = 0.0_wp
     do a = 1, n
-      expected = max(expected, wall_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), walls))
+      expected = max(expected, wall_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), &
+        walls))
       do b = 1, a - 1
         x = blocks%x(:, b) + nearest_shift(walls%period, blocks%x(:, b) - blocks%x(:, a))
-        expected = max(expected, overlap_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), &
+        expected = max(expected, overlap_depth(shapes(blocks%shape(a)), blocks%x(:, a), &
+          blocks%q(:, a), &
           shapes(blocks%shape(b)), x, blocks%q(:, b)))
       end do
     end do
@@ -197,14 +209,16 @@ contains
         do b = 1, a - 1
           r = x(:, b) - x(:, a)
           r = r + nearest_shift(period, r)
-          if (.not. (active(a) .and. active(b)) .or. norm2(r) >= radius(a) + radius(b) + 0.01_wp) cycle
+          if (.not. (active(a) .and. active(b)) .or. norm2(r) >= radius(a) + radius(b) + 0.01_wp) &
+            cycle
           m = m + 1
           expected(:, m) = [a, b]
         end do
       end do
       call near_pairs(x, radius, active, period, 0.01_wp, pairs)
       call check('number of near pairs', pairs%n, m)
-      if (pairs%n == m) call check('near pairs in order', all(pairs%a(:m) == expected(1, :m)) .and. &
+      if (pairs%n == m) call check('near pairs in order', all(pairs%a(:m) == expected(1, :m)) &
+        .and. &
         all(pairs%b(:m) == expected(2, :m)))
     end do
   end subroutine check_near_pairs

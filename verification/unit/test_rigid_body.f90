@@ -71,11 +71,14 @@ contains
     call blocks_init(case, shapes, blocks)
     call check('five bodies', blocks%n, 5)
     call check('their shapes', all(blocks%shape == [2, 1, 1, 1, 1]))
-    call check('only the first is there', all(blocks%present .eqv. [.true., .false., .false., .false., .false.]))
-    call check('due times', maxval(abs(blocks%release_time - [0.0_wp, 0.5_wp, 1.0_wp, 1.25_wp, 1.5_wp])), &
+    call check('only the first is there', &
+      all(blocks%present .eqv. [.true., .false., .false., .false., .false.]))
+    call check('due times', maxval(abs(blocks%release_time &
+      - [0.0_wp, 0.5_wp, 1.0_wp, 1.25_wp, 1.5_wp])), &
       0.0_wp, 1.0e-15_wp)
     call check('mass of the brick', blocks%mass(2), 2300.0_wp*6.0e-6_wp, 1.0e-15_wp)
-    call check('quaternion with w >= 0', blocks%q(:, 1), sqrt([0.5_wp, 0.0_wp, 0.0_wp, 0.5_wp])*[1, 1, 1, -1], &
+    call check('quaternion with w >= 0', blocks%q(:, 1), &
+      sqrt([0.5_wp, 0.0_wp, 0.0_wp, 0.5_wp])*[1, 1, 1, -1], &
       1.0e-15_wp)
     call check('moves from the start', blocks%v(1, 1), 1.0_wp, 0.0_wp)
     call check('waits at rest', maxval(abs(blocks%v(:, 2:))), 0.0_wp, 0.0_wp)
@@ -112,7 +115,8 @@ contains
     call check('energy of the top', worst, 0.0_wp, 1.0e-4_wp)
     call check('quaternion stays one', norm2(blocks%q(:, 1)), 1.0_wp, 1.0e-15_wp)
     call check('omega belongs to l', maxval(abs(blocks%l(:, 1) - &
-      matmul(space_tensor(blocks%q(:, 1), shapes(1)%inertia), blocks%omega(:, 1)))), 0.0_wp, 1.0e-12_wp*norm2(l))
+      matmul(space_tensor(blocks%q(:, 1), shapes(1)%inertia), blocks%omega(:, 1)))), 0.0_wp, &
+      1.0e-12_wp*norm2(l))
   end subroutine check_free_top
 
   !> The top of the reference table D1_top_torque_free.csv at t = 3: moments 1, 2, 3 and
@@ -128,7 +132,8 @@ contains
     integer :: n, m, steps
 
     top = shapes(1:1)
-    top(1)%inertia = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 3.0_wp], [3, 3])
+    top(1)%inertia = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+      3.0_wp], [3, 3])
     call one_brick(case)
     case%body(1)%angular_velocity = [1.7_wp, 0.0_wp, 1.0_wp]
     do m = 1, 2
@@ -163,7 +168,8 @@ contains
       call drift(0.05_wp, blocks)
     end do
     t = 0.7_wp
-    call check('free fall', maxval(abs(blocks%x(:, 1) - (x + t*v + 0.5_wp*t**2*(g + [0, 1, 0])))), 0.0_wp, 1.0e-14_wp)
+    call check('free fall', maxval(abs(blocks%x(:, 1) - (x + t*v + 0.5_wp*t**2*(g + [0, 1, 0])))), &
+      0.0_wp, 1.0e-14_wp)
   end subroutine check_free_fall
 
   !> A fixed body with given rates moves and turns at them whatever acts on it.
@@ -181,16 +187,20 @@ contains
     blocks%contact_force = 1.0e3_wp
     blocks%contact_torque = 1.0e3_wp
     do n = 1, 10
-      call kick([0.0_wp, 0.0_wp, -9.81_wp], 0.1_wp, blocks%contact_force, blocks%contact_torque, blocks)
+      call kick([0.0_wp, 0.0_wp, -9.81_wp], 0.1_wp, blocks%contact_force, blocks%contact_torque, &
+        blocks)
       call drift(0.1_wp, blocks)
     end do
-    call check('given velocity', maxval(abs(blocks%x(:, 1) - [0.1_wp, 0.2_wp, 0.7_wp])), 0.0_wp, 1.0e-15_wp)
-    call check('given rotation', maxval(abs(rotation_matrix(blocks%q(:, 1)) - rotation_matrix(quaternion_exp(omega)))), &
+    call check('given velocity', maxval(abs(blocks%x(:, 1) - [0.1_wp, 0.2_wp, 0.7_wp])), 0.0_wp, &
+      1.0e-15_wp)
+    call check('given rotation', maxval(abs(rotation_matrix(blocks%q(:, 1)) &
+      - rotation_matrix(quaternion_exp(omega)))), &
       0.0_wp, 1.0e-14_wp)
     call check('rate unchanged', maxval(abs(blocks%omega(:, 1) - omega)), 0.0_wp, 0.0_wp)
   end subroutine check_prescribed
 
-  !> After the fluid: M dU/dt = fluid + contact + M g and dL/dt = fluid + contact, from the start of the step.
+  !> After the fluid: M dU/dt = fluid + contact + M g and dL/dt = fluid + contact, from the start of
+  !! the step.
   subroutine check_after_fluid()
     real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp], dt = 0.01_wp
     type(case_t) :: case
