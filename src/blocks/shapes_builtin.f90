@@ -15,7 +15,8 @@ module shapes_builtin_m
   public :: make_shape, max_refinement
 
   integer, parameter :: max_refinement = 8
-  integer, parameter :: sphere_frequency = 4   !! parts of an icosahedron edge per refinement
+  real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
+  integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
 
   !> The five tetrahedra of a cuboid; corner 1 + a + 2b + 4c is the upper one in x, y, z where
   !! a, b, c = 1. The second set is the mirror image, for every other cuboid.
@@ -90,6 +91,11 @@ contains
     if (input%density <= 0.0_wp) message = 'density must be positive [kg/m3]'
     if (input%refinement < 1 .or. input%refinement > max_refinement) &
       message = 'refinement must be 1 to 8'
+    if (len(message) > 0) return
+    if (trim(input%kind) == 'box') then
+      if (product(anint(input%size/minval(input%size)))*real(input%refinement, wp)**3 > most_parts) &
+        message = 'size: so slender a box would be cut too finely; build it of several boxes'
+    end if
     if (trim(input%spheres) /= 'centroid') &
       message = 'spheres = '''//trim(input%spheres)//''' is not available yet'
   end function problem_with

@@ -25,6 +25,7 @@ module case_input_m
   real(wp), parameter :: most_cells = real(huge(0), wp)   !! cells are counted in default integers
   real(wp), parameter :: most_steps = 1.0e9_wp
   real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
+  real(wp), parameter :: shortest = 1.0e-6_wp, lightest = 1.0e-6_wp   !! [m], [kg/m3]
   integer, parameter :: most_drops = 100000, finest_shape = 8
 
 contains
@@ -252,7 +253,7 @@ contains
     call v%require('cells', all(grid%cells >= 1), 'must be 1 or more in each direction')
     call v%require('cells', product(real(grid%cells, wp)) <= most_cells, &
                    'too many cells, at most '//to_text(huge(0))//' in all')
-    call v%require('length', all(grid%length > 0.0_wp), 'must be positive [m]')
+    call require_length(v, 'length', grid%length)
     if (.not. (v%good('cells') .and. v%good('length'))) return
     call v%require('origin', &
                    all(abs(grid%origin) <= farthest_origin*grid%length/real(grid%cells, wp)), &
@@ -311,8 +312,8 @@ contains
     call v%item('single_phase', fluid%single_phase)
     call v%item('velocity', fluid%velocity)
 
-    call v%require('liquid_density', fluid%liquid_density > 0.0_wp, 'must be positive [kg/m3]')
-    call v%require('gas_density', fluid%gas_density > 0.0_wp, 'must be positive [kg/m3]')
+    call require_density(v, 'liquid_density', fluid%liquid_density)
+    call require_density(v, 'gas_density', fluid%gas_density)
     call require_not_negative(v, 'liquid_viscosity', fluid%liquid_viscosity, '[Pa s]')
     call require_not_negative(v, 'gas_viscosity', fluid%gas_viscosity, '[Pa s]')
     call require_not_negative(v, 'surface_tension', fluid%surface_tension, '[N/m]')
@@ -420,9 +421,8 @@ contains
     call v%option('spheres', shape%spheres, 'centroid inscribed dense')
     call v%item('sphere_spacing', shape%sphere_spacing)
 
-    call v%require('size', all(shape%size > 0.0_wp .or. .not. is_given(shape%size)), &
-                   'must be positive [m]')
-    call v%require('density', shape%density > 0.0_wp, 'must be positive [kg/m3]')
+    call require_length(v, 'size', pack(shape%size, is_given(shape%size)))
+    call require_density(v, 'density', shape%density)
     call v%require('scale', shape%scale > 0.0_wp, 'must be positive [-]')
     call require_range(v, 'refinement', shape%refinement, 1, finest_shape)
     call require_not_negative(v, 'sphere_spacing', shape%sphere_spacing, '[m]')
@@ -666,6 +666,28 @@ contains
 
     call v%require(variable, x >= 0.0_wp, 'must not be negative '//unit)
   end subroutine require_not_negative
+
+  !> Lengths of a size that volumes and inertias can be made of without leaving the number range.
+  subroutine require_length(v, variable, x)
+    type(group_visitor_t), intent(inout) :: v
+    character(*), intent(in) :: variable
+    real(wp), intent(in) :: x(:)
+
+    call v%require(variable, all(x > 0.0_wp), 'must be positive [m]')
+    call v%require(variable, all(x >= shortest .and. x <= 1.0_wp/shortest), &
+                   'must lie between '//to_text(shortest)//' and '//to_text(1.0_wp/shortest)//' m')
+  end subroutine require_length
+
+  !> Densities likewise.
+  subroutine require_density(v, variable, x)
+    type(group_visitor_t), intent(inout) :: v
+    character(*), intent(in) :: variable
+    real(wp), intent(in) :: x
+
+    call v%require(variable, x > 0.0_wp, 'must be positive [kg/m3]')
+    call v%require(variable, x >= lightest .and. x <= 1.0_wp/lightest, 'must lie between ' &
+                   //to_text(lightest)//' and '//to_text(1.0_wp/lightest)//' kg/m3')
+  end subroutine require_density
 
   !> Above zero, at most one.
   subroutine require_share(v, variable, x)

@@ -32,7 +32,7 @@ contains
     call print_run(unit, case)
     call print_grid(unit, case, wet)
     if (wet) call print_liquid(unit, case)
-    if (blocks) call print_shapes(unit, case, shapes)
+    if (blocks) call print_shapes(unit, case, wet, shapes)
     if (blocks) call print_bodies(unit, case, shapes)
     call print_steps(unit, case, shapes, wet, blocks)
     call print_memory(unit, case, shapes, wet)
@@ -108,12 +108,14 @@ contains
   end subroutine print_liquid
 
   !> A table with one line for each shape.
-  subroutine print_shapes(unit, case, shapes)
+  subroutine print_shapes(unit, case, wet, shapes)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
+    logical, intent(in) :: wet
     type(shape_t), intent(in) :: shapes(:)
     character(*), parameter :: form = '(2x, a14, 1x, a8, 2(1x, a7), 4(1x, a12), 1x, a13)'
-    real(wp) :: mass, lift, g, diameter
+    character(:), allocatable :: submerged
+    real(wp) :: mass, g, diameter
     integer :: s
 
     if (size(shapes) == 0) return
@@ -123,13 +125,14 @@ contains
     g = norm2(case%fluid%gravity)
     do s = 1, size(shapes)
       mass = shapes(s)%density*shapes(s)%volume
-      lift = case%fluid%liquid_density*shapes(s)%volume
+      submerged = '-'
+      if (wet) submerged = brief((mass - case%fluid%liquid_density*shapes(s)%volume)*g)
       diameter = 2*minval(shapes(s)%sphere_radius)
       write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 8), &
         right(to_text(size(shapes(s)%tet, 2)), 7), &
         right(to_text(size(shapes(s)%sphere_radius)), 7), &
         right(brief(diameter), 12), right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
-        right(brief(mass*g), 12), right(brief((mass - lift)*g), 13)
+        right(brief(mass*g), 12), right(submerged, 13)
     end do
   end subroutine print_shapes
 

@@ -440,7 +440,7 @@ contains
     case (value_ok)
     case (value_not_finite); call self%fault(i, subject//'must be a finite number')
     case (value_too_large)
-      call self%fault(i, subject//'must be 0 or between 1e-30 and 1e30 in size')
+      call self%fault(i, subject//'must be 0 or between 1e-20 and 1e20 in size')
     case default; call self%fault(i, subject//'must be a number')
     end select
   end subroutine read_real

@@ -1,7 +1,9 @@
-!> Checks with geometry: walls, overlaps, drops without room, periods, and the plan of a case.
+!> Checks with geometry: walls, overlaps, drops without room, periods, the fixed blocks' pose.
 program test_case_check
   use check_m, only: check, finish_checks
+  use kinds_m, only: wp
   use errors_m, only: problems_t
+  use vectors_m, only: rotate
   use case_types_m, only: case_t
   use case_input_m, only: read_case
   use case_check_m, only: make_shapes, check_case
@@ -25,6 +27,7 @@ program test_case_check
   call test_drops()
   call test_periods()
   call test_together()
+  call test_three_legs()
   call finish_checks()
 
 contains
@@ -156,6 +159,38 @@ contains
       //' (there is no group &grid)')
     call expect(tank//'&shape name=''d'' kind=''cube'' size=1 refinement=8/', '')
   end subroutine test_together
+
+  !> The fixed blocks of the paper stand on three corners: side of the triangle sqrt 2 d.
+  subroutine test_three_legs()
+    real(wp), parameter :: d = 0.02_wp
+    type(case_t) :: case
+    type(shape_t), allocatable :: shapes(:)
+    type(problems_t) :: problems
+    real(wp) :: corner(3), feet(3, 3)
+    integer :: i, n
+
+    call read_case(tank//cross_block//'&body shape=''h'' fixed=t position=0.15, 0.05, ' &
+      //'0.0288675134594813 quaternion = 0.540625096237162, 0.455768038939282, ' &
+      //'-0.060003000646866, -0.704556342610988/', case, problems)
+    call make_shapes(case, shapes, problems)
+    call check_case(case, shapes, problems)
+    call check('fixed block is a good case', problems%n, 0)
+    n = 0
+    do i = 1, size(shapes(2)%point, 2)
+      corner = case%body(1)%position + rotate(case%body(1)%quaternion, shapes(2)%point(:, i))
+      if (corner(3) > 1.0e-4_wp) cycle
+      n = n + 1
+      if (n <= 3) feet(:, n) = corner
+    end do
+    call check('three corners at the floor', n, 3)
+    if (n /= 3) return
+    call check('on the floor', feet(3, :), [0.0_wp, 0.0_wp, 0.0_wp], 1.0e-15_wp)
+    call check('sides of the triangle', [norm2(feet(:, 1) - feet(:, 2)), &
+      norm2(feet(:, 2) - feet(:, 3)), norm2(feet(:, 3) - feet(:, 1))], &
+      sqrt(2.0_wp)*[d, d, d], 1.0e-15_wp)
+    call check('a foot towards the viewer', minval(feet(2, :)), 0.05_wp - d*sqrt(2.0_wp/3.0_wp), &
+               1.0e-15_wp)
+  end subroutine test_three_legs
 
   !> All messages about a case, '|' between them.
   function messages(text) result(found)

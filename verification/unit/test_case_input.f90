@@ -102,7 +102,7 @@ contains
     call check('none', attitude(''), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
     call check('normalised', attitude('quaternion=3,0,4,0'), [0.6_wp, 0.0_wp, 0.8_wp, 0.0_wp], &
       1.0e-15_wp)
-    call check('tiny', attitude('quaternion=0,0,0,1e-30'), [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], &
+    call check('tiny', attitude('quaternion=0,0,0,1e-20'), [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], &
       1.0e-15_wp)
     call check('quarter turn', attitude('axis=0,0,5 angle_deg=90'), &
                [sqrt(0.5_wp), 0.0_wp, 0.0_wp, sqrt(0.5_wp)], 1.0e-15_wp)
@@ -227,7 +227,7 @@ contains
     call expect('&run t_end=+Infinity/'//grid, '&run t_end = +Infinity: must be a finite ' &
       //'number (line 1)')
     call expect('&run t_end=1e31/'//grid, &
-      '&run t_end = 1e31: must be 0 or between 1e-30 and 1e30 in size (line 1)')
+      '&run t_end = 1e31: must be 0 or between 1e-20 and 1e20 in size (line 1)')
     call expect('&run t_end=1, 2/'//grid, '&run t_end = 1, 2: 2 values given, 1 needed (line 1)')
     call expect('&run t_end=1'//lf//'dt 0.1/'//grid, &
       '&run t_end = 1, dt, 0.1: 3 values given, 1 needed; is an ''='' missing after dt? (line 1)')
@@ -380,6 +380,9 @@ contains
     call expect(base//a//'''cube'' size=1,1,1,1/', &
       '&shape size = 1, 1, 1, 1: 4 values given, 1 needed (line 3)')
     call expect(base//a//'''cube'' size=-1/', '&shape size = -1: must be positive [m] (line 3)')
+    call expect(base//a//'''cube'' size=1e7 density=1e-9/', &
+      '&shape size = 1e7: must lie between 1e-6 and 1000000 m (line 3)|' &
+      //'&shape density = 1e-9: must lie between 1e-6 and 1000000 kg/m3 (line 3)')
     call expect(base//a//'''box'' size=1,0,1/', '&shape size = 1, 0, 1: must be positive [m] ' &
       //'(line 3)')
     call expect(base//a//'''ball'' size=1/', '&shape kind = ''ball'': unknown, must be one of' &

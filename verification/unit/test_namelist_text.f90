@@ -32,7 +32,7 @@ contains
     call check('no digit behind', number('5.'), 5.0_wp, 0.0_wp)
     call check('exponent', number('-1e-3'), -1.0e-3_wp, 0.0_wp)
     call check('exponent of Fortran', number('+2.5D+2'), 250.0_wp, 0.0_wp)
-    call check('smallest', number('1e-30'), 1.0e-30_wp, 0.0_wp)
+    call check('smallest', number('1e-20'), 1.0e-20_wp, 0.0_wp)
     call check('zero with a large exponent', number('0.000e99999'), 0.0_wp, 0.0_wp)
     call check('leading zeros', number('000.00012'), 1.2e-4_wp, 0.0_wp)
     call check('all digits', number('0.5406250000000001'), 0.5406250000000001_wp, 0.0_wp)

@@ -17,7 +17,7 @@ module value_text_m
 
   !> Largest size of a real value, and one over its smallest: products of a few such values
   !! (a volume, an inertia) stay inside the range of real64.
-  integer, parameter :: largest_exponent = 30
+  integer, parameter :: largest_exponent = 20
 
   integer, parameter :: longest_shown = 60   !! characters of a value in a message
 
