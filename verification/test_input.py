@@ -1,0 +1,180 @@
+"""Good cases are accepted and bad ones refused: exit code, messages, and nothing written."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from run_cases import CASES, MPI_SETTINGS, ROOT, Machine
+
+INPUT = sorted((ROOT / "input").glob("*.nml"))
+GOOD = [*INPUT, *sorted(CASES.glob("*/*.nml"))]
+
+SERIAL = Machine(ROOT / "mics")
+
+TANK = """&run t_end = 1 /
+&grid cells = 6, 4, 4  length = 0.3, 0.2, 0.2 /
+&shape name = 'cube'  kind = 'cube'  size = 0.02 /
+"""
+BODY = "&body shape = 'cube'  position = "
+
+BAD = {
+    "unknown variable": (
+        TANK.replace("t_end = 1", "t_end = 1 tend = 2"),
+        "&run tend = 2: unknown variable, nearest known: t_end (line 1)",
+    ),
+    "unknown group": (TANK + "&bodies /", "&bodies: unknown group, nearest known: &body (line 4)"),
+    "wrong type": (
+        TANK.replace("= 1 /", "= soon /"),
+        "&run t_end = soon: must be a number (line 1)",
+    ),
+    "not a number": (
+        TANK + "&fluid water_level = nan /",
+        "&fluid water_level = nan: must be a finite number (line 4)",
+    ),
+    "out of range": (
+        TANK + "&contact\n restitution = 1.5 /",
+        "&contact restitution = 1.5: must be above 0 and at most 1 (line 5)",
+    ),
+    "not yet": (
+        TANK + "&fluid surface_tension = 0.07 /",
+        "&fluid surface_tension = 0.07: not available yet (line 4)",
+    ),
+    "no end": (
+        TANK + "&fluid",
+        "&fluid: no '/' closes the group before the end of the text (line 4)",
+    ),
+    "outside": (
+        TANK + BODY + "0.1, 0.1, 0.005 /",
+        "&body position = 0.1, 0.1, 0.005: reaches 0.005 m through the wall z_min; "
+        "a body must lie inside the tank (line 4)",
+    ),
+    "overlap": (
+        TANK + 2 * (BODY + "0.1, 0.1, 0.1 /\n"),
+        "&body position = 0.1, 0.1, 0.1: overlaps the &body on line 4 by 0.01 m; "
+        "bodies must lie apart at the start (line 5)",
+    ),
+    "drop without room": (
+        TANK
+        + (BODY + "0.1, 0.1, 0.01 fixed = T /\n")
+        + "&drop shape = 'cube' position = 0.1, 0.1, 0.02 /",
+        "&drop position = 0.1, 0.1, 0.02: lies inside the fixed &body on line 4; "
+        "it could never be released (line 5)",
+    ),
+    "empty": ("", "the case is empty"),
+    "binary": ("\0\1\2", "zero bytes"),
+}
+
+
+def mics(
+    arguments: list[str], folder: Path, text: str = "", machine: Machine = SERIAL
+) -> subprocess.CompletedProcess[str]:
+    """Run the program in a folder with the text as its standard input."""
+    return subprocess.run(
+        [*machine.command, *arguments],
+        cwd=folder,
+        env={**os.environ, **MPI_SETTINGS},
+        input=text,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("case", GOOD, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_good_case_is_planned(case: Path, tmp_path: Path) -> None:
+    """--check prints a plan, ends with 0 and writes nothing."""
+    done = mics(["--check", str(case)], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for heading in ("Run", "Tank", "Time steps", "Memory", "Files in"):
+        assert f"\n{heading}" in f"\n{done.stdout}"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_plan_tells_the_numbers(tmp_path: Path) -> None:
+    """The plan of the paper's tank: cells, tetrahedra, volume and weight of the block."""
+    plan = mics(["--check"], tmp_path, (ROOT / "input" / "blocks.nml").read_text()).stdout
+    assert "60 x 20 x 40 = 48000" in plan
+    block = next(row for row in plan.splitlines() if row.split()[:2] == ["hexapod", "hexapod"])
+    volume, mass, weight, submerged = map(float, block.split()[-4:])
+    assert volume == pytest.approx(7 * 0.02**3, rel=1e-3)
+    assert mass == pytest.approx(2300 * volume, rel=1e-3)
+    assert weight == pytest.approx(9.81 * mass, rel=1e-3)
+    assert submerged == pytest.approx((2300 - 998.2) * 9.81 * volume, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_case_is_refused(name: str, tmp_path: Path) -> None:
+    """Exit code 2, the message on standard error, nothing on standard output or disk."""
+    text, message = BAD[name]
+    done = mics([], tmp_path, text)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_problems_at_once(tmp_path: Path) -> None:
+    """Faults of form, type, range, geometry and between groups come out in one go."""
+    text = (
+        TANK.replace("t_end = 1", "t_end = 1 dt = -1 titel = 'x'")
+        + "&fluid gravity = 0, 0 /\n"
+        + "stray\n"
+        + BODY
+        + "0.1, 0.1, 0.5 release_time = 1 colour = 1 /\n"
+        + BODY
+        + "-1, 0.1, 0.1 /\n"
+        + "&boundary x_min = 'periodic /\n"
+    )
+    done = mics([], tmp_path, text)
+    assert done.returncode == 2
+    for start in (
+        "&run dt = -1: must be positive [s] (line 1)",
+        "&run titel = 'x': unknown variable",
+        "&fluid gravity = 0, 0: 2 values given, 3 needed (line 4)",
+        "text outside the groups: stray",
+        "&body colour = 1: unknown variable",
+        "&boundary x_min: the string 'periodic / is not closed on its line (line 8)",
+    ):
+        assert start in done.stderr
+    assert len(done.stderr.splitlines()) == 6
+
+
+def test_geometry_is_checked_beside_other_problems(tmp_path: Path) -> None:
+    """A typing error in one group does not hide a body outside the tank."""
+    done = mics([], tmp_path, TANK + "&fluid colour = 1 /\n" + BODY + "-1, 0.1, 0.1 /")
+    assert "&fluid colour = 1: unknown variable" in done.stderr
+    assert "through the wall x_min" in done.stderr
+    assert done.returncode == 2
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"], ids=["unix", "windows", "old mac"])
+def test_line_ends_and_byte_order_mark(ending: str, tmp_path: Path) -> None:
+    """Text from any system reads the same, with or without a byte-order mark."""
+    text = (TANK + "! größe\n&fluid water_level = high /\n").replace("\n", ending)
+    case = tmp_path / "case.nml"
+    case.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    done = mics(["--check", str(case)], tmp_path)
+    assert "&fluid water_level = high: must be a number (line 5)" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("case", ["missing.nml", "."])
+def test_case_that_cannot_be_read(case: str, tmp_path: Path) -> None:
+    """A missing file and a folder are named and refused."""
+    done = mics([case], tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"mics: {case}: ")
+
+
+def test_every_rank_stops_and_one_speaks(tmp_path: Path) -> None:
+    """The parallel build prints each message once and ends with the same code."""
+    machine = Machine(ROOT / "mics_mpi", ranks=2)
+    case = tmp_path / "case.nml"
+    case.write_text(BAD["unknown variable"][0])
+    done = mics([str(case)], tmp_path, machine=machine)
+    assert done.returncode == 2
+    assert done.stderr.count(BAD["unknown variable"][1]) == 1
+    assert list(tmp_path.iterdir()) == [case]
