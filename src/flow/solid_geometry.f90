@@ -42,6 +42,12 @@ module solid_geometry_m
     integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
     real(wp), allocatable :: face_beta(:)       !! share of the face area [-]
     real(wp), allocatable :: face_centroid(:, :) !! (3, *) [m]
+    !> The lists hold the cells and faces of the halo too, also as images in other periods, with the
+    !! centroids at the place of the image. Legs with a hit; cut cells of pockets without a way out,
+    !! whose faces are closed, in the lists of this process and in the whole domain.
+    integer :: n_leg = 0, n_closed = 0, n_sealed = 0
+    integer, allocatable :: leg(:, :)           !! (4, *) cell index and direction of the lower face
+    integer, allocatable :: closed_cell(:, :)   !! (3, *)
   end type solid_geometry_t
 
 contains
@@ -70,6 +76,7 @@ contains
     allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%body_tet(n + 1), source=1)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
+    allocate (solid%leg(4, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
 end module solid_geometry_m

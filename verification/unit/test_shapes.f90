@@ -222,13 +222,13 @@ contains
     do r = 1, 2
       call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
       call check('sphere: true volume', s%volume, 4*pi/3*a**3, 1e-13_wp*a**3)
-      call check('sphere: 20 (4 r)^2 triangles', size(s%triangle, 2), 20*(4*r)**2)
+      call check('sphere: 20 (2 r)^2 triangles', size(s%triangle, 2), 20*(2*r)**2)
       call check('sphere: touches with its true radius', s%sphere_radius(1), a, 0.0_wp)
       outside(r) = maxval(norm2(s%point, 1))/a - 1
     end do
-    call check('sphere: corners stand out by 1.2 and 0.3 per cent', outside, &
-               [1.15e-2_wp, 2.9e-3_wp], 1e-4_wp)
-    call check('sphere: second order in the refinement', outside(1)/outside(2), 4.0_wp, 0.2_wp)
+    call check('sphere: corners stand out by 4.6 and 1.2 per cent', outside, &
+               [4.61e-2_wp, 1.15e-2_wp], 1e-4_wp)
+    call check('sphere: second order in the refinement', outside(1)/outside(2), 4.0_wp, 0.1_wp)
   end subroutine sphere_sizes
 
   subroutine refusals()

@@ -1,0 +1,654 @@
+!> The bodies in the grid: solid shares of cells and faces, wall distances, cut cells, sealed pockets.
+!!
+!! Every process fills its own cells and halo, images in other periods included, from the poses of
+!! the bodies alone; nothing is exchanged but the flags of pockets, where there are any.
+module solid_fraction_m
+  use omp_lib, only: omp_get_max_threads, omp_get_thread_num
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
+  use solid_geometry_m, only: solid_geometry_t, no_hit
+  use rigid_body_m, only: blocks_t
+  use body_shares_m, only: body_shares_t, share_work_t, find_body_shares
+  use parallel_m, only: halo_exchange, global_sum
+  implicit none
+  private
+  public :: solid_fraction_t, solid_fraction_init, update_solid
+
+  real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
+  real(wp), parameter :: full_cell = 1.0e-12_wp     !! a cell lacking less is full
+  real(wp), parameter :: full_face = 1.0e-9_wp      !! a face lacking less is closed
+
+  type :: solid_fraction_t
+    type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body
+    type(share_work_t), allocatable :: work(:)    !! (threads)
+    logical, allocatable :: near(:)               !! (n) present and in the cells kept here
+    integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods by which its images are shifted
+    !> First and last cell where the solids are kept: own cells and halo, less what is outside.
+    integer :: low(3) = 1, high(3) = 0
+    !> (2, cells listed) place in the list of the body; number of the body's first tetrahedron less one.
+    integer, allocatable :: source(:, :)
+    logical, allocatable :: reached(:)            !! (cut cells) fluid gets there from uncut cells
+    integer, allocatable :: stack(:)
+    integer, allocatable :: flag(:, :, :)         !! the same on the grid, for the exchange
+  end type solid_fraction_t
+
+contains
+
+  !> Allocate the caches and work arrays.
+  subroutine solid_fraction_init(grid, blocks, self)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(solid_fraction_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    self%low = merge(a, max(a, 1), grid%periodic)
+    self%high = merge(b, min(b, grid%n), grid%periodic)
+    allocate (self%body(blocks%n), self%work(0:omp_get_max_threads() - 1))
+    allocate (self%near(blocks%n), source=.false.)
+    allocate (self%first(3, blocks%n), self%last(3, blocks%n), source=0)
+    allocate (self%source(2, 0), self%reached(0), self%stack(0))
+    allocate (self%flag(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+  end subroutine solid_fraction_init
+
+  !> Fill the solid geometry for the poses of the bodies present.
+  subroutine update_solid(self, grid, blocks, solid)
+    type(solid_fraction_t), intent(inout) :: self
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b
+
+    call clear(grid, solid)
+    call find_shares(grid, blocks, self)
+    call reserve(self, blocks, solid)
+    call place_bodies(grid, self, solid)
+    do b = 1, blocks%n
+      call paint_body(self, grid, b, solid)
+    end do
+    call finish_faces(solid)
+    call finish_cells(grid, solid)
+    call guard_legs(self, solid)
+    call tets_of_cut_cells(self, solid)
+    call close_pockets(grid, self, solid)
+  end subroutine update_solid
+
+  !> Take away what the lists of the last time say was there.
+  subroutine clear(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n
+
+    n = size(solid%body_cell)
+    do m = 1, solid%body_cell(n) - 1
+      associate (i => solid%cell(:, m))
+        solid%alpha(i(1), i(2), i(3)) = 0.0_wp
+        solid%inside(i(1), i(2), i(3)) = 0
+        solid%cut(i(1), i(2), i(3)) = 0
+      end associate
+    end do
+    do m = 1, solid%body_face(n) - 1
+      associate (i => solid%face(:, m))
+        solid%open(i(1), i(2), i(3), i(4)) = 1.0_wp
+      end associate
+    end do
+    do m = 1, solid%n_leg
+      associate (i => solid%leg(:, m))
+        solid%leg_low(i(1), i(2), i(3), i(4)) = no_hit
+        solid%leg_high(i(1), i(2), i(3), i(4)) = no_hit
+        solid%leg_body_low(i(1), i(2), i(3), i(4)) = 0
+        solid%leg_body_high(i(1), i(2), i(3), i(4)) = 0
+      end associate
+    end do
+    do m = 1, solid%n_closed
+      call set_faces(grid, solid%closed_cell(:, m), 1.0_wp, solid)
+    end do
+    solid%n_leg = 0
+    solid%n_closed = 0
+  end subroutine clear
+
+  !> Give the six faces of a cell an open share, as far as they are in the arrays.
+  pure subroutine set_faces(grid, cell, open, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: cell(3)
+    real(wp), intent(in) :: open
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: d, i(3)
+
+    do d = 1, 3
+      solid%open(cell(1), cell(2), cell(3), d) = open
+      i = cell + unit_step(:, d)
+      if (i(d) <= grid%hi(d) + n_halo) solid%open(i(1), i(2), i(3), d) = open
+    end do
+  end subroutine set_faces
+
+  !> Shares of every body that is near the cells of this process and has moved.
+  subroutine find_shares(grid, blocks, self)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(solid_fraction_t), intent(inout) :: self
+    integer :: b
+
+    if (size(self%work) < omp_get_max_threads()) then
+      deallocate (self%work)
+      allocate (self%work(0:omp_get_max_threads() - 1))
+    end if
+    do b = 1, blocks%n
+      self%near(b) = blocks%present(b)
+      if (blocks%present(b)) &
+        call find_images(self, grid, b, blocks%x(:, b), blocks%shapes(blocks%shape(b))%radius)
+    end do
+    !$omp parallel do schedule(dynamic, 1) if (count(self%near) > 1)
+    do b = 1, blocks%n
+      if (self%near(b)) call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), &
+                                              blocks%q(:, b), self%work(omp_get_thread_num()), self%body(b))
+    end do
+  end subroutine find_shares
+
+  !> Images of body b, a ball at most, that touch the cells kept here.
+  pure subroutine find_images(self, grid, b, x, radius)
+    type(solid_fraction_t), intent(inout) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    real(wp), intent(in) :: x(3), radius   !! [m]
+    integer :: d, low, high
+
+    do d = 1, 3
+      low = grid%cell_of(x(d) - radius, d) - 1
+      high = grid%cell_of(x(d) + radius, d) + 1
+      call images(self, grid, d, low, high, self%first(d, b), self%last(d, b))
+    end do
+    self%near(b) = all(self%first(:, b) <= self%last(:, b))
+  end subroutine find_images
+
+  !> Numbers of periods by which cells low..high may be shifted to touch the cells kept here.
+  pure subroutine images(self, grid, d, low, high, first, last)
+    type(solid_fraction_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d, low, high
+    integer, intent(out) :: first, last
+
+    if (grid%periodic(d)) then
+      first = -floor_ratio(high - self%low(d), grid%n(d))
+      last = floor_ratio(self%high(d) - low, grid%n(d))
+    else
+      first = 0
+      last = merge(0, -1, high >= self%low(d) .and. low <= self%high(d))
+    end if
+  end subroutine images
+
+  !> Largest whole number not above a/b, b > 0.
+  elemental integer function floor_ratio(a, b)
+    integer, intent(in) :: a, b
+
+    floor_ratio = (a - modulo(a, b))/b
+  end function floor_ratio
+
+  !> Lists long enough for all bodies in all their images; they grow by doubling.
+  subroutine reserve(self, blocks, solid)
+    type(solid_fraction_t), intent(inout) :: self
+    type(blocks_t), intent(in) :: blocks
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b, copies, cells, faces, legs, tets
+
+    if (size(solid%body_cell) /= blocks%n + 1) then
+      deallocate (solid%body_cell, solid%body_face, solid%body_tet)
+      allocate (solid%body_cell(blocks%n + 1), solid%body_face(blocks%n + 1), &
+                solid%body_tet(blocks%n + 1))
+    end if
+    solid%body_cell(1) = 1
+    solid%body_face(1) = 1
+    cells = 0
+    faces = 0
+    legs = 0
+    tets = 0
+    do b = 1, blocks%n
+      if (.not. self%near(b)) cycle
+      copies = product(self%last(:, b) - self%first(:, b) + 1)
+      cells = cells + copies*self%body(b)%n_cell
+      faces = faces + copies*self%body(b)%n_face
+      legs = legs + copies*(self%body(b)%n_hit + 6*self%body(b)%n_cell)
+      tets = tets + (1 + copies)*size(self%body(b)%corner, 3)
+    end do
+    if (size(solid%cell_alpha) < cells) then
+      cells = max(cells, 2*size(solid%cell_alpha))
+      deallocate (solid%cell, solid%cell_alpha, solid%cell_centroid, solid%cut_cell, solid%first)
+      deallocate (solid%closed_cell)
+      allocate (solid%cell(3, cells), solid%cell_alpha(cells), solid%cell_centroid(3, cells))
+      allocate (solid%cut_cell(3, cells), solid%first(cells + 1), solid%closed_cell(3, cells))
+    end if
+    if (size(self%source, 2) < cells) then
+      deallocate (self%source)
+      allocate (self%source(2, size(solid%cell_alpha)))
+    end if
+    if (size(solid%face_beta) < faces) then
+      faces = max(faces, 2*size(solid%face_beta))
+      deallocate (solid%face, solid%face_beta, solid%face_centroid)
+      allocate (solid%face(4, faces), solid%face_beta(faces), solid%face_centroid(3, faces))
+    end if
+    if (size(solid%leg, 2) < legs) then
+      legs = max(legs, 2*size(solid%leg, 2))
+      deallocate (solid%leg)
+      allocate (solid%leg(4, legs))
+    end if
+    if (size(solid%corner, 3) < tets) then
+      tets = max(tets, 2*size(solid%corner, 3))
+      deallocate (solid%corner)
+      allocate (solid%corner(3, 4, tets))
+    end if
+  end subroutine reserve
+
+  !> Add one body with all its images.
+  subroutine paint_body(self, grid, b, solid)
+    type(solid_fraction_t), intent(inout) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: i, j, k, first_tet
+
+    solid%body_cell(b + 1) = solid%body_cell(b)
+    solid%body_face(b + 1) = solid%body_face(b)
+    if (.not. self%near(b)) return
+    do k = self%first(3, b), self%last(3, b)
+      do j = self%first(2, b), self%last(2, b)
+        do i = self%first(1, b), self%last(1, b)
+          associate (offset => self%body(b)%base + [i, j, k]*grid%n)
+            first_tet = solid%body_tet(b)
+            if (any([i, j, k] /= 0)) then
+              first_tet = solid%n_tet + 1
+              call place_tets(grid, self%body(b), offset, solid)
+            end if
+            call paint_cells(self, grid, b, offset, first_tet, solid)
+            call paint_faces(self, grid, self%body(b), b, offset, solid)
+            call paint_legs(self, grid, self%body(b), b, offset, solid)
+          end associate
+        end do
+      end do
+    end do
+  end subroutine paint_body
+
+  !> Shares of cells, and the centres that are inside.
+  subroutine paint_cells(self, grid, b, offset, first_tet, solid)
+    type(solid_fraction_t), intent(inout) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b, offset(3), first_tet
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n, i(3)
+
+    n = solid%body_cell(b + 1) - 1
+    associate (body => self%body(b))
+      do m = 1, body%n_cell
+        i = offset + body%cell(:, m)
+        if (any(i < self%low) .or. any(i > self%high)) cycle
+        n = n + 1
+        self%source(:, n) = [m, first_tet - 1]
+        solid%cell(:, n) = i
+        solid%cell_alpha(n) = body%alpha(m)
+        solid%cell_centroid(:, n) = grid%origin + (real(i - 1, wp) + body%centroid(:, m))*grid%h
+        solid%alpha(i(1), i(2), i(3)) = solid%alpha(i(1), i(2), i(3)) + body%alpha(m)
+        if (body%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) &
+          solid%inside(i(1), i(2), i(3)) = b
+      end do
+    end associate
+    solid%body_cell(b + 1) = n + 1
+  end subroutine paint_cells
+
+  !> Shares of faces, with those on the far sides of the domain.
+  subroutine paint_faces(self, grid, body, b, offset, solid)
+    type(solid_fraction_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: b, offset(3)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n, f(4)
+
+    n = solid%body_face(b + 1) - 1
+    do m = 1, body%n_face
+      f = body%face(:, m)
+      f(1:3) = f(1:3) + offset
+      if (.not. kept_face(self, grid, f)) cycle
+      n = n + 1
+      solid%face(:, n) = f
+      solid%face_beta(n) = body%beta(m)
+      solid%face_centroid(:, n) = grid%origin + (real(f(1:3) - 1, wp) + body%face_centroid(:, m))*grid%h
+      solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body%beta(m)
+    end do
+    solid%body_face(b + 1) = n + 1
+  end subroutine paint_faces
+
+  !> Is the lower face f of a cell kept? Those on the far sides of the domain are.
+  pure logical function kept_face(self, grid, f)
+    type(solid_fraction_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: f(4)   !! cell and direction
+    integer :: high(3)
+
+    high = self%high
+    if (.not. grid%periodic(f(4))) high(f(4)) = min(high(f(4)) + 1, grid%hi(f(4)) + n_halo)
+    kept_face = all(f(1:3) >= self%low) .and. all(f(1:3) <= high)
+  end function kept_face
+
+  !> Nearest hits from both ends of the legs; what lies behind a side of the domain does not count.
+  subroutine paint_legs(self, grid, body, b, offset, solid)
+    type(solid_fraction_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: b, offset(3)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, f(4)
+
+    do m = 1, body%n_hit
+      f = body%hit(:, m)
+      f(1:3) = f(1:3) + offset
+      if (.not. kept_face(self, grid, f)) cycle
+      if (.not. grid%periodic(f(4))) then
+        if (f(f(4)) == 1 .and. body%at(m) < 0.5_wp) cycle
+        if (f(f(4)) == grid%n(f(4)) + 1 .and. body%at(m) > 0.5_wp) cycle
+      end if
+      call shorten_leg(f, body%at(m), b, solid)
+    end do
+  end subroutine paint_legs
+
+  !> Body b meets a leg at a place between 0 (lower centre) and 1.
+  subroutine shorten_leg(f, at, b, solid)
+    integer, intent(in) :: f(4), b
+    real(wp), intent(in) :: at
+    type(solid_geometry_t), intent(inout) :: solid
+
+    associate (low => solid%leg_low(f(1), f(2), f(3), f(4)), &
+               high => solid%leg_high(f(1), f(2), f(3), f(4)))
+      if (low > 1.0_wp) then
+        solid%n_leg = solid%n_leg + 1
+        solid%leg(:, solid%n_leg) = f
+      end if
+      if (max(at, least_leg) < low) then
+        low = max(at, least_leg)
+        solid%leg_body_low(f(1), f(2), f(3), f(4)) = b
+      end if
+      if (max(1.0_wp - at, least_leg) < high) then
+        high = max(1.0_wp - at, least_leg)
+        solid%leg_body_high(f(1), f(2), f(3), f(4)) = b
+      end if
+    end associate
+  end subroutine shorten_leg
+
+  !> Faces that bodies close: no open share is left, and shares above one are scaled down.
+  pure subroutine finish_faces(solid)
+    type(solid_geometry_t), intent(inout) :: solid
+    real(wp) :: total
+    integer :: m, n
+
+    n = solid%body_face(size(solid%body_face)) - 1
+    do m = 1, n
+      associate (f => solid%face(:, m))
+        total = 1.0_wp - solid%open(f(1), f(2), f(3), f(4))
+      end associate
+      if (total > 1.0_wp - full_face) solid%face_beta(m) = solid%face_beta(m)/total
+    end do
+    do m = 1, n
+      associate (f => solid%face(:, m))
+        if (solid%open(f(1), f(2), f(3), f(4)) < full_face) &
+          solid%open(f(1), f(2), f(3), f(4)) = 0.0_wp
+      end associate
+    end do
+  end subroutine finish_faces
+
+  !> Full cells are closed all round; the others that hold solid are cut cells.
+  subroutine finish_cells(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m
+
+    solid%n_cut = 0
+    do m = 1, solid%body_cell(size(solid%body_cell)) - 1
+      associate (i => solid%cell(:, m))
+        if (solid%alpha(i(1), i(2), i(3)) > 1.0_wp - full_cell) then
+          solid%alpha(i(1), i(2), i(3)) = 1.0_wp
+          call set_faces(grid, i, 0.0_wp, solid)
+        else if (solid%cut(i(1), i(2), i(3)) == 0) then
+          solid%n_cut = solid%n_cut + 1
+          solid%cut(i(1), i(2), i(3)) = solid%n_cut
+          solid%cut_cell(:, solid%n_cut) = i
+        end if
+      end associate
+    end do
+  end subroutine finish_cells
+
+  !> A leg from a centre inside to one outside always has a hit, also where round-off sees the centre
+  !! on either side of the surface: then the wall is at the centre inside.
+  subroutine guard_legs(self, solid)
+    type(solid_fraction_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, d, b, i(3), n(3)
+
+    do m = 1, solid%body_cell(size(solid%body_cell)) - 1
+      i = solid%cell(:, m)
+      b = solid%inside(i(1), i(2), i(3))
+      if (b == 0) cycle
+      do d = 1, 3
+        n = i - unit_step(:, d)
+        if (n(d) >= self%low(d)) then
+          if (solid%inside(n(1), n(2), n(3)) == 0 .and. solid%leg_low(i(1), i(2), i(3), d) > 1.0_wp) &
+            call shorten_leg([i, d], 1.0_wp, b, solid)
+        end if
+        n = i + unit_step(:, d)
+        if (n(d) <= self%high(d)) then
+          if (solid%inside(n(1), n(2), n(3)) == 0 .and. solid%leg_low(n(1), n(2), n(3), d) > 1.0_wp) &
+            call shorten_leg([n, d], 0.0_wp, b, solid)
+        end if
+      end do
+    end do
+  end subroutine guard_legs
+
+  !> Tetrahedra of the bodies where they are, in space; those of images elsewhere will follow.
+  pure subroutine place_bodies(grid, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_fraction_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b
+
+    solid%body_tet(1) = 1
+    solid%n_tet = 0
+    do b = 1, size(self%body)
+      if (self%near(b)) call place_tets(grid, self%body(b), self%body(b)%base, solid)
+      solid%body_tet(b + 1) = solid%n_tet + 1
+    end do
+  end subroutine place_bodies
+
+  !> Append the tetrahedra of a body at the place of one image.
+  pure subroutine place_tets(grid, body, offset, solid)
+    type(grid_t), intent(in) :: grid
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: offset(3)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: t, v
+
+    do t = 1, size(body%corner, 3)
+      solid%n_tet = solid%n_tet + 1
+      do v = 1, 4
+        solid%corner(:, v, solid%n_tet) = grid%origin + (real(offset, wp) + body%corner(:, v, t))*grid%h
+      end do
+    end do
+  end subroutine place_tets
+
+  !> Lists of tetrahedra by cut cell: those of its bodies one after the other.
+  pure subroutine tets_of_cut_cells(self, solid)
+    type(solid_fraction_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b, e, m, p, t, pass
+
+    solid%first(1:solid%n_cut + 1) = 0
+    do pass = 1, 2
+      do b = size(self%body), 1, -1
+        do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
+          associate (i => solid%cell(:, e), local => self%source(1, e))
+            m = solid%cut(i(1), i(2), i(3))
+            if (m == 0) cycle
+            associate (from => self%body(b)%first_tet(local), to => self%body(b)%first_tet(local + 1) - 1)
+              if (pass == 1) solid%first(m) = solid%first(m) + to - from + 1
+              if (pass == 1) cycle
+              do t = to, from, -1
+                solid%first(m) = solid%first(m) - 1
+                solid%tet(solid%first(m)) = self%body(b)%tet(t) + self%source(2, e)
+              end do
+            end associate
+          end associate
+        end do
+      end do
+      if (pass == 2) return
+      p = 1
+      do m = 1, solid%n_cut
+        p = p + solid%first(m)
+        solid%first(m) = p
+      end do
+      solid%first(solid%n_cut + 1) = p
+      if (size(solid%tet) < p - 1) then
+        deallocate (solid%tet)
+        allocate (solid%tet(2*p))
+      end if
+    end do
+  end subroutine tets_of_cut_cells
+
+  !> Close the faces of cut cells from which no way leads through open faces to a cell without solid.
+  subroutine close_pockets(grid, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_fraction_t), intent(inout) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer(i8) :: left(1), changed(1)
+    integer :: m
+
+    if (size(self%reached) < solid%n_cut) then
+      deallocate (self%reached, self%stack)
+      allocate (self%reached(2*solid%n_cut), self%stack(2*solid%n_cut))
+    end if
+    do m = 1, solid%n_cut
+      self%reached(m) = .false.
+    end do
+    call spread_reach(grid, self, solid)
+    left(1) = own_unreached(grid, self, solid)
+    call global_sum(left)
+    do while (left(1) > 0)
+      call exchange_reach(self, solid)
+      call spread_reach(grid, self, solid)
+      changed(1) = left(1)
+      left(1) = own_unreached(grid, self, solid)
+      call global_sum(left)
+      if (left(1) == changed(1)) exit
+    end do
+    solid%n_sealed = int(left(1))
+    if (left(1) == 0) return
+    call exchange_reach(self, solid)
+    do m = 1, solid%n_cut
+      if (self%reached(m)) cycle
+      solid%n_closed = solid%n_closed + 1
+      solid%closed_cell(:, solid%n_closed) = solid%cut_cell(:, m)
+      call set_faces(grid, solid%cut_cell(:, m), 0.0_wp, solid)
+    end do
+  end subroutine close_pockets
+
+  !> Own cut cells not yet reached.
+  pure function own_unreached(grid, self, solid) result(n)
+    type(grid_t), intent(in) :: grid
+    type(solid_fraction_t), intent(in) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer(i8) :: n
+    integer :: m
+
+    n = 0
+    do m = 1, solid%n_cut
+      if (self%reached(m)) cycle
+      if (all(solid%cut_cell(:, m) >= grid%lo) .and. all(solid%cut_cell(:, m) <= grid%hi)) n = n + 1_i8
+    end do
+  end function own_unreached
+
+  !> Learn from the owners which cut cells of the halo are reached.
+  subroutine exchange_reach(self, solid)
+    type(solid_fraction_t), intent(inout) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: m
+
+    self%flag = 0
+    do m = 1, solid%n_cut
+      associate (i => solid%cut_cell(:, m))
+        self%flag(i(1), i(2), i(3)) = merge(1, 0, self%reached(m))
+      end associate
+    end do
+    call halo_exchange(self%flag, n_halo)
+    do m = 1, solid%n_cut
+      associate (i => solid%cut_cell(:, m))
+        self%reached(m) = self%flag(i(1), i(2), i(3)) == 1
+      end associate
+    end do
+  end subroutine exchange_reach
+
+  !> Spread the reach through the open faces of the cells kept here.
+  subroutine spread_reach(grid, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_fraction_t), intent(inout) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: m, n_stack, d, s, i(3), n(3), f(3)
+
+    n_stack = 0
+    do m = 1, solid%n_cut
+      if (.not. self%reached(m)) self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
+      if (.not. self%reached(m)) cycle
+      n_stack = n_stack + 1
+      self%stack(n_stack) = m
+    end do
+    do while (n_stack > 0)
+      i = solid%cut_cell(:, self%stack(n_stack))
+      n_stack = n_stack - 1
+      do d = 1, 3
+        do s = 1, 2
+          n = i + (2*s - 3)*unit_step(:, d)
+          if (any(n < self%low) .or. any(n > self%high)) cycle
+          f = merge(i, n, s == 1)
+          if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
+          m = solid%cut(n(1), n(2), n(3))
+          if (m == 0) cycle
+          if (self%reached(m)) cycle
+          self%reached(m) = .true.
+          n_stack = n_stack + 1
+          self%stack(n_stack) = m
+        end do
+      end do
+    end do
+  end subroutine spread_reach
+
+  !> Does a cell share an open face with a cell without solid, or with an open side of the domain?
+  pure logical function touches_free_cell(self, grid, solid, i)
+    type(solid_fraction_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: i(3)
+    integer :: d, s, n(3), f(3)
+
+    touches_free_cell = .true.
+    do d = 1, 3
+      do s = 1, 2
+        n = i + (2*s - 3)*unit_step(:, d)
+        f = merge(i, n, s == 1)
+        if (f(d) > grid%hi(d) + n_halo) cycle
+        if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
+        if (n(d) < self%low(d) .or. n(d) > self%high(d)) then
+          if (leads_out(grid, d, s, n(d))) return
+        else if (solid%alpha(n(1), n(2), n(3)) <= 0.0_wp) then
+          return
+        end if
+      end do
+    end do
+    touches_free_cell = .false.
+  end function touches_free_cell
+
+  !> Is a cell index beyond a side of the domain through which fluid may pass?
+  pure logical function leads_out(grid, d, s, index)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d, s, index
+
+    leads_out = .false.
+    if (grid%periodic(d) .or. (index >= 1 .and. index <= grid%n(d))) return
+    leads_out = grid%side(s, d) /= side_no_slip .and. grid%side(s, d) /= side_slip
+  end function leads_out
+
+end module solid_fraction_m
