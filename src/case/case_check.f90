@@ -234,6 +234,7 @@ contains
           if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
             text = 'its centre lies '//brief(-beyond)//' m beyond '//side_name(s, d)
           end if
+        case default   ! a wall has been looked at, a periodic side is none
         end select
       end do
     end do

@@ -134,18 +134,25 @@ contains
   end subroutine visit_group
 
   !> Remember that a group is faulty, so that later checks leave it alone.
-  subroutine mark_faulty(case, name, n)
-    type(case_t), intent(inout) :: case
+  subroutine mark_faulty(input, name, n)
+    type(case_t), intent(inout) :: input
     character(*), intent(in) :: name
     integer, intent(in) :: n
 
     select case (name)
-    case ('grid'); case%grid%faulty = .true.
-    case ('boundary'); case%boundary%faulty = .true.
-    case ('water'); case%water(n)%faulty = .true.
-    case ('shape'); case%shape(n)%faulty = .true.
-    case ('body'); case%body(n)%faulty = .true.
-    case ('drop'); case%drop(n)%faulty = .true.
+    case ('grid')
+      input%grid%faulty = .true.
+    case ('boundary')
+      input%boundary%faulty = .true.
+    case ('water')
+      input%water(n)%faulty = .true.
+    case ('shape')
+      input%shape(n)%faulty = .true.
+    case ('body')
+      input%body(n)%faulty = .true.
+    case ('drop')
+      input%drop(n)%faulty = .true.
+    case default   ! nobody asks about the others
     end select
   end subroutine mark_faulty
 

@@ -48,7 +48,7 @@ contains
     select case (case%run%physics)
     case ('coupled'); call entry(unit, 'physics', 'coupled: water, air and blocks')
     case ('fluid'); call entry(unit, 'physics', 'fluid: water and air, no blocks')
-    case ('dry'); call entry(unit, 'physics', 'dry: blocks alone')
+    case default; call entry(unit, 'physics', 'dry: blocks alone')
     end select
     call entry(unit, 'simulated time', brief(case%run%t_end)//' s')
     if (case%run%stop_when_settled) then

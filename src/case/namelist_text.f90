@@ -12,7 +12,8 @@
 !! Separators are blanks, line ends and single commas (one more after the last value is fine); a
 !! comment runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
 module namelist_text_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
+    c_associated, c_loc
   use errors_m, only: problems_t, to_text
   use value_text_m, only: lower_case, printable, quoted_text, parse_integer, value_ok
   implicit none
@@ -69,34 +70,40 @@ module namelist_text_m
   interface
     function c_fopen(path, mode) bind(c, name='fopen') result(stream)
       import :: c_char, c_ptr
+      implicit none
       character(kind=c_char), intent(in) :: path(*), mode(*)
       type(c_ptr) :: stream
     end function c_fopen
     function c_fdopen(fd, mode) bind(c, name='fdopen') result(stream)
       import :: c_char, c_int, c_ptr
+      implicit none
       integer(c_int), value :: fd
       character(kind=c_char), intent(in) :: mode(*)
       type(c_ptr) :: stream
     end function c_fdopen
     function c_fread(buffer, size, count, stream) bind(c, name='fread') result(n)
-      import :: c_char, c_size_t, c_ptr
-      character(kind=c_char), intent(out) :: buffer(*)
+      import :: c_size_t, c_ptr
+      implicit none
+      type(c_ptr), value :: buffer
       integer(c_size_t), value :: size, count
       type(c_ptr), value :: stream
       integer(c_size_t) :: n
     end function c_fread
     function c_ferror(stream) bind(c, name='ferror') result(status)
       import :: c_int, c_ptr
+      implicit none
       type(c_ptr), value :: stream
       integer(c_int) :: status
     end function c_ferror
     function c_fclose(stream) bind(c, name='fclose') result(status)
       import :: c_int, c_ptr
+      implicit none
       type(c_ptr), value :: stream
       integer(c_int) :: status
     end function c_fclose
     function c_isatty(fd) bind(c, name='isatty') result(yes)
       import :: c_int
+      implicit none
       integer(c_int), value :: fd
       integer(c_int) :: yes
     end function c_isatty
@@ -111,7 +118,7 @@ contains
     character(*), intent(in) :: file
     character(:), allocatable, intent(out) :: text
     type(problems_t), intent(inout) :: problems
-    character(kind=c_char) :: piece(65536)
+    character(kind=c_char), target :: piece(65536)
     character(65536) :: part
     character(:), allocatable :: source
     type(c_ptr) :: stream
@@ -134,7 +141,7 @@ contains
       return
     end if
     do
-      n = int(c_fread(piece, 1_c_size_t, size(piece, kind=c_size_t), stream))
+      n = int(c_fread(c_loc(piece), 1_c_size_t, size(piece, kind=c_size_t), stream))
       if (n == 0 .or. len(text) > longest_text) exit
       do i = 1, n
         part(i:i) = piece(i)
