@@ -8,6 +8,7 @@ OPT := -O3 -march=native
 OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \
   -ffpe-trap=invalid,zero,overflow
 FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
+FFLAGS += $(if $(CI),-Werror)
 PYTHON := .venv/bin/python
 CASE := input/blocks.nml
 

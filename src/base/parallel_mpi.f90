@@ -344,6 +344,7 @@ contains
       n = before*width*after
       if (wraps(e)) call wrap_wp(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
+      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call grow_wp(n)
       do s = 1, 2
         call MPI_Irecv(coming%reals(:, s), n, MPI_DOUBLE_PRECISION, neighbour(s, e), 3 - s, &
@@ -388,6 +389,7 @@ contains
       n = before*width*after
       if (wraps(e)) call wrap_sp(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
+      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call grow_sp(n)
       do s = 1, 2
         call MPI_Irecv(coming%singles(:, s), n, MPI_REAL, neighbour(s, e), 3 - s, &
@@ -431,6 +433,7 @@ contains
       n = before*width*after
       if (wraps(e)) call wrap_integer(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
+      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
       call grow_integer(n)
       do s = 1, 2
         call MPI_Irecv(coming%integers(:, s), n, MPI_INTEGER, neighbour(s, e), 3 - s, &
