@@ -2,7 +2,7 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
-  use case_types_m, only: case_t, shape_input_t, is_given
+  use case_types_m, only: case_t, is_given
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
   use tet_mesh_m, only: shape_t
   implicit none

@@ -8,7 +8,7 @@ module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
   use case_types_m, only: is_given
-  use namelist_text_m, only: group_text_t, value_t
+  use namelist_text_m, only: group_text_t
   use not_yet_m, only: is_not_yet, not_yet_message
   use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
     quoted_text, printable, value_ok, value_not_finite, value_too_large, value_not_whole
