@@ -240,7 +240,7 @@ contains
     end associate
   end subroutine list_wall
 
-  !> Sphere pairs of near pair p of bodies, in the order of the spheres of a, then of b.
+  !> Sphere pairs of near pair p of bodies, in the order of the spheres of a, then of the bins of b.
   subroutine list_body(blocks, p, self)
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: p
@@ -270,9 +270,8 @@ contains
     real(wp), intent(in) :: c(3)   !! [m]
     type(contact_spheres_t), intent(inout) :: self
     real(wp) :: reach, d(3)
-    integer :: low(3), high(3), kx, ky, kz, bin, m, j, begin, slot_i, slot_j
+    integer :: low(3), high(3), kx, ky, kz, bin, m, j, slot_i, slot_j
 
-    begin = self%n_candidates + 1
     associate (set => self%set(blocks%shape(b)), shape => blocks%shapes(blocks%shape(b)))
       reach = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
       if (any(c + reach + set%largest < set%bins%low) &
@@ -295,26 +294,7 @@ contains
         end do
       end do
     end associate
-    call sort_by_sphere(self%sphere, self%j(begin:self%n_candidates))
   end subroutine list_sphere
-
-  !> Sort slots of one body by sphere number.
-  pure subroutine sort_by_sphere(sphere, slot)
-    integer, intent(in) :: sphere(:)
-    integer, intent(inout) :: slot(:)
-    integer :: k, m, s
-
-    do k = 2, size(slot)
-      s = slot(k)
-      m = k - 1
-      do while (m >= 1)
-        if (sphere(slot(m)) < sphere(s)) exit
-        slot(m + 1) = slot(m)
-        m = m - 1
-      end do
-      slot(m + 1) = s
-    end do
-  end subroutine sort_by_sphere
 
   !> Touches of pair p, a body and a wall. The contact lies on the wall.
   subroutine touch_wall(walls, blocks, self, p, touches)

@@ -1,6 +1,6 @@
 !> Contact of whole bodies: impacts, friction, rest, balances, and independence of bookkeeping.
 program test_contacts
-  use kinds_m, only: wp
+  use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: case_t, body_input_t
   use tet_mesh_m, only: shape_t
@@ -32,6 +32,7 @@ program test_contacts
   call check_bouncing_ball()
   call check_colliding_balls()
   call check_landing_cube()
+  call check_swinging_ball()
   call check_slip_to_roll()
   call check_incline()
   call check_incline_on_body()
@@ -208,6 +209,30 @@ contains
       height = max(height, shape%sphere_radius(i) - c(3))
     end do
   end function lowest
+
+  !> A ball at rest on the floor, nudged, swings on its tangential spring: with k_t = 2/7 k_n and the
+  !! mass 2/7 M that a ball sets against a tangential push, half a period is the contact time.
+  subroutine check_swinging_ball()
+    real(wp), parameter :: nudge = 1.0e-4_wp   ! too small to slip [m/s]
+    type(world_t) :: world
+    real(wp) :: slip, energy
+
+    call new_world(world, 1, 'ball')
+    world%case%contact%restitution = 1.0_wp
+    world%case%contact%wall_friction = 0.4_wp
+    world%gravity(3) = -g
+    world%case%body(1)%position(3) = 0.5_wp*d - g*(world%case%contact%contact_time/pi)**2
+    world%case%body(1)%velocity(1) = nudge
+    call start(world)
+    energy = kinetic_energy(world%blocks)
+    call run(world, 1)
+    slip = world%blocks%v(1, 1) - 0.5_wp*d*world%blocks%omega(2, 1)
+    call check('swings back', slip, -nudge, 0.01_wp*nudge)
+    call check('rolls on meanwhile', world%blocks%v(1, 1), 3*nudge/7, 0.01_wp*nudge)
+    call run(world, 1, 1.25_wp*dt)
+    call check('energy while swinging', kinetic_energy(world%blocks) + world%report%energy &
+      - 0.5_wp*world%blocks%mass(1)*(g*world%case%contact%contact_time/pi)**2, energy, 0.01_wp*energy)
+  end subroutine check_swinging_ball
 
   !> A ball set down sliding ends rolling at 5/7 of its speed after 2 v/(7 mu g).
   subroutine check_slip_to_roll()

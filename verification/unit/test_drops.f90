@@ -3,7 +3,7 @@ program test_drops
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: drop_input_t
-  use vectors_m, only: rotate, quaternion_from_axis
+  use vectors_m, only: rotate, quaternion_from_axis, quaternion_product
   use drops_m, only: draw_drop
   implicit none
 
@@ -52,7 +52,8 @@ contains
   subroutine check_tilt()
     integer, parameter :: n = 20000
     type(drop_input_t) :: drop
-    real(wp) :: x(3), q(4), given(4), up(3), angle, mean_angle, largest, axis(3), mean(3)
+    real(wp) :: x(3), q(4), given(4), turn(4), up(3), mean(3), square(3)
+    real(wp) :: angle, mean_angle, largest
     integer :: i
 
     given = quaternion_from_axis([1.0_wp, 2.0_wp, 3.0_wp], 1.0_wp)
@@ -62,17 +63,20 @@ contains
     mean_angle = 0.0_wp
     largest = 0.0_wp
     mean = 0.0_wp
+    square = 0.0_wp
     do i = 1, n
       call draw_drop(drop, i, x, q)
       angle = 2*acos(min(1.0_wp, abs(dot_product(q, given))))*180.0_wp/pi
       mean_angle = mean_angle + angle/real(n, wp)
       largest = max(largest, angle)
       up = rotate(given, [0.0_wp, 0.0_wp, 1.0_wp])
-      axis = rotate(q, [0.0_wp, 0.0_wp, 1.0_wp]) - up
-      mean = mean + axis/real(n, wp)
+      mean = mean + (rotate(q, [0.0_wp, 0.0_wp, 1.0_wp]) - up)/real(n, wp)
+      turn = quaternion_product(q, given*[1, -1, -1, -1])
+      square = square + turn(2:4)**2/sum(turn(2:4)**2)/real(n, wp)
     end do
     call check('largest tilt', largest, 10.0_wp, 0.01_wp)
     call check('mean tilt', mean_angle, 5.0_wp, 0.09_wp)   ! standard error 0.02
+    call check('about axes of all directions', maxval(abs(square - 1.0_wp/3.0_wp)), 0.0_wp, 0.009_wp)
     call check('to all sides', norm2(mean - dot_product(mean, up)*up), 0.0_wp, 0.002_wp)
     call check('unit quaternion', norm2(q), 1.0_wp, 1.0e-15_wp)
   end subroutine check_tilt

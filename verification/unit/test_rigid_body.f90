@@ -214,6 +214,7 @@ contains
     v = blocks%v(:, 1)
     l = blocks%l(:, 1)
     call begin_step(blocks)
+    blocks%fluid_torque(:, 1) = [-1.0e-3_wp, 5.0e-3_wp, 0.0_wp]
     call kick(g, dt, blocks%fluid_force, blocks%fluid_torque, blocks)   ! what the substeps may do
     blocks%contact_force(:, 1) = [0.3_wp, 0.2_wp, 0.1_wp]
     blocks%contact_torque(:, 1) = [1.0e-3_wp, 2.0e-3_wp, 3.0e-3_wp]
