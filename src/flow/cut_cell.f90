@@ -14,15 +14,15 @@ module cut_cell_m
   public :: cut_cell_t, cut_cell_init, load_cut_cell
   public :: open_below, open_constant, open_slab_below, tet_share_below
 
-  real(wp), parameter :: least_piece = 1.0e-20_wp   !! smaller pieces are left out [share of the box]
-  real(wp), parameter :: round_off = 1.0e-15_wp     !! accuracy of the volume below a found plane [share]
+  real(wp), parameter :: least_piece = 1.0e-20_wp   !! of pieces that count [share]
+  real(wp), parameter :: round_off = 1.0e-15_wp     !! volume below a found plane [share]
 
   type :: cut_cell_t
     integer :: n = 0                            !! pieces
     real(wp) :: open = 1.0_wp                   !! open share of the box
     real(wp), allocatable :: corner(:, :, :)    !! (3, 4, *) corners of the pieces, 0..1
     real(wp), allocatable :: share(:)           !! (*) their volumes [share of the box]
-    real(wp), allocatable :: height(:, :)       !! (4, *) rising values of m.x at the corners for one m
+    real(wp), allocatable :: height(:, :)       !! (4, *) rising m.x of the corners for one m
   end type cut_cell_t
 
 contains
@@ -247,7 +247,8 @@ contains
     low = [min(z(1), z(2)), min(z(3), z(4))]
     high = [max(z(1), z(2)), max(z(3), z(4))]
     middle = [max(low(1), low(2)), min(high(1), high(2))]
-    s = [min(low(1), low(2)), min(middle(1), middle(2)), max(middle(1), middle(2)), max(high(1), high(2))]
+    s = [min(low(1), low(2)), min(middle(1), middle(2)), &
+         max(middle(1), middle(2)), max(high(1), high(2))]
   end function rising
 
   !> Share of a tetrahedron below height a; no term cancels another.
@@ -264,7 +265,8 @@ contains
     else if (a < z(2)) then
       share = (a - z(1))/(z(2) - z(1))*((a - z(1))/(z(3) - z(1)))*((a - z(1))/(z(4) - z(1)))
     else if (a >= z(3)) then
-      share = 1.0_wp - (z(4) - a)/(z(4) - z(1))*((z(4) - a)/(z(4) - z(2)))*((z(4) - a)/(z(4) - z(3)))
+      share = 1.0_wp - (z(4) - a)/(z(4) - z(1))*((z(4) - a)/(z(4) - z(2))) &
+                       *((z(4) - a)/(z(4) - z(3)))
     else
       t13 = (a - z(1))/(z(3) - z(1))
       t14 = (a - z(1))/(z(4) - z(1))

@@ -22,10 +22,10 @@ module extended_fraction_m
   public :: extended_fraction_t, extended_fraction_init, extend_fraction, liquid_share, nearly_pure
 
   real(wp), parameter :: unknown = -1.0_wp           !! C^ not found yet
-  real(wp), parameter :: least_open_volume = 0.02_wp !! open share below which a cell takes its row's value
+  real(wp), parameter :: least_open_volume = 0.02_wp !! open share of a cell with a value of its own
   real(wp), parameter :: same_liquid = 1.0e-9_wp     !! liquid that the row's value may miss [V]
   real(wp), parameter :: nearly_pure = 1.0e-8_wp     !! share of gas or liquid that has no plane
-  integer, parameter :: plane_passes = 2             !! of the planes of cut cells, whose normals depend on each other
+  integer, parameter :: plane_passes = 2             !! their normals depend on each other
 
   type :: extended_fraction_t
     type(vertical_t) :: vertical
@@ -94,16 +94,20 @@ contains
   subroutine cells_without_solid(grid, solid, liquid, room, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: liquid(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: room(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                grid%lo(3) - n_halo:) :: liquid, room
+    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
     integer :: i, j, k
 
     !$omp parallel do private(i, j) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          c(i, j, k) = merge(liquid_share(liquid(i, j, k), room(i, j, k)), unknown, solid%alpha(i, j, k) <= 0.0_wp)
+          c(i, j, k) = unknown
+          if (solid%alpha(i, j, k) <= 0.0_wp) then
+            c(i, j, k) = liquid_share(liquid(i, j, k), room(i, j, k))
+          end if
         end do
       end do
     end do
@@ -141,10 +145,11 @@ contains
   subroutine spread_sideways(grid, solid, liquid, room, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: liquid(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: room(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                grid%lo(3) - n_halo:) :: liquid, room
     type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
     integer :: left, l
     integer(i8) :: count(2)   ! values found in this pass, cells left
     logical :: sideways
@@ -176,7 +181,8 @@ contains
     end do
     do l = 1, left   ! sealed in: what the cell itself holds
       associate (at => self%cell(:, self%open_list(l)))
-        c(at(1), at(2), at(3)) = liquid_share(liquid(at(1), at(2), at(3)), room(at(1), at(2), at(3)))
+        c(at(1), at(2), at(3)) = liquid_share(liquid(at(1), at(2), at(3)), &
+                                              room(at(1), at(2), at(3)))
       end associate
     end do
     call halo_exchange(c, n_halo)
@@ -189,7 +195,8 @@ contains
     logical, intent(in) :: sideways   !! only within the row
     type(extended_fraction_t), intent(inout) :: self
     integer, intent(inout) :: left    !! cells in the list
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
     integer :: l, kept, at(3)
 
     do l = 1, left
@@ -244,11 +251,12 @@ contains
   subroutine planes_of_cut_cells(grid, solid, liquid, room, may_accept, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: liquid(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: room(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                grid%lo(3) - n_halo:) :: liquid, room
     logical, intent(in) :: may_accept   !! first pass; later only cells with an own plane take part
     type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)
     integer :: l, at(3)
     real(wp) :: share, row
     logical :: accepted
@@ -256,7 +264,7 @@ contains
     !$omp parallel do private(at, share, row, accepted) schedule(dynamic, 8)
     do l = 1, self%n
       at = self%cell(:, l)
-      if (1.0_wp - solid%alpha(at(1), at(2), at(3)) <= least_open_volume) self%has_plane(l) = .false.
+      if (nearly_solid(solid, at)) self%has_plane(l) = .false.
       if (.not. self%has_plane(l)) cycle
       share = liquid_share(liquid(at(1), at(2), at(3)), room(at(1), at(2), at(3)))
       row = c(at(1), at(2), at(3))
@@ -272,7 +280,8 @@ contains
   end subroutine planes_of_cut_cells
 
   !> Is the row's value good for the cut cell, and which share lies below its own plane if not?
-  subroutine share_of_cut_cell(grid, solid, vertical, at, share, row, may_accept, c, cut, value, accepted)
+  subroutine share_of_cut_cell(grid, solid, vertical, at, share, row, may_accept, c, cut, value, &
+                               accepted)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(vertical_t), intent(in) :: vertical
@@ -280,7 +289,8 @@ contains
     real(wp), intent(in) :: share       !! of the open part
     real(wp), intent(in) :: row         !! value that the row offers
     logical, intent(in) :: may_accept
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)
     type(cut_cell_t), intent(inout) :: cut
     real(wp), intent(out) :: value
     logical, intent(out) :: accepted
@@ -290,7 +300,9 @@ contains
     value = share
     open = 1.0_wp - solid%alpha(at(1), at(2), at(3))
     if (may_accept .and. row <= same_liquid) accepted = share*open <= same_liquid
-    if (may_accept .and. row >= 1.0_wp - same_liquid) accepted = (1.0_wp - share)*open <= same_liquid
+    if (may_accept .and. row >= 1.0_wp - same_liquid) then
+      accepted = (1.0_wp - share)*open <= same_liquid
+    end if
     if (accepted) return
     if (row <= same_liquid .or. row >= 1.0_wp - same_liquid) then
       if (share <= nearly_pure .or. share >= 1.0_wp - nearly_pure) return
@@ -307,6 +319,15 @@ contains
     value = unit_volume(m, a)
   end subroutine share_of_cut_cell
 
+  !> Has this cell too little open space for a value of its own?
+  pure function nearly_solid(solid, at) result(yes)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: at(3)
+    logical :: yes
+
+    yes = 1.0_wp - solid%alpha(at(1), at(2), at(3)) <= least_open_volume
+  end function nearly_solid
+
   !> Cells almost or fully solid lose their value again, to get that of the finished row.
   subroutine forget_solid_cells(solid, self, c)
     type(solid_geometry_t), intent(in) :: solid
@@ -316,7 +337,7 @@ contains
 
     do l = 1, self%n
       associate (at => self%cell(:, l))
-        if (1.0_wp - solid%alpha(at(1), at(2), at(3)) <= least_open_volume) c(at(1), at(2), at(3)) = unknown
+        if (nearly_solid(solid, at)) c(at(1), at(2), at(3)) = unknown
       end associate
     end do
   end subroutine forget_solid_cells

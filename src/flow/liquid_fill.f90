@@ -88,7 +88,8 @@ contains
         if (all(a(:, n) <= 0.0_wp .and. b(:, n) >= 1.0_wp)) share = 1.0_wp
       end do
       if (n == 0 .or. share >= 1.0_wp) return
-      call open_union(grid, solid, solid%cut(at(1), at(2), at(3)), corner, a(:, 1:n), b(:, 1:n), cut, share)
+      call open_union(grid, solid, solid%cut(at(1), at(2), at(3)), corner, a(:, 1:n), b(:, 1:n), &
+                      cut, share)
     end function share_in_boxes
   end subroutine fill_liquid
 
@@ -234,7 +235,8 @@ contains
           kept = share*room
           if (share > nearly_pure .and. share < 1.0_wp - nearly_pure .and. room > 0.0_wp) then
             m = surface_normal(grid, before, vertical, flow%c, i, j, k)
-            call load_cut_cell(after, after%cut(i, j, k), grid%face([i, j, k], [1, 2, 3]), grid%h, cut)
+            call load_cut_cell(after, after%cut(i, j, k), grid%face([i, j, k], [1, 2, 3]), &
+                               grid%h, cut)
             call open_below(cut, m, unit_constant(m, flow%c(i, j, k)), below)
             kept = room*min(max(below/max(cut%open, tiny(below)), 0.0_wp), 1.0_wp)
           end if
@@ -306,7 +308,8 @@ contains
       integer :: n
 
       do n = 1, size(gain)
-        call layer_in_cell(grid, solid, vertical, cell(:, n), surface_at(cell(:, n)), height, cut, gain(n))
+        call layer_in_cell(grid, solid, vertical, cell(:, n), surface_at(cell(:, n)), height, cut, &
+                           gain(n))
         associate (at => cell(:, n))
           gain(n) = min(gain(n), flow%room(at(1), at(2), at(3)) - flow%liquid(at(1), at(2), at(3)))
         end associate

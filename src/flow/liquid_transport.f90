@@ -25,8 +25,7 @@ module liquid_transport_m
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_constant, open_slab_below
   use surface_normal_m, only: surface_normal
   use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
-  use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction, &
-                                 liquid_share
+  use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use exact_sum_m, only: exact_sum
   use parallel_m, only: halo_exchange, global_max, global_sum
   implicit none
@@ -35,20 +34,21 @@ module liquid_transport_m
   public :: transport_liquid, begin_transport, sweep, small_cells, finish_transport
   public :: late_values, move_late
 
-  real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume that a cell may give in the sweeps
-  real(wp), parameter :: least_volume = 1.0e-6_wp   !! open volume of the smallest cell of the sweeps [V]
-  real(wp), parameter :: pure_open = 1.0e-11_wp     !! share below which a cell without solid has no plane
-  real(wp), parameter :: pure_cut = 1.0e-8_wp       !! the same for a cut cell
+  real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
+  real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
+  real(wp), parameter :: pure_open = 1.0e-11_wp     !! least share that has a plane, no solid
+  real(wp), parameter :: pure_cut = 1.0e-8_wp       !! the same in a cut cell
   real(wp), parameter :: closed_volume = 1.0e-12_wp !! open volume of a closed cell [V]
   integer, parameter :: max_late_iterations = 1000
 
   !> The six orders of the directions.
-  integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 1, 3, 2, 2, 1, 3], [3, 6])
+  integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 1, 3, 2, &
+                                             2, 1, 3], [3, 6])
 
   type :: liquid_transport_t
     type(open_flux_t) :: flux
     type(extended_fraction_t) :: extension
-    real(wp) :: incoming(2, 3) = 0.0_wp       !! liquid share of what comes in through a side of the domain
+    real(wp) :: incoming(2, 3) = 0.0_wp       !! liquid share of what enters through a side
     integer :: order(3) = [1, 2, 3]           !! directions of this step's sweeps
     !> Volumes through the lower faces, all and liquid, positive along the axis; faces lo..hi+1
     !! [m3]. Those of small donors are zero during the sweeps and stand there after `small_cells`.
@@ -70,9 +70,9 @@ module liquid_transport_m
     integer :: small_open = 0                 !! of them without solid: the time step is long
     integer :: late_iterations = 0
     real(wp) :: clamped = 0.0_wp              !! largest change by the round-off guard of a slab [V]
-    real(wp) :: held = 0.0_wp                 !! liquid that stays in closed cells until they open [m3]
+    real(wp) :: held = 0.0_wp                 !! liquid in closed cells until they open [m3]
     ! Work arrays.
-    real(wp), allocatable :: out_low(:, :, :), out_high(:, :, :)   !! liquid that leaves through either face
+    real(wp), allocatable :: out_low(:, :, :), out_high(:, :, :)   !! liquid leaving by either face
     real(wp), allocatable :: value(:, :, :)
     integer, allocatable :: number(:, :, :)   !! of a small cell, 0 for others; halo filled
     integer :: n_mixed = 0
@@ -524,12 +524,21 @@ contains
                              - max(self%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp)) &
                             + (max(self%q(i, j, k, d), 0.0_wp) &
                                + max(-self%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp))
-          if (old%alpha(i, j, k) <= 0.0_wp) &
-            self%c(i, j, k) = liquid_share(self%w(i, j, k), self%v(i, j, k))
+          if (old%alpha(i, j, k) <= 0.0_wp) then
+            self%c(i, j, k) = share_of(self%w(i, j, k), self%v(i, j, k))
+          end if
         end do
       end do
     end do
   end subroutine move_volumes
+
+  !> Liquid share of a volume, within 0 and 1.
+  elemental function share_of(w, v) result(share)
+    real(wp), intent(in) :: w, v
+    real(wp) :: share
+
+    share = min(max(w/merge(v, 1.0_wp, v > 0.0_wp), 0.0_wp), 1.0_wp)
+  end function share_of
 
   !> The small cells give: w and v are final, q and g are complete.
   subroutine small_cells(grid, self)
@@ -562,13 +571,13 @@ contains
   subroutine late_values(grid, amount, mass, weight, self, value)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: amount(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                               grid%lo(3) - n_halo:)  !! carried quantity after the sweeps
+                                               grid%lo(3) - n_halo:)  !! carried, after the sweeps
     real(wp), intent(in), contiguous :: mass(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)    !! mass or volume after the sweeps
+                                             grid%lo(3) - n_halo:)    !! mass or volume then
     real(wp), intent(in) :: weight(:)   !! of the late faces, like `mass`, positive
     type(liquid_transport_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: value(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:)  !! of small cells, halo filled
+                                                 grid%lo(3) - n_halo:)  !! of small cells
     integer(i8) :: faces(1)
     integer :: it, l, s, at(3)
     real(wp) :: change(2)   ! largest change and largest value
@@ -581,7 +590,9 @@ contains
       at = self%small_cell(:, s)
       self%mass(s) = mass(at(1), at(2), at(3))
       value(at(1), at(2), at(3)) = 0.0_wp
-      if (self%mass(s) > 0.0_wp) value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
+      if (self%mass(s) > 0.0_wp) then
+        value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
+      end if
     end do
     do l = 1, self%n_late
       s = number_of(self%receiver(:, l))
@@ -635,10 +646,12 @@ contains
     do l = 1, self%n_late
       up = self%late_face(1:3, l)
       low = up - unit_step(:, self%late_face(4, l))
-      if (all(low >= grid%lo .and. low <= grid%hi)) &
+      if (all(low >= grid%lo .and. low <= grid%hi)) then
         amount(low(1), low(2), low(3)) = amount(low(1), low(2), low(3)) - flux(l)
-      if (all(up >= grid%lo .and. up <= grid%hi)) &
+      end if
+      if (all(up >= grid%lo .and. up <= grid%hi)) then
         amount(up(1), up(2), up(3)) = amount(up(1), up(2), up(3)) + flux(l)
+      end if
     end do
   end subroutine move_late
 

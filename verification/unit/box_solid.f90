@@ -9,7 +9,8 @@ module box_solid_m
   private
   public :: set_boxes, simple_grid
 
-  integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 2, 1, 3, 1, 3, 2], [3, 6])
+  integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, &
+                                             2, 1, 3, 1, 3, 2], [3, 6])
 
 contains
 
@@ -68,7 +69,8 @@ contains
             solid%open(i, j, k, d) = max(1.0_wp - cover, 0.0_wp)
             if (solid%open(i, j, k, d) < 1.0e-9_wp) solid%open(i, j, k, d) = 0.0_wp
           end do
-          if (solid%alpha(i, j, k) > 0.0_wp .and. solid%alpha(i, j, k) < 1.0_wp) call add_cut_cell([i, j, k])
+          cover = solid%alpha(i, j, k)
+          if (cover > 0.0_wp .and. cover < 1.0_wp) call add_cut_cell([i, j, k])
         end do
       end do
     end do
@@ -78,8 +80,8 @@ contains
       integer, intent(in) :: c(3), b
       real(wp) :: part(3)
 
-      part = max(min(grid%face(c + 1, [1, 2, 3]), high(:, b)) - max(grid%face(c, [1, 2, 3]), low(:, b)), 0.0_wp)
-      part = part/grid%h
+      part = min(grid%face(c + 1, [1, 2, 3]), high(:, b)) - max(grid%face(c, [1, 2, 3]), low(:, b))
+      part = max(part, 0.0_wp)/grid%h
     end function inside
 
     subroutine add_cut_cell(c)
@@ -89,8 +91,9 @@ contains
       m = solid%n_cut + 1
       if (m + 1 > size(solid%first)) solid%first = [solid%first, spread(0, 1, m + 1)]
       solid%first(1) = 1
-      if (solid%first(m) + 6*size(low, 2) > size(solid%tet)) &
+      if (solid%first(m) + 6*size(low, 2) > size(solid%tet)) then
         solid%tet = [solid%tet, spread(0, 1, size(solid%tet) + 6*size(low, 2))]
+      end if
       solid%first(m + 1) = solid%first(m)
       do t = 1, 6*size(low, 2)
         if (any(inside(c, (t + 5)/6) <= 0.0_wp)) cycle

@@ -14,8 +14,9 @@ program test_cut_cell
   call cut_cell_init(cut)
   call box_in_cell([-0.3_wp, 0.2_wp, 0.1_wp], [0.6_wp, 1.7_wp, 0.8_wp], 'box that sticks out')
   call box_in_cell([0.25_wp, 0.3_wp, 0.35_wp], [0.75_wp, 0.6_wp, 0.9_wp], 'box inside')
-  call box_in_cell([-2.0_wp, -3.0_wp, -1.0_wp], [0.999999_wp, 2.0_wp, 1.5_wp], 'box that fills nearly all')
-  call box_in_cell([0.5_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], 'box on the faces of the cell')
+  call box_in_cell([-2.0_wp, -3.0_wp, -1.0_wp], [0.999999_wp, 2.0_wp, 1.5_wp], &
+                   'box that fills nearly all')
+  call box_in_cell([0.5_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], 'box on the faces')
   call cell_without_open_part()
   call finish_checks()
 
@@ -25,7 +26,8 @@ contains
   subroutine set_box(a, b, solid)
     real(wp), intent(in) :: a(3), b(3)
     type(solid_geometry_t), intent(inout) :: solid
-    integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 2, 1, 3, 1, 3, 2], [3, 6])
+    integer, parameter :: path(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, &
+                                               2, 1, 3, 1, 3, 2], [3, 6])
     integer :: t, v
     real(wp) :: x(3)
 
@@ -47,7 +49,8 @@ contains
     real(wp), intent(in) :: a(3), b(3)
     character(*), intent(in) :: name
     type(solid_geometry_t) :: solid
-    real(wp) :: from(3), edge(3), m(3), s, share, exact, worst_below, worst_inverse, worst_slab, limit, c
+    real(wp) :: from(3), edge(3), m(3), s, share, exact, limit, c
+    real(wp) :: worst_below, worst_inverse, worst_slab
     integer :: i, d
 
     call set_box(a, b, solid)

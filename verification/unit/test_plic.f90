@@ -64,13 +64,16 @@ contains
     third = 1.0_wp/3.0_wp
     call check('plane through three corners', unit_volume([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp), &
                1.0_wp/6.0_wp, 1.0e-15_wp)
-    call check('plane through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), 0.5_wp, 1.0e-15_wp)
+    call check('plane through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), &
+               0.5_wp, 1.0e-15_wp)
     call check('hexagon', unit_volume([third, third, third], 0.4_wp), &
                (1.2_wp**3 - 3.0_wp*0.2_wp**3)/6.0_wp, 1.0e-15_wp)
-    call check('plane parallel to a face', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), 0.75_wp, 1.0e-15_wp)
+    call check('plane parallel to a face', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), &
+               0.75_wp, 1.0e-15_wp)
     call check('wedge', unit_volume([0.25_wp, 0.75_wp, 0.0_wp], 0.5_wp), 0.5_wp, 1.0e-15_wp)
     call check('box of edges 1, 2, 3', volume_below([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp, &
-                                                    [1.0_wp, 2.0_wp, 3.0_wp]), 1.0_wp/6.0_wp, 1.0e-15_wp)
+                                                    [1.0_wp, 2.0_wp, 3.0_wp]), &
+               1.0_wp/6.0_wp, 1.0e-15_wp)
     call check('constant of the plane through three corners', &
                unit_constant([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp/6.0_wp), 1.0_wp, 1.0e-14_wp)
   end subroutine against_exact_volumes
@@ -85,7 +88,7 @@ contains
       small = 10.0_wp**(-k)
       do i = 1, 99
         b = 0.01_wp*real(i, wp)
-        flat = unit_volume([0.0_wp, 0.4_wp, 0.6_wp], b - 0.5_wp*small)   ! equal to second order in small
+        flat = unit_volume([0.0_wp, 0.4_wp, 0.6_wp], b - 0.5_wp*small)   ! equal to second order
         worst = max(worst, abs(unit_volume([small, 0.4_wp, 0.6_wp], b) - flat) - small**2)
       end do
     end do
@@ -130,9 +133,10 @@ contains
     n = [0.0_wp, 0.0_wp, 1.0_wp]
     call check('slab beside the lower face is under water', &
                liquid_in_slab(n, 1.0_wp, h, 3, 1, 0.5_wp), 1.0_wp, 1.0e-15_wp)
-    call check('slab beside the upper face is dry', liquid_in_slab(n, 1.0_wp, h, 3, 2, 0.5_wp), 0.0_wp, &
-               1.0e-15_wp)
-    call check('slab across is a quarter full', liquid_in_slab(n, 1.0_wp, h, 1, 2, 0.5_wp), 1.0_wp, 1.0e-15_wp)
+    call check('slab beside the upper face is dry', liquid_in_slab(n, 1.0_wp, h, 3, 2, 0.5_wp), &
+               0.0_wp, 1.0e-15_wp)
+    call check('slab across is a quarter full', liquid_in_slab(n, 1.0_wp, h, 1, 2, 0.5_wp), &
+               1.0_wp, 1.0e-15_wp)
   end subroutine slabs_add_up
 
   !> Shares of the 27 cells below the plane n.x = d; the centre cell is 0..1 in each direction.
@@ -156,7 +160,7 @@ contains
 
     worst = 0.0_wp
     do i = 1, 200
-      n = [0.2_wp*sin(real(i, wp)), 0.2_wp*cos(3.0_wp*real(i, wp)), 1.0_wp]   ! flat enough for columns of 3
+      n = [0.2_wp*sin(real(i, wp)), 0.2_wp*cos(3.0_wp*real(i, wp)), 1.0_wp]   ! flat enough
       n = cshift(n, i)*merge(1.0_wp, -1.0_wp, modulo(i, 2) == 0)
       n = n/sum(abs(n))
       m = unit_normal(shares(n, unit_constant(n, 0.5_wp)))

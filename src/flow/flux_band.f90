@@ -1,0 +1,420 @@
+!> The band of cells around the bodies as a graph: lists of its cells, sorted by connected part.
+!!
+!! Cells are joined by the conductance k of the face between them. A part that a wall or another
+!! body separates from the rest has a volume balance of its own. Parts reach across processes; they
+!! are numbered by the smallest cell number in them, so the numbering does not depend on the
+!! processes.
+module flux_band_m
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, unit_step
+  use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
+  use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
+  implicit none
+  private
+  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, side_at
+
+  type :: flux_band_t
+    ! Arrays over cells with one halo cell.
+    integer, allocatable :: marked(:, :, :)  !! 1: in the band; 2 while it is marked: holds solid
+    integer, allocatable :: number(:, :, :)  !! place in the list as found, 0: not in it
+    integer, allocatable :: label(:, :, :)   !! smallest global cell number of the connected part
+    real(wp), allocatable :: k(:, :, :, :)   !! conductance of the lower faces, largest face = 1 [-]
+    real(wp), allocatable :: p(:, :, :)      !! search direction, in the end the potential [V]
+
+    !> The cells, sorted by part; in each part those that the solver eliminates ("red": no two of
+    !! them are neighbours) come first: red cells of part c are `first(2c-1):first(2c)-1`, the
+    !! others, black, `first(2c):first(2c+1)-1`.
+    integer :: n = 0
+    integer, allocatable :: at(:)            !! place in the arrays above with their halo, from 1
+    real(wp), allocatable :: r(:)            !! volume balance of the cell [V]
+    real(wp), allocatable :: diagonal(:)     !! sum of the conductances of its faces
+    real(wp), allocatable :: s(:), phi(:), terms(:)   !! work of the solver
+    integer, allocatable :: root(:), group(:), order(:), spare(:)
+
+    !> The connected parts, of all processes.
+    integer :: parts = 0
+    integer, allocatable :: first(:)         !! (2 parts + 1)
+    integer(i8), allocatable :: home(:)      !! (parts) labels, rising
+    integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
+    integer(i8), allocatable :: count(:)     !! (2 parts) cells, and cells at an open side
+    integer(i8), allocatable :: bins(:, :)
+    real(wp), allocatable :: total(:), before(:), largest(:)
+    logical, allocatable :: active(:)        !! (parts) still to be solved
+  end type flux_band_t
+
+contains
+
+  !> Allocate; lists grow by doubling.
+  subroutine flux_band_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(out) :: self
+    integer, parameter :: first_size = 4096, first_parts = 64
+    integer :: a(3), b(3)
+
+    a = grid%lo - 1
+    b = grid%hi + 1
+    allocate (self%marked(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (self%number, self%label, source=self%marked)
+    allocate (self%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%held(0:nproc() - 1), source=0_i8)
+    call allocate_lists(first_size, self)
+    call allocate_parts(first_parts, self)
+  end subroutine flux_band_init
+
+  subroutine allocate_lists(n, self)
+    integer, intent(in) :: n
+    type(flux_band_t), intent(inout) :: self
+
+    allocate (self%at(n), self%root(n), self%group(n), self%order(n), self%spare(n))
+    allocate (self%r(n), self%s(n), self%phi(n), self%diagonal(n), self%terms(n))
+  end subroutine allocate_lists
+
+  subroutine allocate_parts(n, self)
+    integer, intent(in) :: n
+    type(flux_band_t), intent(inout) :: self
+
+    allocate (self%first(2*n + 1), self%home(n), self%count(2*n), self%bins(bin_size, n))
+    allocate (self%total(n), self%before(n), self%largest(n), self%active(n))
+  end subroutine allocate_parts
+
+  !> Twice the room in the lists, the entries kept.
+  subroutine grow_lists(self)
+    type(flux_band_t), intent(inout) :: self
+    integer, allocatable :: at(:)
+    real(wp), allocatable :: r(:), diagonal(:)
+    integer :: n
+
+    n = self%n
+    call move_alloc(self%at, at)
+    call move_alloc(self%r, r)
+    call move_alloc(self%diagonal, diagonal)
+    deallocate (self%root, self%group, self%order, self%spare, self%s, self%phi, self%terms)
+    call allocate_lists(2*n, self)
+    self%at(1:n) = at(1:n)
+    self%r(1:n) = r(1:n)
+    self%diagonal(1:n) = diagonal(1:n)
+  end subroutine grow_lists
+
+  !> Append a cell to the list; call in the order of the grid.
+  subroutine add_cell(grid, cell, r, diagonal, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: cell(3)
+    real(wp), intent(in) :: r, diagonal
+    type(flux_band_t), intent(inout) :: self
+
+    if (self%n == size(self%at)) call grow_lists(self)
+    self%n = self%n + 1
+    self%number(cell(1), cell(2), cell(3)) = self%n
+    self%at(self%n) = place(grid, cell)
+    self%r(self%n) = r
+    self%diagonal(self%n) = diagonal
+  end subroutine add_cell
+
+  !> Place of a cell in the arrays with one halo cell, counted from 1.
+  pure function place(grid, cell) result(m)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: cell(3)
+    integer :: m
+    integer :: c(3), extent(3)
+
+    extent = grid%hi - grid%lo + 3
+    c = cell - grid%lo + 1
+    m = 1 + c(1) + extent(1)*(c(2) + extent(2)*c(3))
+  end function place
+
+  !> Cell of a place.
+  pure function cell_at(grid, m) result(c)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: m
+    integer :: c(3)
+    integer :: extent(3)
+
+    extent = grid%hi - grid%lo + 3
+    c(1) = modulo(m - 1, extent(1))
+    c(2) = modulo((m - 1)/extent(1), extent(2))
+    c(3) = (m - 1)/(extent(1)*extent(2))
+    c = c + grid%lo - 1
+  end function cell_at
+
+  !> Number of a cell in the whole domain, from 1.
+  pure function global_number(grid, c) result(g)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c(3)
+    integer :: g
+
+    g = c(1) + grid%n(1)*(c(2) - 1 + grid%n(2)*(c(3) - 1))
+  end function global_number
+
+  !> May the solver eliminate this cell? No two such cells are neighbours, periodic ones included.
+  pure function is_red(grid, c) result(red)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c(3)
+    logical :: red
+
+    red = modulo(sum(c), 2) == 0 .and. &
+          .not. any(grid%periodic .and. modulo(grid%n, 2) == 1 .and. c == grid%n)
+  end function is_red
+
+  !> What lies at lower face number i of direction d: 0 a neighbour cell, else the code of the side.
+  pure function side_at(grid, i, d) result(side)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: i, d
+    integer :: side
+
+    side = 0
+    if (grid%periodic(d)) return
+    if (i == 1) side = grid%side(1, d)
+    if (i == grid%n(d) + 1) side = grid%side(2, d)
+  end function side_at
+
+  !> Find the connected parts, on all processes, and sort the list by them.
+  subroutine find_parts(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, c(3)
+
+    call join_neighbours(grid, self)
+    call join_processes(grid, self)
+    call list_parts(grid, self)
+    do l = 1, self%n
+      c = cell_at(grid, self%at(l))
+      self%group(l) = 2*position(int(self%label(c(1), c(2), c(3)), i8), self%home(1:self%parts))
+      if (is_red(grid, c)) self%group(l) = self%group(l) - 1
+    end do
+    call sort_by_group(self)
+  end subroutine find_parts
+
+  !> Join cells of this process across faces with a conductance: `root` of each cell of the list.
+  subroutine join_neighbours(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, d, c(3), e(3), m, a, b
+
+    do l = 1, self%n
+      self%root(l) = l
+    end do
+    do l = 1, self%n
+      c = cell_at(grid, self%at(l))
+      do d = 1, 3
+        if (.not. self%k(c(1), c(2), c(3), d) > 0.0_wp) cycle
+        e = c - unit_step(:, d)
+        m = self%number(e(1), e(2), e(3))
+        if (m == 0) cycle
+        call find_root(self%root, l, a)
+        call find_root(self%root, m, b)
+        self%root(max(a, b)) = min(a, b)
+      end do
+    end do
+    do l = 1, self%n
+      call find_root(self%root, l, self%spare(l))
+    end do
+    self%root(1:self%n) = self%spare(1:self%n)
+  end subroutine join_neighbours
+
+  !> Root of a cell; the path to it is shortened for the next call.
+  pure subroutine find_root(root, l, found)
+    integer, intent(inout) :: root(:)
+    integer, intent(in) :: l
+    integer, intent(out) :: found
+
+    found = l
+    do while (root(found) /= found)
+      root(found) = root(root(found))
+      found = root(found)
+    end do
+  end subroutine find_root
+
+  !> Give all cells of a connected part, on whatever process, the smallest global number in it.
+  subroutine join_processes(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, c(3)
+    integer(i8) :: changes(1)
+
+    associate (smallest => self%spare)
+      do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
+        smallest(l) = global_number(grid, cell_at(grid, self%at(l)))
+      end do
+      self%label = 0
+      do
+        do l = 1, self%n
+          c = cell_at(grid, self%at(l))
+          self%label(c(1), c(2), c(3)) = smallest(self%root(l))
+        end do
+        call halo_exchange(self%label, 1)
+        changes = 0_i8
+        do l = 1, self%n
+          c = cell_at(grid, self%at(l))
+          if (all(c > grid%lo .and. c < grid%hi)) cycle
+          call look_across(c, smallest(self%root(l)))
+        end do
+        call global_sum(changes)
+        if (changes(1) == 0_i8) exit
+      end do
+    end associate
+  contains
+    !> Take over a smaller label from a neighbour behind an open face.
+    subroutine look_across(c, label)
+      integer, intent(in) :: c(3)
+      integer, intent(inout) :: label
+      integer :: d, s, f(3), nb(3)
+
+      do d = 1, 3
+        do s = 0, 1
+          f = c + s*unit_step(:, d)
+          nb = c + (2*s - 1)*unit_step(:, d)
+          if (.not. self%k(f(1), f(2), f(3), d) > 0.0_wp) cycle
+          if (self%label(nb(1), nb(2), nb(3)) == 0) cycle
+          if (self%label(nb(1), nb(2), nb(3)) >= label) cycle
+          label = self%label(nb(1), nb(2), nb(3))
+          changes = changes + 1_i8
+        end do
+      end do
+    end subroutine look_across
+  end subroutine join_processes
+
+  !> The labels of all parts on all processes, rising.
+  subroutine list_parts(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, c(3), rank, n
+
+    rank = my_rank()
+    self%held = 0_i8
+    do l = 1, self%n
+      if (is_home(l)) self%held(rank) = self%held(rank) + 1_i8
+    end do
+    call global_sum(self%held)
+    self%parts = int(sum(self%held))
+    if (self%parts > size(self%home)) then
+      deallocate (self%first, self%home, self%count, self%bins)
+      deallocate (self%total, self%before, self%largest, self%active)
+      call allocate_parts(2*self%parts, self)
+    end if
+    self%home(1:self%parts) = 0_i8
+    n = int(sum(self%held(0:rank - 1)))
+    do l = 1, self%n
+      if (.not. is_home(l)) cycle
+      n = n + 1
+      c = cell_at(grid, self%at(l))
+      self%home(n) = int(global_number(grid, c), i8)
+    end do
+    call global_sum(self%home(1:self%parts))
+    call sort(self%home(1:self%parts))
+  contains
+    !> Is this the cell that gave its part the label?
+    logical function is_home(l)
+      integer, intent(in) :: l
+      integer :: c(3)
+
+      c = cell_at(grid, self%at(l))
+      is_home = self%label(c(1), c(2), c(3)) == global_number(grid, c)
+    end function is_home
+  end subroutine list_parts
+
+  !> Rising order, in place; the lists of parts are short.
+  pure subroutine sort(a)
+    integer(i8), intent(inout) :: a(:)
+    integer(i8) :: key
+    integer :: i, j
+
+    do i = 2, size(a)
+      key = a(i)
+      j = i - 1
+      do while (j >= 1)
+        if (a(j) <= key) exit
+        a(j + 1) = a(j)
+        j = j - 1
+      end do
+      a(j + 1) = key
+    end do
+  end subroutine sort
+
+  !> Place of a label in the rising list that holds it.
+  pure function position(label, list) result(p)
+    integer(i8), intent(in) :: label, list(:)
+    integer :: p
+    integer :: high, middle
+
+    p = 1
+    high = size(list)
+    do while (p < high)
+      middle = (p + high)/2
+      if (list(middle) < label) then
+        p = middle + 1
+      else
+        high = middle
+      end if
+    end do
+  end function position
+
+  !> Stable sort of the lists by group; `first` marks where each begins.
+  subroutine sort_by_group(self)
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, g, groups
+
+    groups = 2*self%parts
+    self%first(1:groups + 1) = 0
+    do l = 1, self%n
+      self%first(self%group(l) + 1) = self%first(self%group(l) + 1) + 1
+    end do
+    self%first(1) = 1
+    do g = 1, groups
+      self%first(g + 1) = self%first(g + 1) + self%first(g)
+    end do
+    do l = self%n, 1, -1   ! from the back, so that a group keeps its order
+      g = self%group(l)
+      self%first(g + 1) = self%first(g + 1) - 1
+      self%order(self%first(g + 1)) = l
+    end do
+    do g = 1, groups       ! the ends have moved down to the begins
+      self%first(g) = self%first(g + 1)
+    end do
+    self%first(groups + 1) = self%n + 1
+    do l = 1, self%n
+      self%spare(l) = self%at(self%order(l))
+      self%terms(l) = self%r(self%order(l))
+      self%s(l) = self%diagonal(self%order(l))
+    end do
+    self%at(1:self%n) = self%spare(1:self%n)
+    self%r(1:self%n) = self%terms(1:self%n)
+    self%diagonal(1:self%n) = self%s(1:self%n)
+  end subroutine sort_by_group
+
+  !> Cells, cells at an open side and the sum of r of each part over all processes.
+  subroutine sum_by_part(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: c, l, n
+
+    n = self%parts
+    self%count(1:2*n) = 0_i8
+    do c = 1, n
+      self%count(c) = int(self%first(2*c + 1) - self%first(2*c - 1), i8)
+      do l = self%first(2*c - 1), self%first(2*c + 1) - 1
+        if (at_open_side(cell_at(grid, self%at(l)))) self%count(n + c) = self%count(n + c) + 1_i8
+      end do
+      self%bins(:, c) = no_terms
+      call exact_add(self%r(self%first(2*c - 1):self%first(2*c + 1) - 1), self%bins(:, c))
+    end do
+    call global_sum(self%count(1:2*n))
+    call exact_totals(self%bins(:, 1:n), self%total(1:n))
+  contains
+    !> Can this cell exchange through an open side of the domain?
+    logical function at_open_side(c)
+      integer, intent(in) :: c(3)
+      integer :: d, s, f(3)
+
+      at_open_side = .false.
+      do d = 1, 3
+        do s = 0, 1
+          f = c + s*unit_step(:, d)
+          if (side_at(grid, f(d), d) == 0) cycle
+          if (self%k(f(1), f(2), f(3), d) > 0.0_wp) at_open_side = .true.
+        end do
+      end do
+    end function at_open_side
+  end subroutine sum_by_part
+
+end module flux_band_m
