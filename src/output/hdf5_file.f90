@@ -48,6 +48,7 @@ module hdf5_file_m
     procedure :: flush => file_flush
     procedure :: group => file_group
     procedure :: has => file_has
+    procedure :: remove => file_remove
     procedure, private :: attribute_text, attribute_integer, attribute_integers, attribute_real
     procedure, private :: attribute_reals, attribute_matrix
     generic :: attribute => attribute_text, attribute_integer, attribute_integers, attribute_real, &
@@ -64,8 +65,9 @@ module hdf5_file_m
     procedure, private :: read_reals, read_integers
     generic :: read => read_reals, read_integers
     procedure :: new_blocks, write_block, read_block
-    procedure :: new_column, open_column, resize, append, append_integers, append_block, read_row
-    procedure, private :: check, agree, write_attribute, new_dataset, select, transfer_row
+    procedure :: new_column, open_column, resize, append, append_rows, append_integers, append_wide
+    procedure :: append_block, read_row, count_rows
+    procedure, private :: check, agree, write_attribute, new_dataset, select, transfer_rows
   end type h5_file_t
 
 contains
@@ -207,6 +209,17 @@ contains
     call h5lexists_f(self%id, name, yes, status)
     call self%check(status, 'look for '//name)
   end function file_has
+
+  !> Remove a dataset, or a group with all it holds.
+  subroutine file_remove(self, name)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5ldelete_f(self%id, name, status)
+    call self%check(status, 'remove '//name)
+  end subroutine file_remove
 
   !> A text of any length as an attribute; h5py shows it as str. An attribute that exists is replaced.
   subroutine attribute_text(self, object, name, value)
@@ -777,7 +790,7 @@ contains
   subroutine resize(self, column, rows)
     class(h5_file_t), intent(inout) :: self
     type(h5_column_t), intent(inout) :: column
-    integer, intent(in) :: rows
+    integer(i8), intent(in) :: rows
     integer :: status
 
     if (self%info /= 0) return
@@ -791,18 +804,28 @@ contains
     class(h5_file_t), intent(inout) :: self
     type(h5_column_t), intent(inout) :: column
     real(wp), intent(in) :: a(:)
+
+    call self%append_rows(column, 1, a)
+  end subroutine append
+
+  !> Append several rows of reals, their elements in a row.
+  subroutine append_rows(self, column, n, a)
+    class(h5_file_t), intent(inout) :: self
+    type(h5_column_t), intent(inout) :: column
+    integer, intent(in) :: n      !! rows
+    real(wp), intent(in) :: a(:)
     real(wp), target :: copy(max(1, size(a)))
     real(sp), target :: single(max(1, size(a)))
 
     if (self%info /= 0) return
     if (column%kind == file_real32) then
       single(:size(a)) = real(a, sp)
-      call self%transfer_row(column, memory_type(file_real32), size(a), c_loc(single))
+      call self%transfer_rows(column, memory_type(file_real32), n, size(a), c_loc(single))
     else
       copy(:size(a)) = a
-      call self%transfer_row(column, memory_type(file_real64), size(a), c_loc(copy))
+      call self%transfer_rows(column, memory_type(file_real64), n, size(a), c_loc(copy))
     end if
-  end subroutine append
+  end subroutine append_rows
 
   subroutine append_integers(self, column, a)
     class(h5_file_t), intent(inout) :: self
@@ -812,26 +835,38 @@ contains
 
     if (self%info /= 0) return
     copy(:size(a)) = a
-    call self%transfer_row(column, memory_type(file_integer32), size(a), c_loc(copy))
+    call self%transfer_rows(column, memory_type(file_integer32), 1, size(a), c_loc(copy))
   end subroutine append_integers
 
-  !> Make a column one row longer and fill the row from the root process.
-  subroutine transfer_row(self, column, mem_type, n, data)
+  !> Append a row of integers of 64 bits.
+  subroutine append_wide(self, column, a)
+    class(h5_file_t), intent(inout) :: self
+    type(h5_column_t), intent(inout) :: column
+    integer(i8), intent(in) :: a(:)
+    integer(i8), target :: copy(max(1, size(a)))
+
+    if (self%info /= 0) return
+    copy(:size(a)) = a
+    call self%transfer_rows(column, memory_type(file_integer64), 1, size(a), c_loc(copy))
+  end subroutine append_wide
+
+  !> Make a column n rows longer and fill them from the root process.
+  subroutine transfer_rows(self, column, mem_type, n, elements, data)
     class(h5_file_t), intent(inout) :: self
     type(h5_column_t), intent(inout) :: column
     integer(hid_t), intent(in) :: mem_type
-    integer, intent(in) :: n
+    integer, intent(in) :: n, elements
     type(c_ptr), intent(in) :: data
     integer(hsize_t) :: first(max_rank), extent(max_rank)
     integer(hid_t) :: there, here
     integer :: status
 
-    call self%resize(column, int(column%extent(column%rank)) + 1)
-    if (n > 0 .and. (is_root() .or. .not. self%shared)) then
-      first = 0
-      first(column%rank) = column%extent(column%rank) - 1
+    first = 0
+    first(column%rank) = column%extent(column%rank)
+    call self%resize(column, int(column%extent(column%rank), i8) + n)
+    if (elements > 0 .and. (is_root() .or. .not. self%shared)) then
       extent = column%extent
-      extent(column%rank) = 1
+      extent(column%rank) = int(n, hsize_t)
       call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, here)
       if (self%info == 0) then
         call h5dwrite_f(column%id, mem_type, data, status, here, there)
@@ -840,7 +875,7 @@ contains
       end if
     end if
     call self%agree()
-  end subroutine transfer_row
+  end subroutine transfer_rows
 
   !> Append a row of 32-bit reals of which this process gives the block `first : first + extent - 1`;
   !! all processes together in a shared file. The kind in memory must be that of the file: HDF5 does
@@ -853,7 +888,7 @@ contains
     integer(hid_t) :: there, here
     integer :: status
 
-    call self%resize(column, int(column%extent(column%rank)) + 1)
+    call self%resize(column, int(column%extent(column%rank), i8) + 1_i8)
     call self%select(column%name, column%id, [int(first - 1, hsize_t), column%extent(column%rank) - 1], &
                      [int(extent, hsize_t), 1_hsize_t], there, here)
     if (self%info /= 0) return
@@ -888,6 +923,34 @@ contains
     call close_selection(there, here)
     a = copy(:size(a))
   end subroutine read_row
+
+  !> How many rows of a column of times a run keeps that goes on: those that it has counted, and one
+  !! more if that one is of this very time.
+  subroutine count_rows(self, column, counted, time, rows, up_to_date)
+    class(h5_file_t), intent(inout) :: self
+    type(h5_column_t), intent(in) :: column
+    integer, intent(in) :: counted
+    real(wp), intent(in) :: time        !! [s]
+    integer, intent(out) :: rows
+    logical, intent(out) :: up_to_date  !! the last row kept is of this very time
+    real(wp) :: last(1)
+    integer :: row
+
+    rows = counted
+    up_to_date = .false.
+    if (self%info /= 0) return
+    if (column%extent(column%rank) < int(counted, hsize_t)) then
+      self%info = 1
+      self%message = self%path//': has lost rows, the run cannot go on in it'
+      return
+    end if
+    do row = max(1, counted), min(counted + 1, int(column%extent(column%rank)))
+      call self%read_row(column, row, last)
+      if (self%info /= 0 .or. abs(last(1) - time) > 0.0_wp) cycle
+      rows = row
+      up_to_date = .true.
+    end do
+  end subroutine count_rows
 
   !> Create a dataset of any type, with its unit; `list` of a growing one says how it is cut.
   subroutine new_dataset(self, name, units, file_type, extent, list, id)

@@ -171,10 +171,7 @@ contains
     character(*), intent(in) :: path
     character(:), allocatable :: short
 
-    short = trim(path)
-    do while (len(short) > 1 .and. short(len(short):) == '/')
-      short = short(:len(short) - 1)
-    end do
+    short = path(:max(verify(path, '/ ', back=.true.), min(1, len(path))))
   end function trimmed
 
   function exists(path) result(yes)

@@ -2,7 +2,7 @@
 ! ranks: 2 3
 program test_hdf5_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use kinds_m, only: wp, sp
+  use kinds_m, only: wp, sp, i8
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, my_rank, broadcast
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_real32, file_integer32
   use check_m, only: check, finish_checks
@@ -135,9 +135,9 @@ contains
     call check('rows are counted', int(place%extent(place%rank)), 11)
     call file%read_row(place, 7, x)
     call check('a row comes back', x, 7 + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp], 0.0_wp)
-    call file%resize(place, 6)
+    call file%resize(place, 6_i8)
     call file%append(place, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, 6.0_wp])
-    call file%resize(place, 9)
+    call file%resize(place, 9_i8)
     call file%read_row(place, 7, x)
     call check('rows are dropped and others appended', x(2), 2.0_wp, 0.0_wp)
     call file%read_row(place, 8, x)

@@ -1,0 +1,161 @@
+!> The numbers of a row of results: what the step reports, and sums over the fluid and the blocks.
+module diagnostics_m
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+  use kinds_m, only: wp, i8
+  use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_body_m, only: blocks_t, kinetic_energy, potential_energy
+  use clock_m, only: clock_t
+  implicit none
+  private
+  public :: step_report_t, row_t, make_row, row_values, column_name, column_units, n_columns
+
+  !> What one fluid step, with its body substeps, tells about itself.
+  type :: step_report_t
+    real(wp) :: cfl = 0.0_wp                  !! largest Courant number of the fluid [-]
+    real(wp) :: divergence_max = 0.0_wp       !! of the face velocity that the next step uses [1/s]
+    integer :: pressure_passes = 0
+    integer :: solver_iterations = 0          !! of all passes together
+    real(wp) :: contact_energy = 0.0_wp       !! elastic, at the end of the step [J]
+    real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m]
+    real(wp) :: contact_courant_max = 0.0_wp  !! C_s of eq. (6) [-]
+    integer :: substeps = 0
+    integer :: small_cells = 0                !! cells that the transport treated as small
+    integer :: sealed_cells = 0               !! cells without any open face that held fluid
+    integer :: warnings = 0                   !! printed in this step
+  end type step_report_t
+
+  !> The columns of /series, in the order of `column_name`.
+  type :: row_t
+    real(wp) :: time = 0.0_wp                 !! [s]
+    real(wp) :: dt = 0.0_wp                   !! of the step that ends here [s]
+    real(wp) :: cfl = 0.0_wp
+    real(wp) :: divergence_max = 0.0_wp       !! [1/s]
+    real(wp) :: pressure_passes = 0.0_wp
+    real(wp) :: solver_iterations = 0.0_wp
+    real(wp) :: liquid_volume = 0.0_wp        !! [m3]
+    real(wp) :: liquid_volume_drift = 0.0_wp  !! (volume - initial - inflow)/initial
+    real(wp) :: kinetic_energy_fluid = 0.0_wp, kinetic_energy_bodies = 0.0_wp      !! [J]
+    real(wp) :: potential_energy_bodies = 0.0_wp, contact_energy = 0.0_wp          !! [J]
+    real(wp) :: max_overlap = 0.0_wp          !! [m]
+    real(wp) :: contact_courant_max = 0.0_wp
+    real(wp) :: substeps = 0.0_wp
+    real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
+  end type row_t
+
+  integer, parameter :: n_columns = 16
+  character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
+    'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', 'liquid_volume_drift', &
+    'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
+    'max_overlap', 'contact_courant_max', 'substeps', 'wall_time']
+  character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
+    '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', 's']
+
+contains
+
+  !> The row of this moment. Without fluid its columns are NaN. All processes call.
+  subroutine make_row(gravity, clock, wall_time, grid, flow, solid, blocks, report, row)
+    real(wp), intent(in) :: gravity(3)            !! [m/s2]
+    type(clock_t), intent(in) :: clock
+    real(wp), intent(in) :: wall_time             !! [s]
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(in) :: flow              !! not allocated in a dry run
+    type(solid_geometry_t), intent(in) :: solid   !! likewise
+    type(blocks_t), intent(in) :: blocks
+    type(step_report_t), intent(in) :: report
+    type(row_t), intent(out) :: row
+
+    row%time = clock%t
+    row%dt = clock%dt
+    row%wall_time = wall_time
+    call add_fluid(grid, flow, solid, report, row)
+    row%kinetic_energy_bodies = kinetic_energy(blocks)
+    row%potential_energy_bodies = potential_energy(gravity, blocks)
+    row%contact_energy = report%contact_energy
+    row%max_overlap = report%max_overlap
+    row%contact_courant_max = report%contact_courant_max
+    row%substeps = real(report%substeps, wp)
+  end subroutine make_row
+
+  !> The columns of the fluid.
+  subroutine add_fluid(grid, flow, solid, report, row)
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(in) :: flow
+    type(solid_geometry_t), intent(in) :: solid
+    type(step_report_t), intent(in) :: report
+    type(row_t), intent(inout) :: row
+
+    if (.not. allocated(flow%u)) then
+      row%cfl = ieee_value(row%cfl, ieee_quiet_nan)
+      row%divergence_max = row%cfl
+      row%pressure_passes = row%cfl
+      row%solver_iterations = row%cfl
+      row%liquid_volume = row%cfl
+      row%liquid_volume_drift = row%cfl
+      row%kinetic_energy_fluid = row%cfl
+      return
+    end if
+    row%cfl = report%cfl
+    row%divergence_max = report%divergence_max
+    row%pressure_passes = real(report%pressure_passes, wp)
+    row%solver_iterations = real(report%solver_iterations, wp)
+    call sum_fluid(grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
+    if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
+      (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
+  end subroutine add_fluid
+
+  !> Volume of liquid, and kinetic energy sum 1/2 rho V (1 - alpha) |u|^2 of the fluid, exact and
+  !! therefore the same on any number of threads and processes.
+  subroutine sum_fluid(grid, flow, solid, volume, energy)
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(in) :: flow
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(out) :: volume   !! [m3]
+    real(wp), intent(out) :: energy   !! [J]
+    integer(i8) :: bins(bin_size, 2), mine(bin_size, 2)
+    real(wp) :: total(2)
+    integer :: j, k, m
+
+    do m = 1, 2
+      bins(:, m) = no_terms
+    end do
+    !$omp parallel private(mine, j, k, m)
+    do m = 1, 2
+      mine(:, m) = no_terms
+    end do
+    !$omp do schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        associate (a => grid%lo(1), b => grid%hi(1))
+          call exact_add(flow%liquid(a:b, j, k), mine(:, 1))
+          call exact_add(0.5_wp*grid%volume*flow%rho(a:b, j, k)*(1.0_wp - solid%alpha(a:b, j, k)) &
+                         *(flow%u(a:b, j, k, 1)**2 + flow%u(a:b, j, k, 2)**2 + flow%u(a:b, j, k, 3)**2), mine(:, 2))
+        end associate
+      end do
+    end do
+    !$omp end do nowait
+    !$omp critical (merge_fluid_sums)
+    do m = 1, 2
+      call merge_bins(mine(:, m), bins(:, m))
+    end do
+    !$omp end critical (merge_fluid_sums)
+    !$omp end parallel
+    call exact_totals(bins, total)
+    volume = total(1)
+    energy = total(2)
+  end subroutine sum_fluid
+
+  !> The columns as an array, in the order of `column_name`.
+  pure function row_values(row) result(v)
+    type(row_t), intent(in) :: row
+    real(wp) :: v(n_columns)
+
+    v = [row%time, row%dt, row%cfl, row%divergence_max, row%pressure_passes, row%solver_iterations, &
+         row%liquid_volume, row%liquid_volume_drift, row%kinetic_energy_fluid, row%kinetic_energy_bodies, &
+         row%potential_energy_bodies, row%contact_energy, row%max_overlap, row%contact_courant_max, &
+         row%substeps, row%wall_time]
+  end function row_values
+
+end module diagnostics_m

@@ -1,0 +1,294 @@
+!> Everything a run writes: opened once, written when due, closed with the last state in place.
+!!
+!! After trouble `code` is not `exit_ok` and `message` says why; the caller then ends with `fatal`. In a
+!! parallel run trouble with a file of the root process is known to the root process only.
+module output_m
+  use kinds_m, only: wp, i8
+  use errors_m, only: exit_ok, exit_files
+  use parallel_m, only: broadcast
+  use timers_m, only: timer, tic, toc, wall_clock
+  use command_line_m, only: options_t
+  use case_types_m, only: case_t
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_body_m, only: blocks_t
+  use contacts_m, only: contacts_t
+  use clock_m, only: clock_t
+  use hdf5_file_m, only: h5_file_t
+  use output_folder_m, only: prepare_folder, continue_folder, folder_of
+  use diagnostics_m, only: step_report_t, row_t, make_row
+  use write_run_m, only: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
+  use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, write_field_frame
+  use write_vtkhdf_m, only: block_file_t, create_block_file, reopen_block_file, write_block_frame
+  use restart_m, only: write_restart
+  use progress_m, only: progress_t, progress_start, line_due, write_line, write_summary
+  implicit none
+  private
+  public :: output_t, open_output, write_due_output, close_output
+
+  character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', block_name = '/blocks.vtkhdf'
+  character(*), parameter :: restart_name(2) = ['/restart-a.h5', '/restart-b.h5']
+
+  type :: output_t
+    integer :: code = exit_ok                !! exit code of the trouble met
+    character(:), allocatable :: message     !! what the trouble was
+    character(:), allocatable :: folder
+    character(:), allocatable, private :: text, parameters   !! of the case
+    real(wp), private :: gravity(3) = 0.0_wp                 !! [m/s2]
+    logical, private :: quiet = .false.      !! no table
+    logical, private :: fluid = .false.      !! there is one
+    logical, private :: fields = .false., surfaces = .false. !! these files are written
+    integer, private :: next_restart = 1     !! file to write next
+    integer, private :: row_step = -1, frame_step = -1, restart_step = -1   !! step of the last of each
+    integer, private :: phase = 0, restart_phase = 0         !! timers
+    type(run_file_t), private :: run_file
+    type(field_file_t), private :: field_file
+    type(block_file_t), private :: block_file
+    type(progress_t), private :: progress
+  end type output_t
+
+contains
+
+  !> Make the folder fit and create its files, or open those of the run that goes on from `clock`.
+  subroutine open_output(case, parameters, options, fluid, grid, clock, blocks, output)
+    type(case_t), intent(in) :: case
+    character(*), intent(in) :: parameters   !! all values of the case as text
+    type(options_t), intent(in) :: options
+    logical, intent(in) :: fluid             !! there is one
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(in) :: clock
+    type(blocks_t), intent(in) :: blocks
+    type(output_t), intent(out) :: output
+
+    output%message = ''
+    output%phase = timer('output')
+    output%restart_phase = timer('restart files')
+    call tic(output%phase)
+    output%text = case%text
+    output%parameters = parameters
+    output%gravity = case%fluid%gravity
+    output%quiet = options%quiet
+    output%fluid = fluid
+    output%fields = fluid .and. case%run%field_interval > 0.0_wp
+    output%surfaces = blocks%n > 0 .and. case%run%field_interval > 0.0_wp
+    if (len(options%restart) > 0) then
+      call continue_files(options, grid, clock, blocks, output)
+    else
+      output%folder = case%run%output
+      if (len(options%output) > 0) output%folder = options%output
+      call prepare_folder(output%folder, output%code, output%message)
+      if (output%code == exit_ok) call create_files(grid, blocks, output)
+    end if
+    call look_for_trouble(output)
+    call progress_start(options%quiet, fluid, clock, output%progress)
+    call toc(output%phase)
+  end subroutine open_output
+
+  subroutine create_files(grid, blocks, output)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(output_t), intent(inout) :: output
+
+    call create_run_file(output%folder//run_name, output%text, output%parameters, grid, blocks, output%run_file)
+    if (output%fields) call create_field_file(output%folder//field_name, grid, output%field_file)
+    if (output%surfaces) call create_block_file(output%folder//block_name, blocks, output%block_file)
+  end subroutine create_files
+
+  !> Open the files of the run that goes on.
+  subroutine continue_files(options, grid, clock, blocks, output)
+    type(options_t), intent(in) :: options
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(in) :: clock
+    type(blocks_t), intent(in) :: blocks
+    type(output_t), intent(inout) :: output
+    integer :: up_to_date(2)
+
+    call continue_folder(options%restart, options%output, output%folder, output%code, output%message)
+    if (output%code /= exit_ok) return
+    call reopen_run_file(output%folder//run_name, output%text, output%parameters, clock, blocks, output%run_file)
+    if (output%fluid) call continue_fields(grid, clock, output)
+    if (blocks%n > 0) call continue_surfaces(blocks, clock, output)
+    up_to_date = 0
+    if (output%run_file%up_to_date) up_to_date(1) = 1
+    if (output%field_file%up_to_date .or. output%block_file%up_to_date) up_to_date(2) = 1
+    call broadcast(up_to_date)   ! only the root process knows about its own files
+    if (up_to_date(1) == 1) output%row_step = clock%step
+    if (up_to_date(2) == 1) output%frame_step = clock%step
+    if (folder_of(options%restart)//restart_name(1) == options%restart) output%next_restart = 2
+    output%restart_step = clock%step
+  end subroutine continue_files
+
+  !> Go on with the frames of the fluid; without any so far the file begins now, and where no more are
+  !! wanted it only loses the later ones.
+  subroutine continue_fields(grid, clock, output)
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(in) :: clock
+    type(output_t), intent(inout) :: output
+
+    if (clock%n_frames > 0) then
+      call reopen_field_file(output%folder//field_name, grid, clock, output%field_file)
+      if (.not. output%fields) call output%field_file%file%close()
+    else if (output%fields) then
+      call create_field_file(output%folder//field_name, grid, output%field_file)
+    end if
+  end subroutine continue_fields
+
+  !> The same for the frames of the blocks.
+  subroutine continue_surfaces(blocks, clock, output)
+    type(blocks_t), intent(in) :: blocks
+    type(clock_t), intent(in) :: clock
+    type(output_t), intent(inout) :: output
+
+    if (clock%n_frames > 0) then
+      call reopen_block_file(output%folder//block_name, blocks, clock, output%block_file)
+      if (.not. output%surfaces) call output%block_file%file%close()
+    else if (output%surfaces) then
+      call create_block_file(output%folder//block_name, blocks, output%block_file)
+    end if
+  end subroutine continue_surfaces
+
+  !> Keep the first trouble of any of the files.
+  subroutine look_for_trouble(output)
+    type(output_t), intent(inout) :: output
+
+    call look_at(output%run_file%file)
+    call look_at(output%field_file%file)
+    call look_at(output%block_file%file)
+
+  contains
+
+    subroutine look_at(file)
+      type(h5_file_t), intent(in) :: file
+
+      if (file%info == 0 .or. output%code /= exit_ok) return
+      output%code = exit_files
+      output%message = file%message
+    end subroutine look_at
+
+  end subroutine look_for_trouble
+
+  !> After a step, and once before the first: write the row, the frames and the restart file that are
+  !! due, and a line of the table. All processes call.
+  subroutine write_due_output(grid, clock, flow, solid, blocks, contacts, report, output)
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    type(step_report_t), intent(in) :: report
+    type(output_t), intent(inout) :: output
+    type(row_t) :: row
+    logical :: row_wanted, frame_wanted, line_wanted
+
+    if (output%code /= exit_ok) return
+    call tic(output%phase)
+    output%progress%warnings = output%progress%warnings + report%warnings
+    row_wanted = clock%row_due() .and. output%row_step /= clock%step
+    frame_wanted = clock%frame_due() .and. output%frame_step /= clock%step
+    line_wanted = line_due(output%progress)
+    line_wanted = line_wanted .or. frame_wanted
+    if (.not. (row_wanted .or. frame_wanted)) call tell_all(output%quiet, line_wanted)
+    if (row_wanted .or. line_wanted) then
+      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() - output%progress%began, &
+                    grid, flow, solid, blocks, report, row)
+    end if
+    if (row_wanted) then
+      call write_row(output%run_file, clock%n_rows, row, blocks)
+      call clock%row_done()
+      output%row_step = clock%step
+    end if
+    if (frame_wanted) then
+      call write_frames(grid, clock, flow, solid, blocks, output)
+      call clock%frame_done()
+    end if
+    if (line_wanted) call write_line(output%progress, clock, row, blocks)
+    call look_for_trouble(output)
+    call toc(output%phase)
+    if (clock%restart_due()) then
+      call clock%restart_done()
+      call save_state(grid, clock, flow, solid, blocks, contacts, output)
+    end if
+  end subroutine write_due_output
+
+  !> Whether a line is wanted depends on the clock of the root process.
+  subroutine tell_all(quiet, wanted)
+    logical, intent(in) :: quiet
+    logical, intent(inout) :: wanted
+    integer :: flag
+
+    if (quiet) return
+    flag = merge(1, 0, wanted)
+    call broadcast(flag)
+    wanted = flag == 1
+  end subroutine tell_all
+
+  !> Write the frames of this moment as the next ones; the caller counts them if they were due.
+  subroutine write_frames(grid, clock, flow, solid, blocks, output)
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(in) :: clock
+    type(flow_t), intent(in) :: flow
+    type(solid_geometry_t), intent(in) :: solid
+    type(blocks_t), intent(in) :: blocks
+    type(output_t), intent(inout) :: output
+
+    if (output%fields) call write_field_frame(output%field_file, clock%n_frames, clock%t, grid, flow, solid)
+    if (output%surfaces) call write_block_frame(output%block_file, clock%n_frames, clock%t, blocks)
+    output%frame_step = clock%step
+  end subroutine write_frames
+
+  !> Write the restart file whose turn it is.
+  subroutine save_state(grid, clock, flow, solid, blocks, contacts, output)
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    type(output_t), intent(inout) :: output
+    character(:), allocatable :: message
+    integer :: info
+
+    if (output%code /= exit_ok) return
+    call tic(output%restart_phase)
+    call write_restart(output%folder//restart_name(output%next_restart), output%text, output%parameters, grid, clock, &
+                       flow, solid, blocks, contacts, info, message)
+    output%next_restart = 3 - output%next_restart
+    output%restart_step = clock%step
+    call toc(output%restart_phase)
+    if (info == 0) return
+    output%code = exit_files
+    output%message = message
+  end subroutine save_state
+
+  !> Write what a run must end with, its last row, frames and state, say how it ended, and close all
+  !! files; after trouble with files only close them. All processes call.
+  subroutine close_output(exit_code, grid, clock, flow, solid, blocks, contacts, report, output)
+    integer, intent(in) :: exit_code
+    type(grid_t), intent(in) :: grid
+    type(clock_t), intent(inout) :: clock
+    type(flow_t), intent(inout) :: flow
+    type(solid_geometry_t), intent(inout) :: solid
+    type(blocks_t), intent(inout) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    type(step_report_t), intent(in) :: report
+    type(output_t), intent(inout) :: output
+    type(row_t) :: row
+
+    if (output%code == exit_ok) then
+      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() - output%progress%began, &
+                    grid, flow, solid, blocks, report, row)
+      if (output%row_step /= clock%step) call write_row(output%run_file, clock%n_rows, row, blocks)
+      if (output%frame_step /= clock%step) call write_frames(grid, clock, flow, solid, blocks, output)
+      call write_line(output%progress, clock, row, blocks)
+      if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, contacts, output)
+    end if
+    call close_run_file(output%run_file, exit_code)
+    call output%field_file%file%close()
+    call output%block_file%file%close()
+    call look_for_trouble(output)
+    call write_summary(output%progress, clock, product(int(grid%n, i8)), exit_code, output%folder)
+  end subroutine close_output
+
+end module output_m

@@ -1,0 +1,151 @@
+!> The table that a person follows on standard output while a run goes on, and its closing words.
+module progress_m
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use kinds_m, only: wp, i8
+  use errors_m, only: to_text
+  use parallel_m, only: is_root
+  use timers_m, only: wall_clock
+  use rigid_body_m, only: blocks_t
+  use clock_m, only: clock_t
+  use diagnostics_m, only: row_t
+  implicit none
+  private
+  public :: progress_t, progress_start, line_due, write_line, write_summary
+
+  integer, parameter :: lines_per_header = 25
+  real(wp), parameter :: line_interval = 1.0_wp   !! of wall time [s]
+
+  type :: progress_t
+    logical :: shown = .false.            !! on this process, and not forbidden by --quiet
+    logical :: fluid = .true.
+    integer :: lines = 0
+    integer :: warnings = 0
+    integer :: first_step = 0             !! where this part of the run began
+    real(wp) :: first_time = 0.0_wp       !! likewise [s]
+    real(wp) :: began = 0.0_wp            !! wall clock at the start [s]
+    real(wp) :: last_line = -huge(1.0_wp) !! wall clock at the last line [s]
+  end type progress_t
+
+contains
+
+  !> Begin to count time.
+  subroutine progress_start(quiet, fluid, clock, self)
+    logical, intent(in) :: quiet
+    logical, intent(in) :: fluid   !! there is one
+    type(clock_t), intent(in) :: clock
+    type(progress_t), intent(out) :: self
+
+    self%shown = is_root() .and. .not. quiet
+    self%fluid = fluid
+    self%first_step = clock%step
+    self%first_time = clock%t
+    self%began = wall_clock()
+  end subroutine progress_start
+
+  !> Has enough time passed for another line?
+  function line_due(self) result(yes)
+    type(progress_t), intent(in) :: self
+    logical :: yes
+
+    yes = wall_clock() - self%last_line >= line_interval
+    yes = yes .and. self%shown
+  end function line_due
+
+  !> Write one line; the header first where it is time for it.
+  subroutine write_line(self, clock, row, blocks)
+    type(progress_t), intent(inout) :: self
+    type(clock_t), intent(in) :: clock
+    type(row_t), intent(in) :: row
+    type(blocks_t), intent(in) :: blocks
+    character(160) :: line
+    integer :: released, moving
+
+    if (.not. self%shown) return
+    if (modulo(self%lines, lines_per_header) == 0) write (output_unit, '(a)') header(self%fluid)
+    self%lines = self%lines + 1
+    self%last_line = wall_clock()
+    released = count(blocks%present)
+    moving = count_moving(clock%run%rest_speed, blocks)
+    if (self%fluid) then
+      write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, row%dt, row%cfl, &
+        row%divergence_max, nint(row%pressure_passes), nint(row%solver_iterations)
+    else
+      write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, row%dt, nint(row%substeps), &
+        row%contact_courant_max
+    end if
+    write (line(len_trim(line) + 1:), '(a11, i8, f13.4)') to_text(released)//'/'//to_text(blocks%n), moving, &
+      1.0e3_wp*row%max_overlap
+    if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') row%liquid_volume_drift
+    write (output_unit, '(2a)') trim(line), time_left(self, clock)
+    flush (output_unit)
+  end subroutine write_line
+
+  pure function header(fluid) result(line)
+    logical, intent(in) :: fluid
+    character(:), allocatable :: line
+    character(*), parameter :: clock_columns = '    step      t [s]    dt [s]'
+    character(*), parameter :: block_columns = '   released  moving overlap [mm]'
+
+    if (fluid) then
+      line = clock_columns//'  Courant  div. [1/s]  passes  iterations'//block_columns//'      drift  time left'
+    else
+      line = clock_columns//'  substeps  Courant'//block_columns//'  time left'
+    end if
+  end function header
+
+  !> Free blocks that are not at rest.
+  pure function count_moving(rest_speed, blocks) result(n)
+    real(wp), intent(in) :: rest_speed   !! [m/s]
+    type(blocks_t), intent(in) :: blocks
+    integer :: n, b
+
+    n = 0
+    do b = 1, blocks%n
+      if (blocks%present(b) .and. .not. blocks%fixed(b) .and. norm2(blocks%v(:, b)) > rest_speed) n = n + 1
+    end do
+  end function count_moving
+
+  !> Wall time to the end at the mean speed so far, as h:mm:ss.
+  function time_left(self, clock) result(text)
+    type(progress_t), intent(in) :: self
+    type(clock_t), intent(in) :: clock
+    character(11) :: text
+    real(wp) :: seconds
+    integer :: s
+
+    text = '          -'
+    if (clock%t <= self%first_time) return
+    seconds = (wall_clock() - self%began)*(clock%t_end - clock%t)/(clock%t - self%first_time)
+    if (seconds >= 3.6e6_wp) return
+    s = nint(seconds)
+    write (text, '(i5, 2(":", i2.2))') s/3600, modulo(s/60, 60), modulo(s, 60)
+  end function time_left
+
+  !> Say how the run went.
+  subroutine write_summary(self, clock, cells, exit_code, folder)
+    type(progress_t), intent(in) :: self
+    type(clock_t), intent(in) :: clock
+    integer(i8), intent(in) :: cells   !! of the whole domain
+    integer, intent(in) :: exit_code
+    character(*), intent(in) :: folder
+    character(200) :: line
+    character(:), allocatable :: how
+    real(wp) :: seconds
+    integer :: steps
+
+    if (.not. self%shown) return
+    seconds = wall_clock() - self%began
+    steps = clock%step - self%first_step
+    how = 'stopped with code '//to_text(exit_code)
+    if (exit_code == 0) how = 'finished'
+    if (exit_code == 0 .and. clock%settled) how = 'settled'
+    write (line, '(2a, f0.5, a, i0, a, f0.1, a)') how, ' at t = ', clock%t, ' s: ', steps, ' steps in ', seconds, ' s'
+    if (self%fluid .and. steps > 0) write (line(len_trim(line) + 1:), '(a, f0.3, a)') ', ', &
+      1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), ' us per cell and step'
+    if (self%warnings > 0) line = trim(line)//', '//to_text(self%warnings)//' warnings'
+    write (output_unit, '(a)') trim(line)
+    write (output_unit, '(2a)') 'results in ', folder
+    flush (output_unit)
+  end subroutine write_summary
+
+end module progress_m

@@ -1,0 +1,314 @@
+!> `run.h5`: how the run was made, its grid, shapes and blocks, and one row after another.
+!!
+!! Only the root process writes. Each row is flushed, so that a fault loses nothing already computed.
+module write_run_m
+  use kinds_m, only: wp, i8, name_length
+  use parallel_m, only: is_root, nproc, get_threads
+  use timers_m, only: timer_count, timer_name, timer_seconds, timer_calls
+  use build_info_m, only: version, git_revision, compiler, flags
+  use grid_m, only: grid_t
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_t
+  use clock_m, only: clock_t
+  use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_integer32
+  use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
+  implicit none
+  private
+  public :: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
+
+  integer, parameter :: n_vectors = 7       !! columns of three numbers per block
+  character(*), parameter :: vector_name(n_vectors) = [character(16) :: 'position', 'velocity', &
+    'angular_velocity', 'fluid_force', 'fluid_torque', 'contact_force', 'contact_torque']
+  character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', 'N m', 'N', 'N m']
+  integer, parameter :: chunk_bytes = 16384  !! room that a column takes at a time
+  integer, parameter :: running = -1         !! exit status while the run goes on, or if it was killed
+
+  type :: run_file_t
+    type(h5_file_t) :: file
+    integer :: rows = 0
+    logical :: up_to_date = .false.                    !! a run that goes on has a row of its very start
+    real(wp) :: wall_time = 0.0_wp                     !! of the last row when a run goes on [s]
+    type(h5_column_t), private :: series(n_columns)
+    type(h5_column_t), private :: time, vector(n_vectors), quaternion, contacts, on_floor
+    real(wp), allocatable, private :: q(:, :)          !! as in the last row
+    real(wp), allocatable, private :: release_time(:)  !! as in the file
+  end type run_file_t
+
+contains
+
+  !> Create the file with everything but rows.
+  subroutine create_run_file(path, text, parameters, grid, blocks, self)
+    character(*), intent(in) :: path
+    character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(run_file_t), intent(out) :: self
+    integer :: c
+
+    if (.not. is_root()) return
+    associate (file => self%file)
+      call file%create(path, .false.)
+      call file%attribute('/', 'format', 'mics-run')
+      call file%attribute('/', 'format_version', 1)
+      call write_provenance(text, parameters, file)
+      call write_grid(grid, file)
+      call write_shapes(blocks, file)
+      call write_bodies(blocks, file)
+      call file%new_column('/bodies/time', 's', file_real64, [integer ::], chunk_rows(1), self%time)
+      do c = 1, n_vectors
+        call file%new_column('/bodies/'//trim(vector_name(c)), trim(vector_units(c)), file_real64, &
+                             [3, blocks%n], chunk_rows(3*blocks%n), self%vector(c))
+      end do
+      call file%new_column('/bodies/quaternion', '1', file_real64, [4, blocks%n], chunk_rows(4*blocks%n), &
+                           self%quaternion)
+      call file%new_column('/bodies/contacts', '1', file_integer32, [blocks%n], chunk_rows(blocks%n), self%contacts)
+      call file%new_column('/bodies/on_floor', '1', file_integer32, [blocks%n], chunk_rows(blocks%n), self%on_floor)
+      call file%group('/series')
+      do c = 1, n_columns
+        call file%new_column('/series/'//trim(column_name(c)), trim(column_units(c)), file_real64, [integer ::], &
+                             chunk_rows(1), self%series(c))
+      end do
+      call file%flush()
+    end associate
+    self%release_time = blocks%release_time
+    self%q = first_sign(blocks%q)
+  end subroutine create_run_file
+
+  !> Rows of n numbers in a chunk of about `chunk_bytes`.
+  pure function chunk_rows(n) result(rows)
+    integer, intent(in) :: n
+    integer :: rows
+
+    rows = max(8, chunk_bytes/(8*max(1, n)))
+  end function chunk_rows
+
+  !> Attitudes with w >= 0.
+  pure function first_sign(q) result(signed)
+    real(wp), intent(in) :: q(:, :)
+    real(wp) :: signed(size(q, 1), size(q, 2))
+    integer :: b
+
+    do b = 1, size(q, 2)
+      signed(:, b) = merge(q(:, b), -q(:, b), q(1, b) >= 0.0_wp)
+    end do
+  end function first_sign
+
+  subroutine write_provenance(text, parameters, file)
+    character(*), intent(in) :: text, parameters
+    type(h5_file_t), intent(inout) :: file
+    character(*), parameter :: here = '/provenance'
+
+    call file%group(here)
+    call file%attribute(here, 'namelist', text)
+    call file%attribute(here, 'parameters', parameters)
+    call file%attribute(here, 'version', version)
+    call file%attribute(here, 'git_revision', git_revision)
+    call file%attribute(here, 'compiler', compiler)
+    call file%attribute(here, 'flags', flags)
+    call file%attribute(here, 'threads', get_threads())
+    call file%attribute(here, 'ranks', nproc())
+    call file%attribute(here, 'started', time_now())
+    call file%attribute(here, 'finished', '')
+    call file%attribute(here, 'exit_status', running)
+  end subroutine write_provenance
+
+  !> Date and time with the shift of the time zone, as in 2026-11-21T07:30:00+09:00.
+  function time_now() result(text)
+    character(25) :: text
+    character(8) :: date
+    character(10) :: time
+    character(5) :: zone
+
+    call date_and_time(date, time, zone)
+    text = date(:4)//'-'//date(5:6)//'-'//date(7:8)//'T'//time(:2)//':'//time(3:4)//':'//time(5:6) &
+      //zone(:3)//':'//zone(4:5)
+  end function time_now
+
+  !> The coordinates of the faces.
+  subroutine write_grid(grid, file)
+    type(grid_t), intent(in) :: grid
+    type(h5_file_t), intent(inout) :: file
+    character(*), parameter :: axis = 'xyz'
+    integer :: d, i
+
+    call file%group('/grid')
+    do d = 1, 3
+      call file%store('/grid/'//axis(d:d), 'm', grid%face([(i, i=1, grid%n(d) + 1)], d))
+    end do
+  end subroutine write_grid
+
+  !> The shapes; corners are counted from 0, as h5py and VTK do.
+  subroutine write_shapes(blocks, file)
+    type(blocks_t), intent(in) :: blocks
+    type(h5_file_t), intent(inout) :: file
+    integer :: s
+
+    call file%group('/shapes')
+    do s = 1, size(blocks%shapes)
+      associate (shape => blocks%shapes(s), here => '/shapes/'//trim(blocks%shapes(s)%name))
+        call file%group(here)
+        call file%store(here//'/points', 'm', shape%point)
+        call file%store(here//'/triangles', '1', shape%triangle - 1)
+        call file%store(here//'/tets', '1', shape%tet - 1)
+        call file%store(here//'/sphere_centre', 'm', shape%sphere_centre)
+        call file%store(here//'/sphere_radius', 'm', shape%sphere_radius)
+        call file%attribute(here, 'volume', shape%volume)
+        call file%attribute(here, 'inertia', shape%inertia)
+        call file%attribute(here, 'density', shape%density)
+      end associate
+    end do
+  end subroutine write_shapes
+
+  !> What is said once of each block.
+  subroutine write_bodies(blocks, file)
+    type(blocks_t), intent(in) :: blocks
+    type(h5_file_t), intent(inout) :: file
+    character(name_length) :: name(blocks%n)
+    integer :: b
+
+    do b = 1, blocks%n
+      name(b) = blocks%shapes(blocks%shape(b))%name
+    end do
+    call file%group('/bodies')
+    call file%store('/bodies/shape', '1', name)
+    call file%store('/bodies/mass', 'kg', blocks%mass)
+    call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
+    call file%store('/bodies/release_time', 's', blocks%release_time)
+  end subroutine write_bodies
+
+  !> Open the file of a run that goes on from `clock` and drop the rows later than that.
+  subroutine reopen_run_file(path, text, parameters, clock, blocks, self)
+    character(*), intent(in) :: path
+    character(*), intent(in) :: text, parameters   !! the case as it is now
+    type(clock_t), intent(in) :: clock
+    type(blocks_t), intent(in) :: blocks
+    type(run_file_t), intent(out) :: self
+    integer :: c
+    real(wp) :: wall_time(1), q(4*blocks%n)
+
+    if (.not. is_root()) return
+    associate (file => self%file)
+      call file%open(path, .false., .true.)
+      call file%open_column('/bodies/time', file_real64, self%time)
+      do c = 1, n_vectors
+        call file%open_column('/bodies/'//trim(vector_name(c)), file_real64, self%vector(c))
+      end do
+      call file%open_column('/bodies/quaternion', file_real64, self%quaternion)
+      call file%open_column('/bodies/contacts', file_integer32, self%contacts)
+      call file%open_column('/bodies/on_floor', file_integer32, self%on_floor)
+      do c = 1, n_columns
+        call file%open_column('/series/'//trim(column_name(c)), file_real64, self%series(c))
+      end do
+      call file%count_rows(self%time, clock%n_rows, clock%t, self%rows, self%up_to_date)
+      call resize_all(self)
+      wall_time = 0.0_wp
+      q = 0.0_wp
+      call file%read_row(self%quaternion, self%rows, q)
+      call file%read_row(self%series(n_columns), self%rows, wall_time)
+      self%q = reshape(q, [4, blocks%n])
+      self%wall_time = wall_time(1)
+      self%release_time = blocks%release_time
+      call file%rewrite('/bodies/release_time', self%release_time)
+      call file%attribute('/provenance', 'namelist', text)
+      call file%attribute('/provenance', 'parameters', parameters)
+      call file%attribute('/provenance', 'finished', '')
+      call file%attribute('/provenance', 'exit_status', running)
+      call file%flush()
+    end associate
+  end subroutine reopen_run_file
+
+  !> Give all columns `self%rows` rows.
+  subroutine resize_all(self)
+    type(run_file_t), intent(inout) :: self
+    integer :: c
+
+    associate (file => self%file, rows => int(self%rows, i8))
+      call file%resize(self%time, rows)
+      do c = 1, n_vectors
+        call file%resize(self%vector(c), rows)
+      end do
+      call file%resize(self%quaternion, rows)
+      call file%resize(self%contacts, rows)
+      call file%resize(self%on_floor, rows)
+      do c = 1, n_columns
+        call file%resize(self%series(c), rows)
+      end do
+    end associate
+  end subroutine resize_all
+
+  !> Write a row as number `rows_before` + 1, in the place of a row that only ended an earlier run.
+  subroutine write_row(self, rows_before, row, blocks)
+    type(run_file_t), intent(inout) :: self
+    integer, intent(in) :: rows_before   !! due rows written so far
+    type(row_t), intent(in) :: row
+    type(blocks_t), intent(in) :: blocks
+    real(wp) :: values(n_columns)
+    integer :: c
+
+    if (.not. is_root()) return
+    if (self%rows /= rows_before) then
+      self%rows = rows_before
+      call resize_all(self)
+    end if
+    call follow_sign(blocks%q, self%q)
+    values = row_values(row)
+    associate (file => self%file, n => 3*blocks%n)
+      call file%append(self%time, [row%time])
+      call file%append(self%vector(1), reshape(blocks%x, [n]))
+      call file%append(self%vector(2), reshape(blocks%v, [n]))
+      call file%append(self%vector(3), reshape(blocks%omega, [n]))
+      call file%append(self%vector(4), reshape(blocks%fluid_force, [n]))
+      call file%append(self%vector(5), reshape(blocks%fluid_torque, [n]))
+      call file%append(self%vector(6), reshape(blocks%contact_force, [n]))
+      call file%append(self%vector(7), reshape(blocks%contact_torque, [n]))
+      call file%append(self%quaternion, reshape(self%q, [4*blocks%n]))
+      call file%append_integers(self%contacts, blocks%contacts)
+      call file%append_integers(self%on_floor, blocks%on_floor)
+      do c = 1, n_columns
+        call file%append(self%series(c), values(c:c))
+      end do
+      if (any(abs(blocks%release_time - self%release_time) > 0.0_wp)) then
+        self%release_time = blocks%release_time
+        call file%rewrite('/bodies/release_time', self%release_time)
+      end if
+      call file%flush()
+    end associate
+    self%rows = self%rows + 1
+  end subroutine write_row
+
+  !> Of the two quaternions of each attitude take the one nearer to that of the row before.
+  pure subroutine follow_sign(q, followed)
+    real(wp), intent(in) :: q(:, :)            !! (4, n)
+    real(wp), intent(inout) :: followed(:, :)  !! (4, n)
+    integer :: b
+
+    do b = 1, size(q, 2)
+      followed(:, b) = merge(q(:, b), -q(:, b), dot_product(q(:, b), followed(:, b)) >= 0.0_wp)
+    end do
+  end subroutine follow_sign
+
+  !> Write the times of the phases, how the run ended and when, and close the file.
+  subroutine close_run_file(self, exit_status)
+    type(run_file_t), intent(inout) :: self
+    integer, intent(in) :: exit_status
+    character(name_length), allocatable :: name(:)
+    integer :: i
+
+    if (.not. is_root()) return
+    allocate (name(timer_count()))
+    do i = 1, timer_count()
+      name(i) = timer_name(i)
+    end do
+    associate (file => self%file)
+      if (file%has('/timers')) call file%remove('/timers')
+      call file%group('/timers')
+      call file%store('/timers/name', '1', name)
+      call file%store('/timers/seconds', 's', [(timer_seconds(i), i=1, timer_count())])
+      call file%store('/timers/calls', '1', [(timer_calls(i), i=1, timer_count())])
+      call file%attribute('/provenance', 'finished', time_now())
+      call file%attribute('/provenance', 'exit_status', exit_status)
+      call file%close()
+    end associate
+  end subroutine close_run_file
+
+end module write_run_m
