@@ -1,17 +1,20 @@
 !> One body in the grid: its share of every cell and face, and where grid lines meet its surface.
 !!
-!! Only the surface is looked at, never the inside. Over each facet stands a prism that reaches down
-!! to the bottom of the grid; the volume of the body in a cell is the sum of the prisms of the facets
-!! that look up less those of the facets that look down. In the cell a facet passes through, its prism
-!! is integrated over the piece of the facet in that cell; cells further down take the whole column,
-!! by a running sum. The same one dimension lower gives the solid share of a face: areas under the
-!! lines in which the facets cut the plane of the face. Nothing has to be classified, so nothing can
-!! be misjudged: the sums are exact to round-off wherever facets lie.
+!! Only the surface is looked at, never the inside. Under each facet stands a prism that reaches
+!! down to the bottom of the grid; the volume of the body in a cell is the sum of the prisms of the
+!! facets that look up less those of the facets that look down. In the cell a facet passes through,
+!! its prism is integrated over the piece of the facet in that cell; cells further down take the
+!! whole column, by a running sum. The same one dimension lower gives the solid share of a face:
+!! areas under the lines in which the facets cut the plane of the face. Nothing has to be classified
+!! as inside or outside, so nothing can be misjudged: the sums are exact to round-off wherever the
+!! facets lie.
 !!
-!! Lengths are in cells and counted from a whole number of cells near the body, so images in
-!! other periods and other processes get the same bits. Corners within round-off of a grid plane are
-!! put on it. A corner on a plane counts as below the plane, everywhere: where a flat side lies in a grid
-!! plane, the face there is solid if the body stands above it and open if it ends below.
+!! Lengths are in cells and counted from a whole number of cells near the body, so images in other
+!! periods and other processes get the same bits. Corners within round-off of a grid plane are put
+!! on it. A corner on a plane counts as below the plane, everywhere, so the lines of a face are
+!! those just above it; a facet that lies in the plane and ends the body there adds its own area. A
+!! face is therefore solid where the body touches it from either side, and full cells are closed
+!! all round.
 !!
 !! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron: those
 !! are off by up to 0.08 of a cell. Cutting the tetrahedra themselves gives the same shares to
@@ -23,13 +26,13 @@ module body_shares_m
   use tet_mesh_m, only: shape_t
   implicit none
   private
-  public :: body_shares_t, share_work_t, find_body_shares
+  public :: body_shares_t, share_work_t, find_body_shares, full_cell, full_face
 
   real(wp), parameter :: least_share = 1.0e-13_wp     !! smaller shares are dropped
   real(wp), parameter :: full_cell = 1.0e-12_wp       !! a cell lacking less is full
   real(wp), parameter :: full_face = 1.0e-9_wp        !! a face lacking less is closed
-  real(wp), parameter :: on_plane = 1.0e-13_wp        !! distance of a corner on a grid plane [cells]
-  real(wp), parameter :: near_face = 1.0e-12_wp       !! such distance does not part cell and tetrahedron
+  real(wp), parameter :: on_plane = 1.0e-13_wp     !! corners so near a grid plane are on it [cells]
+  real(wp), parameter :: near_face = 1.0e-12_wp    !! a gap that parts no cell from a tetrahedron
   integer, parameter :: max_polygon = 32              !! corners of a facet cut to a cell
 
   !> Corners of the outward face opposite each corner of a tetrahedron.
@@ -46,7 +49,7 @@ module body_shares_m
     integer, allocatable :: cell(:, :)         !! (3, *)
     logical, allocatable :: inside(:)          !! the body holds the centre of the cell
     real(wp), allocatable :: alpha(:)          !! share of the cell [-]
-    real(wp), allocatable :: centroid(:, :)    !! (3, *) of the part, from the cell's lower corner [cells]
+    real(wp), allocatable :: centroid(:, :)    !! (3, *) of the part, from the cell's corner [cells]
     !> Tetrahedra that may touch cell m, if it is cut: `tet(first_tet(m):first_tet(m+1)-1)`.
     integer, allocatable :: first_tet(:), tet(:)
     integer :: n_face = 0
@@ -55,7 +58,7 @@ module body_shares_m
     real(wp), allocatable :: face_centroid(:, :)   !! (3, *) likewise
     integer :: n_hit = 0
     integer, allocatable :: hit(:, :)          !! (4, *) leg: cell and direction of the lower face
-    real(wp), allocatable :: at(:)             !! (*) place on the leg, 0: lower centre, 1: upper [-]
+    real(wp), allocatable :: at(:)             !! (*) place on the leg, 0: lower centre, 1: upper
   end type body_shares_t
 
   !> Flat polygon.
@@ -68,7 +71,7 @@ module body_shares_m
   type :: share_work_t
     real(wp), allocatable :: point(:, :)       !! (3, points) corners of the body [cells]
     real(wp), allocatable :: low(:, :), high(:, :)   !! (3, facets) boxes of the facets [cells]
-    !> (7, x, z) volume, its first moment, and area of the column further down with its moments in x, y.
+    !> (7, x, z) volume and first moment; area of the column further down and its moments in x, y.
     real(wp), allocatable :: volume(:, :, :)
     !> (5, x, z, d) area of the lower face d, first moments along and up the columns, length of the
     !! column further down and its moment.
@@ -76,11 +79,12 @@ module body_shares_m
     integer, allocatable :: crossings(:, :)    !! (x, z) surfaces passed upwards between two centres
     ! To find the tetrahedra of cut cells.
     integer, allocatable :: number(:, :, :)    !! place in the list of a cut cell, 0 elsewhere
-    integer, allocatable :: run(:, :, :)       !! (4, y, z) ends of the first and of the last run of cut cells
+    integer, allocatable :: run(:, :, :)       !! (4, y, z) ends of the first run of cut cells,
+                                               !! of the rest
     integer, allocatable :: pair(:, :)         !! (2, *) cell, tetrahedron
   end type share_work_t
 
-  !> Columns of the faces of each direction: they run along `along` and are stacked in `up`; the sign
+  !> Columns of the faces of each direction: side by side along `along`, stacked in `up`; the sign
   !! makes areas under lines positive where the body is below the line.
   integer, parameter :: along(3) = [2, 1, 2], up(3) = [3, 3, 1]
   real(wp), parameter :: turn(3) = [1.0_wp, -1.0_wp, -1.0_wp]
@@ -156,7 +160,8 @@ contains
       end associate
     end do
     do d = 1, 3
-      call cells_between(minval(work%low(d, :n)), maxval(work%high(d, :n)), self%low(d), self%high(d))
+      self%low(d) = floor(minval(work%low(d, :n))) + 1
+      self%high(d) = floor(maxval(work%high(d, :n))) + 1
     end do
     n = size(shape%flow_tet, 2)
     if (allocated(self%corner)) then
@@ -225,9 +230,19 @@ contains
       if (work%low(2, m) <= real(j - 1, wp)) call lines_in_plane(facet, real(j - 1, wp), work)
       call hits_in_row(facet, j, self, work)
       call clip_to_cells(facet, 2, j, work%low(2, m), work%high(2, m), piece)
-      call sum_columns(piece, j, work)
+      call sum_columns(piece, j, flat_direction(work%low(:, m), work%high(:, m)), work)
     end do
   end subroutine sum_row
+
+  !> Direction of the grid plane in which a facet lies, 0 if it does not.
+  pure function flat_direction(low, high) result(d)
+    real(wp), intent(in) :: low(3), high(3)   !! box around the facet [cells]
+    integer :: d
+
+    do d = 3, 1, -1
+      if (high(d) <= low(d) .and. abs(low(d) - anint(low(d))) <= 0.0_wp) return
+    end do
+  end function flat_direction
 
   !> The corners of a facet [cells].
   pure subroutine load_facet(shape, m, work, facet)
@@ -244,9 +259,10 @@ contains
   end subroutine load_facet
 
   !> Follow a piece of a facet, in row j, through the columns and cells of the row.
-  subroutine sum_columns(piece, j, work)
+  subroutine sum_columns(piece, j, flat, work)
     type(polygon_t), intent(in) :: piece
     integer, intent(in) :: j
+    integer, intent(in) :: flat   !! direction of the grid plane the facet lies in, 0: none
     type(share_work_t), intent(inout) :: work
     type(polygon_t) :: column, part
     real(wp) :: low, high, line(3, 2, 4), corner(3)
@@ -254,7 +270,8 @@ contains
 
     if (piece%n < 3) return
     corner(2) = real(j - 1, wp)
-    call cells_between(minval(piece%x(1, :piece%n)), maxval(piece%x(1, :piece%n)), first(1), last(1))
+    call cells_between(minval(piece%x(1, :piece%n)), maxval(piece%x(1, :piece%n)), &
+                       first(1), last(1))
     do i = first(1), last(1)
       corner(1) = real(i - 1, wp)
       call cut_by_plane(piece, 1, corner(1), line, n)
@@ -270,11 +287,12 @@ contains
         corner(3) = real(k - 1, wp)
         call cut_by_plane(column, 3, corner(3), line, n)
         do m = 1, n
-          call add_piece(turn(3), line(2, 1, m) - corner(2), line(1, 1, m) - corner(1), &
-                         line(2, 2, m) - corner(2), line(1, 2, m) - corner(1), work%area(:, i, k, 3))
+          call add_piece(turn(3), line([2, 1], 1, m) - corner([2, 1]), &
+                         line([2, 1], 2, m) - corner([2, 1]), work%area(:, i, k, 3))
         end do
         call clip_to_cells(column, 3, k, low, high, part)
         call add_prism(part, corner, work%volume(:, i, k))
+        if (flat > 0) call add_end(part, corner, flat, work%area(:, i, k, flat))
       end do
     end do
   end subroutine sum_columns
@@ -406,26 +424,52 @@ contains
       s = a + b + c
       twice = (b(1) - a(1))*(c(2) - a(2)) - (c(1) - a(1))*(b(2) - a(2))
       total(1) = total(1) + twice*s(3)/6.0_wp
-      total(2:3) = total(2:3) + twice/24.0_wp*(s(1:2)*s(3) + a(1:2)*a(3) + b(1:2)*b(3) + c(1:2)*c(3))
+      total(2:3) = total(2:3) + &
+                   twice/24.0_wp*(s(1:2)*s(3) + a(1:2)*a(3) + b(1:2)*b(3) + c(1:2)*c(3))
       total(4) = total(4) + twice/48.0_wp*(s(3)**2 + a(3)**2 + b(3)**2 + c(3)**2)
       total(5) = total(5) + 0.5_wp*twice
       total(6:7) = total(6:7) + twice*s(1:2)/6.0_wp
     end do
   end subroutine add_prism
 
-  !> Add the area under a line in one cell of a face, and the column further down.
-  pure subroutine add_piece(sign, f1, e1, f2, e2, total)
-    real(wp), intent(in) :: sign
-    real(wp), intent(in) :: f1, e1, f2, e2   !! ends: along and up the columns, from the cell's corner
+  !> Add the area of a facet that lies in the lower face d of a cell and ends the body there.
+  pure subroutine add_end(part, corner, d, total)
+    type(polygon_t), intent(in) :: part
+    real(wp), intent(in) :: corner(3)        !! lower corner of the cell [cells]
+    integer, intent(in) :: d
     real(wp), intent(inout) :: total(5)
-    real(wp) :: width
+    real(wp) :: a(2), b(2), c(2), twice, sum3(3)
+    integer :: v
 
-    width = sign*(f2 - f1)
-    total(1) = total(1) + 0.5_wp*width*(e1 + e2)
-    total(2) = total(2) + width*((f1 + f2)*(e1 + e2) + f1*e1 + f2*e2)/6.0_wp
-    total(3) = total(3) + width*(e1*e1 + e1*e2 + e2*e2)/6.0_wp
+    if (part%n < 3) return
+    associate (m => [along(d), up(d)])
+      sum3 = 0.0_wp
+      a = part%x(m, 1) - corner(m)
+      c = part%x(m, 2) - corner(m)
+      do v = 3, part%n
+        b = c
+        c = part%x(m, v) - corner(m)
+        twice = turn(d)*((b(1) - a(1))*(c(2) - a(2)) - (c(1) - a(1))*(b(2) - a(2)))
+        sum3 = sum3 + twice*[0.5_wp, (a + b + c)/6.0_wp]
+      end do
+    end associate
+    if (sum3(1) > 0.0_wp) total(1:3) = total(1:3) + sum3   ! looks up: the body ends
+  end subroutine add_end
+
+  !> Add the area under a line in one cell of a face, and the column further down.
+  pure subroutine add_piece(sign, a, b, total)
+    real(wp), intent(in) :: sign
+    real(wp), intent(in) :: a(2), b(2)   !! ends: along and up the columns, from the cell's corner
+    real(wp), intent(inout) :: total(5)
+    real(wp) :: width, height
+
+    width = sign*(b(1) - a(1))
+    height = a(2) + b(2)
+    total(1) = total(1) + 0.5_wp*width*height
+    total(2) = total(2) + width*((a(1) + b(1))*height + a(1)*a(2) + b(1)*b(2))/6.0_wp
+    total(3) = total(3) + width*(a(2)**2 + a(2)*b(2) + b(2)**2)/6.0_wp
     total(4) = total(4) + width
-    total(5) = total(5) + 0.5_wp*width*(f1 + f2)
+    total(5) = total(5) + 0.5_wp*width*(a(1) + b(1))
   end subroutine add_piece
 
   !> Follow a line in the faces of direction d up the column of cells number i.
@@ -435,7 +479,7 @@ contains
     integer, intent(in) :: i, d
     real(wp), intent(in) :: sign         !! of the area under a line from a to b
     type(share_work_t), intent(inout) :: work
-    real(wp) :: low(2), high(2), f, f_next, e, e_next, way
+    real(wp) :: low(2), high(2), here(2), next(2), corner(2), way
     integer :: k, first, last
 
     if (a(2) <= b(2)) then
@@ -448,22 +492,26 @@ contains
       way = -sign
     end if
     call cells_between(low(2), high(2), first, last)
-    f = low(1)
-    e = low(2)
+    here = low
     do k = first, last
-      if (k == last) then
-        f_next = high(1)
-        e_next = high(2)
-      else
-        e_next = real(k, wp)
-        f_next = low(1) + (e_next - low(2))/(high(2) - low(2))*(high(1) - low(1))
-      end if
-      call add_piece(way, f - f0, e - real(k - 1, wp), f_next - f0, e_next - real(k - 1, wp), &
-                     work%area(:, i, k, d))
-      f = f_next
-      e = e_next
+      next = high
+      if (k < last) next = point_at(low, high, 2, real(k, wp))
+      corner = [f0, real(k - 1, wp)]
+      call add_piece(way, here - corner, next - corner, work%area(:, i, k, d))
+      here = next
     end do
   end subroutine add_line
+
+  !> Point of a line in the plane where coordinate m has a value between those of its ends.
+  pure function point_at(a, b, m, value) result(x)
+    real(wp), intent(in) :: a(2), b(2)   !! a(m) < b(m)
+    integer, intent(in) :: m
+    real(wp), intent(in) :: value
+    real(wp) :: x(2)
+
+    x = a + (value - a(m))/(b(m) - a(m))*(b - a)
+    x(m) = value
+  end function point_at
 
   !> Lines of a facet in the plane between two rows, column by column.
   subroutine lines_in_plane(facet, plane, work)
@@ -488,7 +536,7 @@ contains
       a = low
       do i = first, last
         b = high
-        if (i < last) b = [real(i, wp), low(2) + (real(i, wp) - low(1))/(high(1) - low(1))*(high(2) - low(2))]
+        if (i < last) b = point_at(low, high, 1, real(i, wp))
         call add_line(a, b, real(i - 1, wp), i, 2, sign, work)
         a = b
       end do
@@ -691,7 +739,7 @@ contains
     self%at(n) = at
   end subroutine add_hit
 
-  !> Number the cut cells on the grid, and the ends of the first and last run of them in each row.
+  !> Number the cut cells on the grid; in each row, ends of their first run, and of all that follow.
   pure subroutine mark_cut_cells(self, work)
     type(body_shares_t), intent(in) :: self
     type(share_work_t), intent(inout) :: work
@@ -707,7 +755,7 @@ contains
         if (run(1) > run(2)) then
           run = i(1)
         else
-          if (i(1) /= run(4) + 1) run(3) = i(1)
+          if (i(1) /= run(4) + 1 .and. run(3) <= run(2)) run(3) = i(1)
           if (i(1) == run(2) + 1) run(2) = i(1)
           run(4) = i(1)
         end if

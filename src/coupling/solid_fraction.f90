@@ -1,4 +1,4 @@
-!> The bodies in the grid: solid shares of cells and faces, wall distances, cut cells, sealed pockets.
+!> The bodies in the grid: solid shares, wall distances, cut cells, sealed pockets.
 !!
 !! Every process fills its own cells and halo, images in other periods included, from the poses of
 !! the bodies alone; nothing is exchanged but the flags of pockets, where there are any.
@@ -8,24 +8,22 @@ module solid_fraction_m
   use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
   use solid_geometry_m, only: solid_geometry_t, no_hit
   use rigid_body_m, only: blocks_t
-  use body_shares_m, only: body_shares_t, share_work_t, find_body_shares
+  use body_shares_m, only: body_shares_t, share_work_t, find_body_shares, full_cell, full_face
   use parallel_m, only: halo_exchange, global_sum
   implicit none
   private
   public :: solid_fraction_t, solid_fraction_init, update_solid
 
   real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
-  real(wp), parameter :: full_cell = 1.0e-12_wp     !! a cell lacking less is full
-  real(wp), parameter :: full_face = 1.0e-9_wp      !! a face lacking less is closed
 
   type :: solid_fraction_t
     type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body
     type(share_work_t), allocatable :: work(:)    !! (threads)
     logical, allocatable :: near(:)               !! (n) present and in the cells kept here
-    integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods by which its images are shifted
+    integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by
     !> First and last cell where the solids are kept: own cells and halo, less what is outside.
     integer :: low(3) = 1, high(3) = 0
-    !> (2, cells listed) place in the list of the body; number of the body's first tetrahedron less one.
+    !> (2, cells listed) place in the list of the body; number of its first tetrahedron less one.
     integer, allocatable :: source(:, :)
     logical, allocatable :: reached(:)            !! (cut cells) fluid gets there from uncut cells
     integer, allocatable :: stack(:)
@@ -141,8 +139,9 @@ contains
     end do
     !$omp parallel do schedule(dynamic, 1) if (count(self%near) > 1)
     do b = 1, blocks%n
-      if (self%near(b)) call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), &
-                                              blocks%q(:, b), self%work(omp_get_thread_num()), self%body(b))
+      if (.not. self%near(b)) cycle
+      call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), blocks%q(:, b), &
+                            self%work(omp_get_thread_num()), self%body(b))
     end do
   end subroutine find_shares
 
@@ -311,7 +310,8 @@ contains
       n = n + 1
       solid%face(:, n) = f
       solid%face_beta(n) = body%beta(m)
-      solid%face_centroid(:, n) = grid%origin + (real(f(1:3) - 1, wp) + body%face_centroid(:, m))*grid%h
+      solid%face_centroid(:, n) = grid%origin + &
+                                  (real(f(1:3) - 1, wp) + body%face_centroid(:, m))*grid%h
       solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body%beta(m)
     end do
     solid%body_face(b + 1) = n + 1
@@ -406,6 +406,10 @@ contains
         if (solid%alpha(i(1), i(2), i(3)) > 1.0_wp - full_cell) then
           solid%alpha(i(1), i(2), i(3)) = 1.0_wp
           call set_faces(grid, i, 0.0_wp, solid)
+          if (solid%cell_alpha(m) < 1.0_wp) then   ! bodies overlap: not all its faces are listed
+            solid%n_closed = solid%n_closed + 1
+            solid%closed_cell(:, solid%n_closed) = i
+          end if
         else if (solid%cut(i(1), i(2), i(3)) == 0) then
           solid%n_cut = solid%n_cut + 1
           solid%cut(i(1), i(2), i(3)) = solid%n_cut
@@ -415,8 +419,8 @@ contains
     end do
   end subroutine finish_cells
 
-  !> A leg from a centre inside to one outside always has a hit, also where round-off sees the centre
-  !! on either side of the surface: then the wall is at the centre inside.
+  !> A leg from a centre inside to one outside always has a hit, also where round-off sees the
+  !! centre now on this, now on that side of the surface: then the wall is at the centre inside.
   subroutine guard_legs(self, solid)
     type(solid_fraction_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
@@ -428,15 +432,13 @@ contains
       if (b == 0) cycle
       do d = 1, 3
         n = i - unit_step(:, d)
-        if (n(d) >= self%low(d)) then
-          if (solid%inside(n(1), n(2), n(3)) == 0 .and. solid%leg_low(i(1), i(2), i(3), d) > 1.0_wp) &
-            call shorten_leg([i, d], 1.0_wp, b, solid)
+        if (n(d) >= self%low(d) .and. solid%leg_low(i(1), i(2), i(3), d) > 1.0_wp) then
+          if (solid%inside(n(1), n(2), n(3)) == 0) call shorten_leg([i, d], 1.0_wp, b, solid)
         end if
         n = i + unit_step(:, d)
-        if (n(d) <= self%high(d)) then
-          if (solid%inside(n(1), n(2), n(3)) == 0 .and. solid%leg_low(n(1), n(2), n(3), d) > 1.0_wp) &
-            call shorten_leg([n, d], 0.0_wp, b, solid)
-        end if
+        if (n(d) > self%high(d)) cycle
+        if (solid%inside(n(1), n(2), n(3)) == 0 .and. &
+            solid%leg_low(n(1), n(2), n(3), d) > 1.0_wp) call shorten_leg([n, d], 0.0_wp, b, solid)
       end do
     end do
   end subroutine guard_legs
@@ -467,7 +469,8 @@ contains
     do t = 1, size(body%corner, 3)
       solid%n_tet = solid%n_tet + 1
       do v = 1, 4
-        solid%corner(:, v, solid%n_tet) = grid%origin + (real(offset, wp) + body%corner(:, v, t))*grid%h
+        solid%corner(:, v, solid%n_tet) = grid%origin + &
+                                          (real(offset, wp) + body%corner(:, v, t))*grid%h
       end do
     end do
   end subroutine place_tets
@@ -476,41 +479,49 @@ contains
   pure subroutine tets_of_cut_cells(self, solid)
     type(solid_fraction_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b, e, m, p, t, pass
+    integer :: b, e, m, n, t, total, from, to
 
     solid%first(1:solid%n_cut + 1) = 0
-    do pass = 1, 2
-      do b = size(self%body), 1, -1
-        do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
-          associate (i => solid%cell(:, e), local => self%source(1, e))
-            m = solid%cut(i(1), i(2), i(3))
-            if (m == 0) cycle
-            associate (from => self%body(b)%first_tet(local), to => self%body(b)%first_tet(local + 1) - 1)
-              if (pass == 1) solid%first(m) = solid%first(m) + to - from + 1
-              if (pass == 1) cycle
-              do t = to, from, -1
-                solid%first(m) = solid%first(m) - 1
-                solid%tet(solid%first(m)) = self%body(b)%tet(t) + self%source(2, e)
-              end do
-            end associate
-          end associate
+    do b = 1, size(self%body)
+      do e = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        m = number_of_cut(e)
+        if (m == 0) cycle
+        n = self%source(1, e)
+        solid%first(m) = solid%first(m) + self%body(b)%first_tet(n + 1) - self%body(b)%first_tet(n)
+      end do
+    end do
+    total = 0
+    do m = 1, solid%n_cut
+      total = total + solid%first(m)
+      solid%first(m) = total + 1
+    end do
+    solid%first(solid%n_cut + 1) = total + 1
+    if (size(solid%tet) < total) then
+      deallocate (solid%tet)
+      allocate (solid%tet(2*total))
+    end if
+    do b = size(self%body), 1, -1
+      do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
+        m = number_of_cut(e)
+        if (m == 0) cycle
+        n = self%source(1, e)
+        from = self%body(b)%first_tet(n)
+        to = self%body(b)%first_tet(n + 1) - 1
+        solid%first(m) = solid%first(m) - (to - from + 1)
+        do t = from, to
+          solid%tet(solid%first(m) + t - from) = self%body(b)%tet(t) + self%source(2, e)
         end do
       end do
-      if (pass == 2) return
-      p = 1
-      do m = 1, solid%n_cut
-        p = p + solid%first(m)
-        solid%first(m) = p
-      end do
-      solid%first(solid%n_cut + 1) = p
-      if (size(solid%tet) < p - 1) then
-        deallocate (solid%tet)
-        allocate (solid%tet(2*p))
-      end if
     end do
+  contains
+    pure integer function number_of_cut(e)
+      integer, intent(in) :: e
+
+      number_of_cut = solid%cut(solid%cell(1, e), solid%cell(2, e), solid%cell(3, e))
+    end function number_of_cut
   end subroutine tets_of_cut_cells
 
-  !> Close the faces of cut cells from which no way leads through open faces to a cell without solid.
+  !> Close the faces of cut cells from which no open faces lead to a cell without solid.
   subroutine close_pockets(grid, self, solid)
     type(grid_t), intent(in) :: grid
     type(solid_fraction_t), intent(inout) :: self
@@ -558,7 +569,8 @@ contains
     n = 0
     do m = 1, solid%n_cut
       if (self%reached(m)) cycle
-      if (all(solid%cut_cell(:, m) >= grid%lo) .and. all(solid%cut_cell(:, m) <= grid%hi)) n = n + 1_i8
+      if (any(solid%cut_cell(:, m) < grid%lo) .or. any(solid%cut_cell(:, m) > grid%hi)) cycle
+      n = n + 1_i8
     end do
   end function own_unreached
 
@@ -591,7 +603,8 @@ contains
 
     n_stack = 0
     do m = 1, solid%n_cut
-      if (.not. self%reached(m)) self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
+      if (.not. self%reached(m)) &
+        self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
       if (.not. self%reached(m)) cycle
       n_stack = n_stack + 1
       self%stack(n_stack) = m

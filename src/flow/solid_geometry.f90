@@ -12,42 +12,43 @@ module solid_geometry_m
   real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
 
   type :: solid_geometry_t
-    real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell volume, all bodies, 0..1 [-]
+    real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
-    integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid there
+    integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
     !> Legs between the centres of the two cells of a lower face d, in units of h(d), 0..1:
-    !! distance from the lower cell (i-1) up to the first surface, and from the upper cell (i) down to
-    !! the first surface; `no_hit` where the leg is free. The bodies hit stand in `leg_body_*`.
+    !! distance from the lower cell (i-1) up to the first surface, and from the upper cell (i) down
+    !! to the first surface; `no_hit` where the leg is free. The bodies hit stand in `leg_body_*`.
     real(wp), allocatable :: leg_low(:, :, :, :), leg_high(:, :, :, :)
     integer, allocatable :: leg_body_low(:, :, :, :), leg_body_high(:, :, :, :)
 
     !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m].
     integer :: n_tet = 0
     real(wp), allocatable :: corner(:, :, :)
-    integer, allocatable :: body_tet(:)         !! (n_bodies + 1) tetrahedra of body b: body_tet(b):body_tet(b+1)-1
-    !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, 0 elsewhere;
+    integer, allocatable :: body_tet(:)         !! (n_bodies + 1) of b: body_tet(b):body_tet(b+1)-1
+    !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0;
     !! its tetrahedra are `tet(first(m):first(m+1)-1)`, indices into `corner`.
     integer :: n_cut = 0
     integer, allocatable :: cut(:, :, :)
     integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
     integer, allocatable :: first(:), tet(:)
 
-    !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and the centroid of its part.
+    !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
     integer, allocatable :: cell(:, :)          !! (3, *) cell index
     real(wp), allocatable :: cell_alpha(:)      !! share of the cell volume [-]
     real(wp), allocatable :: cell_centroid(:, :) !! (3, *) centroid of the solid part [m]
-    !> Per body b: faces `body_face(b):body_face(b+1)-1` with its own share and the centroid of its part.
+    !> Per body b: faces `body_face(b):body_face(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_face(:)
     integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
     real(wp), allocatable :: face_beta(:)       !! share of the face area [-]
     real(wp), allocatable :: face_centroid(:, :) !! (3, *) [m]
     !> The lists hold the cells and faces of the halo too, also as images in other periods, with the
-    !! centroids at the place of the image. Legs with a hit; cut cells of pockets without a way out,
-    !! whose faces are closed, in the lists of this process and in the whole domain.
-    integer :: n_leg = 0, n_closed = 0, n_sealed = 0
+    !! centroids at the place of the image. What else to clear before the next filling: legs with a
+    !! hit, and cells closed all round because bodies overlap there or the cell is sealed in.
+    integer :: n_leg = 0, n_closed = 0
     integer, allocatable :: leg(:, :)           !! (4, *) cell index and direction of the lower face
     integer, allocatable :: closed_cell(:, :)   !! (3, *)
+    integer :: n_sealed = 0                     !! cut cells of the domain that are sealed in
   end type solid_geometry_t
 
 contains
