@@ -25,7 +25,8 @@ module liquid_transport_m
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_constant, open_slab_below
   use surface_normal_m, only: surface_normal
   use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
-  use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
+  use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction, &
+                                 nearly_pure
   use exact_sum_m, only: exact_sum
   use parallel_m, only: halo_exchange, global_max, global_sum
   implicit none
@@ -36,8 +37,6 @@ module liquid_transport_m
 
   real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
   real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
-  real(wp), parameter :: pure_open = 1.0e-11_wp     !! least share that has a plane, no solid
-  real(wp), parameter :: pure_cut = 1.0e-8_wp       !! the same in a cut cell
   real(wp), parameter :: closed_volume = 1.0e-12_wp !! open volume of a closed cell [V]
   integer, parameter :: max_late_iterations = 1000
 
@@ -265,7 +264,7 @@ contains
     type(liquid_transport_t), intent(inout) :: self
 
     call mixed_outflow(grid, d, self)
-    call list_mixed_cells(grid, old, d, self)
+    call list_mixed_cells(grid, d, self)
     call plane_outflow(grid, old, d, self)
     call halo_exchange(self%out_low, n_halo, d)
     call halo_exchange(self%out_high, n_halo, d)
@@ -299,9 +298,8 @@ contains
   end subroutine mixed_outflow
 
   !> Cells with liquid and gas that give volume in direction d, in the order of the grid.
-  subroutine list_mixed_cells(grid, old, d, self)
+  subroutine list_mixed_cells(grid, d, self)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old
     integer, intent(in) :: d
     type(liquid_transport_t), intent(inout) :: self
     integer :: i, j, k, n
@@ -339,14 +337,13 @@ contains
     pure logical function needs_plane(i, j, k)
       integer, intent(in) :: i, j, k
       integer :: f(3)
-      real(wp) :: w, v, pure_share
+      real(wp) :: w, v
 
       needs_plane = .false.
       w = self%w(i, j, k)
       v = self%v(i, j, k)
       if (w <= 0.0_wp .or. w >= v) return
-      pure_share = merge(pure_cut, pure_open, old%alpha(i, j, k) > 0.0_wp)
-      if (w <= pure_share*v .or. v - w <= pure_share*v) return
+      if (w <= nearly_pure*v .or. v - w <= nearly_pure*v) return
       f = [i, j, k] + unit_step(:, d)
       needs_plane = self%q(i, j, k, d) < 0.0_wp .or. self%q(f(1), f(2), f(3), d) > 0.0_wp
     end function needs_plane

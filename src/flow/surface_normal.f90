@@ -92,9 +92,8 @@ contains
         before(d) = 0
         f = at + before
         f(d) = f(d) + max(o(d), 0)
-        if (seen(before(1), before(2), before(3)) .and. passable(solid%open(f(1), f(2), f(3), d))) then
-          seen(o(1), o(2), o(3)) = .true.
-        end if
+        if (.not. seen(before(1), before(2), before(3))) cycle
+        if (passable(solid%open(f(1), f(2), f(3), d))) seen(o(1), o(2), o(3)) = .true.
       end do
       if (.not. seen(o(1), o(2), o(3))) then
         before = 0

@@ -1,13 +1,18 @@
 !> Transport of the liquid: exact volumes, bounds, still water, moving boxes, parted basins.
 program test_liquid_transport
   use kinds_m, only: wp, pi
-  use case_types_m, only: fluid_t, water_t
+  use case_types_m, only: case_t, fluid_t, water_t
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, transport_liquid
   use liquid_fill_m, only: fill_liquid, liquid_volume
+  use vectors_m, only: quaternion_from_axis
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use box_solid_m, only: set_boxes, simple_grid
   use check_m, only: check, finish_checks
   implicit none
@@ -23,6 +28,7 @@ program test_liquid_transport
   call box_under_water()
   call box_through_the_surface()
   call box_leaves_through_the_top()
+  call hexapod_through_the_surface()
   call still_water()
   call two_basins()
   call finish_checks()
@@ -220,7 +226,8 @@ contains
 
     fluid%water_level = 0.19_wp
     call box_at(place(0.0_wp), half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
+               transport)
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     impure = 0.0_wp
@@ -267,7 +274,8 @@ contains
     fluid%water_level = 0.1013_wp
     centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
     call box_at(centre, half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
+               transport)
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     bound = 0.0_wp
@@ -296,6 +304,62 @@ contains
       ', clamped ', clamped, ', late iterations ', late
   end subroutine box_through_the_surface
 
+  !> A turning hexapod dips into the water and comes out again, fluid moved by the correction alone.
+  subroutine hexapod_through_the_surface()
+    type(grid_t) :: grid
+    type(solid_geometry_t), allocatable :: old, new, keep
+    type(flow_t) :: flow
+    type(liquid_transport_t) :: transport
+    type(case_t) :: case
+    type(shape_t) :: shapes(1)
+    type(blocks_t) :: blocks
+    type(solid_fraction_t) :: fraction
+    character(:), allocatable :: message
+    real(wp) :: worst, bound, drift, volume
+    integer :: step
+
+    allocate (case%shape(1), case%body(1), case%drop(0), old, new)
+    case%shape(1)%name = 'hexapod'
+    case%shape(1)%kind = 'hexapod'
+    case%shape(1)%size = 0.03_wp
+    case%shape(1)%refinement = 1
+    case%body(1)%shape = 'hexapod'
+    case%body(1)%position = [0.0771_wp, 0.0611_wp, 0.14_wp]
+    case%fluid%water_level = 0.1013_wp
+    call make_shape(case%shape(1), shapes(1), message)
+    call blocks_init(case, shapes, blocks)
+    call simple_grid(tank_cells, tank, grid)
+    call flow_init(grid, flow)
+    call solid_geometry_init(grid, old, blocks%n)
+    call solid_geometry_init(grid, new, blocks%n)
+    call solid_fraction_init(grid, blocks, fraction)
+    call liquid_transport_init(grid, gravity, transport)
+    call update_solid(fraction, grid, blocks, new)
+    call fill_liquid(grid, case%fluid, [water_t ::], new, flow)
+    call extend_fraction(grid, new, transport%extension, flow)
+    worst = 0.0_wp
+    bound = 0.0_wp
+    drift = 0.0_wp
+    do step = 1, 40
+      call move_alloc(old, keep)
+      call move_alloc(new, old)
+      call move_alloc(keep, new)
+      blocks%x(3, 1) = 0.14_wp - 0.06_wp*sin(2.0_wp*pi*real(step, wp)/40.0_wp)
+      blocks%q(:, 1) = quaternion_from_axis([1.0_wp, -0.4_wp, 0.3_wp], 0.08_wp*real(step, wp))
+      call update_solid(fraction, grid, blocks, new)
+      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
+      worst = max(worst, room_error(grid, new, flow))
+      bound = max(bound, out_of_bounds(grid, flow))
+      volume = liquid_volume(grid, flow%liquid) - flow%liquid_inflow
+      drift = max(drift, abs(volume/flow%liquid_initial - 1.0_wp))
+    end do
+    call check('hexapod: volume at every step', drift, 0.0_wp, 1.0e-13_wp)
+    call check('hexapod: bounds, to the tolerance of the volumes', bound, 0.0_wp, 1.0e-12_wp)
+    call check('hexapod: room follows the block', worst, 0.0_wp, 2.0e-12_wp)
+    call check('hexapod: C^ within 0 and 1', all(flow%c >= 0.0_wp .and. flow%c <= 1.0_wp))
+    print '(3(a, es9.2))', 'hexapod: drift ', drift, ', bounds ', bound, ', room error ', worst
+  end subroutine hexapod_through_the_surface
+
   !> A box moves out through the open top: what it leaves behind comes in as gas.
   subroutine box_leaves_through_the_top()
     type(grid_t) :: grid
@@ -309,7 +373,8 @@ contains
     fluid%water_level = 0.0613_wp
     centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
     call box_at(centre, half, low, high)
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
+               transport)
     before = liquid_volume(grid, flow%liquid)
     worst = 0.0_wp
     do step = 1, 30
@@ -343,7 +408,8 @@ contains
     high(:, 2) = [0.111_wp, 0.033_wp, 0.2_wp]
     low(:, 3) = [0.12_wp, 0.05_wp, 0.1502_wp]
     high(:, 3) = [0.151_wp, 0.1_wp, 0.153_wp]
-    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, transport)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
+               transport)
     allocate (liquid, source=flow%liquid)
     allocate (c, source=flow%c)
     do step = 1, 3
