@@ -77,6 +77,7 @@ module body_shares_m
     !! column further down and its moment.
     real(wp), allocatable :: area(:, :, :, :)
     integer, allocatable :: crossings(:, :)    !! (x, z) surfaces passed upwards between two centres
+    logical, allocatable :: full(:, :)         !! (x, z) the cell of the row before is full
     ! To find the tetrahedra of cut cells.
     integer, allocatable :: number(:, :, :)    !! place in the list of a cut cell, 0 elsewhere
     integer, allocatable :: run(:, :, :)       !! (4, y, z) ends of the first run of cut cells,
@@ -112,6 +113,7 @@ contains
     do j = self%low(2), self%high(2)
       call sum_row(shape, j, self, work)
       call close_columns(self, work)
+      call close_full_cells(self, work)
       call list_row(j, self, work)
     end do
     call hits_along_y(shape, self, work)
@@ -161,7 +163,7 @@ contains
     end do
     do d = 1, 3
       self%low(d) = floor(minval(work%low(d, :n))) + 1
-      self%high(d) = floor(maxval(work%high(d, :n))) + 1
+      self%high(d) = floor(maxval(work%high(d, :n)) + full_face) + 1   ! also above its last plane
     end do
     n = size(shape%flow_tet, 2)
     if (allocated(self%corner)) then
@@ -193,15 +195,16 @@ contains
     if (allocated(work%volume)) then
       if (any(ubound(work%number) < m)) then
         m = max(m, ubound(work%number))
-        deallocate (work%volume, work%area, work%crossings, work%number, work%run)
+        deallocate (work%volume, work%area, work%crossings, work%full, work%number, work%run)
       end if
     end if
     if (.not. allocated(work%volume)) then
       allocate (work%volume(7, -m(1):m(1), -m(3):m(3)), work%area(5, -m(1):m(1), -m(3):m(3), 3))
-      allocate (work%crossings(-m(1):m(1), -m(3):m(3)))
+      allocate (work%crossings(-m(1):m(1), -m(3):m(3)), work%full(-m(1):m(1), -m(3):m(3)))
       allocate (work%number(-m(1):m(1), -m(2):m(2), -m(3):m(3)), source=0)
       allocate (work%run(4, -m(2):m(2), -m(3):m(3)))
     end if
+    work%full(self%low(1):self%high(1), self%low(3):self%high(3)) = .false.
     if (.not. allocated(work%pair)) allocate (work%pair(2, first_size))
     if (.not. allocated(self%cell)) then
       allocate (self%cell(3, first_size), self%inside(first_size), self%alpha(first_size))
@@ -649,6 +652,25 @@ contains
       end do
     end do
   end subroutine close_columns
+
+  !> A cell that is full but for round-off has six closed faces.
+  pure subroutine close_full_cells(self, work)
+    type(body_shares_t), intent(in) :: self
+    type(share_work_t), intent(inout) :: work
+    integer :: i, k
+    logical :: full
+
+    do k = self%low(3), self%high(3)
+      do i = self%low(1), self%high(1)
+        full = work%volume(1, i, k) > 1.0_wp - full_cell
+        if (full .or. work%full(i, k)) work%area(1, i, k, 2) = 1.0_wp
+        work%full(i, k) = full
+        if (.not. full) cycle
+        work%area(1, i:i + 1, k, 1) = 1.0_wp
+        work%area(1, i, k:k + 1, 3) = 1.0_wp
+      end do
+    end do
+  end subroutine close_full_cells
 
   !> A cell of a face takes the column that stands above it.
   pure subroutine add_above(above, here)

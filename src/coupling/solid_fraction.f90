@@ -388,8 +388,8 @@ contains
     end do
     do m = 1, n
       associate (f => solid%face(:, m))
-        if (solid%open(f(1), f(2), f(3), f(4)) < full_face) &
-          solid%open(f(1), f(2), f(3), f(4)) = 0.0_wp
+        total = 1.0_wp - solid%open(f(1), f(2), f(3), f(4))
+        if (total > 1.0_wp - full_face) solid%open(f(1), f(2), f(3), f(4)) = 0.0_wp
       end associate
     end do
   end subroutine finish_faces
@@ -405,11 +405,10 @@ contains
       associate (i => solid%cell(:, m))
         if (solid%alpha(i(1), i(2), i(3)) > 1.0_wp - full_cell) then
           solid%alpha(i(1), i(2), i(3)) = 1.0_wp
-          call set_faces(grid, i, 0.0_wp, solid)
-          if (solid%cell_alpha(m) < 1.0_wp) then   ! bodies overlap: not all its faces are listed
-            solid%n_closed = solid%n_closed + 1
-            solid%closed_cell(:, solid%n_closed) = i
-          end if
+          if (solid%cell_alpha(m) >= 1.0_wp) cycle
+          call set_faces(grid, i, 0.0_wp, solid)   ! shared: perhaps not all are closed
+          solid%n_closed = solid%n_closed + 1
+          solid%closed_cell(:, solid%n_closed) = i
         else if (solid%cut(i(1), i(2), i(3)) == 0) then
           solid%n_cut = solid%n_cut + 1
           solid%cut(i(1), i(2), i(3)) = solid%n_cut

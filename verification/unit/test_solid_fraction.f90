@@ -22,6 +22,7 @@ program test_solid_fraction
   call random_poses([60, 10, 25], [0.3_wp, 0.1_wp, 0.2_wp], 100)
   call against_tetrahedra()
   call faces_on_grid_planes()
+  call degenerate_poses()
   call three_legs_on_the_floor()
   call legs_of_a_box()
   call legs_of_a_sphere()
@@ -311,6 +312,85 @@ contains
     call check('on grid planes: each of them by the body', beta)
   end subroutine faces_on_grid_planes
 
+  !> Corners, edges and sides on grid planes and cell centres, or nearly: volume, open and solid
+  !! share of each face, a hit on every leg between inside and outside.
+  subroutine degenerate_poses()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp), parameter :: angle(8) = [pi*[0.0_wp, 0.25_wp, 0.5_wp, 0.75_wp, 1.0_wp, 0.2_wp], &
+                                       pi/6, atan(sqrt(0.5_wp))]
+    real(wp), parameter :: shift(8) = [0.0_wp, 0.5_wp, 0.25_wp, 1e-13_wp, -1e-12_wp, 1e-10_wp, &
+                                       1.0_wp/3, -1e-7_wp]
+    real(wp) :: q(4), x(3), worst(2)
+    integer :: p, i, complete
+
+    grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
+    worst = 0.0_wp
+    complete = 0
+    do p = 1, 90
+      q = identity
+      do i = 1, 3
+        q = quaternion_product(quaternion_from_axis(real(unit_step(:, 1 + int(3*draw())), wp), &
+                                                    angle(1 + int(8*draw()))), q)
+        x(i) = 0.005_wp*(8 + shift(1 + int(8*draw())))
+      end do
+      select case (mod(p, 3))
+      case (0)
+        call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      case (1)
+        call make_bodies('box', [0.02_wp, 0.03_wp, 0.0075_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      case (2)
+        call make_bodies('sphere', [0.04_wp, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      end select
+      call fill(grid, blocks, solid)
+      worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
+      worst(2) = max(worst(2), largest_gap(solid))
+      complete = complete + legs_without_hit(grid, solid)
+    end do
+    call check('degenerate: volume', worst(1), 0.0_wp, 1e-12_wp)
+    call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
+    call check('degenerate: legs between inside and outside without a hit', complete, 0)
+  end subroutine degenerate_poses
+
+  !> Largest |1 - open - sum of the shares of the bodies| of a face.
+  function largest_gap(solid) result(gap)
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp) :: gap
+    real(wp), allocatable :: rest(:, :, :, :)
+    integer :: m
+
+    allocate (rest, source=solid%open)
+    do m = 1, solid%body_face(size(solid%body_face)) - 1
+      associate (f => solid%face(:, m))
+        rest(f(1), f(2), f(3), f(4)) = rest(f(1), f(2), f(3), f(4)) + solid%face_beta(m)
+      end associate
+    end do
+    gap = maxval(abs(rest - 1))
+  end function largest_gap
+
+  function legs_without_hit(grid, solid) result(n)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: n, i, j, k, m, low(3)
+
+    n = 0
+    do m = 1, 3
+      do k = 2, grid%n(3)
+        do j = 2, grid%n(2)
+          do i = 2, grid%n(1)
+            low = [i, j, k] - unit_step(:, m)
+            if (solid%leg_low(i, j, k, m) <= 1 .and. solid%leg_high(i, j, k, m) <= 1) cycle
+            if (solid%inside(i, j, k) /= solid%inside(low(1), low(2), low(3))) n = n + 1
+          end do
+        end do
+      end do
+    end do
+  end function legs_without_hit
+
   !> The pose of the fixed blocks: three corners on the floor, nothing below it.
   subroutine three_legs_on_the_floor()
     type(grid_t) :: grid
@@ -347,7 +427,7 @@ contains
       call make_bodies('box', size_m, reshape([0.04_wp, 0.028_wp, 0.036_wp] + &
                                                   0.004_wp*[draw(), draw(), draw()], [3, 1]), &
                            reshape(draw_attitude(), [4, 1]), blocks)
-      if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet: two hits on a leg
+      if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
       e = maxval(blocks%shapes(1)%point, 2)
       call fill(grid, blocks, solid)
       r = transpose(rotation_matrix(blocks%q(:, 1)))
