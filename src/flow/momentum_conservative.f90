@@ -13,11 +13,13 @@ module momentum_conservative_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo, unit_step
-  use boundary_m, only: fill_velocity_halo
+  use solid_geometry_m, only: solid_geometry_t
+  use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use tvd_m, only: tvd5
+  use liquid_transport_m, only: liquid_transport_t, sweep, small_cells, late_values, move_late
   implicit none
   private
-  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, mass_through
+  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_late, mass_through
 
   real(wp), parameter :: pure_share = 1.0e-6_wp   !! shares this close count as one phase
 
@@ -25,6 +27,9 @@ module momentum_conservative_m
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
     real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
+    real(wp), allocatable :: room(:, :, :)          !! open volume before the sweep [m3]
+    real(wp), allocatable :: mass(:, :, :)          !! of the fluid in the cell after the sweeps [kg]
+    real(wp), allocatable :: late(:), late_mass(:)  !! momentum and mass through the faces of small cells
   end type momentum_t
 
 contains
@@ -39,6 +44,8 @@ contains
     b = grid%hi + n_halo
     allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%carried(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%mass, self%room, source=self%carried)
+    allocate (self%late(0), self%late_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
 
@@ -80,24 +87,25 @@ contains
     end do
   end subroutine momentum_begin
 
-  !> One sweep in direction d: momentum moves with the volumes q and g of that sweep.
-  subroutine momentum_sweep(grid, fluid, d, q, g, room_before, liquid, room, u, self)
+  !> One sweep in direction d of liquid, room and momentum together.
+  subroutine momentum_sweep(grid, fluid, old, d, transport, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: old   !! bodies at the start of the step
     integer, intent(in) :: d
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
-      contiguous :: q, g                      !! volume of fluid and liquid through the lower faces [m3]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
-      contiguous :: room_before, liquid, room !! Vt before, W and Vt after the sweep [m3]
+    type(liquid_transport_t), intent(inout) :: transport
     real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! halo filled on entry and return
+                                             grid%lo(3) - n_halo:, :)   !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: i, j, k, m, e(3)
-    real(wp) :: mass
 
     e = unit_step(:, d)
+    self%room = transport%v
+    call fill_scalar_halo(grid, self%room)
+    call sweep(grid, old, d, transport)
     do m = 1, 3
-      call carried_momentum(grid, fluid, e, q, g, room_before, u(:, :, :, m), self%mixed_near, self%carried)
+      call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), self%room, &
+                            u(:, :, :, m), self%mixed_near, self%carried)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
@@ -108,17 +116,65 @@ contains
         end do
       end do
     end do
+    call velocity_of_momentum(grid, fluid, transport%w, transport%v, self%momentum, u)
+  end subroutine momentum_sweep
+
+  !> Velocity after the small cells have given what they hold, with the same implicit donor value as
+  !! their liquid; moves the volumes of the small cells too (`small_cells`).
+  subroutine momentum_late(grid, fluid, transport, u, self)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(liquid_transport_t), intent(inout) :: transport
+    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)   !! halo filled on return [m/s]
+    type(momentum_t), intent(inout) :: self
+    integer :: m, l, at(3)
+
+    self%mass = mass_through(fluid, transport%v, transport%w)
+    call small_cells(grid, transport)
+    if (size(self%late) < transport%n_late) then
+      deallocate (self%late, self%late_mass)
+      allocate (self%late(2*transport%n_late), self%late_mass(2*transport%n_late))
+    end if
+    associate (n => transport%n_late)
+      self%late_mass(1:n) = mass_through(fluid, transport%late_q(1:n), transport%late_g(1:n))
+      do m = 1, 3
+        call late_values(grid, self%momentum(:, :, :, m), self%mass, abs(self%late_mass(1:n)), transport, &
+                         self%carried)
+        do l = 1, n
+          at = transport%donor(:, l)
+          self%late(l) = self%late_mass(l)*self%carried(at(1), at(2), at(3))
+        end do
+        call move_late(grid, transport, self%late(1:n), self%momentum(:, :, :, m))
+      end do
+    end associate
+    call velocity_of_momentum(grid, fluid, transport%w, transport%v, self%momentum, u)
+  end subroutine momentum_late
+
+  !> Velocity of every own cell that holds mass; the others keep theirs. Halo filled.
+  subroutine velocity_of_momentum(grid, fluid, liquid, room, momentum, u)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+      contiguous :: liquid, room   !! [m3]
+    real(wp), intent(in), contiguous :: momentum(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                 grid%lo(3) - n_halo:, :)   !! [kg m/s]
+    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)       !! [m/s]
+    integer :: i, j, k
+    real(wp) :: mass
+
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           mass = mass_through(fluid, room(i, j, k), liquid(i, j, k))
-          if (mass > 0.0_wp) u(i, j, k, :) = self%momentum(i, j, k, :)/mass
+          if (mass > 0.0_wp) u(i, j, k, :) = momentum(i, j, k, :)/mass
         end do
       end do
     end do
     call fill_velocity_halo(grid, u)
-  end subroutine momentum_sweep
+  end subroutine velocity_of_momentum
 
   !> Momentum through the lower faces: mass times the mean velocity of the slab that leaves the donor.
   subroutine carried_momentum(grid, fluid, e, q, g, room, u, mixed_near, carried)

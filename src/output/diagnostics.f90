@@ -3,7 +3,7 @@ module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
   use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
-  use grid_m, only: grid_t
+  use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t, kinetic_energy, potential_energy
@@ -25,6 +25,7 @@ module diagnostics_m
     integer :: small_cells = 0                !! cells that the transport treated as small
     integer :: sealed_cells = 0               !! cells without any open face that held fluid
     integer :: warnings = 0                   !! printed in this step
+    logical :: pressure_converged = .true., viscous_converged = .true., contacts_solved = .true.
   end type step_report_t
 
   !> The columns of /series, in the order of `column_name`.
@@ -47,7 +48,8 @@ module diagnostics_m
 
   integer, parameter :: n_columns = 16
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
-    'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', 'liquid_volume_drift', &
+    'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
+    'liquid_volume_drift', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
     'max_overlap', 'contact_courant_max', 'substeps', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
@@ -115,24 +117,23 @@ contains
     real(wp), intent(out) :: volume   !! [m3]
     real(wp), intent(out) :: energy   !! [J]
     integer(i8) :: bins(bin_size, 2), mine(bin_size, 2)
+    real(wp), allocatable :: terms(:, :)   ! of one plane
     real(wp) :: total(2)
-    integer :: j, k, m
+    integer :: k, m
 
     do m = 1, 2
       bins(:, m) = no_terms
     end do
-    !$omp parallel private(mine, j, k, m)
+    !$omp parallel private(mine, terms, k, m)
+    allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), 2))
     do m = 1, 2
       mine(:, m) = no_terms
     end do
     !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        associate (a => grid%lo(1), b => grid%hi(1))
-          call exact_add(flow%liquid(a:b, j, k), mine(:, 1))
-          call exact_add(0.5_wp*grid%volume*flow%rho(a:b, j, k)*(1.0_wp - solid%alpha(a:b, j, k)) &
-                         *(flow%u(a:b, j, k, 1)**2 + flow%u(a:b, j, k, 2)**2 + flow%u(a:b, j, k, 3)**2), mine(:, 2))
-        end associate
+      call plane_terms(grid, k, flow%liquid, flow%rho, solid%alpha, flow%u, terms)
+      do m = 1, 2
+        call exact_add(terms(:, m), mine(:, m))
       end do
     end do
     !$omp end do nowait
@@ -147,14 +148,40 @@ contains
     energy = total(2)
   end subroutine sum_fluid
 
+  !> Volume of liquid and kinetic energy of the cells of plane k.
+  pure subroutine plane_terms(grid, k, liquid, rho, alpha, u, terms)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: k
+    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                grid%lo(3) - n_halo:) :: liquid, rho, alpha
+    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+      - n_halo:, :)
+    real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 2) [m3], [J]
+    integer :: i, j, first, last, at
+
+    first = grid%lo(1)
+    last = grid%hi(1)
+    do j = grid%lo(2), grid%hi(2)
+      at = (j - grid%lo(2))*(last - first + 1) + 1 - first
+      do i = first, last
+        terms(at + i, 1) = liquid(i, j, k)
+        terms(at + i, 2) = 0.5_wp*grid%volume*rho(i, j, k)*(1.0_wp - alpha(i, j, k)) &
+          *(u(i, j, k, 1)**2 + u(i, j, k, 2)**2 + u(i, j, k, 3)**2)
+      end do
+    end do
+  end subroutine plane_terms
+
   !> The columns as an array, in the order of `column_name`.
   pure function row_values(row) result(v)
     type(row_t), intent(in) :: row
     real(wp) :: v(n_columns)
 
-    v = [row%time, row%dt, row%cfl, row%divergence_max, row%pressure_passes, row%solver_iterations, &
-         row%liquid_volume, row%liquid_volume_drift, row%kinetic_energy_fluid, row%kinetic_energy_bodies, &
-         row%potential_energy_bodies, row%contact_energy, row%max_overlap, row%contact_courant_max, &
+    v = [row%time, row%dt, row%cfl, row%divergence_max, row%pressure_passes, &
+      row%solver_iterations, &
+         row%liquid_volume, row%liquid_volume_drift, row%kinetic_energy_fluid, &
+         row%kinetic_energy_bodies, &
+         row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
+         row%contact_courant_max, &
          row%substeps, row%wall_time]
   end function row_values
 

@@ -1,0 +1,198 @@
+!> Exact weight of the fluid that each body displaces, and what the face pressures miss of it.
+!!
+!! The pressure acts on a body through the solid shares of the grid faces, which measure its volume by
+!! the trapezoid rule: a submerged block would float by the wrong volume, by some per cent at coarse
+!! grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra, cut by the
+!! plane of the liquid where the surface crosses a body, and only the rest of the pressure force comes
+!! from the faces. In still water the force on a body is Archimedes' to round-off. The same term makes
+!! the weight of the fluid that of its true volume, so it closes the momentum of fluid and bodies.
+module buoyancy_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross
+  use case_types_m, only: fluid_t
+  use grid_m, only: grid_t, n_halo, unit_step, side_open
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t
+  use rigid_flux_m, only: rigid_flux_t, nearest_arm
+  use mixture_m, only: face_mean
+  use plic_m, only: unit_constant
+  use surface_normal_m, only: surface_normal, vertical_of
+  use polyhedron_m, only: box_clip_moments_below
+  use exact_sum_m, only: exact_sums
+  implicit none
+  private
+  public :: buoyancy_t, buoyancy_init, displaced_force, hydrostatic_correction
+
+  real(wp), parameter :: pure_share = 1.0e-12_wp   !! shares this close to 0 or 1 have no surface
+
+  type :: buoyancy_t
+    real(wp), allocatable :: work(:, :)   !! (*, 6) terms of the sums
+  end type buoyancy_t
+
+contains
+
+  !> Allocate; the work array grows when a body covers more cells than any before.
+  subroutine buoyancy_init(self)
+    type(buoyancy_t), intent(out) :: self
+
+    allocate (self%work(0, 6))
+  end subroutine buoyancy_init
+
+  !> Archimedes' force and torque: minus the weight of the fluid in the true place of each body.
+  subroutine displaced_force(grid, fluid, solid, bodies, c, self, force)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
+    type(buoyancy_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
+    integer :: b, n
+
+    force = 0.0_wp
+    do b = 1, bodies%n
+      if (.not. bodies%present(b)) cycle
+      call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
+      n = displaced_weight(grid, fluid, solid, bodies, c, b, self%work)
+      force(:, b) = exact_sums(self%work(1:n, :))
+    end do
+  end subroutine displaced_force
+
+  !> Buoyancy of the true displaced fluid less the hydrostatic part of the face pressures, per body.
+  subroutine hydrostatic_correction(grid, fluid, solid, bodies, flux, c, rho, self, force)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(in) :: flux
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+      contiguous :: c, rho                 !! liquid share [-] and density [kg/m3] of the fluid
+    type(buoyancy_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
+    integer :: b, n
+
+    call displaced_force(grid, fluid, solid, bodies, c, self, force)
+    do b = 1, bodies%n
+      if (.not. bodies%present(b)) cycle
+      call make_room(self, solid%body_face(b + 1) - solid%body_face(b))
+      n = hydrostatic_of_faces(grid, fluid%gravity, solid, flux, rho, b, self%work)
+      force(:, b) = force(:, b) - exact_sums(self%work(1:n, :))
+    end do
+  end subroutine hydrostatic_correction
+
+  !> Lists long enough for n terms.
+  subroutine make_room(self, n)
+    type(buoyancy_t), intent(inout) :: self
+    integer, intent(in) :: n
+
+    if (size(self%work, 1) >= n) return
+    deallocate (self%work)
+    allocate (self%work(2*n, 6))
+  end subroutine make_room
+
+  !> Minus the weight of the fluid in the place of body b, cell by cell, with its torque.
+  function displaced_weight(grid, fluid, solid, bodies, c, b, term) result(n)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)
+    integer, intent(in) :: b
+    real(wp), intent(inout) :: term(:, :)
+    integer :: n
+    integer :: m, i(3)
+    real(wp) :: mass, moment(3)      !! of the displaced fluid, moment about the centre of mass
+    real(wp) :: liquid, liquid_moment(3), share
+
+    n = 0
+    do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+      i = solid%cell(:, m)
+      if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+      share = c(i(1), i(2), i(3))
+      if (share > 1.0_wp - pure_share) share = 1.0_wp
+      if (share < pure_share) share = 0.0_wp
+      associate (volume => solid%cell_alpha(m)*grid%volume, &
+                 arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)))
+        if (share > 0.0_wp .and. share < 1.0_wp) then
+          call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), c, i(1), i(2), i(3)), &
+                           share, bodies%x(:, b), b, i, liquid, liquid_moment)
+        else
+          liquid = share*volume
+          liquid_moment = liquid*arm
+        end if
+        mass = fluid%gas_density*volume + (fluid%liquid_density - fluid%gas_density)*liquid
+        moment = fluid%gas_density*volume*arm + (fluid%liquid_density - fluid%gas_density)*liquid_moment
+      end associate
+      n = n + 1
+      term(n, 1:3) = -mass*fluid%gravity
+      term(n, 4:6) = -cross(moment, fluid%gravity)
+    end do
+  end function displaced_weight
+
+  !> Volume and first moment about x of the part of body b in cell i that lies below the liquid plane.
+  pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, b, i, volume, moment)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: normal_of_cube(3)  !! of the surface, on the unit cube
+    real(wp), intent(in) :: share              !! liquid share of the full cell [-]
+    real(wp), intent(in) :: x(3)               !! [m]
+    integer, intent(in) :: b, i(3)
+    real(wp), intent(out) :: volume, moment(3) !! [m3, m4]
+    real(wp) :: lower(3), normal(3), d, part, part_moment(3), image(3)
+    integer :: t, a
+
+    do a = 1, 3
+      lower(a) = grid%face(i(a), a)
+    end do
+    normal = normal_of_cube/grid%h
+    d = unit_constant(normal_of_cube, share) + dot_product(normal, lower)
+    volume = 0.0_wp
+    moment = 0.0_wp
+    image = lower + 0.5_wp*grid%h - x
+    image = image - nearest_arm(grid, lower + 0.5_wp*grid%h, x)   ! period between body and cell
+    do t = solid%body_tet(b), solid%body_tet(b + 1) - 1
+      associate (corner => solid%corner(:, :, t))
+        if (any(maxval(corner, 2) + image < lower) .or. any(minval(corner, 2) + image > lower + grid%h)) cycle
+        call box_clip_moments_below(corner + spread(image, 2, 4), lower, lower + grid%h, normal, d, &
+                                    part, part_moment)
+      end associate
+      volume = volume + part
+      moment = moment + part_moment - part*(x + image)
+    end do
+  end subroutine liquid_part
+
+  !> What the face pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each face.
+  function hydrostatic_of_faces(grid, gravity, solid, flux, rho, b, term) result(n)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_flux_t), intent(in) :: flux
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)
+    integer, intent(in) :: b
+    real(wp), intent(inout) :: term(:, :)
+    integer :: n
+    integer :: m, d, f(3), low(3)
+    real(wp) :: head   !! rho_f g h [Pa]
+
+    n = 0
+    do m = solid%body_face(b), solid%body_face(b + 1) - 1
+      d = solid%face(4, m)
+      f = solid%face(1:3, m)
+      if (.not. flux%mine(m)) cycle
+      low = f - unit_step(:, d)
+      if (low(d) == 0 .and. grid%side(1, d) == side_open) then
+        head = 0.5_wp*rho(f(1), f(2), f(3))*gravity(d)*grid%h(d)
+      else if (f(d) == grid%n(d) + 1 .and. grid%side(2, d) == side_open) then
+        head = 0.5_wp*rho(low(1), low(2), low(3))*gravity(d)*grid%h(d)
+      else
+        head = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*gravity(d)*grid%h(d)
+      end if
+      n = n + 1
+      term(n, :) = -flux%s(:, m)*head
+    end do
+  end function hydrostatic_of_faces
+
+end module buoyancy_m

@@ -1,0 +1,53 @@
+!> Fluid and bodies move each other: one velocity stage for both, by the chosen coupling.
+module coupling_m
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_flux_m, only: solid_face_flux
+  use monolithic_m, only: monolithic_stage
+  use mass_average_m, only: mass_average_stage, overlay_bodies
+  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion
+  use rigid_body_m, only: blocks_t, set_velocity_after_fluid
+  implicit none
+  private
+  public :: advance_velocity
+
+contains
+
+  !> Velocity of the fluid and of the bodies at the end of the step.
+  !!
+  !! On entry the liquid and the bodies are where the step ends, `flow%u` is the transported velocity;
+  !! the bodies carry the mean contact force of the step. On return the bodies have their final
+  !! velocity and the force from the fluid; face velocity and solid flux are those the next step uses.
+  subroutine advance_velocity(case, grid, solid, dt, flow, blocks, stage, report)
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(blocks_t), intent(inout) :: blocks
+    type(stage_t), intent(inout) :: stage
+    type(stage_report_t), intent(out) :: report
+
+    stage%total = 0.0_wp
+    call set_velocity()
+    if (case%numerics%coupling == 'mics') then
+      call mass_average_stage(case, grid, solid, dt, flow, stage, report)
+      call set_velocity()
+      call overlay_bodies(grid, solid, flow, stage, report)
+    else
+      call monolithic_stage(case, grid, solid, dt, flow, stage, report)
+      call set_velocity()
+      call solid_face_flux(grid, solid, stage%bodies, stage%pressure%operator%flux, flow%solid_flux)
+    end if
+  contains
+    !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.
+    subroutine set_velocity()
+      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :), stage%total(4:6, :), blocks)
+      call copy_motion(blocks, stage%bodies)
+    end subroutine set_velocity
+  end subroutine advance_velocity
+
+end module coupling_m

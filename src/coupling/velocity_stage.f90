@@ -1,0 +1,95 @@
+!> What both couplings share: the bodies as the flow sees them, the solvers, the parts of the force.
+module velocity_stage_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
+  use viscous_m, only: viscous_t, viscous_init
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init
+  use buoyancy_m, only: buoyancy_t, buoyancy_init
+  use rigid_body_m, only: blocks_t, space_tensor
+  implicit none
+  private
+  public :: stage_t, stage_report_t, stage_init, copy_motion, push_bodies
+
+  type :: stage_report_t
+    type(pressure_report_t) :: pressure
+    integer :: viscous_iterations = 0
+    logical :: viscous_converged = .true.
+  end type stage_report_t
+
+  type :: stage_t
+    type(rigid_motion_t) :: bodies
+    type(viscous_t) :: viscous
+    type(pressure_t) :: pressure
+    type(buoyancy_t) :: buoyancy
+    type(solid_geometry_t) :: whole                !! the domain without solids, for the mixture
+    real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
+    real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
+    real(wp), allocatable :: from_viscosity(:, :)  !! (6, n)
+    real(wp), allocatable :: total(:, :)           !! (6, n)
+    real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
+    real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
+    real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor of the mixture [m/s]
+  end type stage_t
+
+contains
+
+  !> Allocate all work arrays for a grid and n bodies.
+  subroutine stage_init(grid, n, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n
+    type(stage_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    call rigid_motion_init(n, self%bodies)
+    call viscous_init(grid, n, self%viscous)
+    call pressure_init(grid, n, self%pressure)
+    call buoyancy_init(self%buoyancy)
+    call solid_geometry_init(grid, self%whole, n)
+    allocate (self%from_pressure(6, n), source=0.0_wp)
+    allocate (self%from_level, self%from_viscosity, self%total, source=self%from_pressure)
+    allocate (self%terms(0, 6))
+    allocate (self%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+  end subroutine stage_init
+
+  !> What the flow has to know of the blocks, at their present pose and velocity.
+  subroutine copy_motion(blocks, bodies)
+    type(blocks_t), intent(in) :: blocks
+    type(rigid_motion_t), intent(inout) :: bodies
+    integer :: b
+
+    do b = 1, blocks%n
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        bodies%present(b) = blocks%present(b)
+        bodies%free(b) = blocks%present(b) .and. .not. blocks%fixed(b)
+        bodies%x(:, b) = blocks%x(:, b)
+        bodies%motion(1:3, b) = merge(blocks%v(:, b), 0.0_wp, blocks%present(b))
+        bodies%motion(4:6, b) = merge(blocks%omega(:, b), 0.0_wp, blocks%present(b))
+        bodies%mass(b) = blocks%mass(b)
+        bodies%volume(b) = shape%volume
+        bodies%inertia(:, :, b) = space_tensor(blocks%q(:, b), shape%inertia)
+        bodies%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
+                                                       blocks%inverse_inertia(:, :, blocks%shape(b)))
+      end associate
+    end do
+  end subroutine copy_motion
+
+  !> Change the motion of the free bodies by forces acting over dt.
+  pure subroutine push_bodies(dt, force, bodies)
+    real(wp), intent(in) :: dt
+    real(wp), intent(in) :: force(:, :)   !! (6, n) [N, N m]
+    type(rigid_motion_t), intent(inout) :: bodies
+    integer :: b
+
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      bodies%motion(1:3, b) = bodies%motion(1:3, b) + dt*force(1:3, b)/bodies%mass(b)
+      bodies%motion(4:6, b) = bodies%motion(4:6, b) + dt*matmul(bodies%inverse_inertia(:, :, b), force(4:6, b))
+    end do
+  end subroutine push_bodies
+
+end module velocity_stage_m

@@ -1,0 +1,97 @@
+!> What can go wrong in the numbers of a run, found and named after each step.
+module faults_m
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use kinds_m, only: wp
+  use errors_m, only: exit_ok, exit_numerics, to_text
+  use grid_m, only: grid_t, side_periodic
+  use boundary_m, only: is_wall
+  use time_step_m, only: simulation_t
+  use diagnostics_m, only: step_report_t
+  use release_m, only: n_waiting
+  implicit none
+  private
+  public :: fault_t, find_fault, find_final_fault
+
+  type :: fault_t
+    integer :: code = exit_ok
+    character(:), allocatable :: message
+  end type fault_t
+
+contains
+
+  !> The first fault of the step that just ended, if there is one.
+  subroutine find_fault(sim, report, fault)
+    type(simulation_t), intent(in) :: sim
+    type(step_report_t), intent(in) :: report
+    type(fault_t), intent(inout) :: fault
+
+    if (.not. report%contacts_solved) call set(sim, 'blocks move too fast for any body step', fault)
+    if (.not. report%viscous_converged) call set(sim, 'the viscous stage did not converge', fault)
+    if (.not. report%pressure_converged) &
+      call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
+               //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
+    call look_at_blocks(sim, fault)
+  end subroutine find_fault
+
+  !> Every block must have a place that is a number, inside the tank.
+  subroutine look_at_blocks(sim, fault)
+    type(simulation_t), intent(in) :: sim
+    type(fault_t), intent(inout) :: fault
+    integer :: b
+
+    do b = 1, sim%blocks%n
+      if (.not. sim%blocks%present(b)) cycle
+      associate (x => sim%blocks%x(:, b))
+        if (.not. all(ieee_is_finite(x)) .or. .not. all(ieee_is_finite(sim%blocks%v(:, b)))) then
+          call set(sim, 'body '//to_text(b)//': its place or speed is not a number', fault)
+        else if (has_left(sim%grid, sim%case%fluid%gravity, x)) then
+          call set(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x(1))//', ' &
+                   //to_text(x(2))//', '//to_text(x(3))//') m', fault)
+        end if
+      end associate
+    end do
+  end subroutine look_at_blocks
+
+  !> Is a centre of mass outside? Not so in periodic directions, nor above an open top, from where a
+  !! block falls back, up to the height of the tank.
+  pure function has_left(grid, gravity, x) result(left)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3), x(3)
+    logical :: left
+    real(wp) :: beyond
+    integer :: d, s
+
+    left = .false.
+    do d = 1, 3
+      do s = 1, 2
+        if (grid%side(s, d) == side_periodic) cycle
+        beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
+        if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp) &
+          beyond = beyond - grid%length(d)
+        left = left .or. beyond > 0.0_wp
+      end do
+    end do
+  end function has_left
+
+  !> Faults that show only when the time is over: blocks that never found room.
+  subroutine find_final_fault(sim, fault)
+    type(simulation_t), intent(in) :: sim
+    type(fault_t), intent(inout) :: fault
+    integer :: n
+
+    n = n_waiting(sim%clock%t, sim%blocks)
+    if (n == 0) return
+    call set(sim, to_text(n)//' due block(s) never found room', fault)
+  end subroutine find_final_fault
+
+  subroutine set(sim, what, fault)
+    type(simulation_t), intent(in) :: sim
+    character(*), intent(in) :: what
+    type(fault_t), intent(inout) :: fault
+
+    if (fault%code /= exit_ok) return
+    fault%code = exit_numerics
+    fault%message = 't = '//to_text(sim%clock%t)//' s, step '//to_text(sim%clock%step)//': '//what
+  end subroutine set
+
+end module faults_m

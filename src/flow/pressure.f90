@@ -1,0 +1,560 @@
+!> C-HSMAC: pressure and velocity correction until the face velocity is free of divergence.
+!!
+!! The unknown of a pass is the pressure change phi. Fluid moves through the open part w of a face only,
+!! bodies push through the rest:
+!! $$ \sum_f \frac{w_f A_f}{\rho_f h_f} (\phi_c - \phi_{nb}) + \sum_k J_k M_k^{-1} J_k^T \phi = -D_c/\Delta t $$
+!! with D the net volume outflow of a cell, fluid and solid. Symmetric and positive, so conjugate
+!! gradients with the multigrid of the first term. Without bodies in the list it is the paper's system.
+module pressure_m
+  use kinds_m, only: wp, i8
+  use case_types_m, only: numerics_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use grid_m, only: grid_t, n_halo, unit_step, side_open
+  use boundary_m, only: fill_scalar_halo
+  use rigid_motion_m, only: rigid_motion_t
+  use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, solid_face_flux, force_from_cells, add_cell_flux
+  use mixture_m, only: face_mean
+  use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
+  use multigrid_m, only: multigrid_t
+  use parallel_m, only: global_max, global_sum, halo_exchange
+  implicit none
+  private
+  public :: pressure_t, pressure_report_t, pressure_init, set_pressure_system, solve_pressure
+  public :: face_acceleration, cell_mean_of_faces, predict_face_velocity, divergence, extend_pressure
+
+  integer, parameter :: max_iterations = 2000   !! of one linear solve
+
+  !> The operator of the module's head, on arrays with one halo cell.
+  type, extends(linear_operator_t) :: pressure_operator_t
+    real(wp), allocatable :: cf(:, :, :, :)    !! w A/(rho h) of the lower faces [m3 s2 / (kg m2)]
+    integer :: lo(3) = 0, hi(3) = 0
+    type(rigid_motion_t) :: bodies
+    type(rigid_flux_t) :: flux
+    real(wp), allocatable :: push(:, :)        !! (6, bodies) force of a trial pressure, then its motion
+  contains
+    procedure :: apply => apply_pressure
+  end type pressure_operator_t
+
+  type :: pressure_report_t
+    integer :: passes = 0              !! of the C-HSMAC loop
+    integer :: iterations = 0          !! of the linear solver, all passes
+    real(wp) :: divergence = 0.0_wp    !! max |div u| left [1/s]
+    logical :: converged = .false.
+  end type pressure_report_t
+
+  type :: pressure_t
+    type(pressure_operator_t) :: operator
+    type(multigrid_t) :: multigrid
+    type(jacobi_t) :: jacobi
+    type(identity_t) :: identity
+    type(krylov_work_t) :: work
+    real(wp), allocatable :: rhs(:, :, :), phi(:, :, :)   !! one halo cell
+    real(wp), allocatable :: phi_pass(:, :, :), phi_total(:, :, :)   !! full halo [Pa]
+    real(wp), allocatable :: a_face(:, :, :, :), a_cell(:, :, :, :)  !! accelerations [m/s2]
+    logical, allocatable :: active(:, :, :)    !! the cell has an open face
+    integer, allocatable :: known(:, :, :)     !! work of the extension into closed cells
+  end type pressure_t
+
+contains
+
+  !> Allocate the system and its solvers.
+  subroutine pressure_init(grid, n_bodies, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_bodies
+    type(pressure_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%lo - 1
+    b = grid%hi + 1
+    allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%operator%push(6, n_bodies), source=0.0_wp)
+    allocate (self%rhs(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%phi, source=self%rhs)
+    a = grid%lo - n_halo
+    b = grid%hi + n_halo
+    allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
+    allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (self%phi_pass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%phi_total, source=self%phi_pass)
+    allocate (self%a_face(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%a_cell, source=self%a_face)
+    call rigid_flux_init(grid, n_bodies, self%operator%flux)
+    self%operator%lo = grid%lo
+    self%operator%hi = grid%hi
+    call self%multigrid%init(grid)
+    call krylov_init(grid, self%work)
+  end subroutine pressure_init
+
+  !> Coefficients of the system for the open shares and densities at hand, and of its preconditioner.
+  subroutine set_pressure_system(grid, numerics, open, rho, self)
+    type(grid_t), intent(in) :: grid
+    type(numerics_t), intent(in) :: numerics
+    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)   !! [-]
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)       !! [kg/m3]
+    type(pressure_t), intent(inout) :: self
+    integer :: i, j, k, d, s, e(3), face
+    real(wp) :: area_over_h
+
+    do d = 1, 3
+      e = unit_step(:, d)
+      area_over_h = grid%area(d)/grid%h(d)
+      !$omp parallel do private(i, j) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            self%operator%cf(i, j, k, d) = open(i, j, k, d)*area_over_h &
+                                           /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+          end do
+        end do
+      end do
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
+        face = merge(1, grid%n(d) + 1, s == 1)
+        call side_coefficients(face, merge(face, face - 1, s == 1))
+      end do
+    end do
+    call mark_active(grid, self%operator%cf, self%active)
+    call find_null_space(grid, self%operator%cf, self%work)
+    select case (trim(numerics%preconditioner))
+    case ('multigrid'); call self%multigrid%setup(self%operator%cf)
+    case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
+    end select
+  contains
+    !> A side of the domain: closed, or open with p = 0 half a cell away.
+    subroutine side_coefficients(face, cell)
+      integer, intent(in) :: face, cell
+      integer :: a(3), b(3), shift(3)
+
+      a = grid%lo
+      b = grid%hi
+      a(d) = face
+      b(d) = face
+      if (grid%side(s, d) /= side_open) then
+        self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+        return
+      end if
+      shift = (cell - face)*e
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            self%operator%cf(i, j, k, d) = 2.0_wp*open(i, j, k, d)*area_over_h &
+                                           /rho(i + shift(1), j + shift(2), k + shift(3))
+          end do
+        end do
+      end do
+    end subroutine side_coefficients
+  end subroutine set_pressure_system
+
+  !> Own cells that have a face through which fluid can move.
+  subroutine mark_active(grid, cf, active)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: cf(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:, :)
+    logical, intent(inout), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                 grid%lo(3) - n_halo:)
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          active(i, j, k) = cf(i, j, k, 1) + cf(i + 1, j, k, 1) + cf(i, j, k, 2) &
+                            + cf(i, j + 1, k, 2) + cf(i, j, k, 3) + cf(i, j, k + 1, 3) > 0.0_wp
+        end do
+      end do
+    end do
+  end subroutine mark_active
+
+  !> y = A x: outflow that a pressure x drives, through open faces and by moving the free bodies.
+  subroutine apply_pressure(self, x, y)
+    class(pressure_operator_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: x(:, :, :)
+    real(wp), intent(inout), contiguous :: y(:, :, :)
+
+    call halo_exchange(x, 1)
+    call seven_points(self%lo, self%hi, self%cf, x, y)
+    if (.not. any(self%bodies%free)) return
+    call force_from_cells(self%bodies, self%flux, x, self%lo - 1, self%push)
+    call motion_of_force(self%bodies, self%push)
+    call add_cell_flux(self%bodies, self%flux, self%push, self%lo - 1, y)
+  end subroutine apply_pressure
+
+  !> The part of the operator on the grid.
+  subroutine seven_points(lo, hi, cf, x, y)
+    integer, intent(in) :: lo(3), hi(3)
+    real(wp), intent(in), contiguous :: cf(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
+    real(wp), intent(in), contiguous :: x(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
+    real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = lo(3), hi(3)
+      do j = lo(2), hi(2)
+        do i = lo(1), hi(1)
+          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
+                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
+                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
+                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
+                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
+                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+        end do
+      end do
+    end do
+  end subroutine seven_points
+
+  !> Acceleration of the free bodies by given forces: a = M^{-1} F, in place.
+  pure subroutine motion_of_force(bodies, a)
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(inout) :: a(:, :)   !! (6, bodies) force and torque in, acceleration out
+    integer :: b
+
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      a(1:3, b) = a(1:3, b)/bodies%mass(b)
+      a(4:6, b) = matmul(bodies%inverse_inertia(:, :, b), a(4:6, b))
+    end do
+  end subroutine motion_of_force
+
+  !> Acceleration at the faces: a_f = (rho_w,f g - (p_high - p_low)/h)/rho_f [m/s2].
+  !!
+  !! Gravity, pressure gradient and density live at the same face, so still water stays still. The
+  !! density rho_w that has weight is the fluid's; rho is it too, or that of the mixture. Zero on
+  !! walls; on an open side p = 0 half a cell away.
+  subroutine face_acceleration(grid, gravity, rho_w, rho, p, a)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+      contiguous :: rho_w, rho           !! [kg/m3]
+    real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)     !! [Pa], halo filled
+    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    integer :: i, j, k, d, e(3)
+
+    do d = 1, 3
+      e = unit_step(:, d)
+      !$omp parallel do private(i, j) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            a(i, j, k, d) = (face_mean(rho_w(i - e(1), j - e(2), k - e(3)), rho_w(i, j, k))*gravity(d) &
+                             - (p(i, j, k) - p(i - e(1), j - e(2), k - e(3)))/grid%h(d)) &
+                            /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+          end do
+        end do
+      end do
+      if (.not. grid%periodic(d)) call sides_of_direction()
+    end do
+  contains
+    subroutine sides_of_direction()
+      integer :: s, lower(3), upper(3), c(3)
+      real(wp) :: outward
+
+      do s = 1, 2
+        if (.not. grid%at_side(s, d)) cycle
+        lower = grid%lo
+        upper = grid%hi
+        lower(d) = merge(1, grid%n(d) + 1, s == 1)
+        upper(d) = lower(d)
+        outward = merge(-1.0_wp, 1.0_wp, s == 1)
+        do k = lower(3), upper(3)
+          do j = lower(2), upper(2)
+            do i = lower(1), upper(1)
+              c = [i, j, k] - merge(0, 1, s == 1)*e
+              a(i, j, k, d) = 0.0_wp
+              if (grid%side(s, d) == side_open) a(i, j, k, d) = (rho_w(c(1), c(2), c(3))*gravity(d) &
+                + outward*p(c(1), c(2), c(3))/(0.5_wp*grid%h(d)))/rho(c(1), c(2), c(3))
+            end do
+          end do
+        end do
+      end do
+    end subroutine sides_of_direction
+  end subroutine face_acceleration
+
+  !> Cell vector from a face vector: mean of the two faces of each direction by their open shares.
+  subroutine cell_mean_of_faces(grid, open, a_face, a_cell)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: a_face(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                               grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: a_cell(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                  grid%lo(3) - n_halo:, :)
+    integer :: i, j, k, d, e(3)
+    real(wp) :: w_low, w_high
+
+    do d = 1, 3
+      e = unit_step(:, d)
+      !$omp parallel do private(i, j, w_low, w_high) schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            w_low = open(i, j, k, d)
+            w_high = open(i + e(1), j + e(2), k + e(3), d)
+            a_cell(i, j, k, d) = (w_low*a_face(i, j, k, d) &
+                                  + w_high*a_face(i + e(1), j + e(2), k + e(3), d)) &
+                                 /max(w_low + w_high, tiny(1.0_wp))
+          end do
+        end do
+      end do
+    end do
+  end subroutine cell_mean_of_faces
+
+  !> Net volume outflow of fluid and solid from each own cell [m3/s], and its largest value per cell
+  !! volume among the cells that hold moving fluid [1/s].
+  subroutine divergence(grid, open, uf, solid_flux, active, outflow, largest)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:, :), &
+      contiguous :: open, uf, solid_flux
+    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                              grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
+    real(wp), intent(out) :: largest
+    integer :: i, j, k
+    real(wp) :: worst(1), a(3)
+
+    a = grid%area
+    worst = 0.0_wp
+    !$omp parallel do private(i, j) reduction(max: worst) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          outflow(i, j, k) = merge(through(i + 1, j, k, 1) - through(i, j, k, 1) &
+                                   + through(i, j + 1, k, 2) - through(i, j, k, 2) &
+                                   + through(i, j, k + 1, 3) - through(i, j, k, 3), 0.0_wp, active(i, j, k))
+          worst = max(worst, abs(outflow(i, j, k)))
+        end do
+      end do
+    end do
+    call global_max(worst)
+    largest = worst(1)/grid%volume
+  contains
+    pure function through(i, j, k, d) result(q)
+      integer, intent(in) :: i, j, k, d
+      real(wp) :: q
+
+      q = open(i, j, k, d)*a(d)*uf(i, j, k, d) + solid_flux(i, j, k, d)
+    end function through
+  end subroutine divergence
+
+  !> Face velocity before the pressure stage, interpolated from the cells:
+  !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu \Delta t \sum_d h_d^{-2}) $$
+  !!
+  !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt keeps the
+  !! steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
+  subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:, :), &
+      contiguous :: a_face, a_cell   !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
+    type(flow_t), intent(inout) :: flow   !! halo of u filled
+    integer :: i, j, k, d, e(3)
+    real(wp) :: nu, steps
+
+    steps = 2.0_wp*sum(1.0_wp/grid%h**2)*dt
+    do d = 1, 3
+      e = unit_step(:, d)
+      !$omp parallel do private(i, j, nu) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            associate (il => i - e(1), jl => j - e(2), kl => k - e(3))
+              nu = face_mean(flow%mu(il, jl, kl), flow%mu(i, j, k)) &
+                   /face_mean(rho(il, jl, kl), rho(i, j, k))
+              flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
+                + dt/(1.0_wp + nu*steps)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), a_cell(i, j, k, d)))
+            end associate
+          end do
+        end do
+      end do
+      if (.not. grid%periodic(d)) call sides_of_direction()
+    end do
+  contains
+    !> Walls: the wall's own normal velocity. Open sides: the velocity of the last cell.
+    subroutine sides_of_direction()
+      integer :: s, lower(3), upper(3), c(3)
+
+      do s = 1, 2
+        if (.not. grid%at_side(s, d)) cycle
+        lower = grid%lo
+        upper = grid%hi
+        lower(d) = merge(1, grid%n(d) + 1, s == 1)
+        upper(d) = lower(d)
+        do k = lower(3), upper(3)
+          do j = lower(2), upper(2)
+            do i = lower(1), upper(1)
+              c = [i, j, k] - merge(0, 1, s == 1)*e
+              flow%uf(i, j, k, d) = 0.0_wp
+              if (grid%side(s, d) == side_open) flow%uf(i, j, k, d) = flow%u(c(1), c(2), c(3), d) &
+                + dt*(a_face(i, j, k, d) - a_cell(c(1), c(2), c(3), d))
+            end do
+          end do
+        end do
+      end do
+    end subroutine sides_of_direction
+  end subroutine predict_face_velocity
+
+  !> Make the face velocity free of divergence; pressure and motion of the free bodies follow.
+  !!
+  !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both are
+  !! final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final motion.
+  subroutine solve_pressure(grid, numerics, solid, rho, dt, flow, bodies, self, report)
+    type(grid_t), intent(in) :: grid
+    type(numerics_t), intent(in) :: numerics
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(rigid_motion_t), intent(inout) :: bodies
+    type(pressure_t), intent(inout) :: self
+    type(pressure_report_t), intent(out) :: report
+    integer :: iterations
+    real(wp) :: tolerance   !! of the residual of the linear system [m3/s2]
+
+    self%phi_total = 0.0_wp
+    self%operator%bodies = bodies
+    tolerance = 0.5_wp*numerics%divergence_tolerance*grid%volume/dt
+    do
+      call solid_face_flux(grid, solid, bodies, self%operator%flux, flow%solid_flux)
+      call divergence(grid, solid%open, flow%uf, flow%solid_flux, self%active, self%rhs, report%divergence)
+      report%converged = report%divergence < numerics%divergence_tolerance
+      if (report%converged .or. report%passes == numerics%max_pressure_passes) exit
+      self%rhs = -self%rhs/dt
+      self%phi = 0.0_wp
+      call solve_linear(numerics, tolerance, self, iterations)
+      report%passes = report%passes + 1
+      report%iterations = report%iterations + iterations
+      call add_correction(grid, rho, dt, bodies, flow, self)
+    end do
+    call fill_scalar_halo(grid, self%phi_total)
+    flow%p = flow%p + self%phi_total
+  end subroutine solve_pressure
+
+  !> One linear solve for phi with the chosen method.
+  subroutine solve_linear(numerics, tolerance, self, iterations)
+    type(numerics_t), intent(in) :: numerics
+    real(wp), intent(in) :: tolerance
+    type(pressure_t), intent(inout) :: self
+    integer, intent(out) :: iterations
+
+    select case (trim(numerics%preconditioner))
+    case ('multigrid'); call solve_with(self%multigrid)
+    case ('jacobi'); call solve_with(self%jacobi)
+    case default; call solve_with(self%identity)
+    end select
+  contains
+    subroutine solve_with(preconditioner)
+      class(preconditioner_t), intent(inout) :: preconditioner
+      real(wp) :: residual
+      integer :: info   !! 0: converged; the next pass sees what is left either way
+
+      if (trim(numerics%pressure_solver) == 'bicgstab') then
+        call bicgstab(self%operator, preconditioner, self%rhs, self%phi, tolerance, &
+                      max_iterations, iterations, residual, info, self%work)
+      else
+        call conjugate_gradient(self%operator, preconditioner, self%rhs, self%phi, tolerance, &
+                                max_iterations, iterations, residual, info, self%work)
+      end if
+    end subroutine solve_with
+  end subroutine solve_linear
+
+  !> Add phi to the total, its gradient to the face velocity, its push to the bodies.
+  subroutine add_correction(grid, rho, dt, bodies, flow, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in) :: dt
+    type(rigid_motion_t), intent(inout) :: bodies
+    type(flow_t), intent(inout) :: flow
+    type(pressure_t), intent(inout) :: self
+    real(wp), parameter :: weightless(3) = 0.0_wp
+    integer :: b
+
+    associate (a => grid%lo, z => grid%hi)
+      self%phi_pass(a(1):z(1), a(2):z(2), a(3):z(3)) = self%phi(a(1):z(1), a(2):z(2), a(3):z(3))
+    end associate
+    call fill_scalar_halo(grid, self%phi_pass)
+    call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_face)
+    flow%uf = flow%uf + dt*self%a_face
+    self%phi_total = self%phi_total + self%phi_pass
+    call force_from_cells(bodies, self%operator%flux, self%phi, grid%lo - 1, self%operator%push)
+    call motion_of_force(bodies, self%operator%push)
+    do b = 1, bodies%n
+      if (bodies%free(b)) bodies%motion(:, b) = bodies%motion(:, b) + dt*self%operator%push(:, b)
+    end do
+  end subroutine add_correction
+
+  !> Pressure of cells without open faces, for the cells that will open and for looking: mean of the
+  !! known neighbours of the same height, and only where there are none, hydrostatic from above or below.
+  subroutine extend_pressure(grid, gravity, rho, active, known, p)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+      contiguous :: rho
+    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                              grid%lo(3) - n_halo:)
+    integer, intent(inout), contiguous :: known(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                grid%lo(3) - n_halo:)   !! work: pass in which p was found, 0 unknown
+    real(wp), intent(inout), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:)      !! [Pa]
+    integer :: i, j, k, pass, n_found
+    integer(i8) :: left(1)
+    logical :: sideways
+
+    known = 0
+    where (active) known = 1
+    sideways = .true.
+    pass = 1
+    do
+      call halo_exchange(p, n_halo)
+      call halo_exchange(known, n_halo)
+      pass = pass + 1
+      n_found = 0
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            if (known(i, j, k) == 0) call from_neighbours([i, j, k])
+          end do
+        end do
+      end do
+      left = n_found
+      call global_sum(left)
+      if (left(1) > 0_i8) cycle
+      if (.not. sideways) exit
+      sideways = .false.
+    end do
+    call fill_scalar_halo(grid, p)
+  contains
+    !> Mean over the neighbours known before this pass.
+    subroutine from_neighbours(c)
+      integer, intent(in) :: c(3)
+      integer :: d, s, n(3), count
+      real(wp) :: total
+
+      count = 0
+      total = 0.0_wp
+      do d = 1, 3
+        if (sideways .and. abs(gravity(d)) > 0.0_wp) cycle
+        do s = -1, 1, 2
+          n = c + s*unit_step(:, d)
+          if (any((n < 1 .or. n > grid%n) .and. .not. grid%periodic)) cycle
+          if (known(n(1), n(2), n(3)) == 0 .or. known(n(1), n(2), n(3)) == pass) cycle
+          count = count + 1
+          total = total + p(n(1), n(2), n(3)) - real(s, wp)*gravity(d)*grid%h(d) &
+                  *face_mean(rho(n(1), n(2), n(3)), rho(c(1), c(2), c(3)))
+        end do
+      end do
+      if (count == 0) return
+      p(c(1), c(2), c(3)) = total/real(count, wp)
+      known(c(1), c(2), c(3)) = pass
+      n_found = n_found + 1
+    end subroutine from_neighbours
+  end subroutine extend_pressure
+
+end module pressure_m

@@ -1,0 +1,133 @@
+!> mics: concrete blocks dropped into water.
+!!
+!! Free-surface flow with colliding rigid bodies of any shape in three dimensions, after Yoshikawa,
+!! Ushijima, Makino & Nezu (2008). Reads a case, steps through time, writes results.
+program mics
+  use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
+  use kinds_m, only: wp
+  use build_info_m, only: version, git_revision
+  use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
+  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, set_threads, global_max
+  use signals_m, only: catch_signals, signal_caught
+  use command_line_m, only: options_t, read_command_line, print_help
+  use namelist_text_m, only: read_text
+  use case_types_m, only: case_t
+  use case_input_m, only: read_case, parameters_text
+  use case_check_m, only: make_shapes, check_case
+  use case_plan_m, only: print_plan
+  use tet_mesh_m, only: shape_t
+  use output_m, only: output_t, open_output, write_due_output, close_output
+  use restart_m, only: read_restart
+  use diagnostics_m, only: step_report_t
+  use time_step_m, only: simulation_t, simulation_init, resume, take_step
+  use faults_m, only: fault_t, find_fault, find_final_fault
+  implicit none
+  type(options_t) :: options
+  type(case_t) :: case
+  type(shape_t), allocatable :: shapes(:)
+  type(simulation_t) :: sim
+  type(output_t) :: output
+  type(step_report_t) :: report
+  type(fault_t) :: fault
+  integer :: code, signal = 0
+
+  call parallel_init()
+  call read_options()
+  call read_and_check()
+  call catch_signals()
+  call simulation_init(case, shapes, sim)
+  if (len(options%restart) > 0) call go_on()
+
+  call open_output(case, parameters_text(case), options, sim%wet, sim%grid, sim%clock, sim%blocks, output)
+  call stop_on_trouble()
+  call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+  do while (.not. sim%clock%finished())
+    call take_step(sim, report)
+    call find_fault(sim, report, fault)
+    signal = any_signal()
+    if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
+    call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+  end do
+  if (fault%code == exit_ok .and. sim%clock%finished()) call find_final_fault(sim, fault)
+
+  code = fault%code
+  if (code == exit_ok .and. signal /= 0) code = 128 + signal
+  call close_output(code, sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+  call stop_on_trouble()
+  if (fault%code /= exit_ok) call fatal(code, fault%message)
+  if (code /= exit_ok) call fatal(code, 'stopped by a signal; the run can go on from its restart file')
+  call parallel_final()
+
+contains
+
+  !> Number of the signal that any process has caught, 0 for none.
+  function any_signal() result(number)
+    integer :: number
+    real(wp) :: caught(1)
+
+    caught = real(signal_caught(), wp)
+    call global_max(caught)
+    number = nint(caught(1))
+  end function any_signal
+
+  !> Options that end the program at once, and the number of threads.
+  subroutine read_options()
+    type(problems_t) :: problems
+
+    call read_command_line(options, problems)
+    if (problems%n > 0) call refuse(problems)
+    if (options%help .or. options%version) then
+      if (is_root() .and. options%help) call print_help(output_unit)
+      if (is_root() .and. options%version) write (output_unit, '(4a)') 'mics ', version, ' ', git_revision
+      call finish()
+    end if
+    call set_threads(options%threads)
+  end subroutine read_options
+
+  !> The case with its shapes; every problem with them is reported at once.
+  subroutine read_and_check()
+    type(problems_t) :: problems
+    character(:), allocatable :: text
+
+    call read_text(options%case_file, text, problems)
+    if (problems%n > 0) call refuse(problems)
+    call read_case(text, case, problems)
+    call make_shapes(case, shapes, problems)
+    call check_case(case, shapes, problems)
+    if (problems%n > 0) call refuse(problems)
+    if (.not. options%check) return
+    if (is_root()) call print_plan(output_unit, case, shapes)
+    call finish()
+  end subroutine read_and_check
+
+  !> State from a restart file in place of the initial one.
+  subroutine go_on()
+    character(:), allocatable :: message
+    integer :: info
+
+    call read_restart(options%restart, parameters_text(case), sim%grid, sim%clock, sim%flow, sim%solid, &
+                      sim%blocks, sim%contacts, info, message)
+    if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)
+    call resume(sim)
+  end subroutine go_on
+
+  !> End with code 2 after naming all problems.
+  subroutine refuse(problems)
+    type(problems_t), intent(in) :: problems
+
+    if (is_root()) call problems%report(error_unit)
+    call parallel_abort(exit_input)
+  end subroutine refuse
+
+  !> End in good order before a run began.
+  subroutine finish()
+    call parallel_final()
+    stop
+  end subroutine finish
+
+  !> Trouble with files ends the run; what was written stays.
+  subroutine stop_on_trouble()
+    if (output%code /= exit_ok) call fatal(output%code, output%message)
+  end subroutine stop_on_trouble
+
+end program mics

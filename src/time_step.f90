@@ -1,0 +1,274 @@
+!> One step of fluid and blocks, in the order of the paper.
+!!
+!! The blocks move first, under the fluid force of the step before and in short substeps for contact;
+!! then the liquid and the momentum are carried through the faces that the moving blocks leave open;
+!! then pressure, viscosity and the rigid motions are solved together at the new place of the blocks.
+module time_step_m
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use grid_m, only: grid_t, grid_init
+  use fields_m, only: flow_t, flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, finish_transport
+  use liquid_fill_m, only: fill_liquid, raise_surface
+  use extended_fraction_m, only: extend_fraction
+  use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
+                                     momentum_late
+  use mixture_m, only: mix_fluid
+  use boundary_m, only: fill_velocity_halo, fill_scalar_halo
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_t, blocks_init
+  use walls_m, only: walls_t, walls_init
+  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use overlap_m, only: overlap_t, overlap_init, max_overlap
+  use release_m, only: release_due_blocks, next_release
+  use diagnostics_m, only: step_report_t
+  use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
+  use monolithic_m, only: start_flow
+  use coupling_m, only: advance_velocity
+  use clock_m, only: clock_t, clock_init
+  use parallel_m, only: global_max
+  use timers_m, only: timer, tic, toc
+  implicit none
+  private
+  public :: simulation_t, simulation_init, resume, take_step
+
+  real(wp), parameter :: least_open = 0.5_wp   !! share of a face whose velocity limits the step
+
+  !> Everything that lives as long as the run.
+  type :: simulation_t
+    type(case_t) :: case
+    type(grid_t) :: grid
+    type(flow_t) :: flow
+    type(solid_geometry_t), allocatable :: solid     !! solids at the present time
+    type(solid_geometry_t), allocatable :: before    !! solids at the start of the step
+    type(solid_fraction_t) :: fraction
+    type(liquid_transport_t) :: transport
+    type(momentum_t) :: momentum
+    type(stage_t) :: stage
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contacts_t) :: contacts
+    type(overlap_t) :: overlap
+    logical :: wet = .true.                !! there is a fluid
+    logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
+    type(clock_t) :: clock
+    integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
+  end type simulation_t
+
+contains
+
+  !> State at t = 0: bodies in place, liquid filled in, everything at rest or at its given velocity.
+  subroutine simulation_init(case, shapes, sim)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(simulation_t), intent(inout) :: sim
+    type(stage_report_t) :: report
+    integer :: d
+
+    sim%case = case
+    sim%wet = case%run%physics /= 'dry'
+    sim%timer_blocks = timer('blocks')
+    sim%timer_solid = timer('solid shares')
+    sim%timer_transport = timer('transport')
+    sim%timer_velocity = timer('velocity and pressure')
+    call clock_init(case%run, sim%clock)
+    call grid_init(case%grid, case%boundary, sim%grid)
+    call walls_init(case%grid, case%boundary, sim%walls)
+    call blocks_init(case, shapes, sim%blocks)
+    call contacts_init(case%contact, sim%blocks, sim%contacts)
+    call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
+    allocate (sim%waiting(sim%blocks%n), source=.false.)
+    allocate (sim%solid, sim%before)
+    if (.not. sim%wet) return
+    call flow_init(sim%grid, sim%flow)
+    call solid_geometry_init(sim%grid, sim%solid, sim%blocks%n)
+    call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)
+    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction)
+    call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
+    call momentum_init(sim%grid, sim%momentum)
+    call stage_init(sim%grid, sim%blocks%n, sim%stage)
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+    call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
+    call extend_fraction(sim%grid, sim%solid, sim%transport%extension, sim%flow)
+    call mix_fluid(case%fluid, sim%flow)
+    do d = 1, 3
+      sim%flow%u(:, :, :, d) = case%fluid%velocity(d)
+      sim%flow%uf(:, :, :, d) = case%fluid%velocity(d)
+    end do
+    call fill_velocity_halo(sim%grid, sim%flow%u)
+    call copy_motion(sim%blocks, sim%stage%bodies)
+    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, report)
+  end subroutine simulation_init
+
+  !> What follows from the state after it was read: solids in the grid, density, halos.
+  subroutine resume(sim)
+    type(simulation_t), intent(inout) :: sim
+
+    if (.not. sim%wet) return
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+    call fill_velocity_halo(sim%grid, sim%flow%u)
+    call fill_scalar_halo(sim%grid, sim%flow%p)
+    call fill_scalar_halo(sim%grid, sim%flow%liquid)
+    call fill_scalar_halo(sim%grid, sim%flow%room)
+    call fill_scalar_halo(sim%grid, sim%flow%c)
+    call mix_fluid(sim%case%fluid, sim%flow)
+  end subroutine resume
+
+  !> Advance by one step.
+  subroutine take_step(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(out) :: report
+    type(contact_report_t) :: contact
+    type(stage_report_t) :: stage
+
+    call release(sim, report)
+    call choose_step(sim, report)
+    associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, dt => sim%clock%dt)
+      call tic(sim%timer_blocks)
+      call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
+      call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
+      call toc(sim%timer_blocks)
+      if (sim%wet) then
+        call tic(sim%timer_solid)
+        call swap_solids(sim)
+        call update_solid(sim%fraction, grid, blocks, sim%solid)
+        call toc(sim%timer_solid)
+        call tic(sim%timer_transport)
+        call transport(sim, dt)
+        call toc(sim%timer_transport)
+        call tic(sim%timer_velocity)
+        call advance_velocity(case, grid, sim%solid, dt, flow, blocks, sim%stage, stage)
+        call toc(sim%timer_velocity)
+      end if
+    end associate
+    call sim%clock%advance()
+    call tell(sim, contact, stage, report)
+  end subroutine take_step
+
+  !> What the parts of the step found out, in one report.
+  subroutine tell(sim, contact, stage, report)
+    type(simulation_t), intent(inout) :: sim
+    type(contact_report_t), intent(in) :: contact
+    type(stage_report_t), intent(in) :: stage
+    type(step_report_t), intent(inout) :: report
+    real(wp) :: speed
+    integer :: b
+
+    report%contact_energy = contact%energy
+    report%contact_courant_max = contact%courant_max
+    report%substeps = contact%substeps
+    report%contacts_solved = contact%info == 0
+    speed = 0.0_wp
+    do b = 1, sim%blocks%n
+      if (sim%blocks%present(b) .and. .not. sim%blocks%fixed(b)) speed = max(speed, norm2(sim%blocks%v(:, b)))
+    end do
+    call sim%clock%note_speed(speed, all(sim%blocks%present))
+    if (.not. sim%wet) return
+    report%divergence_max = stage%pressure%divergence
+    report%pressure_passes = stage%pressure%passes
+    report%solver_iterations = stage%pressure%iterations
+    report%pressure_converged = stage%pressure%converged
+    report%viscous_converged = stage%viscous_converged
+    report%small_cells = sim%transport%small_count
+    report%sealed_cells = sim%solid%n_sealed
+  end subroutine tell
+
+  !> Blocks whose time has come; the liquid in their place raises the free surface.
+  subroutine release(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+    logical :: released
+
+    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, report%warnings, released)
+    if (.not. released .or. .not. sim%wet) return
+    call swap_solids(sim)
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+    call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%extension, sim%flow)
+    call mix_fluid(sim%case%fluid, sim%flow)
+  end subroutine release
+
+  !> The present solids become those of the start of the step.
+  subroutine swap_solids(sim)
+    type(simulation_t), intent(inout) :: sim
+    type(solid_geometry_t), allocatable :: keep
+
+    call move_alloc(sim%solid, keep)
+    call move_alloc(sim%before, sim%solid)
+    call move_alloc(keep, sim%before)
+  end subroutine swap_solids
+
+  !> Liquid and momentum through the faces, direction by direction; new density and viscosity.
+  subroutine transport(sim, dt)
+    type(simulation_t), intent(inout) :: sim
+    real(wp), intent(in) :: dt   !! [s]
+    integer :: n, d
+
+    associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, carrier => sim%transport)
+      call begin_transport(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow)
+      call momentum_begin(grid, fluid, flow%liquid, flow%room, flow%c, flow%u, sim%momentum)
+      do n = 1, 3
+        d = carrier%order(n)
+        call momentum_sweep(grid, fluid, sim%before, d, carrier, flow%u, sim%momentum)
+      end do
+      call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
+      call finish_transport(grid, sim%solid, carrier, flow)
+      call mix_fluid(fluid, flow)
+    end associate
+  end subroutine transport
+
+  !> Length of the step: what stability allows, or less to land on a release or on the end.
+  subroutine choose_step(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+    real(wp) :: rate, allowed
+
+    allowed = sim%case%run%dt
+    rate = courant_rate(sim)
+    if (sim%case%run%cfl_max > 0.0_wp .and. rate > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate)
+    call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
+    report%cfl = sim%clock%dt*rate
+  end subroutine choose_step
+
+  !> Largest sum over the directions of |u|/h, over faces that are mostly open, and of the speed of
+  !! the bodies' surfaces over the smallest spacing [1/s].
+  function courant_rate(sim) result(rate)
+    type(simulation_t), intent(in) :: sim
+    real(wp) :: rate
+    integer :: i, j, k, b
+    real(wp) :: largest(1)
+
+    rate = 0.0_wp
+    if (.not. sim%wet) return
+    largest = 0.0_wp
+    associate (grid => sim%grid)
+      !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            largest = max(largest, max(face(i, j, k, 1), face(i + 1, j, k, 1))/grid%h(1) &
+                                   + max(face(i, j, k, 2), face(i, j + 1, k, 2))/grid%h(2) &
+                                   + max(face(i, j, k, 3), face(i, j, k + 1, 3))/grid%h(3))
+          end do
+        end do
+      end do
+      call global_max(largest)
+      rate = largest(1)
+      do b = 1, sim%blocks%n
+        if (.not. sim%blocks%present(b)) cycle
+        rate = max(rate, (norm2(sim%blocks%v(:, b)) + norm2(sim%blocks%omega(:, b)) &
+                          *sim%blocks%shapes(sim%blocks%shape(b))%radius)/minval(grid%h))
+      end do
+    end associate
+  contains
+    !> Speed at a lower face, zero where the face is mostly closed.
+    pure function face(i, j, k, d) result(speed)
+      integer, intent(in) :: i, j, k, d
+      real(wp) :: speed
+
+      speed = merge(abs(sim%flow%uf(i, j, k, d)), 0.0_wp, sim%solid%open(i, j, k, d) >= least_open)
+    end function face
+  end function courant_rate
+
+end module time_step_m
