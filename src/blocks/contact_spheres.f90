@@ -1,7 +1,7 @@
 !> Touches of the contact spheres of the T-type model with one another and with the plane walls.
 !!
-!! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved by half
-!! the skin. Touches come out in an order that does not depend on when the list was made.
+!! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved so far
+!! that others may touch. What comes out, and its order, do not depend on when the list was made.
 module contact_spheres_m
   use kinds_m, only: wp
   use vectors_m, only: rotation_matrix
@@ -22,7 +22,8 @@ module contact_spheres_m
   end type sphere_set_t
 
   type :: contact_spheres_t
-    real(wp) :: skin = 0.0_wp                  !! [m]
+    real(wp) :: skin = 0.0_wp                  !! pairs nearer than this are listed [m]
+    real(wp) :: free_way = 0.0_wp              !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
     real(wp), allocatable :: reach(:)          !! (bodies) [m]
@@ -50,10 +51,11 @@ module contact_spheres_m
 contains
 
   !> Sort the spheres of all shapes and size the lists.
-  subroutine contact_spheres_init(blocks, self)
+  subroutine contact_spheres_init(courant_max, blocks, self)
+    real(wp), intent(in) :: courant_max   !! C_s of eq. (6): bodies move less in a substep, over d_s
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(out) :: self
-    real(wp), parameter :: skin_share = 0.5_wp   !! of the smallest radius
+    real(wp), parameter :: share = 0.125_wp   !! of the smallest diameter: shorter lists, or fewer
     integer :: s, b
 
     allocate (self%set(size(blocks%shapes)))
@@ -76,13 +78,16 @@ contains
       self%reach(b) = self%set(blocks%shape(b))%reach
     end do
     allocate (self%slot_of(s), source=0)
-    if (blocks%n > 0) self%skin = 0.5_wp*skin_share*self%smallest
+    if (blocks%n == 0) return
+    self%free_way = share*self%smallest
+    self%skin = 2*self%free_way + courant_max*self%smallest
   end subroutine contact_spheres_init
 
-  !> All touches at the present poses.
-  subroutine find_sphere_touches(walls, blocks, self, touches)
+  !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.
+  subroutine find_sphere_touches(walls, blocks, ahead, self, touches)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
     type(contact_spheres_t), intent(inout) :: self
     type(touch_t), intent(inout) :: touches
     integer :: p, s, b
@@ -102,12 +107,33 @@ contains
     call reserve_touches(self%n_candidates, touches)
     do p = 1, self%n_pairs
       if (self%pair_b(p) < 0) then
-        call touch_wall(walls, blocks, self, p, touches)
+        call touch_wall(walls, blocks, self, p, way(self, blocks, p, ahead), touches)
       else
-        call touch_body(blocks, self, p, touches)
+        call touch_body(blocks, self, p, way(self, blocks, p, ahead), touches)
       end if
     end do
   end subroutine find_sphere_touches
+
+  !> The way by which two points of pair p may come nearer within a time [m].
+  pure function way(self, blocks, p, time)
+    type(contact_spheres_t), intent(in) :: self
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: p
+    real(wp), intent(in) :: time   !! [s]
+    real(wp) :: way
+    real(wp) :: v(3)
+    integer :: a, b
+
+    a = self%pair_a(p)
+    b = self%pair_b(p)
+    v = blocks%v(:, a)
+    way = norm2(blocks%omega(:, a))*self%reach(a)
+    if (b > 0) then
+      v = v - blocks%v(:, b)
+      way = way + norm2(blocks%omega(:, b))*self%reach(b)
+    end if
+    way = time*(way + norm2(v))
+  end function way
 
   !> Whether the list of candidates has to be made anew.
   pure function moved_too_far(self, blocks) result(yes)
@@ -125,7 +151,7 @@ contains
       dx = blocks%x(:, b) - self%x(:, b)
       dq = blocks%q(:, b) - self%q(:, b)
       ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-      if (norm2(dx) + 2*self%reach(b)*norm2(dq) > 0.5_wp*self%skin) return
+      if (norm2(dx) + 2*self%reach(b)*norm2(dq) > self%free_way) return
     end do
     yes = .false.
   end function moved_too_far
@@ -297,11 +323,12 @@ contains
   end subroutine list_sphere
 
   !> Touches of pair p, a body and a wall. The contact lies on the wall.
-  subroutine touch_wall(walls, blocks, self, p, touches)
+  subroutine touch_wall(walls, blocks, self, p, gap, touches)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
+    real(wp), intent(in) :: gap   !! still taken as a touch [m]
     type(touch_t), intent(inout) :: touches
     real(wp) :: depth
     integer :: c, s, w, t
@@ -310,7 +337,7 @@ contains
     do c = self%first(p), self%first(p + 1) - 1
       s = self%i(c)
       depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) + self%radius(s)
-      if (depth <= 0.0_wp) cycle
+      if (depth <= -gap) cycle
       t = touches%n + 1
       touches%n = t
       touches%a(t) = self%pair_a(p)
@@ -338,10 +365,11 @@ contains
   end function findloc_wall
 
   !> Touches of pair p of bodies. The contact lies in the middle of the overlap.
-  subroutine touch_body(blocks, self, p, touches)
+  subroutine touch_body(blocks, self, p, gap, touches)
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
+    real(wp), intent(in) :: gap   !! still taken as a touch [m]
     type(touch_t), intent(inout) :: touches
     real(wp) :: d(3), shift(3), square, distance, reach
     integer :: c, i, j, t
@@ -353,7 +381,7 @@ contains
       reach = self%radius(i) + self%radius(j)
       d = self%centre(:, j) + shift - self%centre(:, i)
       square = dot_product(d, d)
-      if (square >= reach**2) cycle
+      if (square >= (reach + gap)**2) cycle
       distance = sqrt(square)
       t = touches%n + 1
       touches%n = t

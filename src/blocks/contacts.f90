@@ -9,7 +9,7 @@ module contacts_m
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
   use walls_m, only: walls_t, floor_wall
   use neighbours_m, only: reserve
-  use touches_m, only: touch_t
+  use touches_m, only: touch_t, select_touching
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
     stored_energy, normal_force, tangential_force, tangential_slip
@@ -49,6 +49,13 @@ module contacts_m
     real(wp), allocatable :: frequency2(:)       !! (-6:n) sum over the pairs of a free body [1/s2]
   end type response_t
 
+  !> What may touch: walls (-6..-1) and bodies (1..n) alike.
+  type :: partners_t
+    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n) [m/s], [rad/s]
+    real(wp), allocatable :: inverse_mass(:)             !! (-6:n) 0 for walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) likewise [1/(kg m2)]
+  end type partners_t
+
   type :: contacts_t
     type(contact_law_t) :: law
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
@@ -58,14 +65,15 @@ module contacts_m
     type(springs_t) :: before                    !! work: springs of the substep before
     type(contact_spheres_t) :: spheres
     type(touch_t) :: touches
+    type(touch_t) :: soon                        !! with those that may come before the substep ends
     type(groups_t) :: groups
-    type(response_t) :: response
-    !> Partners -6..-1 (walls) and 1..n (bodies) alike.
-    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n)
-    real(wp), allocatable :: inverse_mass(:)             !! (-6:n) 0 for walls, fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) likewise [1/(kg m2)]
+    type(response_t) :: response, response_soon
+    real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
+    type(partners_t) :: partners
     real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -6:n) of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -6:n) of the step [N s], [N m s]
+    !> The place to go back to: (3, n), (4, n), (3, n), (3, n).
+    real(wp), allocatable :: x(:, :), q(:, :), l(:, :), spin(:, :)
     integer :: n_met = 0
     integer, allocatable :: met_a(:), met_b(:)           !! pairs that touched in this step, sorted
   end type contacts_t
@@ -92,13 +100,13 @@ contains
     contacts%substep_ratio = input%substep_ratio
     contacts%longest_substep = input%contact_time/20.0_wp
     contacts%courant_max = input%courant_max
-    call contact_spheres_init(blocks, contacts%spheres)
+    call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
     n = blocks%n
-    allocate (contacts%v(3, -6:n), contacts%omega(3, -6:n), source=0.0_wp)
+    call partners_init(n, contacts%partners)
     allocate (contacts%force(3, -6:n), contacts%torque(3, -6:n), source=0.0_wp)
     allocate (contacts%impulse(3, -6:n), contacts%twist(3, -6:n), source=0.0_wp)
-    allocate (contacts%inverse_mass(-6:n), contacts%inverse_inertia(3, 3, -6:n), source=0.0_wp)
-    allocate (contacts%response%frequency2(-6:n), source=0.0_wp)
+    allocate (contacts%response%frequency2(-6:n), contacts%response_soon%frequency2(-6:n))
+    allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
   end subroutine contacts_init
@@ -120,8 +128,8 @@ contains
     contacts%impulse = 0.0_wp
     contacts%twist = 0.0_wp
     contacts%n_met = 0
-    call know_partners(walls, blocks, contacts)
-    call find_touches(walls, blocks, contacts)
+    call know_partners(walls, blocks, contacts%partners)
+    call find_touches(walls, blocks, 0.0_wp, contacts)
     left = dt
     do while (left > 0.0_wp)
       limit = substep_limit(contacts, blocks, dt)
@@ -129,59 +137,86 @@ contains
         report%info = 1
         return
       end if
-      dt_b = left/real(max(1, ceiling(left/limit*(1.0_wp - 1.0e-9_wp))), wp)
+      call go_half_way(walls, left, limit, contacts, blocks, dt_b)
+      call finish_substep(gravity, dt_b, contacts, blocks, report)
       left = merge(left - dt_b, 0.0_wp, dt_b < left)
       report%substeps = report%substeps + 1
-      call substep(walls, gravity, dt_b, contacts, blocks, report)
     end do
     blocks%contact_force = contacts%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%twist(:, 1:)/dt
     call count_partners(contacts, blocks)
-    call find_touches(walls, blocks, contacts)
+    call find_touches(walls, blocks, 0.0_wp, contacts)
     report%energy = elastic_energy(contacts)
   end subroutine move_blocks
 
-  !> One substep: half drift, contact, half drift.
-  subroutine substep(walls, gravity, dt_b, contacts, blocks, report)
+  !> Begin a substep: drift for half of it and find what touches then.
+  !!
+  !! The step is an equal part of the time left. Where the bodies come down on more touches than the
+  !! step is short enough for, now or before its end, they go back and take a shorter one.
+  subroutine go_half_way(walls, left, limit, contacts, blocks, dt_b)
     type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: left, limit   !! time left, longest substep allowed [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    real(wp), intent(out) :: dt_b         !! the substep [s]
+    real(wp), parameter :: bearable = 1.3_wp   !! times the limit of stiffness: not worth going back
+    real(wp) :: longest, allowed
+
+    contacts%x = blocks%x
+    contacts%q = blocks%q
+    contacts%l = blocks%l
+    contacts%spin = blocks%omega
+    longest = limit
+    do
+      dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
+      call drift(0.5_wp*dt_b, blocks)
+      call find_touches(walls, blocks, 0.5_wp*dt_b, contacts)
+      allowed = stiffness_limit(contacts)
+      if (.not. dt_b > bearable*min(allowed, longest)) exit
+      blocks%x = contacts%x
+      blocks%q = contacts%q
+      blocks%l = contacts%l
+      blocks%omega = contacts%spin
+      longest = allowed
+    end do
+  end subroutine go_half_way
+
+  !> The rest of a substep: contact and the other half of the drift.
+  subroutine finish_substep(gravity, dt_b, contacts, blocks, report)
     real(wp), intent(in) :: gravity(3), dt_b   !! [m/s2, s]
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
 
-    call drift(0.5_wp*dt_b, blocks)
-    call find_touches(walls, blocks, contacts)
     call note_partners(contacts)
     call match_springs(contacts)
-    call know_motion(blocks, contacts)
+    call know_motion(blocks, contacts%partners)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
-    call know_motion(blocks, contacts)
+    call know_motion(blocks, contacts%partners)
     call sum_forces(dt_b, contacts, report)
     contacts%impulse = contacts%impulse + dt_b*contacts%force
     contacts%twist = contacts%twist + dt_b*contacts%torque
     call kick([0.0_wp, 0.0_wp, 0.0_wp], dt_b, contacts%force(:, 1:), contacts%torque(:, 1:), blocks)
     call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
-    call know_motion(blocks, contacts)
+    call know_motion(blocks, contacts%partners)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call drift(0.5_wp*dt_b, blocks)
-  end subroutine substep
+  end subroutine finish_substep
 
   !> Longest substep allowed now [s].
   !!
   !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the Courant limit of
-  !! eq. (6) with the highest relative speed any two bodies can have, and the stability limit: the
-  !! highest frequency is no higher than that of all pairs of two touching bodies taken together.
+  !! eq. (6) with the highest relative speed any two bodies can have, and the limit of stiffness.
   pure function substep_limit(contacts, blocks, dt) result(limit)
     type(contacts_t), intent(in) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt   !! fluid step [s]
     real(wp) :: limit
-    real(wp), parameter :: stable = 0.5_wp   !! frequency times substep; 2 is the bound of stability
-    real(wp) :: speed, fastest(2), highest, pair
-    integer :: b, t
+    real(wp) :: speed, fastest(2)
+    integer :: b
 
-    limit = min(contacts%substep_ratio*dt, contacts%longest_substep)
+    limit = min(contacts%substep_ratio*dt, contacts%longest_substep, stiffness_limit(contacts))
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
@@ -192,70 +227,118 @@ contains
     speed = sum(fastest)
     if (.not. speed*limit <= contacts%courant_max*contacts%spheres%smallest) &
       limit = contacts%courant_max*contacts%spheres%smallest/speed
-    highest = 0.0_wp
-    associate (touches => contacts%touches, f2 => contacts%response%frequency2)
-      do t = 1, touches%n
-        pair = contacts%response%pair_frequency2(t)
-        highest = max(highest, pair + max(0.0_wp, f2(touches%a(t)) - pair) &
-          + max(0.0_wp, f2(touches%b(t)) - pair))
-      end do
-    end associate
-    if (highest*limit**2 > stable**2) limit = stable/sqrt(highest)
   end function substep_limit
 
+  !> Longest substep the present touches allow [s].
+  !!
+  !! A sixth of the bound of stability, which also keeps the restitution within 0.02.
+  pure function stiffness_limit(contacts) result(limit)
+    type(contacts_t), intent(in) :: contacts
+    real(wp) :: limit
+    real(wp), parameter :: turn = 0.35_wp   !! frequency times substep; 2 is the bound of stability
+
+    limit = huge(1.0_wp)
+    if (contacts%frequency2 > 0.0_wp) limit = turn/sqrt(contacts%frequency2)
+  end function stiffness_limit
+
+  !> Room for the walls and n bodies.
+  subroutine partners_init(n, partners)
+    integer, intent(in) :: n
+    type(partners_t), intent(out) :: partners
+
+    allocate (partners%v(3, -6:n), partners%omega(3, -6:n), source=0.0_wp)
+    allocate (partners%inverse_mass(-6:n), partners%inverse_inertia(3, 3, -6:n), source=0.0_wp)
+  end subroutine partners_init
+
   !> Masses of all partners and the velocity of the walls.
-  pure subroutine know_partners(walls, blocks, contacts)
+  pure subroutine know_partners(walls, blocks, partners)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(partners_t), intent(inout) :: partners
     integer :: w, b
 
     do w = 1, walls%n
-      contacts%v(:, walls%number(w)) = walls%velocity(:, w)
+      partners%v(:, walls%number(w)) = walls%velocity(:, w)
     end do
     do b = 1, blocks%n
-      contacts%inverse_mass(b) = merge(0.0_wp, 1.0_wp/blocks%mass(b), blocks%fixed(b))
+      partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/blocks%mass(b), blocks%fixed(b))
     end do
   end subroutine know_partners
 
   !> Velocities of the bodies as partners.
-  pure subroutine know_motion(blocks, contacts)
+  pure subroutine know_motion(blocks, partners)
     type(blocks_t), intent(in) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(partners_t), intent(inout) :: partners
 
-    contacts%v(:, 1:) = blocks%v
-    contacts%omega(:, 1:) = blocks%omega
+    partners%v(:, 1:) = blocks%v
+    partners%omega(:, 1:) = blocks%omega
   end subroutine know_motion
 
-  !> Find what touches at the present poses, and how each touch responds.
-  subroutine find_touches(walls, blocks, contacts)
+  !> Find what touches at the present poses, how each touch responds, and how stiff all is together,
+  !! counting also what may touch within a time `ahead`.
+  subroutine find_touches(walls, blocks, ahead, contacts)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
     type(contacts_t), intent(inout) :: contacts
-    integer :: b, first, last
+    integer :: b
 
-    call find_sphere_touches(walls, blocks, contacts%spheres, contacts%touches)
+    call find_sphere_touches(walls, blocks, ahead, contacts%spheres, contacts%soon)
+    call select_touching(contacts%soon, contacts%touches)
     call form_groups(contacts%touches, contacts%groups)
-    contacts%response%frequency2 = 0.0_wp
-    if (contacts%touches%n == 0) return
+    contacts%frequency2 = 0.0_wp
+    if (contacts%soon%n == 0) return
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      contacts%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
+      contacts%partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
         blocks%inverse_inertia(:, :, blocks%shape(b)))
     end do
-    associate (r => contacts%response, n => contacts%touches%n)
-      call reserve(n, r%k)
-      call reserve(n, r%eta)
-      call reserve(n, r%decay)
-      call reserve(n, r%pair_frequency2)
-    end associate
+    call respond(contacts%touches, contacts%law, contacts%partners, contacts%response)
+    contacts%frequency2 = highest_frequency2(contacts%touches, contacts%response)
+    if (contacts%soon%n == contacts%touches%n) return
+    call respond(contacts%soon, contacts%law, contacts%partners, contacts%response_soon)
+    contacts%frequency2 = max(contacts%frequency2, &
+      highest_frequency2(contacts%soon, contacts%response_soon))
+  end subroutine find_touches
+
+  !> Square of the highest frequency of the touching bodies, or a little above [1/s2].
+  !!
+  !! It is no higher than that of all the pairs of two touching bodies taken together.
+  pure function highest_frequency2(touches, response) result(highest)
+    type(touch_t), intent(in) :: touches
+    type(response_t), intent(in) :: response
+    real(wp) :: highest
+    real(wp) :: pair
+    integer :: t
+
+    highest = 0.0_wp
+    do t = 1, touches%n
+      pair = response%pair_frequency2(t)
+      highest = max(highest, pair + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
+        + max(0.0_wp, response%frequency2(touches%b(t)) - pair))
+    end do
+  end function highest_frequency2
+
+  !> Stiffness and damping of all touches of a list.
+  subroutine respond(touches, law, partners, response)
+    type(touch_t), intent(in) :: touches
+    type(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(response_t), intent(inout) :: response
+    integer :: first, last
+
+    response%frequency2 = 0.0_wp
+    call reserve(touches%n, response%k)
+    call reserve(touches%n, response%eta)
+    call reserve(touches%n, response%decay)
+    call reserve(touches%n, response%pair_frequency2)
     first = 1
-    do while (first <= contacts%touches%n)
-      last = last_of_pair(contacts%touches, first)
-      call respond(first, last, contacts)
+    do while (first <= touches%n)
+      last = last_of_pair(touches, first)
+      call respond_pair(touches, first, last, law, partners, response)
       first = last + 1
     end do
-  end subroutine find_touches
+  end subroutine respond
 
   !> Last touch of the pair of bodies whose first touch is given.
   pure function last_of_pair(touches, first) result(last)
@@ -276,49 +359,50 @@ contains
   !! like one. Seen along the normal n_i of touch i the pair has the stiffness
   !! K_i = sum_j k_j (n_i.n_j)^2 and, at the mean of the contact points with the same weights, the
   !! effective mass m_i; then eta_i = (k_i/K_i) 2 zeta sqrt(K_i m_i).
-  pure subroutine respond(first, last, contacts)
+  pure subroutine respond_pair(touches, first, last, law, partners, response)
+    type(touch_t), intent(in) :: touches
     integer, intent(in) :: first, last
-    type(contacts_t), intent(inout) :: contacts
+    type(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(response_t), intent(inout) :: response
     real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
     real(wp) :: total, inverse, k, omega2, highest, stiffness
     integer :: a, b, t
 
-    associate (touches => contacts%touches, law => contacts%law, r => contacts%response)
-      a = touches%a(first)
-      b = touches%b(first)
-      k = normal_constant(law, 1.0_wp/(contacts%inverse_mass(a) + contacts%inverse_mass(b)))
-      weights = 0.0_wp
-      points = 0.0_wp
-      do t = first, last
-        nn = touches%weight(t)*square(touches%normal(:, t))
-        weights = weights + nn
-        points = points + spread(touches%arm_a(:, t), 2, 6)*spread(nn, 1, 3)
-      end do
-      highest = 0.0_wp
-      do t = first, last
-        nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
-        total = dot_product(nn, weights)
-        arm = matmul(points, nn)/total
-        inverse = inverse_effective_mass(contacts, a, arm, touches%normal(:, t))
-        arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
-        inverse = inverse + inverse_effective_mass(contacts, b, arm, touches%normal(:, t))
-        stiffness = k*law%gamma_n*touches%depth(t)**(law%gamma_n - 1.0_wp)
-        omega2 = stiffness*total*inverse
-        r%k(t) = touches%weight(t)*k
-        if (law%constants) then
-          r%eta(t) = touches%weight(t)*law%eta_n
-          r%decay(t) = 0.5_wp*law%eta_n*total*inverse
-        else
-          r%eta(t) = r%k(t)*2*law%damping_ratio/sqrt(omega2)
-          r%decay(t) = law%damping_ratio*sqrt(omega2)
-        end if
-        highest = max(highest, omega2)
-      end do
-      r%pair_frequency2(first:last) = highest
-      if (contacts%inverse_mass(a) > 0.0_wp) r%frequency2(a) = r%frequency2(a) + highest
-      if (contacts%inverse_mass(b) > 0.0_wp) r%frequency2(b) = r%frequency2(b) + highest
-    end associate
-  end subroutine respond
+    a = touches%a(first)
+    b = touches%b(first)
+    weights = 0.0_wp
+    points = 0.0_wp
+    do t = first, last
+      nn = touches%weight(t)*square(touches%normal(:, t))
+      weights = weights + nn
+      points = points + spread(touches%arm_a(:, t), 2, 6)*spread(nn, 1, 3)
+    end do
+    highest = 0.0_wp
+    k = normal_constant(law, 1.0_wp/(partners%inverse_mass(a) + partners%inverse_mass(b)))
+    do t = first, last
+      nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
+      total = dot_product(nn, weights)
+      arm = matmul(points, nn)/total
+      inverse = inverse_effective_mass(partners, a, arm, touches%normal(:, t))
+      arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
+      inverse = inverse + inverse_effective_mass(partners, b, arm, touches%normal(:, t))
+      stiffness = k*law%gamma_n*max(0.0_wp, touches%depth(t))**(law%gamma_n - 1.0_wp)
+      omega2 = stiffness*total*inverse
+      response%k(t) = touches%weight(t)*k
+      if (law%constants) then
+        response%eta(t) = touches%weight(t)*law%eta_n
+        response%decay(t) = 0.5_wp*law%eta_n*total*inverse
+      else
+        response%eta(t) = response%k(t)*2*law%damping_ratio/sqrt(omega2)
+        response%decay(t) = law%damping_ratio*sqrt(omega2)
+      end if
+      highest = max(highest, omega2)
+    end do
+    response%pair_frequency2(first:last) = highest
+    if (partners%inverse_mass(a) > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
+    if (partners%inverse_mass(b) > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
+  end subroutine respond_pair
 
   !> The products n_x n_x, n_y n_y, n_z n_z, n_y n_z, n_z n_x, n_x n_y.
   pure function square(n) result(nn)
@@ -329,17 +413,17 @@ contains
   end function square
 
   !> One over the mass a partner sets against a push along n at the given arm [1/kg].
-  pure function inverse_effective_mass(contacts, b, arm, n) result(inverse)
-    type(contacts_t), intent(in) :: contacts
+  pure function inverse_effective_mass(partners, b, arm, n) result(inverse)
+    type(partners_t), intent(in) :: partners
     integer, intent(in) :: b
     real(wp), intent(in) :: arm(3), n(3)
     real(wp) :: inverse
     real(wp) :: lever(3)
 
-    inverse = contacts%inverse_mass(b)
+    inverse = partners%inverse_mass(b)
     if (inverse <= 0.0_wp) return
     lever = cross(arm, n)
-    inverse = inverse + dot_product(lever, matmul(contacts%inverse_inertia(:, :, b), lever))
+    inverse = inverse + dot_product(lever, matmul(partners%inverse_inertia(:, :, b), lever))
   end function inverse_effective_mass
 
   !> Gather the touches of each key and partner; mean normal and point weighted by overlap.
@@ -455,7 +539,7 @@ contains
 
     associate (groups => contacts%groups, springs => contacts%springs)
       do g = 1, groups%n
-        v = relative_velocity(contacts, springs%a(g), springs%b(g), groups%arm_a(:, g), &
+        v = relative_velocity(contacts%partners, springs%a(g), springs%b(g), groups%arm_a(:, g), &
           groups%arm_b(:, g))
         springs%xi(:, g) = springs%xi(:, g) &
           + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
@@ -464,14 +548,14 @@ contains
   end subroutine stretch_springs
 
   !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
-  pure function relative_velocity(contacts, a, b, arm_a, arm_b) result(v)
-    type(contacts_t), intent(in) :: contacts
+  pure function relative_velocity(partners, a, b, arm_a, arm_b) result(v)
+    type(partners_t), intent(in) :: partners
     integer, intent(in) :: a, b
     real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
     real(wp) :: v(3)
 
-    v = (contacts%v(:, b) + cross(contacts%omega(:, b), arm_b)) &
-      - (contacts%v(:, a) + cross(contacts%omega(:, a), arm_a))
+    v = (partners%v(:, b) + cross(partners%omega(:, b), arm_b)) &
+      - (partners%v(:, a) + cross(partners%omega(:, a), arm_a))
   end function relative_velocity
 
   !> Contact forces and torques of this substep on all bodies.
@@ -497,7 +581,7 @@ contains
         eta = 0.0_wp
         do t = groups%first(g), groups%first(g + 1) - 1
           normal = touches%normal(:, t)
-          v = relative_velocity(contacts, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
+          v = relative_velocity(contacts%partners, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
           v_n = dot_product(v, normal)
           part = 1.0_wp
           if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
@@ -547,7 +631,7 @@ contains
       eta = contacts%touches%weight(t)*law%eta_t
       if (.not. law%constants) eta = eta_n*(k/k_n)
       bound = force_n*merge(law%wall_friction, law%friction, b < 0)
-      v = relative_velocity(contacts, a, b, groups%arm_a(:, g), groups%arm_b(:, g))
+      v = relative_velocity(contacts%partners, a, b, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
       f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/implicit
       size_f = norm2(f)

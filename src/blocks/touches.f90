@@ -4,7 +4,7 @@ module touches_m
   use neighbours_m, only: reserve
   implicit none
   private
-  public :: touch_t, reserve_touches
+  public :: touch_t, reserve_touches, select_touching
 
   !> Touches of one moment, sorted by a, then b, then key.
   !!
@@ -16,7 +16,7 @@ module touches_m
     real(wp), allocatable :: arm_a(:, :)   !! (3, n) from the centre of a to the contact [m]
     real(wp), allocatable :: arm_b(:, :)   !! (3, n) from the (image of the) centre of b [m]
     real(wp), allocatable :: normal(:, :)  !! (3, n) unit vector from a to b [-]
-    real(wp), allocatable :: depth(:)      !! (n) overlap d_n > 0 [m]
+    real(wp), allocatable :: depth(:)      !! (n) overlap d_n, > 0 where bodies touch [m]
     real(wp), allocatable :: weight(:)     !! (n) share of the stiffness of the law [-]
     real(wp), allocatable :: length(:)     !! (n) d_s of the contact Courant number, eq. (6) [m]
   end type touch_t
@@ -38,5 +38,29 @@ contains
     call reserve(n, touches%weight)
     call reserve(n, touches%length)
   end subroutine reserve_touches
+
+  !> Those entries of a list in which the bodies touch.
+  subroutine select_touching(all, touching)
+    type(touch_t), intent(in) :: all
+    type(touch_t), intent(inout) :: touching
+    integer :: t, m
+
+    call reserve_touches(all%n, touching)
+    m = 0
+    do t = 1, all%n
+      if (all%depth(t) <= 0.0_wp) cycle
+      m = m + 1
+      touching%a(m) = all%a(t)
+      touching%b(m) = all%b(t)
+      touching%key(m) = all%key(t)
+      touching%arm_a(:, m) = all%arm_a(:, t)
+      touching%arm_b(:, m) = all%arm_b(:, t)
+      touching%normal(:, m) = all%normal(:, t)
+      touching%depth(m) = all%depth(t)
+      touching%weight(m) = all%weight(t)
+      touching%length(m) = all%length(t)
+    end do
+    touching%n = m
+  end subroutine select_touching
 
 end module touches_m
