@@ -25,7 +25,8 @@ missing() {
   case $(uname) in
     Linux)
       library libEGL.so.1 || echo libegl1
-      library libGL.so.1 || echo libgl1 ;;
+      library libGL.so.1 || echo libgl1
+      library libXcursor.so.1 || echo libxcursor1 ;;
   esac
 }
 
