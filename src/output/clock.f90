@@ -1,7 +1,8 @@
 !> Time, step and what is due when: rows, frames, restart files, releases, the end.
 !!
-!! Output never changes the steps. A row or frame is written after the first step that reaches its due
-!! time, the multiples of its interval; a step is shortened only to land on a release or on the end.
+!! Output never changes the steps. A row or frame is written after the first step that reaches its
+!! due time, the multiples of its interval; a step is shortened only to land on a release or on the
+!! end.
 module clock_m
   use kinds_m, only: wp
   use case_types_m, only: run_t
@@ -15,7 +16,7 @@ module clock_m
     real(wp) :: t = 0.0_wp          !! [s]
     real(wp) :: dt = 0.0_wp         !! of the last step, then of the present one [s]
     integer :: step = 0
-    integer :: n_rows = 0           !! due rows written so far: a row that only ends a run does not count
+    integer :: n_rows = 0           !! due rows written so far, not one that only ends a run
     integer :: n_frames = 0         !! likewise
     real(wp) :: rest_began = -1.0_wp   !! when all blocks came to rest [s]; < 0: they move
     real(wp) :: t_end = 0.0_wp      !! [s]
@@ -40,8 +41,8 @@ contains
     if (run%restart_interval > 0.0_wp) clock%next_restart = run%restart_interval
   end subroutine clock_init
 
-  !> Set the due times of a clock whose t, step and counts came from a restart file: what was due at t
-  !! or before has been written.
+  !> Set the due times of a clock whose t, step and counts came from a restart file: what was due at
+  !! t or before has been written.
   subroutine clock_resume(clock)
     type(clock_t), intent(inout) :: clock
 
@@ -65,12 +66,12 @@ contains
     next = n*interval
   end function next_multiple
 
-  !> Choose dt and where the step ends: the longest dt allowed, or less to land on the next release or
-  !! on the end. The last two steps before a landing share the way, so that none is tiny.
+  !> Choose dt and where the step ends: the longest dt allowed, or less to land on the next release
+  !! or on the end. The last two steps before a landing share the way, so that none is tiny.
   pure subroutine choose_step(self, dt_allowed, next_release)
     class(clock_t), intent(inout) :: self
     real(wp), intent(in) :: dt_allowed     !! by stability and `&run dt` [s]
-    real(wp), intent(in) :: next_release   !! time of the next release after t; huge if there is none [s]
+    real(wp), intent(in) :: next_release   !! time of the next one after t; huge if none [s]
     real(wp) :: landing, way
 
     landing = self%t_end

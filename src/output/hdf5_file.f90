@@ -1,17 +1,37 @@
-!> A thin layer over the HDF5 Fortran interface: groups, attributes, whole datasets, growing columns.
+!> A thin layer over the HDF5 Fortran interface: groups, attributes, whole datasets, growing
+!! columns.
 !!
-!! Every status of HDF5 is looked at. The first trouble sets `info` and a `message` that names the file,
-!! the dataset and the reason; from then on every procedure of that file returns at once, so a caller
-!! may write a whole group of things and look at `info` once, before anything that waits for others.
+!! Every status of HDF5 is looked at. The first trouble sets `info` and a `message` that names the
+!! file, the dataset and the reason; from then on every procedure of that file returns at once, so a
+!! caller may write a whole group of things and look at `info` once, before anything that waits for
+!! others.
 !!
-!! A `shared` file is opened by all processes together: every procedure is then called by all of them,
-!! and blocks of cells are written collectively. Any other file belongs to the process that opens it.
+!! A `shared` file is opened by all processes together: every procedure is then called by all of
+!! them, and blocks of cells are written collectively. Any other file belongs to the process that
+!! opens it.
 !!
 !! The files keep the oldest format and no locks, and columns without compression never move a chunk
-!! once it is there, so a file that was flushed opens again whatever happens to the program afterwards.
+!! once it is there: a file that was flushed opens again whatever happens to the program.
 module hdf5_file_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_char, c_null_char
-  use hdf5
+  use hdf5, only: hid_t, hsize_t, size_t
+  use hdf5, only: h5aclose_f, h5acreate_f, h5aexists_f, h5aget_type_f, h5aopen_by_name_f
+  use hdf5, only: h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dget_space_f
+  use hdf5, only: h5dopen_f, h5dread_f, h5dset_extent_f, h5dwrite_f, h5fclose_f, h5fcreate_f
+  use hdf5, only: h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f
+  use hdf5, only: h5oclose_f, h5oopen_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, h5pset_chunk_f
+  use hdf5, only: h5pset_deflate_f, h5pset_fclose_degree_f, h5pset_fill_time_f
+  use hdf5, only: h5pset_fill_value_f, h5pset_shuffle_f, h5sclose_f, h5screate_f
+  use hdf5, only: h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f
+  use hdf5, only: h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f
+  use hdf5, only: h5tset_strpad_f
+  use hdf5, only: H5_INTEGER_KIND, H5_REAL_KIND, H5D_FILL_TIME_ALLOC_F, H5F_ACC_RDONLY_F
+  use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
+  use hdf5, only: h5kind_to_type, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F
+  use hdf5, only: H5P_FILE_ACCESS_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_C_S1
+  use hdf5, only: H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_IEEE_F32LE, H5T_IEEE_F64LE
+  use hdf5, only: H5T_NATIVE_DOUBLE, H5T_NATIVE_REAL, H5T_STD_I32LE, H5T_STD_I64LE
+  use hdf5, only: H5T_STR_NULLPAD_F, H5T_STRING
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root, set_file_access, set_collective, global_max
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
@@ -83,7 +103,8 @@ contains
     self%message = self%path//': cannot '//what//': '//hdf5_reason()
   end subroutine check
 
-  !> Trouble of one process of a shared file becomes that of all, so that none waits for it for ever.
+  !> Trouble of one process of a shared file becomes that of all, so that none waits for it for
+  !! ever.
   subroutine agree(self)
     class(h5_file_t), intent(inout) :: self
     real(wp) :: worst(1)
@@ -221,7 +242,8 @@ contains
     call self%check(status, 'remove '//name)
   end subroutine file_remove
 
-  !> A text of any length as an attribute; h5py shows it as str. An attribute that exists is replaced.
+  !> A text of any length as an attribute; h5py shows it as str. An attribute that exists is
+  !! replaced.
   subroutine attribute_text(self, object, name, value)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: object, name, value
@@ -241,7 +263,8 @@ contains
     call self%check(status, 'make a text type')
     call h5tset_cset_f(text_type, H5T_CSET_UTF8_F, status)
     call self%check(status, 'make a text type')
-    call self%write_attribute(object, name, text_type, text_type, [integer(hsize_t) ::], c_loc(start))
+    call self%write_attribute(object, name, text_type, text_type, [integer(hsize_t) ::], &
+      c_loc(start))
     call h5tclose_f(text_type, status)
   end subroutine attribute_text
 
@@ -318,7 +341,8 @@ contains
                               shape(value, kind=hsize_t), c_loc(value))
   end subroutine attribute_matrix
 
-  !> Create the attribute, or overwrite the one that is there, which must have the same type and shape.
+  !> Create the attribute, or overwrite the one that is there, which must have the same type and
+  !! shape.
   subroutine write_attribute(self, object, name, file_type, mem_type, extent, data)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: object, name
@@ -392,6 +416,7 @@ contains
     interface
       integer(c_size_t) function c_strlen(s) bind(c, name='strlen')
         import :: c_ptr, c_size_t
+        implicit none
         type(c_ptr), value :: s
       end function c_strlen
     end interface
@@ -623,17 +648,21 @@ contains
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer, intent(in) :: extent(:)
-    integer(hid_t) :: id
+    integer(hid_t) :: id, list
     integer :: status
 
     if (self%info /= 0) return
-    call self%new_dataset(name, units, type_in_file(file_real64), int(extent, hsize_t), &
-                          H5P_DEFAULT_F, id)
+    call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
+    call self%check(status, 'create '//name)
+    call h5pset_fill_time_f(list, H5D_FILL_TIME_ALLOC_F, status)
+    call self%check(status, 'create '//name)
+    call self%new_dataset(name, units, type_in_file(file_real64), int(extent, hsize_t), list, id)
+    call h5pclose_f(list, status)
     if (self%info == 0) call h5dclose_f(id, status)
   end subroutine new_blocks
 
-  !> Write the block `first : first + extent - 1` of a dataset of `new_blocks`; all processes together
-  !! in a shared file.
+  !> Write the block `first : first + extent - 1` of a dataset of `new_blocks`; all processes
+  !! together in a shared file.
   subroutine write_block(self, name, first, extent, a)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name
@@ -679,8 +708,9 @@ contains
 
   !> Create a column without rows. Rows are `row` in shape, for h5py (rows, reversed row).
   !!
-  !! Not compressed: chunks of `chunk_rows` rows, written in place at once. Compressed: `row(size(row))`
-  !! is cut into layers of `chunk_layers`, and a row must be written whole by `append_block`.
+  !! Not compressed: chunks of `chunk_rows` rows, written in place at once. Compressed:
+  !! `row(size(row))` is cut into layers of `chunk_layers`, and a row must be written whole by
+  !! `append_block`.
   subroutine new_column(self, name, units, kind, row, chunk_rows, column, chunk_layers)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
@@ -714,7 +744,8 @@ contains
       call self%check(status, 'create '//name)
     end if
     call set_fill(self, name, kind, list)
-    call self%new_dataset(name, units, type_in_file(kind), column%extent(:column%rank), list, column%id)
+    call self%new_dataset(name, units, type_in_file(kind), column%extent(:column%rank), list, &
+      column%id)
     call h5pclose_f(list, status)
   end subroutine new_column
 
@@ -739,7 +770,8 @@ contains
     case (file_real32); value = c_loc(nothing_single)
     case default; value = c_loc(none)
     end select
-    call h5pset_fill_value_f(list, memory_type(merge(file_integer32, kind, kind == file_integer64)), value, &
+    call h5pset_fill_value_f(list, memory_type(merge(file_integer32, kind, &
+      kind == file_integer64)), value, &
                              status)
     call self%check(status, 'create '//name)
   end subroutine set_fill
@@ -867,7 +899,8 @@ contains
     if (elements > 0 .and. (is_root() .or. .not. self%shared)) then
       extent = column%extent
       extent(column%rank) = int(n, hsize_t)
-      call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, here)
+      call self%select(column%name, column%id, first(:column%rank), extent(:column%rank), there, &
+        here)
       if (self%info == 0) then
         call h5dwrite_f(column%id, mem_type, data, status, here, there)
         call self%check(status, 'write '//column%name)
@@ -877,9 +910,9 @@ contains
     call self%agree()
   end subroutine transfer_rows
 
-  !> Append a row of 32-bit reals of which this process gives the block `first : first + extent - 1`;
-  !! all processes together in a shared file. The kind in memory must be that of the file: HDF5 does
-  !! not convert what it compresses for several processes.
+  !> Append a row of 32-bit reals of which this process gives the block `first : first + extent -
+  !! 1`; all processes together in a shared file. The kind in memory must be that of the file: HDF5
+  !! does not convert what it compresses for several processes.
   subroutine append_block(self, column, first, extent, a)
     class(h5_file_t), intent(inout) :: self
     type(h5_column_t), intent(inout) :: column
@@ -889,7 +922,8 @@ contains
     integer :: status
 
     call self%resize(column, int(column%extent(column%rank), i8) + 1_i8)
-    call self%select(column%name, column%id, [int(first - 1, hsize_t), column%extent(column%rank) - 1], &
+    call self%select(column%name, column%id, [int(first - 1, hsize_t), column%extent(column%rank) &
+      - 1], &
                      [int(extent, hsize_t), 1_hsize_t], there, here)
     if (self%info /= 0) return
     call h5dwrite_f(column%id, H5T_NATIVE_REAL, c_loc(a), status, here, there, self%collective)

@@ -19,6 +19,7 @@ module hdf5_reason_m
   interface
     integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: name(*), value(*)
       integer(c_int), value :: overwrite
     end function c_setenv
@@ -26,6 +27,7 @@ module hdf5_reason_m
     !> Walk the stack of errors; `upward` begins at the innermost.
     integer(c_int) function h5e_walk(stack, direction, visit, data) bind(c, name='H5Ewalk2')
       import :: c_int, c_int64_t, c_funptr, c_ptr
+      implicit none
       integer(c_int64_t), value :: stack
       integer(c_int), value :: direction
       type(c_funptr), value :: visit

@@ -1,7 +1,7 @@
 !> Everything a run writes: opened once, written when due, closed with the last state in place.
 !!
-!! After trouble `code` is not `exit_ok` and `message` says why; the caller then ends with `fatal`. In a
-!! parallel run trouble with a file of the root process is known to the root process only.
+!! After trouble `code` is not `exit_ok` and `message` says why; the caller then ends with `fatal`.
+!! In a parallel run trouble with a file of the root process is known to the root process only.
 module output_m
   use kinds_m, only: wp, i8
   use errors_m, only: exit_ok, exit_files
@@ -27,7 +27,8 @@ module output_m
   private
   public :: output_t, open_output, write_due_output, close_output
 
-  character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', block_name = '/blocks.vtkhdf'
+  character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', &
+    block_name = '/blocks.vtkhdf'
   character(*), parameter :: restart_name(2) = ['/restart-a.h5', '/restart-b.h5']
 
   type :: output_t
@@ -40,7 +41,8 @@ module output_m
     logical, private :: fluid = .false.      !! there is one
     logical, private :: fields = .false., surfaces = .false. !! these files are written
     integer, private :: next_restart = 1     !! file to write next
-    integer, private :: row_step = -1, frame_step = -1, restart_step = -1   !! step of the last of each
+    !> Step of the last of each; -1: none yet.
+    integer, private :: row_step = -1, frame_step = -1, restart_step = -1
     integer, private :: phase = 0, restart_phase = 0         !! timers
     type(run_file_t), private :: run_file
     type(field_file_t), private :: field_file
@@ -90,9 +92,11 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(output_t), intent(inout) :: output
 
-    call create_run_file(output%folder//run_name, output%text, output%parameters, grid, blocks, output%run_file)
+    call create_run_file(output%folder//run_name, output%text, output%parameters, grid, blocks, &
+      output%run_file)
     if (output%fields) call create_field_file(output%folder//field_name, grid, output%field_file)
-    if (output%surfaces) call create_block_file(output%folder//block_name, blocks, output%block_file)
+    if (output%surfaces) call create_block_file(output%folder//block_name, blocks, &
+      output%block_file)
   end subroutine create_files
 
   !> Open the files of the run that goes on.
@@ -104,9 +108,11 @@ contains
     type(output_t), intent(inout) :: output
     integer :: up_to_date(2)
 
-    call continue_folder(options%restart, options%output, output%folder, output%code, output%message)
+    call continue_folder(options%restart, options%output, output%folder, output%code, &
+      output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//run_name, output%text, output%parameters, clock, blocks, output%run_file)
+    call reopen_run_file(output%folder//run_name, output%text, output%parameters, clock, blocks, &
+      output%run_file)
     if (output%fluid) call continue_fields(grid, clock, output)
     if (blocks%n > 0) call continue_surfaces(blocks, clock, output)
     up_to_date = 0
@@ -119,8 +125,8 @@ contains
     output%restart_step = clock%step
   end subroutine continue_files
 
-  !> Go on with the frames of the fluid; without any so far the file begins now, and where no more are
-  !! wanted it only loses the later ones.
+  !> Go on with the frames of the fluid; without any so far the file begins now, and where no more
+  !! are wanted it only loses the later ones.
   subroutine continue_fields(grid, clock, output)
     type(grid_t), intent(in) :: grid
     type(clock_t), intent(in) :: clock
@@ -168,8 +174,8 @@ contains
 
   end subroutine look_for_trouble
 
-  !> After a step, and once before the first: write the row, the frames and the restart file that are
-  !! due, and a line of the table. All processes call.
+  !> After a step, and once before the first: write the row, the frames and the restart file that
+  !! are due, and a line of the table. All processes call.
   subroutine write_due_output(grid, clock, flow, solid, blocks, contacts, report, output)
     type(grid_t), intent(in) :: grid
     type(clock_t), intent(inout) :: clock
@@ -191,7 +197,8 @@ contains
     line_wanted = line_wanted .or. frame_wanted
     if (.not. (row_wanted .or. frame_wanted)) call tell_all(output%quiet, line_wanted)
     if (row_wanted .or. line_wanted) then
-      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() - output%progress%began, &
+      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, &
                     grid, flow, solid, blocks, report, row)
     end if
     if (row_wanted) then
@@ -233,7 +240,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(output_t), intent(inout) :: output
 
-    if (output%fields) call write_field_frame(output%field_file, clock%n_frames, clock%t, grid, flow, solid)
+    if (output%fields) call write_field_frame(output%field_file, clock%n_frames, clock%t, grid, &
+      flow, solid)
     if (output%surfaces) call write_block_frame(output%block_file, clock%n_frames, clock%t, blocks)
     output%frame_step = clock%step
   end subroutine write_frames
@@ -252,7 +260,8 @@ contains
 
     if (output%code /= exit_ok) return
     call tic(output%restart_phase)
-    call write_restart(output%folder//restart_name(output%next_restart), output%text, output%parameters, grid, clock, &
+    call write_restart(output%folder//restart_name(output%next_restart), output%text, &
+      output%parameters, grid, clock, &
                        flow, solid, blocks, contacts, info, message)
     output%next_restart = 3 - output%next_restart
     output%restart_step = clock%step
@@ -277,12 +286,15 @@ contains
     type(row_t) :: row
 
     if (output%code == exit_ok) then
-      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() - output%progress%began, &
+      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, &
                     grid, flow, solid, blocks, report, row)
       if (output%row_step /= clock%step) call write_row(output%run_file, clock%n_rows, row, blocks)
-      if (output%frame_step /= clock%step) call write_frames(grid, clock, flow, solid, blocks, output)
+      if (output%frame_step /= clock%step) call write_frames(grid, clock, flow, solid, blocks, &
+        output)
       call write_line(output%progress, clock, row, blocks)
-      if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, contacts, output)
+      if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, &
+        contacts, output)
     end if
     call close_run_file(output%run_file, exit_code)
     call output%field_file%file%close()

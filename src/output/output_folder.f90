@@ -1,7 +1,7 @@
 !> The folder of the results: made or found fit, never at the cost of older results.
 !!
-!! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not empty is
-!! refused. Only the root process looks and acts; the outcome is told to all.
+!! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not
+!! empty is refused. Only the root process looks and acts; the outcome is told to all.
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_long, c_char, c_ptr, c_null_char, c_associated
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
@@ -10,40 +10,48 @@ module output_folder_m
   private
   public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
 
-  character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', 'blocks.vtkhdf']
+  character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
+    'blocks.vtkhdf']
 
-  character(*), parameter :: refused = 'no permission, no room, or a part of the path is not a folder'
+  character(*), &
+    parameter :: refused = 'no permission, no room, or a part of the path is not a folder'
 
   interface
     integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: mode   ! mode_t is passed like an int
     end function c_mkdir
 
     integer(c_int) function c_access(path, mode) bind(c, name='access')
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
       integer(c_int), value :: mode
     end function c_access
 
     integer(c_int) function c_rename(from, to) bind(c, name='rename')
       import :: c_int, c_char
+      implicit none
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
 
     type(c_ptr) function c_opendir(path) bind(c, name='opendir')
       import :: c_ptr, c_char
+      implicit none
       character(kind=c_char), intent(in) :: path(*)
     end function c_opendir
 
     type(c_ptr) function c_readdir(folder) bind(c, name='readdir')
       import :: c_ptr
+      implicit none
       type(c_ptr), value :: folder
     end function c_readdir
 
     integer(c_int) function c_closedir(folder) bind(c, name='closedir')
       import :: c_int, c_ptr
+      implicit none
       type(c_ptr), value :: folder
     end function c_closedir
   end interface
@@ -140,7 +148,8 @@ contains
     if (is_root()) then
       do i = 1, size(result_file)
         if (.not. exists(path//'/'//trim(result_file(i)))) cycle
-        call copy_file(path//'/'//trim(result_file(i)), trimmed(output)//'/'//trim(result_file(i)), code, message)
+        call copy_file(path//'/'//trim(result_file(i)), trimmed(output)//'/' &
+          //trim(result_file(i)), code, message)
         if (code /= exit_ok) exit
       end do
     end if
@@ -235,11 +244,11 @@ contains
     integer, parameter :: chunk = 2**20
     character(chunk) :: buffer
     character(256) :: reason
-    integer :: source, target, info, part
-    integer :: n
+    integer :: source, target, info, n
     integer(c_long) :: left, length
 
-    open (newunit=source, file=from, access='stream', status='old', action='read', iostat=info, iomsg=reason)
+    open (newunit=source, file=from, access='stream', status='old', action='read', iostat=info, &
+      iomsg=reason)
     if (info == 0) then
       inquire (unit=source, size=length)
       open (newunit=target, file=to, access='stream', status='replace', iostat=info, iomsg=reason)
@@ -251,7 +260,7 @@ contains
         left = left - n
       end do
       if (info == 0) close (target, iostat=info, iomsg=reason)
-      close (source, iostat=part)
+      if (info == 0) close (source, iostat=info, iomsg=reason)
     end if
     if (info == 0) return
     code = exit_files

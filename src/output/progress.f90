@@ -67,13 +67,16 @@ contains
     released = count(blocks%present)
     moving = count_moving(clock%run%rest_speed, blocks)
     if (self%fluid) then
-      write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, row%dt, row%cfl, &
+      write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, row%dt, &
+        row%cfl, &
         row%divergence_max, nint(row%pressure_passes), nint(row%solver_iterations)
     else
-      write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, row%dt, nint(row%substeps), &
+      write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, row%dt, &
+        nint(row%substeps), &
         row%contact_courant_max
     end if
-    write (line(len_trim(line) + 1:), '(a11, i8, f13.4)') to_text(released)//'/'//to_text(blocks%n), moving, &
+    write (line(len_trim(line) + 1:), '(a11, i8, f13.4)') to_text(released)//'/' &
+      //to_text(blocks%n), moving, &
       1.0e3_wp*row%max_overlap
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') row%liquid_volume_drift
     write (output_unit, '(2a)') trim(line), time_left(self, clock)
@@ -87,7 +90,8 @@ contains
     character(*), parameter :: block_columns = '   released  moving overlap [mm]'
 
     if (fluid) then
-      line = clock_columns//'  Courant  div. [1/s]  passes  iterations'//block_columns//'      drift  time left'
+      line = clock_columns//'  Courant  div. [1/s]  passes  iterations'//block_columns &
+        //'      drift  time left'
     else
       line = clock_columns//'  substeps  Courant'//block_columns//'  time left'
     end if
@@ -101,7 +105,8 @@ contains
 
     n = 0
     do b = 1, blocks%n
-      if (blocks%present(b) .and. .not. blocks%fixed(b) .and. norm2(blocks%v(:, b)) > rest_speed) n = n + 1
+      if (blocks%present(b) .and. .not. blocks%fixed(b) .and. norm2(blocks%v(:, &
+        b)) > rest_speed) n = n + 1
     end do
   end function count_moving
 
@@ -139,7 +144,8 @@ contains
     how = 'stopped with code '//to_text(exit_code)
     if (exit_code == 0) how = 'finished'
     if (exit_code == 0 .and. clock%settled) how = 'settled'
-    write (line, '(2a, f0.5, a, i0, a, f0.1, a)') how, ' at t = ', clock%t, ' s: ', steps, ' steps in ', seconds, ' s'
+    write (line, '(2a, f0.5, a, i0, a, f0.1, a)') how, ' at t = ', clock%t, ' s: ', steps, &
+      ' steps in ', seconds, ' s'
     if (self%fluid .and. steps > 0) write (line(len_trim(line) + 1:), '(a, f0.3, a)') ', ', &
       1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), ' us per cell and step'
     if (self%warnings > 0) line = trim(line)//', '//to_text(self%warnings)//' warnings'

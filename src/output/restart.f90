@@ -1,10 +1,12 @@
-!> Restart files: the whole state in double precision, checksummed, exact on any number of processes.
+!> Restart files: the whole state in double precision, checksummed, exact on any number of
+!! processes.
 !!
 !! A file is written under a temporary name and renamed when it is complete, so a run that is killed
-!! while it writes leaves the older files whole. Layout (as h5py shows it; faces carry one layer more
-!! in each direction, element (d, k, j, i) is the lower face of cell (i, j, k) in direction d):
+!! while it writes leaves the older files whole. Layout (as h5py shows it; faces carry one layer
+!! more in each direction, element (d, k, j, i) is the lower face of cell (i, j, k) in direction d):
 !!
-!!     /            @format = 'mics-restart' @format_version @checksum @namelist @parameters @version
+!!     /            @format = 'mics-restart' @format_version @checksum @version @git_revision
+!!                  @namelist @parameters
 !!     /clock       t dt step n_rows n_frames rest_began
 !!     /flow        u (3,nz,ny,nx)  p liquid room c alpha (1,nz,ny,nx)
 !!                  uf open (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
@@ -52,7 +54,8 @@ module restart_m
 contains
 
   !> Write the state to `path`, all processes together.
-  subroutine write_restart(path, text, parameters, grid, clock, flow, solid, blocks, contacts, info, message)
+  subroutine write_restart(path, text, parameters, grid, clock, flow, solid, blocks, contacts, &
+    info, message)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
     type(grid_t), intent(in) :: grid
@@ -101,11 +104,13 @@ contains
     call broadcast(info)
   end subroutine finish_file
 
-  !> Read the state from `path`, all processes together, and check that it is whole and of this case.
+  !> Read the state from `path`, all processes together, and check that it is whole and of this
+  !! case.
   !!
   !! Afterwards the halos between processes are filled; those at the sides of the domain, and what
   !! follows from the state, are the caller's.
-  subroutine read_restart(path, parameters, grid, clock, flow, solid, blocks, contacts, info, message)
+  subroutine read_restart(path, parameters, grid, clock, flow, solid, blocks, contacts, info, &
+    message)
     character(*), intent(in) :: path
     character(*), intent(in) :: parameters   !! all values of the case that goes on
     type(grid_t), intent(in) :: grid
@@ -114,7 +119,7 @@ contains
     type(solid_geometry_t), intent(inout) :: solid
     type(blocks_t), intent(inout) :: blocks
     type(contacts_t), intent(inout) :: contacts
-    integer, intent(out) :: info             !! 0: read; 1: the file is no good; 2: the case has changed
+    integer, intent(out) :: info   !! 0: read; 1: the file is no good; 2: the case has changed
     character(:), allocatable, intent(out) :: message
     type(reader_t) :: reader
     type(checksum_visitor_t) :: checksum
@@ -185,7 +190,8 @@ contains
       call next_line(before, at_old, old)
       call next_line(after, at_new, new)
       if (old /= new) then
-        message = 'the case differs from that of the restart file: '//shown(new)//', was '//shown(old)
+        message = 'the case differs from that of the restart file: '//shown(new)//', was ' &
+          //shown(old)
         return
       end if
       if (len(old) == 0) return
@@ -260,7 +266,8 @@ contains
     call self%file%store_shaped_integers(name, '1', extent, a)
   end subroutine write_integers
 
-  !> Faces on the upper side of a periodic domain are those on its lower side: the exchange fills them.
+  !> Faces on the upper side of a periodic domain are those on its lower side: the exchange fills
+  !! them.
   subroutine read_cells(self, name, units, grid, faces, m, a)
     class(reader_t), intent(inout) :: self
     character(*), intent(in) :: name, units

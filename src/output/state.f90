@@ -4,8 +4,8 @@
 !! formed, numbers that are none are searched, and two states are compared, all by the same walk. An
 !! array that is missing here is missing in every one of them.
 !!
-!! Halo cells are not part of the state: whoever reads one fills them, and computes what follows from
-!! the state (density, viscosity, legs to the surfaces), before the next step.
+!! Halo cells are not part of the state: whoever reads one fills them, and computes what follows
+!! from the state (density, viscosity, legs to the surfaces), before the next step.
 module state_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo, unit_step
@@ -37,6 +37,7 @@ module state_m
     !> An array over the cells or lower faces of the grid; every process shows its part.
     subroutine visit_cells(self, name, units, grid, faces, m, a)
       import :: state_visitor_t, grid_t, wp, n_halo
+      implicit none
       class(state_visitor_t), intent(inout) :: self
       character(*), intent(in) :: name, units
       type(grid_t), intent(in) :: grid
@@ -50,6 +51,7 @@ module state_m
     !> Reals that are the same on every process.
     subroutine visit_reals(self, name, units, extent, a)
       import :: state_visitor_t, wp
+      implicit none
       class(state_visitor_t), intent(inout) :: self
       character(*), intent(in) :: name, units
       integer, intent(in) :: extent(:)
@@ -59,6 +61,7 @@ module state_m
     !> Integers that are the same on every process.
     subroutine visit_integers(self, name, extent, a)
       import :: state_visitor_t
+      implicit none
       class(state_visitor_t), intent(inout) :: self
       character(*), intent(in) :: name
       integer, intent(in) :: extent(:)
@@ -96,8 +99,8 @@ contains
     call visitor%whole_number('/clock/n_frames', clock%n_frames)
   end subroutine visit_clock
 
-  !> The open shares and solid shares follow from the poses of the blocks; they are here so that fluxes
-  !! and volumes can be summed from a restart file alone.
+  !> The open shares and solid shares follow from the poses of the blocks; they are here so that
+  !! fluxes and volumes can be summed from a restart file alone.
   subroutine visit_flow(visitor, grid, flow, solid)
     class(state_visitor_t), intent(inout) :: visitor
     type(grid_t), intent(in) :: grid
@@ -213,7 +216,8 @@ contains
   !> Elements first:last of an array with halo, in a row, x fastest.
   pure subroutine pack_part(grid, a, first, last, row)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+      - n_halo:)
     integer, intent(in) :: first(3), last(3)
     real(wp), intent(out) :: row(:)
     integer :: j, k, n, at

@@ -36,8 +36,8 @@ module state_visitors_m
     integer(i8), allocatable :: bits(:)
   end type item_t
 
-  !> Keeps a copy of a state on its first walk and compares another state with it, bit by bit, on the
-  !! next ones. Every process looks at its own part.
+  !> Keeps a copy of a state on its first walk and compares another state with it, bit by bit, on
+  !! the next ones. Every process looks at its own part.
   type, extends(state_visitor_t) :: image_visitor_t
     logical :: comparing = .false.
     integer :: n = 0                          !! items visited on this walk
@@ -69,8 +69,8 @@ contains
     call self%sum%add_integers(4, transfer(halves, [0]))
   end subroutine checksum_cells
 
-  !> Two sums over all processes of scrambled bits, each element with its own place in it, so that the
-  !! order of summation does not matter but the place of every element does.
+  !> Two sums over all processes of scrambled bits, each element with its own place in it, so that
+  !! the order of summation does not matter but the place of every element does.
   function checksum_of_cells(grid, faces, m, a) result(halves)
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
@@ -151,7 +151,8 @@ contains
           if (all(ieee_is_finite(a(first(1):last(1), j, k, d)))) cycle
           do i = first(1), last(1)
             if (ieee_is_finite(a(i, j, k, d))) cycle
-            place(1) = min(place(1), ((real(d, wp)*(grid%n(3) + 2) + k)*(grid%n(2) + 2) + j)*(grid%n(1) + 2) + i)
+            place(1) = min(place(1), ((real(d, wp)*(grid%n(3) + 2) + k)*(grid%n(2) + 2) &
+              + j)*(grid%n(1) + 2) + i)
           end do
         end do
       end do
@@ -161,7 +162,8 @@ contains
     at = int(modulo(place(1), real(product(grid%n + 2), wp)))
     i = modulo(at, grid%n(1) + 2)
     at = at/(grid%n(1) + 2)
-    self%found = name//' ['//units//'] at cell '//to_text(i)//', '//to_text(modulo(at, grid%n(2) + 2)) &
+    self%found = name//' ['//units//'] at cell '//to_text(i)//', '//to_text(modulo(at, grid%n(2) &
+      + 2)) &
       //', '//to_text(at/(grid%n(2) + 2))
   end subroutine finite_cells
 
@@ -176,7 +178,8 @@ contains
     do i = 1, size(a)
       if (ieee_is_finite(a(i))) cycle
       self%found = name//' ['//units//']'
-      if (size(extent) > 1) self%found = self%found//' of number '//to_text((i - 1)/product(extent(:size(extent) - 1)) + 1)
+      if (size(extent) > 1) self%found = self%found//' of number '//to_text((i &
+        - 1)/product(extent(:size(extent) - 1)) + 1)
       return
     end do
   end subroutine finite_reals

@@ -1,6 +1,7 @@
 !> `run.h5`: how the run was made, its grid, shapes and blocks, and one row after another.
 !!
-!! Only the root process writes. Each row is flushed, so that a fault loses nothing already computed.
+!! Only the root process writes. Each row is flushed, so that a fault loses nothing already
+!! computed.
 module write_run_m
   use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root, nproc, get_threads
@@ -19,14 +20,16 @@ module write_run_m
   integer, parameter :: n_vectors = 7       !! columns of three numbers per block
   character(*), parameter :: vector_name(n_vectors) = [character(16) :: 'position', 'velocity', &
     'angular_velocity', 'fluid_force', 'fluid_torque', 'contact_force', 'contact_torque']
-  character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', 'N m', 'N', 'N m']
+  character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', &
+    'N m', 'N', 'N m']
   integer, parameter :: chunk_bytes = 16384  !! room that a column takes at a time
-  integer, parameter :: running = -1         !! exit status while the run goes on, or if it was killed
+  integer, parameter :: running = &
+    -1         !! exit status while the run goes on, or if it was killed
 
   type :: run_file_t
     type(h5_file_t) :: file
     integer :: rows = 0
-    logical :: up_to_date = .false.                    !! a run that goes on has a row of its very start
+    logical :: up_to_date = .false.   !! a run that goes on has a row of its very start
     real(wp) :: wall_time = 0.0_wp                     !! of the last row when a run goes on [s]
     type(h5_column_t), private :: series(n_columns)
     type(h5_column_t), private :: time, vector(n_vectors), quaternion, contacts, on_floor
@@ -59,13 +62,17 @@ contains
         call file%new_column('/bodies/'//trim(vector_name(c)), trim(vector_units(c)), file_real64, &
                              [3, blocks%n], chunk_rows(3*blocks%n), self%vector(c))
       end do
-      call file%new_column('/bodies/quaternion', '1', file_real64, [4, blocks%n], chunk_rows(4*blocks%n), &
+      call file%new_column('/bodies/quaternion', '1', file_real64, [4, blocks%n], &
+        chunk_rows(4*blocks%n), &
                            self%quaternion)
-      call file%new_column('/bodies/contacts', '1', file_integer32, [blocks%n], chunk_rows(blocks%n), self%contacts)
-      call file%new_column('/bodies/on_floor', '1', file_integer32, [blocks%n], chunk_rows(blocks%n), self%on_floor)
+      call file%new_column('/bodies/contacts', '1', file_integer32, [blocks%n], &
+        chunk_rows(blocks%n), self%contacts)
+      call file%new_column('/bodies/on_floor', '1', file_integer32, [blocks%n], &
+        chunk_rows(blocks%n), self%on_floor)
       call file%group('/series')
       do c = 1, n_columns
-        call file%new_column('/series/'//trim(column_name(c)), trim(column_units(c)), file_real64, [integer ::], &
+        call file%new_column('/series/'//trim(column_name(c)), trim(column_units(c)), file_real64, &
+          [integer ::], &
                              chunk_rows(1), self%series(c))
       end do
       call file%flush()

@@ -1,9 +1,10 @@
 !> `fields.vtkhdf` and `blocks.vtkhdf`: the fluid and the surfaces of the blocks, frame by frame, as
 !! ParaView and pyvista read them.
 !!
-!! Layout: VTKHDF 2.0, temporal ImageData (a frame is a row of each dataset) and temporal PolyData (the
-!! points of all frames one after another, the triangles once). A frame is complete when `Steps@NSteps`
-!! counts it, which is flushed after everything else. Source: VTK, "VTKHDF file format".
+!! Layout: VTKHDF 2.0, temporal ImageData (a frame is a row of each dataset) and temporal PolyData
+!! (the points of all frames one after another, the triangles once). A frame is complete when
+!! `Steps@NSteps` counts it, which is flushed after everything else. Source: VTK, "VTKHDF file
+!! format".
 module write_vtkhdf_m
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
@@ -21,7 +22,8 @@ module write_vtkhdf_m
 
   character(*), parameter :: root = '/VTKHDF', steps = '/VTKHDF/Steps'
   integer, parameter :: n_scalars = 3
-  character(*), parameter :: scalar_name(n_scalars) = [character(8) :: 'liquid', 'solid', 'pressure']
+  character(*), parameter :: scalar_name(n_scalars) = [character(8) :: 'liquid', 'solid', &
+    'pressure']
   character(*), parameter :: scalar_units(n_scalars) = [character(2) :: '1', '1', 'Pa']
   integer, parameter :: chunk_bytes = 2**18    !! of a compressed field
   integer, parameter :: chunk_frames = 64      !! of a number per frame
@@ -29,15 +31,16 @@ module write_vtkhdf_m
   type :: field_file_t
     type(h5_file_t) :: file
     integer :: frames = 0
-    logical :: up_to_date = .false.               !! a run that goes on has a frame of its very start
+    logical :: up_to_date = .false.   !! a run that goes on has a frame of its very start
     type(h5_column_t), private :: scalar(n_scalars), velocity, time, offset(n_scalars + 1)
-    real(sp), allocatable, private :: values(:)   !! of the cells of this process, three for a vector
+    real(sp), allocatable, &
+      private :: values(:)   !! of the cells of this process, three for a vector
   end type field_file_t
 
   type :: block_file_t
     type(h5_file_t) :: file
     integer :: frames = 0
-    logical :: up_to_date = .false.               !! a run that goes on has a frame of its very start
+    logical :: up_to_date = .false.   !! a run that goes on has a frame of its very start
     integer, private :: n_points = 0
     type(h5_column_t), private :: points, velocity, time
     type(h5_column_t), private :: part_offset, parts, point_offset, cell_offset, connectivity_offset
@@ -59,19 +62,23 @@ contains
       call file%attribute(root, 'WholeExtent', [0, n(1), 0, n(2), 0, n(3)])
       call file%attribute(root, 'Origin', grid%origin)
       call file%attribute(root, 'Spacing', grid%h)
-      call file%attribute(root, 'Direction', [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp])
+      call file%attribute(root, 'Direction', [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+        0.0_wp, 0.0_wp, 1.0_wp])
       call file%group(root//'/CellData')
       layers = max(1, chunk_bytes/(4*n(1)*n(2)))
       do s = 1, n_scalars
-        call file%new_column(root//'/CellData/'//trim(scalar_name(s)), trim(scalar_units(s)), file_real32, n, 1, &
+        call file%new_column(root//'/CellData/'//trim(scalar_name(s)), trim(scalar_units(s)), &
+          file_real32, n, 1, &
                              self%scalar(s), layers)
       end do
-      call file%new_column(root//'/CellData/velocity', 'm/s', file_real32, [3, n], 1, self%velocity, &
+      call file%new_column(root//'/CellData/velocity', 'm/s', file_real32, [3, n], 1, &
+        self%velocity, &
                            max(1, layers/3))
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       do s = 1, n_scalars + 1
-        call file%new_column(offset_name(s), '1', file_integer64, [integer ::], chunk_frames, self%offset(s))
+        call file%new_column(offset_name(s), '1', file_integer64, [integer ::], chunk_frames, &
+          self%offset(s))
       end do
       call file%flush()
     end associate
@@ -167,7 +174,8 @@ contains
     call file%flush()
   end subroutine count_frames
 
-  !> Write a frame as number `frames_before` + 1, in the place of one that only ended an earlier run.
+  !> Write a frame as number `frames_before` + 1, in the place of one that only ended an earlier
+  !! run.
   subroutine write_field_frame(self, frames_before, t, grid, flow, solid)
     type(field_file_t), intent(inout) :: self
     integer, intent(in) :: frames_before   !! due frames written so far
@@ -182,7 +190,8 @@ contains
       call drop_field_frames(self)
     end if
     n = product(grid%hi - grid%lo + 1)
-    associate (file => self%file, first => grid%lo, extent => grid%hi - grid%lo + 1, values => self%values)
+    associate (file => self%file, first => grid%lo, extent => grid%hi - grid%lo + 1, &
+      values => self%values)
       call liquid_share(grid, flow%liquid, flow%room, flow%c, values)
       call file%append_block(self%scalar(1), first, extent, values(:n))
       call single(grid, solid%alpha, values)
@@ -205,7 +214,8 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                 grid%lo(3) - n_halo:) :: liquid, room   !! [m3]
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+      - n_halo:)
     real(sp), intent(out) :: values(:)
     real(wp), parameter :: no_room = 1.0e-9_wp   !! of the cell volume
     integer :: i, j, k, m
@@ -228,7 +238,8 @@ contains
   !> The cells of this process in single precision, in a row.
   pure subroutine single(grid, a, values)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+      - n_halo:)
     real(sp), intent(out) :: values(:)
     integer :: i, j, k, m
 
@@ -246,7 +257,8 @@ contains
   !> The same for a vector, its components next to one another.
   pure subroutine single_vector(grid, a, values)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+      - n_halo:, :)
     real(sp), intent(out) :: values(:)
     integer :: i, j, k, m
 
@@ -276,19 +288,27 @@ contains
       call file%new_column(root//'/Points', 'm', file_real32, [3], n, self%points, 3)
       call write_cells(blocks, file)
       call file%group(root//'/PointData')
-      call file%new_column(root//'/PointData/velocity', 'm/s', file_real32, [3], n, self%velocity, 3)
+      call file%new_column(root//'/PointData/velocity', 'm/s', file_real32, [3], n, self%velocity, &
+        3)
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       call file%group(steps//'/PointDataOffsets')
-      call file%new_column(steps//'/PartOffsets', '1', file_integer64, [integer ::], chunk_frames, self%part_offset)
-      call file%new_column(steps//'/NumberOfParts', '1', file_integer64, [integer ::], chunk_frames, self%parts)
-      call file%new_column(steps//'/PointOffsets', '1', file_integer64, [integer ::], chunk_frames, self%point_offset)
-      call file%new_column(steps//'/CellOffsets', '1', file_integer64, [4], chunk_frames, self%cell_offset)
-      call file%new_column(steps//'/ConnectivityIdOffsets', '1', file_integer64, [4], chunk_frames, &
+      call file%new_column(steps//'/PartOffsets', '1', file_integer64, [integer ::], chunk_frames, &
+        self%part_offset)
+      call file%new_column(steps//'/NumberOfParts', '1', file_integer64, [integer ::], &
+        chunk_frames, self%parts)
+      call file%new_column(steps//'/PointOffsets', '1', file_integer64, [integer ::], &
+        chunk_frames, self%point_offset)
+      call file%new_column(steps//'/CellOffsets', '1', file_integer64, [4], chunk_frames, &
+        self%cell_offset)
+      call file%new_column(steps//'/ConnectivityIdOffsets', '1', file_integer64, [4], &
+        chunk_frames, &
                            self%connectivity_offset)
-      call file%new_column(steps//'/CellDataOffsets/body', '1', file_integer64, [integer ::], chunk_frames, &
+      call file%new_column(steps//'/CellDataOffsets/body', '1', file_integer64, [integer ::], &
+        chunk_frames, &
                            self%body_offset)
-      call file%new_column(steps//'/PointDataOffsets/velocity', '1', file_integer64, [integer ::], chunk_frames, &
+      call file%new_column(steps//'/PointDataOffsets/velocity', '1', file_integer64, [integer ::], &
+        chunk_frames, &
                            self%velocity_offset)
       call file%flush()
     end associate
@@ -304,7 +324,8 @@ contains
     end do
   end function count_points
 
-  !> The triangles of all blocks and the block each belongs to; counted from 0 like the bodies of run.h5.
+  !> The triangles of all blocks and the block each belongs to; counted from 0 like the bodies of
+  !! run.h5.
   subroutine write_cells(blocks, file)
     type(blocks_t), intent(in) :: blocks
     type(h5_file_t), intent(inout) :: file
@@ -363,9 +384,11 @@ contains
       call file%open_column(steps//'/NumberOfParts', file_integer64, self%parts)
       call file%open_column(steps//'/PointOffsets', file_integer64, self%point_offset)
       call file%open_column(steps//'/CellOffsets', file_integer64, self%cell_offset)
-      call file%open_column(steps//'/ConnectivityIdOffsets', file_integer64, self%connectivity_offset)
+      call file%open_column(steps//'/ConnectivityIdOffsets', file_integer64, &
+        self%connectivity_offset)
       call file%open_column(steps//'/CellDataOffsets/body', file_integer64, self%body_offset)
-      call file%open_column(steps//'/PointDataOffsets/velocity', file_integer64, self%velocity_offset)
+      call file%open_column(steps//'/PointDataOffsets/velocity', file_integer64, &
+        self%velocity_offset)
       call file%count_rows(self%time, clock%n_frames, clock%t, self%frames, self%up_to_date)
     end associate
     call drop_block_frames(self)
@@ -391,7 +414,8 @@ contains
     end associate
   end subroutine drop_block_frames
 
-  !> Write a frame as number `frames_before` + 1, in the place of one that only ended an earlier run.
+  !> Write a frame as number `frames_before` + 1, in the place of one that only ended an earlier
+  !! run.
   subroutine write_block_frame(self, frames_before, t, blocks)
     type(block_file_t), intent(inout) :: self
     integer, intent(in) :: frames_before   !! due frames written so far

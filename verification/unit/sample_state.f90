@@ -37,7 +37,8 @@ contains
     integer :: b
 
     call make_case(periodic, s%case)
-    s%parameters = '&run'//new_line('a')//'  t_end = 2'//new_line('a')//'  dt = 0.01'//new_line('a')//'/' &
+    s%parameters = '&run'//new_line('a')//'  t_end = 2'//new_line('a')//'  dt = 0.01' &
+      //new_line('a')//'/' &
       //new_line('a')
     call make_shape(s%case%shape(1), shapes(1), message)
     call make_shape(s%case%shape(2), shapes(2), message)
@@ -133,7 +134,8 @@ contains
             do e = 1, 3
               if (grid%periodic(e)) cell(e) = modulo(cell(e) - 1, grid%n(e)) + 1
             end do
-            a(i, j, k, d) = start + sin(1.0_wp*cell(1) + 100.0_wp*cell(2) + 10000.0_wp*cell(3) + 0.37_wp*d)
+            a(i, j, k, d) = start + sin(1.0_wp*cell(1) + 100.0_wp*cell(2) + 10000.0_wp*cell(3) &
+              + 0.37_wp*d)
           end do
         end do
       end do

@@ -159,7 +159,8 @@ contains
     call writer%new_column('/time', 's', file_real64, [integer ::], 64, time)
     call writer%append(time, [42.0_wp])
     call writer%flush()
-    call execute_command_line('cp '//path//' copy_'//path)   ! what a reader, or a crash, finds on disk
+    call execute_command_line('cp '//path//' copy_' &
+      //path)   ! what a reader, or a crash, finds on disk
     call reader%open('copy_'//path, .false., .false.)
     call reader%open_column('/time', file_real64, seen)
     call reader%read_row(seen, 1, x)
@@ -189,7 +190,8 @@ contains
     call file%new_column('/field', 'm', file_real32, [2, layers], 1, field, chunk_layers=5)
     call file%new_column('/count', '1', file_real64, [integer ::], 8, count)
     do i = 1, 3
-      call file%append_block(field, [1, first], [2, last - first + 1], real(i*mine(2*first - 1:2*last), sp))
+      call file%append_block(field, [1, first], [2, last - first + 1], real(i*mine(2*first &
+        - 1:2*last), sp))
       call file%append(count, [real(i, wp)])
       call file%attribute('/', 'steps', i)
       call file%flush()
@@ -199,8 +201,10 @@ contains
 
     call file%open(path, .true., .false.)
     all_of_it = 0.0_wp
-    call file%read_block('/blocks', [1, first], [2, last - first + 1], all_of_it(2*first - 1:2*last))
-    call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last), 0.0_wp)
+    call file%read_block('/blocks', [1, first], [2, last - first + 1], all_of_it(2*first &
+      - 1:2*last))
+    call check('own block comes back', all_of_it(2*first - 1:2*last), mine(2*first - 1:2*last), &
+      0.0_wp)
     call file%close()
     if (.not. is_root()) return
     call file%open(path, .false., .false.)
@@ -223,7 +227,8 @@ contains
     if (.not. is_root()) return
     call file%create('no/such/folder/run.h5', .false.)
     call check('a folder that is not there is trouble', file%info /= 0)
-    call check('the message names file and reason', index(file%message, 'no/such/folder/run.h5') == 1 &
+    call check('the message names file and reason', index(file%message, &
+      'no/such/folder/run.h5') == 1 &
                .and. index(file%message, 'No such file or directory') > 0)
     call file%store('/a', 'm', [1.0_wp])   ! after trouble everything returns at once
     call file%flush()
@@ -236,7 +241,8 @@ contains
     call file%close()
     call file%create(path, .false.)
     call file%read('/series/time', x)
-    call check('a missing dataset is named', file%info /= 0 .and. index(file%message, '/series/time') > 0)
+    call check('a missing dataset is named', file%info /= 0 .and. index(file%message, &
+      '/series/time') > 0)
     call file%close()
   end subroutine test_trouble
 

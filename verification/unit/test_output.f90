@@ -77,7 +77,8 @@ contains
     s%case%run%restart_interval = 0.75_wp
     call clock_init(s%case%run, s%clock)
     if (len(options%restart) > 0) then
-      call read_restart(options%restart, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, info, &
+      call read_restart(options%restart, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, &
+        s%contacts, info, &
                         message)
       call check('the restart file is read', info, 0)
     else
@@ -93,7 +94,8 @@ contains
       report%substeps = s%clock%step
       call write_due_output(s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, output)
     end do
-    call close_output(exit_code, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, output)
+    call close_output(exit_code, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, &
+      output)
     call check('the output is closed', output%code, exit_ok)
     if (output%code /= exit_ok) print '(a)', output%message
   end subroutine run
@@ -125,7 +127,8 @@ contains
     call whole%read('/bodies/release_time', release)
     call whole%close()
     call check('rows are there', whole%info, 0)
-    call check('rows come when due, and at the end', time, [(0.5_wp*i, i=0, 11), 5.75_wp], 1.0e-12_wp)
+    call check('rows come when due, and at the end', time, [(0.5_wp*i, i=0, 11), 5.75_wp], &
+      1.0e-12_wp)
     call check('no drift', drift, [(0.0_wp, i=1, 13)], 0.0_wp)
     wanted = energy_at(2.0_wp)
     call check('the energy of the fluid is summed', energy(5), wanted, 1.0e-12_wp*wanted)
@@ -191,7 +194,8 @@ contains
     call file%close()
     q = reshape(all_of_them, shape(q))
     call check('w >= 0 at the first row', all(q(1, :, 1) >= 0.0_wp))
-    call check('quaternions do not jump', all([(sum(q(:, :, row)*q(:, :, row - 1)) > 2.9_wp, row=2, 13)]))
+    call check('quaternions do not jump', all([(sum(q(:, :, row)*q(:, :, row - 1)) > 2.9_wp, &
+      row=2, 13)]))
   end subroutine check_attitudes
 
   !> The last restart file carries what an outsider needs to sum up the divergence.

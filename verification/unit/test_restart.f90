@@ -39,7 +39,8 @@ contains
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
 
-    call write_restart(path, s%case%text, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, &
+    call write_restart(path, s%case%text, s%parameters, s%grid, s%clock, s%flow, s%solid, &
+      s%blocks, s%contacts, &
                        info, message)
   end subroutine write_sample
 
@@ -48,7 +49,8 @@ contains
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
 
-    call read_restart(path, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, info, message)
+    call read_restart(path, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, &
+      info, message)
   end subroutine read_sample
 
   subroutine look(image, s)
@@ -86,7 +88,8 @@ contains
               - s%flow%uf(:, 1, s%grid%lo(3):s%grid%hi(3), 1)) <= 0.0_wp))
     call check('halos between processes are filled', all(abs( &
       other%flow%p(4, 4, max(1, s%grid%lo(3) - n_halo):min(s%grid%n(3), s%grid%hi(3) + n_halo)) &
-      - s%flow%p(4, 4, max(1, s%grid%lo(3) - n_halo):min(s%grid%n(3), s%grid%hi(3) + n_halo))) <= 0.0_wp))
+      - s%flow%p(4, 4, max(1, s%grid%lo(3) - n_halo):min(s%grid%n(3), s%grid%hi(3) &
+      + n_halo))) <= 0.0_wp))
   end subroutine test_comes_back
 
   !> Without fluid and without springs.
@@ -116,14 +119,16 @@ contains
 
     call make_sample(0.5_wp, .false., s)
     call write_sample(s, info, message)
-    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01'//new_line('a') &
+    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01' &
+      //new_line('a') &
       //'  field_interval = 2'//new_line('a')//'/'//new_line('a')
     s%clock%t_end = 9.0_wp
     s%clock%run%history_interval = 0.5_wp
     call read_sample(s, info, message)
     call check('t_end and intervals may change', info, 0)
     call check('the next row is due after the restart', s%clock%next_row, 1.5_wp, 1.0e-14_wp)
-    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.02'//new_line('a') &
+    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.02' &
+      //new_line('a') &
       //'/'//new_line('a')
     call read_sample(s, info, message)
     call check('another dt is refused', info, 2)
@@ -137,7 +142,8 @@ contains
     call check('an end before the restart is refused', info, 2)
   end subroutine test_case_must_stay
 
-  !> Overwrite one byte after the other, all through the file: what is read is either whole or refused.
+  !> Overwrite one byte after the other, all through the file: what is read is either whole or
+  !! refused.
   subroutine test_damage()
     type(sample_t) :: s, other
     type(image_visitor_t) :: image
@@ -200,10 +206,12 @@ contains
     character(:), allocatable :: message
 
     call make_sample(0.5_wp, .false., s)
-    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, s%grid, s%clock, s%flow, s%solid, &
+    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, s%grid, s%clock, &
+      s%flow, s%solid, &
                        s%blocks, s%contacts, info, message)
     call check('a missing folder is trouble', info, 1)
-    call read_restart('no-such-file.h5', s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, &
+    call read_restart('no-such-file.h5', s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, &
+      s%contacts, &
                       info, message)
     call check('a missing file is trouble', info, 1)
     call check('the message names it', index(message, 'no-such-file.h5') > 0)

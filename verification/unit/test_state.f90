@@ -6,7 +6,8 @@ program test_state
   use parallel_m, only: parallel_init, parallel_final, nproc, my_rank
   use grid_m, only: grid_t, n_halo
   use state_m, only: visit_state, owned_part, pack_part, unpack_part
-  use state_visitors_m, only: checksum_visitor_t, finite_visitor_t, image_visitor_t, checksum_of_cells
+  use state_visitors_m, only: checksum_visitor_t, finite_visitor_t, image_visitor_t, &
+    checksum_of_cells
   use sample_state_m, only: sample_t, make_sample, fill_cells
   use check_m, only: check, finish_checks
   implicit none
@@ -114,7 +115,8 @@ contains
     x = nearest(x, 1.0_wp)
   end subroutine touch
 
-  !> The sum over the blocks of all processes is the sum over the whole domain; exchanged elements show.
+  !> The sum over the blocks of all processes is the sum over the whole domain; exchanged elements
+  !! show.
   subroutine test_checksum_of_cells()
     type(sample_t) :: s
     type(grid_t) :: whole
@@ -127,7 +129,8 @@ contains
     whole = s%grid
     whole%lo = 1
     whole%hi = whole%n
-    allocate (a(1 - n_halo:whole%n(1) + n_halo, 1 - n_halo:whole%n(2) + n_halo, 1 - n_halo:whole%n(3) + n_halo, 3))
+    allocate (a(1 - n_halo:whole%n(1) + n_halo, 1 - n_halo:whole%n(2) + n_halo, 1 &
+      - n_halo:whole%n(3) + n_halo, 3))
     call fill_cells(0.3_wp, whole, 3, a)
     all_cells = checksum_of_cells(whole, .true., 3, a)   ! every process adds all of it
     call check('the checksum does not know the processes', all(mine*nproc() == all_cells))
@@ -145,10 +148,12 @@ contains
     call make_sample(0.0_wp, .false., s)
     call visit_state(visitor, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
     call check('a finite state is finite', .not. allocated(visitor%found))
-    if (all([3, 2, 17] >= s%grid%lo .and. [3, 2, 17] <= s%grid%hi)) &
+    if (all([3, 2, 17] >= s%grid%lo .and. [3, 2, 17] <= s%grid%hi)) then
       s%flow%uf(3, 2, 17, 2) = ieee_value(1.0_wp, ieee_quiet_nan)
+    end if
     call visit_state(again, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
-    call check('a NaN of one process is found by all', again%found == '/flow/uf [m/s] at cell 3, 2, 17')
+    call check('a NaN of one process is found by all', &
+      again%found == '/flow/uf [m/s] at cell 3, 2, 17')
     call make_sample(0.0_wp, .false., s)
     s%blocks%v(2, 3) = ieee_value(1.0_wp, ieee_positive_inf)
     call visit_state(bodies, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
