@@ -324,10 +324,12 @@ contains
                                        1.0_wp/3, -1e-7_wp]
     real(wp) :: q(4), x(3), worst(2)
     integer :: p, i, complete
+    logical :: closed
 
     grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
     worst = 0.0_wp
     complete = 0
+    closed = .true.
     do p = 1, 90
       q = identity
       do i = 1, 3
@@ -350,9 +352,11 @@ contains
       worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
       worst(2) = max(worst(2), largest_gap(solid))
       complete = complete + legs_without_hit(grid, solid)
+      closed = closed .and. full_cells_closed(grid, solid)
     end do
     call check('degenerate: volume', worst(1), 0.0_wp, 1e-12_wp)
     call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
+    call check('degenerate: full cells are closed all round', closed)
     call check('degenerate: legs between inside and outside without a hit', complete, 0)
   end subroutine degenerate_poses
 
@@ -371,6 +375,24 @@ contains
     end do
     gap = maxval(abs(rest - 1))
   end function largest_gap
+
+  pure logical function full_cells_closed(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: i, j, k
+
+    full_cells_closed = .true.
+    do k = 1, grid%n(3)
+      do j = 1, grid%n(2)
+        do i = 1, grid%n(1)
+          if (solid%alpha(i, j, k) < 1) cycle
+          full_cells_closed = full_cells_closed .and. all(solid%open(i, j, k, :) <= 0) .and. &
+                              solid%open(i + 1, j, k, 1) <= 0 .and. solid%open(i, j + 1, k, 2) <= 0 &
+                              .and. solid%open(i, j, k + 1, 3) <= 0
+        end do
+      end do
+    end do
+  end function full_cells_closed
 
   function legs_without_hit(grid, solid) result(n)
     type(grid_t), intent(in) :: grid
