@@ -199,12 +199,14 @@ contains
   !! become short before it touches, and no energy is made.
   subroutine check_landing_slab()
     type(world_t) :: world
-    real(wp) :: worst, first, e
+    real(wp) :: worst, turned, first, e
     integer :: phase
 
     worst = 0.0_wp
+    turned = 0.0_wp
     do phase = 0, 3
       call new_world(world, 1, 'slab')
+      world%case%body(1)%angular_velocity(3) = 5.0_wp
       e = merge(0.9_wp, 0.5_wp, phase < 2)
       world%case%contact%restitution = e
       world%case%body(1)%velocity(3) = -0.8_wp
@@ -213,8 +215,10 @@ contains
       call start(world)
       call run(world, 4)
       worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - e))
+      turned = max(turned, abs(2*atan2(world%blocks%q(4, 1), world%blocks%q(1, 1)) - 20*dt))
     end do
     call check('restitution of a slab', worst, 0.0_wp, 0.03_wp)
+    call check('it goes on turning meanwhile', turned, 0.0_wp, 1.0e-9_wp)
     call new_world(world, 1, 'ball')
     world%case%contact%law = 'constants'   ! t_c = 0.05 ms, not told by contact_time
     world%case%contact%k_n = 4.0e7_wp
