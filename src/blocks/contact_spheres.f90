@@ -180,8 +180,9 @@ contains
       end if
       do while (p <= self%near%n)
         if (self%near%a(p) /= a) exit
-        if (.not. (blocks%fixed(a) .and. blocks%fixed(self%near%b(p)))) &
+        if (.not. (blocks%fixed(a) .and. blocks%fixed(self%near%b(p)))) then
           call list_body(blocks, p, self)
+        end if
         p = p + 1
       end do
     end do
@@ -249,7 +250,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, w
     type(contact_spheres_t), intent(inout) :: self
-    real(wp) :: beyond, n(3)
+    real(wp) :: beyond, height, n(3)
     integer :: i, slot
 
     beyond = dot_product(walls%normal(:, w), blocks%x(:, a)) - walls%offset(w) + self%skin
@@ -258,8 +259,8 @@ contains
     call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
-        if (beyond + dot_product(n, shape%sphere_centre(:, i)) + shape%sphere_radius(i) <= 0.0_wp) &
-          cycle
+        height = beyond + dot_product(n, shape%sphere_centre(:, i))
+        if (height + shape%sphere_radius(i) <= 0.0_wp) cycle
         call take_slot(blocks, a, i, self, slot)
         call add_candidate(slot, 0, self)
       end do

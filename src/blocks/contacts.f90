@@ -225,8 +225,9 @@ contains
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
     end do
     speed = sum(fastest)
-    if (.not. speed*limit <= contacts%courant_max*contacts%spheres%smallest) &
+    if (.not. speed*limit <= contacts%courant_max*contacts%spheres%smallest) then
       limit = contacts%courant_max*contacts%spheres%smallest/speed
+    end if
   end function substep_limit
 
   !> Longest substep the present touches allow [s].
@@ -494,8 +495,8 @@ contains
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
-          if (.not. comes_before(old%a(m), old%b(m), old%key(m), new%a(g), new%b(g), new%key(g))) &
-            exit
+          if (.not. comes_before(old%a(m), old%b(m), old%key(m), &
+                                 new%a(g), new%b(g), new%key(g))) exit
           m = m + 1
         end do
         if (m > old%n) cycle

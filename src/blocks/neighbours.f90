@@ -134,8 +134,9 @@ contains
                 d = x(:, b) - x(:, a)
                 shift = nearest_shift(period, d)
                 d = d + shift
-                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) &
+                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) then
                   call add_pair(a, b, shift, pairs)
+                end if
               end if
               b = pairs%chain(b)
             end do
@@ -195,7 +196,7 @@ contains
       pairs%cell(:, a) = floor((x(:, a) - low)/edge)
       where (period > 0.0_wp)
         pairs%cell(:, a) = modulo(pairs%cell(:, a), cells)
-      elsewhere
+      else where
         pairs%cell(:, a) = min(pairs%cell(:, a), cells - 1)
       end where
       c = 1 + pairs%cell(1, a) + cells(1)*(pairs%cell(2, a) + cells(2)*pairs%cell(3, a))

@@ -132,8 +132,9 @@ contains
         p(:, 1:2) = shape%point(:, edge(1:2, e))
         spacing = shape%smallest_edge/per_edge_sharp
         if (edge(4, e) > 0) then
-          if (dot_product(normal(:, edge(3, e)), normal(:, edge(4, e))) > 1.0_wp - flat) &
+          if (dot_product(normal(:, edge(3, e)), normal(:, edge(4, e))) > 1.0_wp - flat) then
             spacing = shape%smallest_edge/per_edge_flat
+          end if
         end if
         m = ceiling(norm(p(:, 2) - p(:, 1))/spacing*(1.0_wp - flat))
         do i = 1, m - 1

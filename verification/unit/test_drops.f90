@@ -76,7 +76,8 @@ contains
     end do
     call check('largest tilt', largest, 10.0_wp, 0.01_wp)
     call check('mean tilt', mean_angle, 5.0_wp, 0.09_wp)   ! standard error 0.02
-    call check('about axes of all directions', maxval(abs(square - 1.0_wp/3.0_wp)), 0.0_wp, 0.009_wp)
+    call check('about axes of all directions', maxval(abs(square - 1.0_wp/3.0_wp)), 0.0_wp, &
+      0.009_wp)
     call check('to all sides', norm2(mean - dot_product(mean, up)*up), 0.0_wp, 0.002_wp)
     call check('unit quaternion', norm2(q), 1.0_wp, 1.0e-15_wp)
   end subroutine check_tilt

@@ -209,8 +209,8 @@ contains
         do b = 1, a - 1
           r = x(:, b) - x(:, a)
           r = r + nearest_shift(period, r)
-          if (.not. (active(a) .and. active(b)) .or. norm2(r) >= radius(a) + radius(b) + 0.01_wp) &
-            cycle
+          if (.not. (active(a) .and. active(b))) cycle
+          if (norm2(r) >= radius(a) + radius(b) + 0.01_wp) cycle
           m = m + 1
           expected(:, m) = [a, b]
         end do
