@@ -105,6 +105,8 @@ contains
       q = s(4)/(s(4) - s(2))
       volume = volume*(share_below(s(1), s(4)) + p*share_below(s(2), s(4)) + &
                        p*q*share_below(s(3), s(4)))
+    case default
+      return   ! all below
     end select
   end function tet_volume_below
 
@@ -144,6 +146,8 @@ contains
       call add_tet(e(:, 1), e(:, 2), c(:, 3), e(:, 3), volume, moment)
     case (4)
       call add_tet(c(:, 1), c(:, 2), c(:, 3), c(:, 4), volume, moment)
+    case default
+      return   ! none below
     end select
   end subroutine tet_moments_below
 

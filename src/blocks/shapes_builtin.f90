@@ -57,6 +57,9 @@ contains
     case ('sphere')
       call build_sphere(0.5_wp*input%size(1), sphere_frequency*input%refinement, shape)
       shape%smallest_edge = input%size(1)
+    case default
+      message = 'kind = '''//trim(input%kind)//''' has no builder'
+      return
     end select
     call finish_shape(shape)
     if (trim(input%kind) == 'sphere') then
@@ -89,15 +92,19 @@ contains
     end select
     if (any(input%size(:n_size) <= 0.0_wp)) message = 'size must be positive [m]'
     if (input%density <= 0.0_wp) message = 'density must be positive [kg/m3]'
-    if (input%refinement < 1 .or. input%refinement > max_refinement) &
+    if (input%refinement < 1 .or. input%refinement > max_refinement) then
       message = 'refinement must be 1 to 8'
+    end if
     if (len(message) > 0) return
     if (trim(input%kind) == 'box') then
-      if (product(anint(input%size/minval(input%size)))*real(input%refinement, wp)**3 > most_parts) &
+      if (product(anint(input%size/minval(input%size))) &
+          > most_parts/real(input%refinement, wp)**3) then
         message = 'size: so slender a box would be cut too finely; build it of several boxes'
+      end if
     end if
-    if (trim(input%spheres) /= 'centroid') &
+    if (trim(input%spheres) /= 'centroid') then
       message = 'spheres = '''//trim(input%spheres)//''' is not available yet'
+    end if
   end function problem_with
 
   !> Occupied places of a hexapod in a block of 3 x 3 x 3 cubes.
@@ -263,8 +270,9 @@ contains
           if (.not. (joined(a, b) .and. joined(b, c) .and. joined(c, a))) cycle
           m = m + 1
           face(:, m) = [a, b, c]
-          if (dot_product(vertex(:, a), cross(vertex(:, b), vertex(:, c))) < 0.0_wp) &
+          if (dot_product(vertex(:, a), cross(vertex(:, b), vertex(:, c))) < 0.0_wp) then
             face(:, m) = [a, c, b]
+          end if
         end do
       end do
     end do

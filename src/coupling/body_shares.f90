@@ -144,8 +144,9 @@ contains
     do v = 1, n
       do d = 1, 3
         work%point(d, v) = centre(d) + dot_product(r(d, :), shape%point(:, v))/grid%h(d)
-        if (abs(work%point(d, v) - anint(work%point(d, v))) < tolerance(d)) &
+        if (abs(work%point(d, v) - anint(work%point(d, v))) < tolerance(d)) then
           work%point(d, v) = anint(work%point(d, v))
+        end if
       end do
     end do
     n = size(shape%facet) - 1
@@ -693,11 +694,13 @@ contains
 
     do k = self%low(3), self%high(3)
       do i = self%low(1), self%high(1)
-        if (work%volume(1, i, k) > least_share) &
+        if (work%volume(1, i, k) > least_share) then
           call add_cell([i, j, k], work%volume(1:4, i, k), work%crossings(i, k) > 0, self)
+        end if
         do d = 1, 3
-          if (work%area(1, i, k, d) > least_share) &
+          if (work%area(1, i, k, d) > least_share) then
             call add_face([i, j, k, d], work%area(1:3, i, k, d), self)
+          end if
         end do
       end do
     end do

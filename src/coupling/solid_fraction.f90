@@ -134,8 +134,9 @@ contains
     end if
     do b = 1, blocks%n
       self%near(b) = blocks%present(b)
-      if (blocks%present(b)) &
+      if (blocks%present(b)) then
         call find_images(self, grid, b, blocks%x(:, b), blocks%shapes(blocks%shape(b))%radius)
+      end if
     end do
     !$omp parallel do schedule(dynamic, 1) if (count(self%near) > 1)
     do b = 1, blocks%n
@@ -286,8 +287,9 @@ contains
         solid%cell_alpha(n) = body%alpha(m)
         solid%cell_centroid(:, n) = grid%origin + (real(i - 1, wp) + body%centroid(:, m))*grid%h
         solid%alpha(i(1), i(2), i(3)) = solid%alpha(i(1), i(2), i(3)) + body%alpha(m)
-        if (body%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) &
+        if (body%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) then
           solid%inside(i(1), i(2), i(3)) = b
+        end if
       end do
     end associate
     solid%body_cell(b + 1) = n + 1
@@ -602,8 +604,9 @@ contains
 
     n_stack = 0
     do m = 1, solid%n_cut
-      if (.not. self%reached(m)) &
+      if (.not. self%reached(m)) then
         self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
+      end if
       if (.not. self%reached(m)) cycle
       n_stack = n_stack + 1
       self%stack(n_stack) = m

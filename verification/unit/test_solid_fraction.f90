@@ -344,7 +344,7 @@ contains
       case (1)
         call make_bodies('box', [0.02_wp, 0.03_wp, 0.0075_wp], reshape(x, [3, 1]), &
                          reshape(q, [4, 1]), blocks)
-      case (2)
+      case default
         call make_bodies('sphere', [0.04_wp, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
                          reshape(q, [4, 1]), blocks)
       end select
@@ -387,8 +387,8 @@ contains
         do i = 1, grid%n(1)
           if (solid%alpha(i, j, k) < 1) cycle
           full_cells_closed = full_cells_closed .and. all(solid%open(i, j, k, :) <= 0) .and. &
-                              solid%open(i + 1, j, k, 1) <= 0 .and. solid%open(i, j + 1, k, 2) <= 0 &
-                              .and. solid%open(i, j, k + 1, 3) <= 0
+                              solid%open(i + 1, j, k, 1) <= 0 .and. &
+                              solid%open(i, j + 1, k, 2) <= 0 .and. solid%open(i, j, k + 1, 3) <= 0
         end do
       end do
     end do
@@ -418,11 +418,13 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
+    real(wp) :: q(4)
 
     grid = make_grid([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp])
+    q = normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp])
     call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
-                     reshape([0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], [3, 1]), reshape(normalised( &
-                     [0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp]), [4, 1]), blocks)
+                     reshape([0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], [3, 1]), &
+                     reshape(q, [4, 1]), blocks)
     call fill(grid, blocks, solid)
     call check('three legs: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
                1e-7_wp*d**3)
