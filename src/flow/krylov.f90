@@ -19,6 +19,8 @@ module krylov_m
   integer, parameter :: not_converged = 1   !! stopped after `max_it` iterations
   integer, parameter :: broken_down = 2     !! matrix or preconditioner not positive, or not a number
 
+  integer, parameter :: worth_threads = 8192   !! fewer cells are the work of one thread
+
   !> Arrays of the solvers, own cells and one halo cell; allocated once.
   type :: krylov_work_t
     real(wp), allocatable, dimension(:, :, :) :: r, z, p, q   !! residual, M r or M s, direction, A p
@@ -242,7 +244,8 @@ contains
     integer :: j, k
 
     largest = 0.0_wp
-    !$omp parallel do private(j) reduction(max: largest) schedule(static)
+    !$omp parallel do private(j) reduction(max: largest) schedule(static) &
+    !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
         largest = max(largest, largest_of(size(a, 1) - 2, a(2:size(a, 1) - 1, j, k)))
@@ -277,7 +280,8 @@ contains
     real(wp), intent(inout), contiguous :: b(:, :, :)
     integer :: i, j, k
 
-    !$omp parallel do private(i, j) schedule(static)
+    !$omp parallel do private(i, j) schedule(static) &
+    !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
         do i = 2, size(a, 1) - 1
@@ -294,7 +298,8 @@ contains
     real(wp), intent(inout), contiguous :: b(:, :, :)
     integer :: i, j, k
 
-    !$omp parallel do private(i, j) schedule(static)
+    !$omp parallel do private(i, j) schedule(static) &
+    !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
         do i = 2, size(a, 1) - 1
@@ -314,7 +319,8 @@ contains
     integer :: i, j, k
 
     largest = 0.0_wp
-    !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
+    !$omp parallel do private(i, j) reduction(max: largest) schedule(static) &
+    !$omp if (size(x) > worth_threads)
     do k = 2, size(x, 3) - 1
       do j = 2, size(x, 2) - 1
         do i = 2, size(x, 1) - 1
@@ -336,7 +342,8 @@ contains
     real(wp), intent(inout), contiguous :: p(:, :, :)
     integer :: i, j, k
 
-    !$omp parallel do private(i, j) schedule(static)
+    !$omp parallel do private(i, j) schedule(static) &
+    !$omp if (size(p) > worth_threads)
     do k = 2, size(p, 3) - 1
       do j = 2, size(p, 2) - 1
         do i = 2, size(p, 1) - 1
@@ -356,7 +363,8 @@ contains
     integer :: i, j, k
 
     largest = 0.0_wp
-    !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
+    !$omp parallel do private(i, j) reduction(max: largest) schedule(static) &
+    !$omp if (size(p) > worth_threads)
     do k = 2, size(p, 3) - 1
       do j = 2, size(p, 2) - 1
         do i = 2, size(p, 1) - 1

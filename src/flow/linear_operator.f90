@@ -9,6 +9,8 @@ module linear_operator_m
   private
   public :: linear_operator_t, preconditioner_t, jacobi_t, identity_t
 
+  integer, parameter :: worth_threads = 8192   !! fewer numbers are the work of one thread
+
   type, abstract :: linear_operator_t
   contains
     procedure(apply_operator_i), deferred :: apply
@@ -78,7 +80,7 @@ contains
     if (.not. allocated(self%inverse)) then
       allocate (self%inverse(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if
-    !$omp parallel do private(i, j, d) schedule(static)
+    !$omp parallel do private(i, j, d) schedule(static) if (size(cf) > worth_threads)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
@@ -108,7 +110,7 @@ contains
     real(wp), intent(inout), contiguous :: z(:, :, :)
     integer :: k
 
-    !$omp parallel do schedule(static)
+    !$omp parallel do schedule(static) if (size(r) > worth_threads)
     do k = 2, size(r, 3) - 1
       z(:, :, k) = d(:, :, k)*r(:, :, k)
     end do

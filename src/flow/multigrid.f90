@@ -86,7 +86,7 @@ contains
     logical :: joined(3)
 
     joined = n > 1
-    joined = joined .and. h < alike*minval(h, mask=joined)
+    joined = joined .and. h/alike < minval(h, mask=joined)
   end function joined
 
   !> Cells and spacing of the next level.
@@ -247,7 +247,8 @@ contains
     integer :: i, j, k, d, e(3)
 
     largest = 0.0_wp
-    !$omp parallel do private(i, j, d, e) reduction(max: largest) schedule(static)
+    !$omp parallel do private(i, j, d, e) reduction(max: largest) schedule(static) &
+    !$omp if (size(cf) > 3*worth_threads)
     do k = lo(3), hi(3) + 1
       do d = 1, 3
         e = 0

@@ -69,12 +69,12 @@ contains
     real(wp), intent(in) :: unit   !! factor that makes the largest coefficient about one
     integer :: k
 
-    !$omp parallel do schedule(static)
+    !$omp parallel do schedule(static) if (self%many)
     do k = self%lo(3), self%hi(3)
       call set_diagonal(self, cf, unit, k)
     end do
     call fill_halo(self, self%s)
-    !$omp parallel do schedule(static)
+    !$omp parallel do schedule(static) if (self%many)
     do k = self%lo(3), self%hi(3) + 1
       call scale_faces(self, cf, unit, k)
     end do
