@@ -7,7 +7,8 @@ program mics
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
-  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, set_threads, global_max
+  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, set_threads, &
+    global_max
   use signals_m, only: catch_signals, signal_caught
   use command_line_m, only: options_t, read_command_line, print_help
   use namelist_text_m, only: read_text
@@ -38,24 +39,29 @@ program mics
   call simulation_init(case, shapes, sim)
   if (len(options%restart) > 0) call go_on()
 
-  call open_output(case, parameters_text(case), options, sim%wet, sim%grid, sim%clock, sim%blocks, output)
+  call open_output(case, parameters_text(case), options, sim%wet, sim%grid, sim%clock, &
+                   sim%blocks, output)
   call stop_on_trouble()
-  call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+  call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
+                        report, output)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
     call find_fault(sim, report, fault)
     signal = any_signal()
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
-    call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+    call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
+                          report, output)
   end do
   if (fault%code == exit_ok .and. sim%clock%finished()) call find_final_fault(sim, fault)
 
   code = fault%code
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
-  call close_output(code, sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, report, output)
+  call close_output(code, sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
+                    report, output)
   call stop_on_trouble()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
-  if (code /= exit_ok) call fatal(code, 'stopped by a signal; the run can go on from its restart file')
+  if (code /= exit_ok) call fatal(code, &
+                                  'stopped by a signal; the run can go on from its restart file')
   call parallel_final()
 
 contains
@@ -78,7 +84,8 @@ contains
     if (problems%n > 0) call refuse(problems)
     if (options%help .or. options%version) then
       if (is_root() .and. options%help) call print_help(output_unit)
-      if (is_root() .and. options%version) write (output_unit, '(4a)') 'mics ', version, ' ', git_revision
+      if (is_root() .and. options%version) write (output_unit, '(4a)') 'mics ', version, ' ', &
+        git_revision
       call finish()
     end if
     call set_threads(options%threads)
@@ -105,7 +112,8 @@ contains
     character(:), allocatable :: message
     integer :: info
 
-    call read_restart(options%restart, parameters_text(case), sim%grid, sim%clock, sim%flow, sim%solid, &
+    call read_restart(options%restart, parameters_text(case), sim%grid, sim%clock, sim%flow, &
+                      sim%solid, &
                       sim%blocks, sim%contacts, info, message)
     if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)
     call resume(sim)

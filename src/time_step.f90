@@ -1,8 +1,10 @@
 !> One step of fluid and blocks, in the order of the paper.
 !!
-!! The blocks move first, under the fluid force of the step before and in short substeps for contact;
+!! The blocks move first, under the fluid force of the step before and in short substeps for
+!! contact;
 !! then the liquid and the momentum are carried through the faces that the moving blocks leave open;
-!! then pressure, viscosity and the rigid motions are solved together at the new place of the blocks.
+!! then pressure, viscosity and the rigid motions are solved together at the new place of the
+!! blocks.
 module time_step_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
@@ -10,7 +12,8 @@ module time_step_m
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
-  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, finish_transport
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
+    finish_transport
   use liquid_fill_m, only: fill_liquid, raise_surface
   use extended_fraction_m, only: extend_fraction
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
@@ -125,7 +128,8 @@ contains
 
     call release(sim, report)
     call choose_step(sim, report)
-    associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, dt => sim%clock%dt)
+    associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
+               dt => sim%clock%dt)
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
@@ -162,7 +166,8 @@ contains
     report%contacts_solved = contact%info == 0
     speed = 0.0_wp
     do b = 1, sim%blocks%n
-      if (sim%blocks%present(b) .and. .not. sim%blocks%fixed(b)) speed = max(speed, norm2(sim%blocks%v(:, b)))
+      if (sim%blocks%present(b) .and. .not. sim%blocks%fixed(b)) speed = max(speed, &
+          norm2(sim%blocks%v(:, b)))
     end do
     call sim%clock%note_speed(speed, all(sim%blocks%present))
     if (.not. sim%wet) return
@@ -181,7 +186,8 @@ contains
     type(step_report_t), intent(inout) :: report
     logical :: released
 
-    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, report%warnings, released)
+    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
+                            report%warnings, released)
     if (.not. released .or. .not. sim%wet) return
     call swap_solids(sim)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
@@ -205,7 +211,8 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     integer :: n, d
 
-    associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, carrier => sim%transport)
+    associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
+               carrier => sim%transport)
       call begin_transport(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow)
       call momentum_begin(grid, fluid, flow%liquid, flow%room, flow%c, flow%u, sim%momentum)
       do n = 1, 3
@@ -226,7 +233,8 @@ contains
 
     allowed = sim%case%run%dt
     rate = courant_rate(sim)
-    if (sim%case%run%cfl_max > 0.0_wp .and. rate > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate)
+    if (sim%case%run%cfl_max > 0.0_wp .and. rate > 0.0_wp) allowed = min(allowed, &
+        sim%case%run%cfl_max/rate)
     call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
     report%cfl = sim%clock%dt*rate
   end subroutine choose_step

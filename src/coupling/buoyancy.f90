@@ -1,10 +1,14 @@
 !> Exact weight of the fluid that each body displaces, and what the face pressures miss of it.
 !!
-!! The pressure acts on a body through the solid shares of the grid faces, which measure its volume by
+!! The pressure acts on a body through the solid shares of the grid faces, which measure its
+!! volume by
 !! the trapezoid rule: a submerged block would float by the wrong volume, by some per cent at coarse
-!! grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra, cut by the
-!! plane of the liquid where the surface crosses a body, and only the rest of the pressure force comes
-!! from the faces. In still water the force on a body is Archimedes' to round-off. The same term makes
+!! grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra, cut
+!! by the
+!! plane of the liquid where the surface crosses a body, and only the rest of the pressure force
+!! comes
+!! from the faces. In still water the force on a body is Archimedes' to round-off. The same term
+!! makes
 !! the weight of the fluid that of its true volume, so it closes the momentum of fluid and bodies.
 module buoyancy_m
   use kinds_m, only: wp
@@ -66,7 +70,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: c, rho                 !! liquid share [-] and density [kg/m3] of the fluid
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
@@ -116,14 +121,16 @@ contains
       associate (volume => solid%cell_alpha(m)*grid%volume, &
                  arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)))
         if (share > 0.0_wp .and. share < 1.0_wp) then
-          call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), c, i(1), i(2), i(3)), &
+          call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
+                                                       c, i(1), i(2), i(3)), &
                            share, bodies%x(:, b), b, i, liquid, liquid_moment)
         else
           liquid = share*volume
           liquid_moment = liquid*arm
         end if
         mass = fluid%gas_density*volume + (fluid%liquid_density - fluid%gas_density)*liquid
-        moment = fluid%gas_density*volume*arm + (fluid%liquid_density - fluid%gas_density)*liquid_moment
+        moment = fluid%gas_density*volume*arm + (fluid%liquid_density &
+                                                 - fluid%gas_density)*liquid_moment
       end associate
       n = n + 1
       term(n, 1:3) = -mass*fluid%gravity
@@ -131,7 +138,8 @@ contains
     end do
   end function displaced_weight
 
-  !> Volume and first moment about x of the part of body b in cell i that lies below the liquid plane.
+  !> Volume and first moment about x of the part of body b in cell i that lies below the liquid
+  !! plane.
   pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, b, i, volume, moment)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -154,8 +162,10 @@ contains
     image = image - nearest_arm(grid, lower + 0.5_wp*grid%h, x)   ! period between body and cell
     do t = solid%body_tet(b), solid%body_tet(b + 1) - 1
       associate (corner => solid%corner(:, :, t))
-        if (any(maxval(corner, 2) + image < lower) .or. any(minval(corner, 2) + image > lower + grid%h)) cycle
-        call box_clip_moments_below(corner + spread(image, 2, 4), lower, lower + grid%h, normal, d, &
+        if (any(maxval(corner, 2) + image < lower) .or. any(minval(corner, 2) + image > lower &
+                                                            + grid%h)) cycle
+        call box_clip_moments_below(corner + spread(image, 2, 4), lower, lower + grid%h, normal, &
+                                    d, &
                                     part, part_moment)
       end associate
       volume = volume + part
@@ -163,7 +173,8 @@ contains
     end do
   end subroutine liquid_part
 
-  !> What the face pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each face.
+  !> What the face pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each
+  !! face.
   function hydrostatic_of_faces(grid, gravity, solid, flux, rho, b, term) result(n)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)

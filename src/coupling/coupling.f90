@@ -18,9 +18,11 @@ contains
 
   !> Velocity of the fluid and of the bodies at the end of the step.
   !!
-  !! On entry the liquid and the bodies are where the step ends, `flow%u` is the transported velocity;
+  !! On entry the liquid and the bodies are where the step ends, `flow%u` is the transported
+  !! velocity;
   !! the bodies carry the mean contact force of the step. On return the bodies have their final
-  !! velocity and the force from the fluid; face velocity and solid flux are those the next step uses.
+  !! velocity and the force from the fluid; face velocity and solid flux are those the next step
+  !! uses.
   subroutine advance_velocity(case, grid, solid, dt, flow, blocks, stage, report)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -45,7 +47,8 @@ contains
   contains
     !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.
     subroutine set_velocity()
-      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :), stage%total(4:6, :), blocks)
+      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :), stage%total(4:6, &
+          :), blocks)
       call copy_motion(blocks, stage%bodies)
     end subroutine set_velocity
   end subroutine advance_velocity

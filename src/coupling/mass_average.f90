@@ -2,9 +2,11 @@
 !!
 !! The mixture density carries the inertia of the bodies into the projection; the force on a body is
 !! the volume integral of -grad p + div tau over it; then the cells take the rigid velocity by mass
-!! average. Known (measured): the average thickens the body, the added mass comes out 9 % too large at
+!! average. Known (measured): the average thickens the body, the added mass comes out 9 % too
+!! large at
 !! 12 cells per diameter, and the last average leaves some divergence, which the report shows.
-!! Source: Yoshikawa et al. (2008), section 3 (2); order of the steps as in Sharma & Patankar (2005).
+!! Source: Yoshikawa et al. (2008), section 3 (2); order of the steps as in Sharma & Patankar
+!! (2005).
 module mass_average_m
   use kinds_m, only: wp
   use vectors_m, only: cross
@@ -33,7 +35,8 @@ contains
 
   !> Velocity after predictor and projection of the mixture, `coupling_passes` times, and the force.
   !!
-  !! Weight less buoyancy and the contact force act on the mixture before the projection, in the cells
+  !! Weight less buoyancy and the contact force act on the mixture before the projection, in the
+  !! cells
   !! of the body; gravity in the mixture is that of the fluid, so still water stays still.
   subroutine mass_average_stage(case, grid, solid, dt, flow, stage, report)
     type(case_t), intent(in) :: case
@@ -47,7 +50,8 @@ contains
     integer :: pass
 
     associate (bodies => stage%bodies, p => stage%pressure)
-      call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%buoyancy, stage%from_level)
+      call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%buoyancy, &
+                           stage%from_level)
       call push_bodies(dt, stage%from_level, bodies)
       stage%total = stage%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, stage%rho_mixture)
@@ -83,7 +87,8 @@ contains
     do b = 1, bodies%n
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
-          mixture(i(1), i(2), i(3)) = mixture(i(1), i(2), i(3)) + solid%cell_alpha(m)*body_density(bodies, b)
+          mixture(i(1), i(2), i(3)) = mixture(i(1), i(2), i(3)) &
+            + solid%cell_alpha(m)*body_density(bodies, b)
         end associate
       end do
     end do
@@ -100,7 +105,8 @@ contains
   end function body_density
 
   !> Mass average of the fluid velocity and the rigid velocity in every cell a body reaches:
-  !! u = [(1 - alpha) rho_fl u + sum alpha_k rho_k (U_k + Omega_k x r)]/rho, r to the solid centroid.
+  !! u = [(1 - alpha) rho_fl u + sum alpha_k rho_k (U_k + Omega_k x r)]/rho, r to the solid
+  !! centroid.
   subroutine average_cells(grid, solid, bodies, flow, mixture)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -112,14 +118,16 @@ contains
     real(wp) :: arm(3)
 
     do c = 1, 3
-      where (solid%alpha > 0.0_wp) flow%u(:, :, :, c) = (1.0_wp - solid%alpha)*flow%rho*flow%u(:, :, :, c)/mixture
+      where (solid%alpha > 0.0_wp) flow%u(:, :, :, c) = (1.0_wp - solid%alpha)*flow%rho*flow%u(:, &
+          :, :, c)/mixture
     end do
     do b = 1, bodies%n
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         arm = nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b))
         associate (i => solid%cell(:, m))
           flow%u(i(1), i(2), i(3), :) = flow%u(i(1), i(2), i(3), :) + solid%cell_alpha(m) &
-            *body_density(bodies, b)/mixture(i(1), i(2), i(3))*wall_velocity(bodies%motion(:, b), arm)
+            *body_density(bodies, b)/mixture(i(1), i(2), i(3))*wall_velocity(bodies%motion(:, b), &
+                arm)
         end associate
       end do
     end do
@@ -140,10 +148,12 @@ contains
       p%a_cell = 0.0_wp
       p%a_face = 0.0_wp
       if (first) then
-        call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho_mixture, flow%p, p%a_face)
+        call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho_mixture, flow%p, &
+                               p%a_face)
         call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
         flow%u = flow%u + dt*p%a_cell
-        call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, stage%viscous)
+        call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, &
+                           stage%viscous)
         call solve_viscous(grid, stage%bodies, dt, flow, stage%viscous, stage%from_viscosity, &
                            report%viscous_iterations, report%viscous_converged)
         call halo_exchange(p%a_cell, n_halo)
@@ -167,7 +177,8 @@ contains
     none%n = 0
     allocate (none%free(0))
     associate (p => stage%pressure)
-      call solve_pressure(grid, case%numerics, stage%whole, stage%rho_mixture, dt, flow, none, p, projection)
+      call solve_pressure(grid, case%numerics, stage%whole, stage%rho_mixture, dt, flow, none, p, &
+                          projection)
       call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, p%a_face)
       call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
     end associate
@@ -175,7 +186,8 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine project_mixture
 
-  !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum that
+  !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum
+  !! that
   !! the mixture gained in its cells since `u_before`.
   subroutine momentum_gained(grid, solid, dt, u, stage)
     type(grid_t), intent(in) :: grid
@@ -197,7 +209,8 @@ contains
           f = solid%cell_alpha(m)*grid%volume*stage%rho_mixture(i(1), i(2), i(3))/dt &
               *(u(i(1), i(2), i(3), :) - stage%u_before(i(1), i(2), i(3), :))
           stage%terms(n, 1:3) = f
-          stage%terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), stage%bodies%x(:, b)), f)
+          stage%terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), &
+                                                  stage%bodies%x(:, b)), f)
         end associate
       end do
       stage%from_pressure(:, b) = exact_sums(stage%terms(1:n, :))
@@ -236,13 +249,16 @@ contains
                               nearest_arm(grid, solid%face_centroid(:, m), stage%bodies%x(:, b)))
         share = mass_share(solid%face_beta(m), body_density(stage%bodies, b), &
                            face_mean(flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
-        flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) - flow%uf(i(1), i(2), i(3), d))
+        flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &
+            - flow%uf(i(1), i(2), i(3), d))
       end do
     end do
     do d = 1, 3
-      flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, :, d)
+      flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, &
+          :, d)
     end do
-    call divergence(grid, solid%open, flow%uf, flow%solid_flux, stage%pressure%active, stage%pressure%rhs, &
+    call divergence(grid, solid%open, flow%uf, flow%solid_flux, stage%pressure%active, &
+                    stage%pressure%rhs, &
                     report%pressure%divergence)
   end subroutine overlay_bodies
 

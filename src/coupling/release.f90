@@ -48,7 +48,8 @@ contains
       character(*), intent(in) :: what
 
       warnings = warnings + 1
-      if (is_root()) write (error_unit, '(5a)') 'mics: warning: body ', to_text(b), what, to_text(time), ' s'
+      if (is_root()) write (error_unit, '(5a)') 'mics: warning: body ', to_text(b), what, &
+        to_text(time), ' s'
     end subroutine warn
   end subroutine release_due_blocks
 
@@ -60,7 +61,8 @@ contains
 
     next = huge(next)
     if (blocks%n == 0) return
-    next = minval(blocks%release_time, mask=.not. blocks%present .and. blocks%release_time > time + same_time)
+    next = minval(blocks%release_time, mask=.not. blocks%present &
+                  .and. blocks%release_time > time + same_time)
   end function next_release
 
   !> Number of blocks whose time has come but whose place is taken.

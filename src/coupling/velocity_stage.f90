@@ -30,7 +30,8 @@ module velocity_stage_m
     real(wp), allocatable :: total(:, :)           !! (6, n)
     real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
     real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
-    real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor of the mixture [m/s]
+    real(wp), allocatable :: u_before(:, :, :, :)
+      !! velocity before the predictor of the mixture [m/s]
   end type stage_t
 
 contains
@@ -73,7 +74,8 @@ contains
         bodies%volume(b) = shape%volume
         bodies%inertia(:, :, b) = space_tensor(blocks%q(:, b), shape%inertia)
         bodies%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
-                                                       blocks%inverse_inertia(:, :, blocks%shape(b)))
+                                                       blocks%inverse_inertia(:, :, &
+                                                           blocks%shape(b)))
       end associate
     end do
   end subroutine copy_motion
@@ -88,7 +90,8 @@ contains
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
       bodies%motion(1:3, b) = bodies%motion(1:3, b) + dt*force(1:3, b)/bodies%mass(b)
-      bodies%motion(4:6, b) = bodies%motion(4:6, b) + dt*matmul(bodies%inverse_inertia(:, :, b), force(4:6, b))
+      bodies%motion(4:6, b) = bodies%motion(4:6, b) + dt*matmul(bodies%inverse_inertia(:, :, b), &
+          force(4:6, b))
     end do
   end subroutine push_bodies
 

@@ -1,7 +1,8 @@
 !> Halo cells of every boundary kind, written once for a direction and a side.
 !!
 !! Each routine exchanges halos between processes (and wraps periodic directions) one direction at a
-!! time and fills the halos outside the domain in the same pass, so edges and corners come out right.
+!! time and fills the halos outside the domain in the same pass, so edges and corners come out
+!! right.
 module boundary_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo, side_no_slip, side_slip, side_periodic
@@ -39,7 +40,8 @@ contains
     end do
   end subroutine fill_scalar_halo
 
-  !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd in the
+  !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd
+  !! in the
   !! normal component only), open sides carry the value of the last cell outward.
   subroutine fill_velocity_halo(grid, u)
     type(grid_t), intent(in) :: grid
@@ -61,7 +63,8 @@ contains
           end if
           do m = 1, n_halo
             call mirror_plane(u(:, :, :, c), d, ghost_layer(grid, s, d, m), &
-                              mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), factor, shift)
+                              mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), &
+                                factor, shift)
           end do
         end do
       end do
@@ -99,7 +102,7 @@ contains
       a(to, :, :) = factor*a(from, :, :) + shift
     case (2)
       a(:, to, :) = factor*a(:, from, :) + shift
-    case (3)
+    case default
       a(:, :, to) = factor*a(:, :, from) + shift
     end select
   end subroutine mirror_plane

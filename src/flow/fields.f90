@@ -9,12 +9,16 @@ module fields_m
   type :: flow_t
     real(wp), allocatable :: u(:, :, :, :)      !! velocity at the cell centre, x y z last [m/s]
     real(wp), allocatable :: p(:, :, :)         !! pressure [Pa]
-    real(wp), allocatable :: uf(:, :, :, :)     !! fluid velocity normal to the lower face, open part [m/s]
-    real(wp), allocatable :: solid_flux(:, :, :, :) !! volume rate of the solids through the lower face [m3/s]
+    real(wp), allocatable :: uf(:, :, :, :)
+      !! fluid velocity normal to the lower face, open part [m/s]
+    real(wp), allocatable :: solid_flux(:, :, :, :)
+      !! volume rate of the solids through the lower face [m3/s]
     real(wp), allocatable :: liquid(:, :, :)    !! volume of liquid W in the cell [m3]
     real(wp), allocatable :: room(:, :, :)      !! carried open volume Vt of the cell [m3]
-    real(wp), allocatable :: c(:, :, :)         !! C^: liquid share of the full cell below its plane, extended
-                                                !! through bodies; gives density, gravity, normals [-]
+    real(wp), allocatable :: c(:, :, :)
+      !! C^: liquid share of the full cell below its plane, extended
+                                                !! through bodies; gives density, gravity, normals
+                                                !! [-]
     real(wp), allocatable :: rho(:, :, :)       !! density of the fluid, from c [kg/m3]
     real(wp), allocatable :: mu(:, :, :)        !! viscosity of the fluid, from c [Pa s]
     real(wp) :: liquid_initial = 0.0_wp         !! sum of `liquid` at t = 0 [m3]

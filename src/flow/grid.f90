@@ -2,8 +2,10 @@
 !!
 !! Every array over cells is declared with the *global* cell index and `n_halo` halo cells:
 !! `a(lo(1)-n_halo:hi(1)+n_halo, ...)`. A face array carries the face direction as its last index;
-!! element `(i,j,k,d)` is the *lower* face of cell `(i,j,k)` in direction d, so the upper face of the
-!! cell is the lower face of its neighbour, and the sides of the tank at the upper end are faces n+1.
+!! element `(i,j,k,d)` is the *lower* face of cell `(i,j,k)` in direction d, so the upper face of
+!! the
+!! cell is the lower face of its neighbour, and the sides of the tank at the upper end are faces
+!! n+1.
 module grid_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
@@ -13,7 +15,8 @@ module grid_m
   public :: grid_t, grid_init, n_halo, unit_step
   public :: side_no_slip, side_slip, side_open, side_periodic, side_inflow, side_outflow
 
-  integer, parameter :: n_halo = 3   !! halo width of cell and face arrays: reach of the fifth-order scheme
+  integer, parameter :: n_halo = 3
+    !! halo width of cell and face arrays: reach of the fifth-order scheme
 
   integer, parameter :: side_no_slip = 1, side_slip = 2, side_open = 3, side_periodic = 4
   integer, parameter :: side_inflow = 5, side_outflow = 6

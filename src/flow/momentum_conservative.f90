@@ -4,8 +4,10 @@
 !! passes a face is
 !! $$ m_f = \rho_l G_f + \rho_g (Q_f - G_f) $$
 !! with Q and G the volumes of fluid and of liquid that the sweep moved, and momentum moves as
-!! `m_f u~_f`. Dividing by the mass of the cell, which saw the same volumes, keeps a uniform velocity
-!! to round-off through any interface and any opening or closing cell. u~ is the fifth-order TVD value,
+!! `m_f u~_f`. Dividing by the mass of the cell, which saw the same volumes, keeps a uniform
+!! velocity
+!! to round-off through any interface and any opening or closing cell. u~ is the fifth-order TVD
+!! value,
 !! carried to the mean over the slab that leaves the donor; first order next to the interface.
 !! Source: consistent transport after Rudman (1998); departs from the velocity form of the paper's
 !! eq. (5), which moves water momentum into air at a density ratio of 830.
@@ -28,8 +30,10 @@ module momentum_conservative_m
     real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
     real(wp), allocatable :: room(:, :, :)          !! open volume before the sweep [m3]
-    real(wp), allocatable :: mass(:, :, :)          !! of the fluid in the cell after the sweeps [kg]
-    real(wp), allocatable :: late(:), late_mass(:)  !! momentum and mass through the faces of small cells
+    real(wp), allocatable :: mass(:, :, :)
+      !! of the fluid in the cell after the sweeps [kg]
+    real(wp), allocatable :: late(:), late_mass(:)
+      !! momentum and mass through the faces of small cells
   end type momentum_t
 
 contains
@@ -62,7 +66,8 @@ contains
   subroutine momentum_begin(grid, fluid, liquid, room, c, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: liquid, room, c   !! W and Vt [m3], liquid share [-]
     real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                           grid%lo(3) - n_halo:, :)   !! [m/s]
@@ -95,7 +100,8 @@ contains
     integer, intent(in) :: d
     type(liquid_transport_t), intent(inout) :: transport
     real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! halo filled on entry and return [m/s]
+                                             grid%lo(3) - n_halo:, :)
+                                               !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: i, j, k, m, e(3)
 
@@ -104,7 +110,8 @@ contains
     call fill_scalar_halo(grid, self%room)
     call sweep(grid, old, d, transport)
     do m = 1, 3
-      call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), self%room, &
+      call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), &
+                            self%room, &
                             u(:, :, :, m), self%mixed_near, self%carried)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
@@ -126,7 +133,8 @@ contains
     type(fluid_t), intent(in) :: fluid
     type(liquid_transport_t), intent(inout) :: transport
     real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! halo filled on return [m/s]
+                                             grid%lo(3) - n_halo:, :)
+                                               !! halo filled on return [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: m, l, at(3)
 
@@ -139,7 +147,8 @@ contains
     associate (n => transport%n_late)
       self%late_mass(1:n) = mass_through(fluid, transport%late_q(1:n), transport%late_g(1:n))
       do m = 1, 3
-        call late_values(grid, self%momentum(:, :, :, m), self%mass, abs(self%late_mass(1:n)), transport, &
+        call late_values(grid, self%momentum(:, :, :, m), self%mass, abs(self%late_mass(1:n)), &
+                         transport, &
                          self%carried)
         do l = 1, n
           at = transport%donor(:, l)
@@ -155,7 +164,8 @@ contains
   subroutine velocity_of_momentum(grid, fluid, liquid, room, momentum, u)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: liquid, room   !! [m3]
     real(wp), intent(in), contiguous :: momentum(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                  grid%lo(3) - n_halo:, :)   !! [kg m/s]
@@ -176,12 +186,14 @@ contains
     call fill_velocity_halo(grid, u)
   end subroutine velocity_of_momentum
 
-  !> Momentum through the lower faces: mass times the mean velocity of the slab that leaves the donor.
+  !> Momentum through the lower faces: mass times the mean velocity of the slab that leaves the
+  !! donor.
   subroutine carried_momentum(grid, fluid, e, q, g, room, u, mixed_near, carried)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: q, g, room, u
     logical, intent(in), contiguous :: mixed_near(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                   grid%lo(3) - n_halo:)
@@ -191,26 +203,31 @@ contains
     real(wp) :: behind2, behind, donor, ahead, ahead2, courant, value
     logical :: forward
 
-    !$omp parallel do private(i, j, behind2, behind, donor, ahead, ahead2, courant, value, forward) &
+    !$omp parallel do private(i, j, behind2, behind, donor, ahead, ahead2, courant, value, &
+    !$omp& forward) &
     !$omp& schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
         do i = grid%lo(1), grid%hi(1) + e(1)
           forward = q(i, j, k) > 0.0_wp
-          associate (u_3 => u(i - 3*e(1), j - 3*e(2), k - 3*e(3)), u_2 => u(i - 2*e(1), j - 2*e(2), k - 2*e(3)), &
+          associate (u_3 => u(i - 3*e(1), j - 3*e(2), k - 3*e(3)), u_2 => u(i - 2*e(1), j &
+              - 2*e(2), k - 2*e(3)), &
                      u_1 => u(i - e(1), j - e(2), k - e(3)), v_1 => u(i, j, k), &
-                     v_2 => u(i + e(1), j + e(2), k + e(3)), v_3 => u(i + 2*e(1), j + 2*e(2), k + 2*e(3)))
+                     v_2 => u(i + e(1), j + e(2), k + e(3)), v_3 => u(i + 2*e(1), j + 2*e(2), k &
+                         + 2*e(3)))
             behind2 = merge(u_3, v_3, forward)
             behind = merge(u_2, v_2, forward)
             donor = merge(u_1, v_1, forward)
             ahead = merge(v_1, u_1, forward)
             ahead2 = merge(v_2, u_2, forward)
           end associate
-          courant = abs(q(i, j, k))/max(merge(room(i - e(1), j - e(2), k - e(3)), room(i, j, k), forward), &
+          courant = abs(q(i, j, k))/max(merge(room(i - e(1), j - e(2), k - e(3)), room(i, j, k), &
+                                              forward), &
                                         tiny(1.0_wp))
           value = tvd5(behind2, behind, donor, ahead, ahead2)
           value = donor + max(0.0_wp, 1.0_wp - courant)*(value - donor)
-          if (merge(mixed_near(i - e(1), j - e(2), k - e(3)), mixed_near(i, j, k), forward)) value = donor
+          if (merge(mixed_near(i - e(1), j - e(2), k - e(3)), mixed_near(i, j, k), &
+                    forward)) value = donor
           carried(i, j, k) = mass_through(fluid, q(i, j, k), g(i, j, k))*value
         end do
       end do

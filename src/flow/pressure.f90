@@ -1,10 +1,13 @@
 !> C-HSMAC: pressure and velocity correction until the face velocity is free of divergence.
 !!
-!! The unknown of a pass is the pressure change phi. Fluid moves through the open part w of a face only,
+!! The unknown of a pass is the pressure change phi. Fluid moves through the open part w of a face
+!! only,
 !! bodies push through the rest:
-!! $$ \sum_f \frac{w_f A_f}{\rho_f h_f} (\phi_c - \phi_{nb}) + \sum_k J_k M_k^{-1} J_k^T \phi = -D_c/\Delta t $$
+!! $$ \sum_f \frac{w_f A_f}{\rho_f h_f} (\phi_c - \phi_{nb}) + \sum_k J_k M_k^{-1} J_k^T \phi =
+!! -D_c/\Delta t $$
 !! with D the net volume outflow of a cell, fluid and solid. Symmetric and positive, so conjugate
-!! gradients with the multigrid of the first term. Without bodies in the list it is the paper's system.
+!! gradients with the multigrid of the first term. Without bodies in the list it is the paper's
+!! system.
 module pressure_m
   use kinds_m, only: wp, i8
   use case_types_m, only: numerics_t
@@ -13,7 +16,8 @@ module pressure_m
   use grid_m, only: grid_t, n_halo, unit_step, side_open
   use boundary_m, only: fill_scalar_halo
   use rigid_motion_m, only: rigid_motion_t
-  use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, solid_face_flux, force_from_cells, add_cell_flux
+  use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, solid_face_flux, force_from_cells, &
+    add_cell_flux
   use mixture_m, only: face_mean
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
@@ -22,7 +26,8 @@ module pressure_m
   implicit none
   private
   public :: pressure_t, pressure_report_t, pressure_init, set_pressure_system, solve_pressure
-  public :: face_acceleration, cell_mean_of_faces, predict_face_velocity, divergence, extend_pressure
+  public :: face_acceleration, cell_mean_of_faces, predict_face_velocity, divergence, &
+    extend_pressure
 
   integer, parameter :: max_iterations = 2000   !! of one linear solve
 
@@ -32,7 +37,8 @@ module pressure_m
     integer :: lo(3) = 0, hi(3) = 0
     type(rigid_motion_t) :: bodies
     type(rigid_flux_t) :: flux
-    real(wp), allocatable :: push(:, :)        !! (6, bodies) force of a trial pressure, then its motion
+    real(wp), allocatable :: push(:, :)
+      !! (6, bodies) force of a trial pressure, then its motion
   contains
     procedure :: apply => apply_pressure
   end type pressure_operator_t
@@ -87,7 +93,8 @@ contains
     call krylov_init(grid, self%work)
   end subroutine pressure_init
 
-  !> Coefficients of the system for the open shares and densities at hand, and of its preconditioner.
+  !> Coefficients of the system for the open shares and densities at hand, and of its
+  !! preconditioner.
   subroutine set_pressure_system(grid, numerics, open, rho, self)
     type(grid_t), intent(in) :: grid
     type(numerics_t), intent(in) :: numerics
@@ -107,7 +114,8 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             self%operator%cf(i, j, k, d) = open(i, j, k, d)*area_over_h &
-                                           /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+                                           /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, &
+                                               j, k))
           end do
         end do
       end do
@@ -122,6 +130,7 @@ contains
     select case (trim(numerics%preconditioner))
     case ('multigrid'); call self%multigrid%setup(self%operator%cf)
     case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
+    case default   ! 'none' needs nothing
     end select
   contains
     !> A side of the domain: closed, or open with p = 0 half a cell away.
@@ -226,7 +235,8 @@ contains
   subroutine face_acceleration(grid, gravity, rho_w, rho, p, a)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: rho_w, rho           !! [kg/m3]
     real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                           grid%lo(3) - n_halo:)     !! [Pa], halo filled
@@ -240,7 +250,8 @@ contains
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
-            a(i, j, k, d) = (face_mean(rho_w(i - e(1), j - e(2), k - e(3)), rho_w(i, j, k))*gravity(d) &
+            a(i, j, k, d) = (face_mean(rho_w(i - e(1), j - e(2), k - e(3)), rho_w(i, j, &
+                k))*gravity(d) &
                              - (p(i, j, k) - p(i - e(1), j - e(2), k - e(3)))/grid%h(d)) &
                             /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           end do
@@ -265,7 +276,8 @@ contains
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
               a(i, j, k, d) = 0.0_wp
-              if (grid%side(s, d) == side_open) a(i, j, k, d) = (rho_w(c(1), c(2), c(3))*gravity(d) &
+              if (grid%side(s, d) == side_open) a(i, j, k, d) = (rho_w(c(1), c(2), &
+                  c(3))*gravity(d) &
                 + outward*p(c(1), c(2), c(3))/(0.5_wp*grid%h(d)))/rho(c(1), c(2), c(3))
             end do
           end do
@@ -307,11 +319,13 @@ contains
   !! volume among the cells that hold moving fluid [1/s].
   subroutine divergence(grid, open, uf, solid_flux, active, outflow, largest)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:, :), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:, :), &
       contiguous :: open, uf, solid_flux
     logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                               grid%lo(3) - n_halo:)
-    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
+    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) &
+                                                   - 1:)
     real(wp), intent(out) :: largest
     integer :: i, j, k
     real(wp) :: worst(1), a(3)
@@ -324,7 +338,8 @@ contains
         do i = grid%lo(1), grid%hi(1)
           outflow(i, j, k) = merge(through(i + 1, j, k, 1) - through(i, j, k, 1) &
                                    + through(i, j + 1, k, 2) - through(i, j, k, 2) &
-                                   + through(i, j, k + 1, 3) - through(i, j, k, 3), 0.0_wp, active(i, j, k))
+                                   + through(i, j, k + 1, 3) - through(i, j, k, 3), 0.0_wp, &
+                                     active(i, j, k))
           worst = max(worst, abs(outflow(i, j, k)))
         end do
       end do
@@ -341,17 +356,21 @@ contains
   end subroutine divergence
 
   !> Face velocity before the pressure stage, interpolated from the cells:
-  !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu \Delta t \sum_d h_d^{-2}) $$
+  !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu
+  !! \Delta t \sum_d h_d^{-2}) $$
   !!
-  !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt keeps the
+  !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt
+  !! keeps the
   !! steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
   subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                             grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:, :), &
-      contiguous :: a_face, a_cell   !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:, :), &
+      contiguous :: a_face, a_cell
+        !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
     integer :: i, j, k, d, e(3)
     real(wp) :: nu, steps
@@ -367,7 +386,8 @@ contains
               nu = face_mean(flow%mu(il, jl, kl), flow%mu(i, j, k)) &
                    /face_mean(rho(il, jl, kl), rho(i, j, k))
               flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
-                + dt/(1.0_wp + nu*steps)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), a_cell(i, j, k, d)))
+                + dt/(1.0_wp + nu*steps)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), &
+                    a_cell(i, j, k, d)))
             end associate
           end do
         end do
@@ -401,7 +421,8 @@ contains
 
   !> Make the face velocity free of divergence; pressure and motion of the free bodies follow.
   !!
-  !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both are
+  !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both
+  !! are
   !! final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final motion.
   subroutine solve_pressure(grid, numerics, solid, rho, dt, flow, bodies, self, report)
     type(grid_t), intent(in) :: grid
@@ -422,7 +443,8 @@ contains
     tolerance = 0.5_wp*numerics%divergence_tolerance*grid%volume/dt
     do
       call solid_face_flux(grid, solid, bodies, self%operator%flux, flow%solid_flux)
-      call divergence(grid, solid%open, flow%uf, flow%solid_flux, self%active, self%rhs, report%divergence)
+      call divergence(grid, solid%open, flow%uf, flow%solid_flux, self%active, self%rhs, &
+                      report%divergence)
       report%converged = report%divergence < numerics%divergence_tolerance
       if (report%converged .or. report%passes == numerics%max_pressure_passes) exit
       self%rhs = -self%rhs/dt
@@ -491,16 +513,19 @@ contains
   end subroutine add_correction
 
   !> Pressure of cells without open faces, for the cells that will open and for looking: mean of the
-  !! known neighbours of the same height, and only where there are none, hydrostatic from above or below.
+  !! known neighbours of the same height, and only where there are none, hydrostatic from above or
+  !! below.
   subroutine extend_pressure(grid, gravity, rho, active, known, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: rho
     logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                               grid%lo(3) - n_halo:)
     integer, intent(inout), contiguous :: known(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:)   !! work: pass in which p was found, 0 unknown
+                                                grid%lo(3) - n_halo:)
+                                                  !! work: pass in which p was found, 0 unknown
     real(wp), intent(inout), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                              grid%lo(3) - n_halo:)      !! [Pa]
     integer :: i, j, k, pass, n_found

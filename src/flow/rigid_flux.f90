@@ -1,6 +1,7 @@
 !> The six unit motions of each body as volume fluxes through the solid parts of the cell faces.
 !!
-!! A body pushes the volume `s_f . (U, Omega)` through its part of face f. Summed over the faces of a
+!! A body pushes the volume `s_f . (U, Omega)` through its part of face f. Summed over the faces
+!! of a
 !! cell this is J_k, the column of the coupled pressure equation; the same numbers, by summation by
 !! parts, turn the pressure into the paper's volume integral of -grad p over the body.
 !! Source: Batty, Bertails & Bridson (2007) in the variational form, with exact face areas.
@@ -18,10 +19,12 @@ module rigid_flux_m
   public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm
 
   type :: rigid_flux_t
-    real(wp), allocatable :: s(:, :)         !! (6, faces of `solid%face`) flux of the unit motions [m2, m3]
+    real(wp), allocatable :: s(:, :)
+      !! (6, faces of `solid%face`) flux of the unit motions [m2, m3]
     logical, allocatable :: mine(:)          !! (faces) this process adds the face to sums
     integer, allocatable :: first(:)         !! (bodies + 1) entries of each body in the lists below
-    integer, allocatable :: cell(:, :)       !! (3, *) own cells with open faces that a body pushes on
+    integer, allocatable :: cell(:, :)
+      !! (3, *) own cells with open faces that a body pushes on
     real(wp), allocatable :: j(:, :)         !! (6, *) net unit fluxes out of the cell [m2, m3]
     real(wp), allocatable :: work(:, :)      !! (*, 6) terms of the sums
     integer, allocatable :: slot(:, :, :)    !! entry of a cell while the lists are built
@@ -76,12 +79,14 @@ contains
         self%mine(m) = owned(grid, high, d)
         if (closed_side(grid, high(d), d)) cycle
         self%s(1:3, m) = grid%area(d)*solid%face_beta(m)*real(unit_step(:, d), wp)
-        self%s(4:6, m) = cross(nearest_arm(grid, solid%face_centroid(:, m), bodies%x(:, b)), self%s(1:3, m))
+        self%s(4:6, m) = cross(nearest_arm(grid, solid%face_centroid(:, m), bodies%x(:, b)), &
+                               self%s(1:3, m))
         call add_to_cell(low, self%s(:, m))
         call add_to_cell(high, -self%s(:, m))
       end do
       do entry_of_body = self%first(b), n_entry
-        self%slot(self%cell(1, entry_of_body), self%cell(2, entry_of_body), self%cell(3, entry_of_body)) = 0
+        self%slot(self%cell(1, entry_of_body), self%cell(2, entry_of_body), self%cell(3, &
+            entry_of_body)) = 0
       end do
     end do
     self%first(bodies%n + 1) = n_entry + 1
@@ -112,7 +117,8 @@ contains
 
     if (size(self%s, 2) >= n_face) return
     deallocate (self%s, self%mine, self%cell, self%j, self%work)
-    allocate (self%s(6, 2*n_face), self%mine(2*n_face), self%cell(3, 4*n_face), self%j(6, 4*n_face), self%work(4*n_face, 6))
+    allocate (self%s(6, 2*n_face), self%mine(2*n_face), self%cell(3, 4*n_face), self%j(6, &
+        4*n_face), self%work(4*n_face, 6))
   end subroutine make_room
 
   !> A lower face of index i that lies on a wall of the domain: no fluid and no pressure there.
@@ -168,7 +174,8 @@ contains
     type(rigid_flux_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                           grid%lo(3) - n_halo:)   !! [Pa], halo filled
-    real(wp), intent(out) :: force(:, :)   !! (6, bodies) force, torque about the centre of mass [N, N m]
+    real(wp), intent(out) :: force(:, :)
+      !! (6, bodies) force, torque about the centre of mass [N, N m]
     integer :: b, m, t, f(3), e(3)
 
     do b = 1, bodies%n
@@ -208,7 +215,8 @@ contains
       first = self%first(b)
       last = self%first(b + 1) - 1
       do e = first, last
-        self%work(e - first + 1, :) = self%j(:, e)*phi(self%cell(1, e), self%cell(2, e), self%cell(3, e))
+        self%work(e - first + 1, :) = self%j(:, e)*phi(self%cell(1, e), self%cell(2, e), &
+                                                       self%cell(3, e))
       end do
       force(:, b) = exact_sums(self%work(1:last - first + 1, :))
     end do

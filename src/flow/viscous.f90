@@ -1,4 +1,5 @@
-!> Implicit viscosity with no-slip on the bodies: legs to the exact surface, film cells, and the body
+!> Implicit viscosity with no-slip on the bodies: legs to the exact surface, film cells, and the
+!! body
 !! velocities as unknowns of the same system.
 !!
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
@@ -30,8 +31,10 @@ module viscous_m
   integer, parameter :: max_iterations = 500
 
   type :: viscous_t
-    real(wp), allocatable :: mass(:, :, :, :)  !! rho m V/dt of each component, 0: not an unknown [kg/s]
-    real(wp), allocatable :: leg(:, :, :, :)   !! conductance of the leg across the lower face [kg/s]
+    real(wp), allocatable :: mass(:, :, :, :)
+      !! rho m V/dt of each component, 0: not an unknown [kg/s]
+    real(wp), allocatable :: leg(:, :, :, :)
+      !! conductance of the leg across the lower face [kg/s]
     real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
     real(wp), allocatable :: r(:, :, :, :), z(:, :, :, :), s(:, :, :, :), y(:, :, :, :)
     integer :: n_wall = 0                      !! wall legs, grouped by body
@@ -40,8 +43,10 @@ module viscous_m
     real(wp), allocatable :: k(:)              !! conductance [kg/s]
     real(wp), allocatable :: arm(:, :)         !! (3, *) from the centre of mass to the wall [m]
     real(wp), allocatable :: work(:, :)        !! (*, 6)
-    real(wp), allocatable :: body_matrix(:, :, :)   !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
-    real(wp), allocatable :: spin_drag(:)      !! 2 mu V of the body: torque per angular velocity [N m s]
+    real(wp), allocatable :: body_matrix(:, :, :)
+      !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
+    real(wp), allocatable :: spin_drag(:)
+      !! 2 mu V of the body: torque per angular velocity [N m s]
     integer, allocatable :: wall_body(:)       !! body of each leg as found, before grouping
     integer, allocatable :: found_cell(:, :)
     real(wp), allocatable :: found_k(:), found_arm(:, :)
@@ -80,7 +85,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) - n_halo:), &
+    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
+                                    - n_halo:), &
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
@@ -155,11 +161,13 @@ contains
           high_wet = solid%inside(i, j, k) == 0
           free_leg = solid%leg_low(i, j, k, d) > 1.0_wp .and. solid%leg_high(i, j, k, d) > 1.0_wp
           if (low_wet .and. high_wet .and. free_leg) then
-            self%leg(i, j, k, d) = conductance*harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, k))
+            self%leg(i, j, k, d) = conductance*harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, &
+                k))
             call add_diagonal(low, self%leg(i, j, k, d))
             call add_diagonal(high, self%leg(i, j, k, d))
           else
-            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
+            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, &
+                j, k, d))
             if (high_wet) call wall_leg(high, solid%leg_high(i, j, k, d), -1, &
                                         solid%leg_body_high(i, j, k, d))
           end if
@@ -218,7 +226,8 @@ contains
     side = (i == 1 .or. i == grid%n(d) + 1) .and. .not. grid%periodic(d)
   end function at_domain_side
 
-  !> Film cells: centre inside a body, but with open faces. Their fluid, V_o = V(1 - alpha), lies in a
+  !> Film cells: centre inside a body, but with open faces. Their fluid, V_o = V(1 - alpha), lies
+  !! in a
   !! layer of mean thickness V_o/A_w on the wall area A_w and hangs on it by 2 mu A_w^2/V_o.
   subroutine film_legs(grid, solid, bodies, mu, self)
     type(grid_t), intent(in) :: grid
@@ -237,12 +246,14 @@ contains
           if (all(self%mass(i, j, k, :) <= 0.0_wp)) cycle
           do d = 1, 3
             e = unit_step(:, d)
-            wall(d) = grid%area(d)*(solid%open(i + e(1), j + e(2), k + e(3), d) - solid%open(i, j, k, d))
+            wall(d) = grid%area(d)*(solid%open(i + e(1), j + e(2), k + e(3), d) - solid%open(i, &
+                j, k, d))
           end do
           area2 = max(sum(wall**2), (1.0e-3_wp*minval(grid%area))**2)
           layer = max(1.0_wp - solid%alpha(i, j, k), 1.0e-3_wp)*grid%volume
           call add_wall(self, [i, j, k], solid%inside(i, j, k), 2.0_wp*mu(i, j, k)*area2/layer, &
-                        nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, 3)], &
+                        nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, &
+                            3)], &
                                     bodies%x(:, solid%inside(i, j, k))))
         end do
       end do
@@ -319,7 +330,8 @@ contains
     self%first(1) = 1
   end subroutine group_by_body
 
-  !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia over
+  !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
+  !! over
   !! dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave out.
   subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
     type(solid_geometry_t), intent(in) :: solid
@@ -340,7 +352,8 @@ contains
         do m = self%first(b), self%first(b + 1) - 1
           associate (i => self%cell(:, m))
             self%work(m - self%first(b) + 1, :) = &
-              wrench(self%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, self%arm(:, m))), &
+              wrench(self%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, &
+                  self%arm(:, m))), &
                      self%arm(:, m))
           end associate
         end do
@@ -353,7 +366,8 @@ contains
       end do
     end do
   contains
-    !> Integral of the viscosity of the surrounding fluid over the body, in all six places [Pa s m3].
+    !> Integral of the viscosity of the surrounding fluid over the body, in all six places [Pa s
+    !! m3].
     function viscosity_times_volume(body) result(total)
       integer, intent(in) :: body
       real(wp) :: total(6)
@@ -451,7 +465,8 @@ contains
         if (.not. bodies%free(b)) cycle
         do c = 1, 3
           z_body(c, b) = r_body(c, b)/(bodies%mass(b)/dt + self%body_matrix(c, c, b))
-          z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + self%body_matrix(c + 3, c + 3, b))
+          z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + self%body_matrix(c &
+              + 3, c + 3, b))
         end do
       end do
     end subroutine precondition
@@ -545,8 +560,10 @@ contains
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
             y(i, j, k, c) = self%diagonal(i, j, k, c)*x(i, j, k, c) &
-              - self%leg(i, j, k, 1)*x(i - 1, j, k, c) - self%leg(i + 1, j, k, 1)*x(i + 1, j, k, c) &
-              - self%leg(i, j, k, 2)*x(i, j - 1, k, c) - self%leg(i, j + 1, k, 2)*x(i, j + 1, k, c) &
+              - self%leg(i, j, k, 1)*x(i - 1, j, k, c) - self%leg(i + 1, j, k, 1)*x(i + 1, j, k, &
+                  c) &
+              - self%leg(i, j, k, 2)*x(i, j - 1, k, c) - self%leg(i, j + 1, k, 2)*x(i, j + 1, k, &
+                  c) &
               - self%leg(i, j, k, 3)*x(i, j, k - 1, c) - self%leg(i, j, k + 1, 3)*x(i, j, k + 1, c)
           end do
         end do
@@ -556,8 +573,10 @@ contains
       do m = self%first(b), self%first(b + 1) - 1
         associate (n => self%cell(:, m))
           self%work(m - self%first(b) + 1, :) = &
-            wrench(self%k(m)*unknown(self%mass(n(1), n(2), n(3), :), x(n(1), n(2), n(3), :)), self%arm(:, m))
-          y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) - self%k(m)*wall_velocity(x_body(:, b), self%arm(:, m))
+            wrench(self%k(m)*unknown(self%mass(n(1), n(2), n(3), :), x(n(1), n(2), n(3), :)), &
+                   self%arm(:, m))
+          y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) - self%k(m)*wall_velocity(x_body(:, b), &
+              self%arm(:, m))
         end associate
       end do
       y_body(:, b) = 0.0_wp

@@ -30,10 +30,12 @@ program test_tvd
   do i = 1, 2000
     q = [sin(1.7_wp*i), sin(3.1_wp*i), cos(0.9_wp*i), sin(2.3_wp*i), cos(4.1_wp*i)]
     value = tvd5(q(-2), q(-1), q(0), q(1), q(2))
-    inside = inside .and. value >= min(q(0), q(1)) - 1.0e-15_wp .and. value <= max(q(0), q(1)) + 1.0e-15_wp
+    inside = inside .and. value >= min(q(0), q(1)) - 1.0e-15_wp .and. value <= max(q(0), q(1)) &
+      + 1.0e-15_wp
   end do
   call check('between donor and next cell', inside)
-  call check('extremum gives the donor', tvd5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp), 1.0_wp, 0.0_wp)
+  call check('extremum gives the donor', tvd5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp), 1.0_wp, &
+             0.0_wp)
   call finish_checks()
 contains
   !> Mean of exp over the cell that ends at i/n.

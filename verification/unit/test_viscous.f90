@@ -15,8 +15,10 @@ program test_viscous
   type(solid_geometry_t) :: solid
   type(rigid_motion_t) :: wall
   type(viscous_t) :: viscous
-  real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, long_time = 1.0e14_wp
-  real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]   !! of the surface, cell height 1/8
+  real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, &
+    long_time = 1.0e14_wp
+  real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
+    !! of the surface, cell height 1/8
   real(wp) :: force(6, 1), z, worst, momentum(2)
   integer :: k, n, iterations
   logical :: converged
@@ -32,11 +34,13 @@ program test_viscous
     do k = 1, 8
       z = grid%centre(k, 3)
       if (z < heights(n)) cycle
-      worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - speed*(depth - z)/(depth - heights(n)))))
+      worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - speed*(depth - z)/(depth &
+          - heights(n)))))
     end do
     call check('converged', converged)
     call check('linear profile above a wall inside a cell', worst, 0.0_wp, 1.0e-7_wp)
-    call check('shear force on the wall', force(1, 1), -mu*speed/(depth - heights(n)), 1.0e-7_wp*mu*speed)
+    call check('shear force on the wall', force(1, 1), -mu*speed/(depth - heights(n)), &
+               1.0e-7_wp*mu*speed)
   end do
 
   ! A free body and the fluid it drags: the stage gives to one what it takes from the other.
@@ -47,7 +51,8 @@ program test_viscous
   call solve_viscous(grid, wall, 5.0_wp, flow, viscous, force, iterations, converged)
   momentum(2) = fluid_momentum() + wall%mass(1)*wall%motion(1, 1) &
                 + 5.0_wp*sum(2.0_wp*mu*8.0_wp*flow%u(1:4, 1:4, 8, 1))/16.0_wp
-  call check('momentum of body, fluid and tank wall', momentum(2), momentum(1), 1.0e-7_wp*momentum(1))
+  call check('momentum of body, fluid and tank wall', momentum(2), momentum(1), &
+             1.0e-7_wp*momentum(1))
   call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
              5.0_wp*force(1, 1), 1.0e-7_wp*momentum(1))
   call finish_checks()
@@ -80,7 +85,8 @@ contains
     wall%present = .true.
     wall%motion(:, 1) = [speed, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     wall%mass = 50.0_wp
-    wall%inertia(:, :, 1) = reshape([1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp], [3, 3])
+    wall%inertia(:, :, 1) = reshape([1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp, 0.0_wp, 0.0_wp, &
+                                    0.0_wp, 1.0e9_wp], [3, 3])
     wall%inverse_inertia(:, :, 1) = wall%inertia(:, :, 1)*1.0e-18_wp
     do k = 1, 8
       low = grid%face(k, 3)
@@ -104,7 +110,8 @@ contains
 
     p = 0.0_wp
     do k = 1, 8
-      p = p + rho*grid%volume*sum(0.5_wp*(solid%open(1:4, 1:4, k, 1) + solid%open(2:5, 1:4, k, 1))*flow%u(1:4, 1:4, k, 1))
+      p = p + rho*grid%volume*sum(0.5_wp*(solid%open(1:4, 1:4, k, 1) + solid%open(2:5, 1:4, k, &
+          1))*flow%u(1:4, 1:4, k, 1))
     end do
   end function fluid_momentum
 end program test_viscous
