@@ -11,7 +11,7 @@ module parallel_m
   use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request, operator(==)
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
-  use mpi_f08, only: MPI_INFO_NULL
+  use mpi_f08, only: MPI_INFO_NULL, MPI_Iallreduce, MPI_Test, MPI_Wtime, MPI_STATUS_IGNORE
   use mpi_f08, only: MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
@@ -25,7 +25,7 @@ module parallel_m
   public :: is_root, nproc, my_rank, set_threads, get_threads
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
-  public :: set_file_access, set_collective
+  public :: set_file_access, set_collective, share_trouble
 
   integer, parameter :: least_cells = 4   !! every process has so many in each direction that is cut
 
@@ -623,5 +623,27 @@ contains
 
     call h5pset_dxpl_mpio_f(transfer, H5FD_MPIO_COLLECTIVE_F, status)
   end subroutine set_collective
+
+  !> Does any process have trouble? One that has waits for the others only as long as its patience
+  !! lasts, for they may be held up by the very trouble.
+  subroutine share_trouble(patience, trouble, answered)
+    real(wp), intent(in) :: patience      !! [s]
+    logical, intent(inout) :: trouble     !! of this process; then of any
+    logical, intent(out) :: answered      !! all have told
+    integer, asynchronous :: worst(1)
+    type(MPI_Request) :: request
+    real(wp) :: began, waited
+
+    worst = merge(1, 0, trouble)
+    began = MPI_Wtime()
+    call MPI_Iallreduce(MPI_IN_PLACE, worst, 1, MPI_INTEGER, MPI_MAX, MPI_COMM_WORLD, request)
+    do
+      call MPI_Test(request, answered, MPI_STATUS_IGNORE)
+      if (answered) exit
+      waited = MPI_Wtime() - began
+      if (trouble .and. waited > patience) return
+    end do
+    trouble = worst(1) > 0
+  end subroutine share_trouble
 
 end module parallel_m

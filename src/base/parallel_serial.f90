@@ -13,7 +13,7 @@ module parallel_m
   public :: is_root, nproc, my_rank, set_threads, get_threads
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
-  public :: set_file_access, set_collective
+  public :: set_file_access, set_collective, share_trouble
 
   logical :: wraps(3) = .false.   !! periodic directions of the last `decompose`
 
@@ -286,5 +286,15 @@ contains
 
     status = merge(0, -1, transfer >= 0)   ! one process writes as ever
   end subroutine set_collective
+
+  !> Does any process have trouble? One that has waits for the others only as long as its patience
+  !! lasts, for they may be held up by the very trouble.
+  subroutine share_trouble(patience, trouble, answered)
+    real(wp), intent(in) :: patience      !! [s]
+    logical, intent(inout) :: trouble     !! of this process; then of any
+    logical, intent(out) :: answered      !! all have told
+
+    answered = patience >= 0.0_wp .or. .not. trouble   ! the only process has told
+  end subroutine share_trouble
 
 end module parallel_m

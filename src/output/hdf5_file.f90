@@ -33,7 +33,9 @@ module hdf5_file_m
   use hdf5, only: H5T_NATIVE_DOUBLE, H5T_NATIVE_REAL, H5T_STD_I32LE, H5T_STD_I64LE
   use hdf5, only: H5T_STR_NULLPAD_F, H5T_STRING
   use kinds_m, only: wp, sp, i8
-  use parallel_m, only: is_root, set_file_access, set_collective, global_max
+  use errors_m, only: fatal, exit_files
+  use parallel_m, only: is_root, my_rank, set_file_access, set_collective, global_max, global_min
+  use parallel_m, only: share_trouble
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   implicit none
   private
@@ -103,19 +105,45 @@ contains
     self%message = self%path//': cannot '//what//': '//hdf5_reason()
   end subroutine check
 
-  !> Trouble of one process of a shared file becomes that of all, so that none waits for it for
-  !! ever.
+  !> Trouble of one process of a shared file becomes that of all.
+  !!
+  !! A process in trouble may find that the others wait for it inside MPI (seen with a full disk): then
+  !! nothing is left but to end them all, though this is a lower procedure.
   subroutine agree(self)
     class(h5_file_t), intent(inout) :: self
-    real(wp) :: worst(1)
+    real(wp), parameter :: patience = 3.0_wp   ! [s]
+    logical :: trouble, answered
 
     if (.not. self%shared) return
-    worst = real(self%info, wp)
-    call global_max(worst)
-    if (worst(1) <= 0.0_wp .or. self%info /= 0) return
-    self%info = 1
-    self%message = self%path//': another process has had trouble with this file'
+    trouble = self%info /= 0
+    call share_trouble(patience, trouble, answered)
+    if (.not. answered) call fatal(exit_files, self%message)
+    if (trouble) call share_message(self)
   end subroutine agree
+
+  !> Give all processes the message of the first one in trouble.
+  subroutine share_message(self)
+    class(h5_file_t), intent(inout) :: self
+    integer, parameter :: longest = 500
+    real(wp) :: first(1), letter(longest)
+    integer :: i
+
+    first = huge(1.0_wp)
+    if (self%info /= 0) first = real(my_rank(), wp)
+    call global_min(first)
+    letter = 0.0_wp
+    if (nint(first(1)) == my_rank()) then
+      do i = 1, min(longest, len(self%message))
+        letter(i) = real(ichar(self%message(i:i)), wp)
+      end do
+    end if
+    call global_max(letter)
+    self%info = 1
+    self%message = repeat(' ', count(letter > 0.0_wp))
+    do i = 1, len(self%message)
+      self%message(i:i) = char(nint(letter(i)))
+    end do
+  end subroutine share_message
 
   !> Create an empty file; one that exists is overwritten.
   subroutine file_create(self, path, shared)
@@ -216,6 +244,7 @@ contains
     call h5gcreate_f(self%id, name, group, status)
     call self%check(status, 'create '//name)
     if (self%info == 0) call h5gclose_f(group, status)
+    call self%agree()
   end subroutine file_group
 
   !> Is there an object of this name? The group around it must exist.
@@ -349,12 +378,23 @@ contains
     integer(hid_t), intent(in) :: file_type, mem_type
     integer(hsize_t), intent(in) :: extent(:)   !! empty: a single value
     type(c_ptr), intent(in) :: data
+
+    if (self%info == 0) call put_attribute(self, object, name, file_type, mem_type, extent, data)
+    call self%agree()
+  end subroutine write_attribute
+
+  !> The work of `write_attribute` on one process.
+  subroutine put_attribute(self, object, name, file_type, mem_type, extent, data)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer(hid_t), intent(in) :: file_type, mem_type
+    integer(hsize_t), intent(in) :: extent(:)   !! empty: a single value
+    type(c_ptr), intent(in) :: data
     character(:), allocatable :: what
     integer(hid_t) :: space, attribute, owner
     integer :: status
     logical :: exists
 
-    if (self%info /= 0) return
     what = 'write '//object//'@'//name
     call h5oopen_f(self%id, object, owner, status)
     call self%check(status, what)
@@ -379,7 +419,7 @@ contains
     call self%check(status, what)
     call h5aclose_f(attribute, status)
     call h5oclose_f(owner, status)
-  end subroutine write_attribute
+  end subroutine put_attribute
 
   !> A text attribute that `attribute` wrote.
   subroutine read_text_attribute(self, object, name, value)
@@ -675,11 +715,13 @@ contains
     call h5dopen_f(self%id, name, id, status)
     call self%check(status, 'open '//name)
     call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
-    if (self%info /= 0) return
-    call h5dwrite_f(id, memory_type(file_real64), c_loc(a), status, here, there, self%collective)
-    call self%check(status, 'write '//name)
-    call close_selection(there, here)
-    call h5dclose_f(id, status)
+    if (self%info == 0) then
+      call h5dwrite_f(id, memory_type(file_real64), c_loc(a), status, here, there, &
+                     self%collective)
+      call self%check(status, 'write '//name)
+      call close_selection(there, here)
+      call h5dclose_f(id, status)
+    end if
     call self%agree()
   end subroutine write_block
 
@@ -697,12 +739,14 @@ contains
     call h5dopen_f(self%id, name, id, status)
     call self%check(status, 'open '//name)
     call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
-    if (self%info /= 0) return
-    data = c_loc(a)
-    call h5dread_f(id, memory_type(file_real64), data, status, here, there, self%collective)
-    call self%check(status, 'read '//name)
-    call close_selection(there, here)
-    call h5dclose_f(id, status)
+    if (self%info == 0) then
+      data = c_loc(a)
+      call h5dread_f(id, memory_type(file_real64), data, status, here, there, &
+                     self%collective)
+      call self%check(status, 'read '//name)
+      call close_selection(there, here)
+      call h5dclose_f(id, status)
+    end if
     call self%agree()
   end subroutine read_block
 
@@ -829,6 +873,7 @@ contains
     column%extent(column%rank) = int(rows, hsize_t)
     call h5dset_extent_f(column%id, column%extent(:column%rank), status)
     call self%check(status, 'write '//column%name)
+    call self%agree()
   end subroutine resize
 
   !> Append a row of reals, its elements in a row; of a shared file the root process writes it.
@@ -922,13 +967,14 @@ contains
     integer :: status
 
     call self%resize(column, int(column%extent(column%rank), i8) + 1_i8)
-    call self%select(column%name, column%id, [int(first - 1, hsize_t), column%extent(column%rank) &
-      - 1], &
+    call self%select(column%name, column%id, &
+                     [int(first - 1, hsize_t), column%extent(column%rank) - 1], &
                      [int(extent, hsize_t), 1_hsize_t], there, here)
-    if (self%info /= 0) return
-    call h5dwrite_f(column%id, H5T_NATIVE_REAL, c_loc(a), status, here, there, self%collective)
-    call self%check(status, 'write '//column%name)
-    call close_selection(there, here)
+    if (self%info == 0) then
+      call h5dwrite_f(column%id, H5T_NATIVE_REAL, c_loc(a), status, here, there, self%collective)
+      call self%check(status, 'write '//column%name)
+      call close_selection(there, here)
+    end if
     call self%agree()
   end subroutine append_block
 
@@ -1005,10 +1051,12 @@ contains
     end if
     call h5screate_simple_f(size(extent), extent, space, status, largest)
     call self%check(status, 'create '//name)
-    if (self%info /= 0) return
-    call h5dcreate_f(self%id, name, file_type, space, id, status, list)
-    call self%check(status, 'create '//name)
-    call h5sclose_f(space, status)
+    if (self%info == 0) then
+      call h5dcreate_f(self%id, name, file_type, space, id, status, list)
+      call self%check(status, 'create '//name)
+      call h5sclose_f(space, status)
+    end if
+    call self%agree()
     call self%attribute(name, 'units', units)
   end subroutine new_dataset
 

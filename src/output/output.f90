@@ -284,6 +284,7 @@ contains
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     type(row_t) :: row
+    integer :: code
 
     if (output%code == exit_ok) then
       call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
@@ -296,11 +297,13 @@ contains
       if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, &
         contacts, output)
     end if
-    call close_run_file(output%run_file, exit_code)
+    code = merge(exit_code, output%code, output%code == exit_ok)
+    call close_run_file(output%run_file, code)
     call output%field_file%file%close()
     call output%block_file%file%close()
     call look_for_trouble(output)
-    call write_summary(output%progress, clock, product(int(grid%n, i8)), exit_code, output%folder)
+    call write_summary(output%progress, clock, product(int(grid%n, i8)), code, &
+                       output%folder)
   end subroutine close_output
 
 end module output_m

@@ -8,7 +8,7 @@ module output_folder_m
   use parallel_m, only: is_root, broadcast
   implicit none
   private
-  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
+  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file, delete_file
 
   character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
     'blocks.vtkhdf']
@@ -36,6 +36,12 @@ module output_folder_m
       implicit none
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
+
+    integer(c_int) function c_unlink(path) bind(c, name='unlink')
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_unlink
 
     type(c_ptr) function c_opendir(path) bind(c, name='opendir')
       import :: c_ptr, c_char
@@ -235,6 +241,13 @@ contains
     info = 1
     message = from//': cannot rename it to '//to//': '//refused
   end subroutine rename_file
+
+  !> Delete a file if it is there.
+  subroutine delete_file(path)
+    character(*), intent(in) :: path
+
+    if (c_unlink(path//c_null_char) /= 0) return   ! it was not there, or nothing can be done
+  end subroutine delete_file
 
   !> Copy a file.
   subroutine copy_file(from, to, code, message)

@@ -25,7 +25,7 @@ module restart_m
   use contacts_m, only: contacts_t
   use clock_m, only: clock_t, clock_resume
   use hdf5_file_m, only: h5_file_t
-  use output_folder_m, only: rename_file
+  use output_folder_m, only: rename_file, delete_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
   use state_visitors_m, only: checksum_visitor_t
   implicit none
@@ -100,7 +100,13 @@ contains
     message = ''
     info = file%info
     if (info /= 0) message = file%message
-    if (info == 0 .and. is_root()) call rename_file(unfinished, path, info, message)
+    if (is_root()) then
+      if (info == 0) then
+        call rename_file(unfinished, path, info, message)
+      else
+        call delete_file(unfinished)   ! the older files may need its room
+      end if
+    end if
     call broadcast(info)
   end subroutine finish_file
 
