@@ -1,0 +1,33 @@
+"""The linear solver gives the same bits on any number of processes.
+
+`test_multigrid` prints one line `solution NAME CELLS ITERATIONS CHECKSUM` for each of its systems.
+"""
+
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+BUILD = Path(__file__).parents[1] / "build"
+
+
+@cache
+def solutions(*command: str) -> list[str]:
+    """The lines of a run of the program."""
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, check=True
+    )
+    return [line for line in done.stdout.splitlines() if line.startswith("solution ")]
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_same_solutions(n: int) -> None:
+    """Compare the parallel build on n processes with the serial build."""
+    serial = solutions(str(BUILD / "serial" / "test_multigrid"))
+    parallel = solutions(
+        *["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(n)],
+        str(BUILD / "mpi" / "test_multigrid"),
+    )
+    assert len(serial) > 0
+    assert parallel == serial
