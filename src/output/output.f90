@@ -290,9 +290,14 @@ contains
       call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
         - output%progress%began, &
                     grid, flow, solid, blocks, report, row)
-      if (output%row_step /= clock%step) call write_row(output%run_file, clock%n_rows, row, blocks)
-      if (output%frame_step /= clock%step) call write_frames(grid, clock, flow, solid, blocks, &
-        output)
+      if (output%row_step /= clock%step) then
+        call write_row(output%run_file, clock%n_rows, row, blocks)
+        if (clock%row_due()) call clock%row_done()
+      end if
+      if (output%frame_step /= clock%step) then
+        call write_frames(grid, clock, flow, solid, blocks, output)
+        if (clock%frame_due()) call clock%frame_done()
+      end if
       call write_line(output%progress, clock, row, blocks)
       if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, &
         contacts, output)
