@@ -57,17 +57,18 @@ class Checks:
 def sound(run: Run, checks: Checks) -> None:
     """What has to hold in every run: a good end, divergence below its tolerance at every row and
     in the saved faces, and the liquid kept."""
-    checks.true("exit status 0", int(run.provenance.get("exit_status", -1)) == 0)
+    here = run.folder.name
+    checks.true(f"{here}: exit status 0", int(run.provenance.get("exit_status", -1)) == 0)
     if not run.field_times.size and not run.restart_files:
         return
     tolerance = float(run.value("numerics", "divergence_tolerance", 1e-6))
     rows = run.series.divergence_max[1:]
-    checks.below("largest divergence of all rows [1/s]", float(rows.max()), tolerance)
+    checks.below(f"{here}: largest divergence of all rows [1/s]", float(rows.max()), tolerance)
     drift = float(np.abs(run.series.liquid_volume_drift).max())
-    checks.below("largest drift of the liquid of all rows", drift, DRIFT_BAND)
+    checks.below(f"{here}: largest drift of the liquid of all rows", drift, DRIFT_BAND)
     for name in run.restart_files:
         worst = float(np.abs(divergence(run, run.restart(name))).max())
-        checks.below(f"divergence from the faces in {name} [1/s]", worst, tolerance)
+        checks.below(f"{here}: divergence from the faces in {name} [1/s]", worst, tolerance)
 
 
 def main(check: Callable[[list[Run]], Checks]) -> None:
