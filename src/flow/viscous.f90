@@ -36,6 +36,7 @@ module viscous_m
     real(wp), allocatable :: leg(:, :, :, :)
       !! conductance of the leg across the lower face [kg/s]
     real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
+    real(wp), allocatable :: inverse(:, :, :, :)    !! of the diagonal, 0: not an unknown [s/kg]
     real(wp), allocatable :: r(:, :, :, :), z(:, :, :, :), s(:, :, :, :), y(:, :, :, :)
     integer :: n_wall = 0                      !! wall legs, grouped by body
     integer, allocatable :: first(:)           !! (bodies + 1)
@@ -64,7 +65,7 @@ contains
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%leg, self%diagonal, self%r, self%z, self%s, self%y, source=self%mass)
+    allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, source=self%mass)
     allocate (self%first(n_bodies + 1), source=1)
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
@@ -104,6 +105,11 @@ contains
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
     self%diagonal = self%diagonal + self%mass
+    where (self%mass > 0.0_wp)
+      self%inverse = 1.0_wp/self%diagonal
+    elsewhere
+      self%inverse = 0.0_wp
+    end where
   end subroutine build_viscous
 
   !> Mass over dt of component d in each cell; zero where the velocity is the wall's.
@@ -418,69 +424,58 @@ contains
     integer, intent(out) :: iterations
     logical, intent(out) :: converged
     real(wp), dimension(6, bodies%n) :: r_body, z_body, s_body, y_body, start
-    real(wp) :: rz, rz_new, alpha, beta, scale, worst
+    real(wp) :: rz, rz_before, alpha, beta, scale
+    real(wp) :: worst   !! largest velocity change that one Jacobi step would make [m/s]
     integer :: b
 
     start = bodies%motion
     s_body = bodies%motion
-    self%s = flow%u
-    call zero_where_wall(self, self%s)
-    call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
-    self%r = self%mass*flow%u - self%y
-    do b = 1, bodies%n
-      r_body(:, b) = inertial_momentum(bodies, b, dt, start(:, b)) - y_body(:, b)
-    end do
     call velocity_scale(flow, bodies, scale)
-    flow%u = self%s
-    rz = 0.0_wp
+    where (self%mass <= 0.0_wp) flow%u = 0.0_wp   ! the wall's; `impose_rigid_velocity` sets them
+    self%s = flow%u
+    call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
+    self%r = self%mass*flow%u
+    do b = 1, bodies%n
+      r_body(:, b) = inertial_momentum(bodies, b, dt, start(:, b))
+    end do
+    call improve(grid, 1.0_wp, self%y, self%r, self%inverse, self%z, worst)
+    r_body = r_body - y_body
+    rz = 1.0_wp
     iterations = 0
     do
-      call precondition()
-      worst = largest_step()
-      converged = worst <= tolerance*scale
+      call precondition_bodies()
+      converged = max(worst, maxval([0.0_wp, abs(z_body(1:3, :))])) <= tolerance*scale
       if (converged .or. iterations == max_iterations) exit
-      rz_new = dot(self%r, self%z) + sum_bodies(r_body, z_body)
-      beta = merge(rz_new/max(rz, tiny(rz)), 0.0_wp, iterations > 0)
-      rz = rz_new
-      self%s = merge(self%z + beta*self%s, self%z, iterations > 0)
-      s_body = merge(z_body + beta*s_body, z_body, iterations > 0)
+      rz_before = rz
+      rz = dot(self%r, self%z) + sum_bodies(r_body, z_body)
+      beta = merge(rz/rz_before, 0.0_wp, iterations > 0)
+      call new_direction(grid, beta, self%z, self%s)
+      s_body = z_body + merge(beta*s_body, 0.0_wp, iterations > 0)
       call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
       alpha = rz/(dot(self%s, self%y) + sum_bodies(s_body, y_body))
-      flow%u = flow%u + alpha*self%s
+      call improve(grid, -alpha, self%s, flow%u)
+      call improve(grid, alpha, self%y, self%r, self%inverse, self%z, worst)
       bodies%motion = bodies%motion + alpha*s_body
-      self%r = self%r - alpha*self%y
       r_body = r_body - alpha*y_body
       iterations = iterations + 1
     end do
     call force_of_legs(bodies, flow, self, force)
   contains
-    !> Divide the residual by the diagonal; bodies by their translational or rotational inertia.
-    subroutine precondition()
+    !> Residual of the bodies over their translational or rotational inertia.
+    subroutine precondition_bodies()
       integer :: b, c
 
-      self%z = self%r/max(self%diagonal, tiny(1.0_wp))
-      call zero_where_wall(self, self%z)
       z_body = 0.0_wp
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
-        do c = 1, 3
-          z_body(c, b) = r_body(c, b)/(bodies%mass(b)/dt + self%body_matrix(c, c, b))
-          z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + self%body_matrix(c &
-              + 3, c + 3, b))
-        end do
+        associate (m => self%body_matrix(:, :, b))
+          do c = 1, 3
+            z_body(c, b) = r_body(c, b)/(bodies%mass(b)/dt + m(c, c))
+            z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + m(c + 3, c + 3))
+          end do
+        end associate
       end do
-    end subroutine precondition
-
-    !> Largest velocity change that one Jacobi step would make [m/s].
-    function largest_step() result(step)
-      real(wp) :: step
-      real(wp) :: m(1)
-
-      m = maxval(abs(self%z))
-      call global_max(m)
-      step = m(1)
-      if (bodies%n > 0) step = max(step, maxval(abs(z_body(1:3, :))))
-    end function largest_step
+    end subroutine precondition_bodies
 
     !> Scalar product over the cells of all processes.
     function dot(a, b) result(total)
@@ -531,13 +526,66 @@ contains
     p(4:6) = matmul(bodies%inertia(:, :, b), motion(4:6))/dt
   end function inertial_momentum
 
-  !> Velocity components that are the wall's are not unknowns.
-  pure subroutine zero_where_wall(self, a)
-    type(viscous_t), intent(in) :: self
-    real(wp), intent(inout) :: a(:, :, :, :)
+  !> x := x - a y on the own cells; with `inverse` also z := x*inverse and the largest |z|.
+  subroutine improve(grid, a, y, x, inverse, z, largest)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: a
+    real(wp), intent(in), contiguous :: y(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: x(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous, optional :: inverse(grid%lo(1) - n_halo:, &
+                                                          grid%lo(2) - n_halo:, &
+                                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous, optional :: z(grid%lo(1) - n_halo:, &
+                                                       grid%lo(2) - n_halo:, &
+                                                       grid%lo(3) - n_halo:, :)
+    real(wp), intent(out), optional :: largest
+    integer :: i, j, k, c
+    real(wp) :: most(1)
 
-    where (self%mass <= 0.0_wp) a = 0.0_wp
-  end subroutine zero_where_wall
+    most = 0.0_wp
+    !$omp parallel do collapse(2) private(i, j) reduction(max: most) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            x(i, j, k, c) = x(i, j, k, c) - a*y(i, j, k, c)
+          end do
+          if (.not. present(inverse)) cycle
+          do i = grid%lo(1), grid%hi(1)
+            z(i, j, k, c) = x(i, j, k, c)*inverse(i, j, k, c)
+            most(1) = max(most(1), abs(z(i, j, k, c)))
+          end do
+        end do
+      end do
+    end do
+    if (.not. present(largest)) return
+    call global_max(most)
+    largest = most(1)
+  end subroutine improve
+
+  !> s := z + beta s on the own cells.
+  subroutine new_direction(grid, beta, z, s)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: beta
+    real(wp), intent(in), contiguous :: z(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: s(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    integer :: i, j, k, c
+
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            s(i, j, k, c) = z(i, j, k, c) + beta*s(i, j, k, c)
+          end do
+        end do
+      end do
+    end do
+  end subroutine new_direction
 
   !> The system applied to velocities x and body motions x_body.
   subroutine apply_viscous(grid, bodies, dt, self, x, x_body, y, y_body)
