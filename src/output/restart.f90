@@ -122,20 +122,25 @@ contains
     type(grid_t), intent(in) :: grid
     type(clock_t), intent(inout) :: clock
     type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(inout) :: solid
+    type(solid_geometry_t), intent(in) :: solid   !! stays: it follows from the poses
     type(blocks_t), intent(inout) :: blocks
     type(contacts_t), intent(inout) :: contacts
     integer, intent(out) :: info   !! 0: read; 1: the file is no good; 2: the case has changed
     character(:), allocatable, intent(out) :: message
     type(reader_t) :: reader
     type(checksum_visitor_t) :: checksum
+    type(solid_geometry_t) :: stored   ! only the shares that the file holds
     character(:), allocatable :: written
 
     written = ''
+    if (allocated(flow%u)) then
+      allocate (stored%alpha, source=solid%alpha)
+      allocate (stored%open, source=solid%open)
+    end if
     associate (file => reader%file)
       call file%open(path, .true., .false.)
       call check_kind(file, parameters, info, message)
-      if (info == 0) call visit_state(reader, grid, clock, flow, solid, blocks, contacts)
+      if (info == 0) call visit_state(reader, grid, clock, flow, stored, blocks, contacts)
       if (info == 0) call file%read_attribute('/', 'checksum', written)
       call file%close()
       if (info /= 0) return
@@ -145,7 +150,7 @@ contains
         return
       end if
     end associate
-    call visit_state(checksum, grid, clock, flow, solid, blocks, contacts)
+    call visit_state(checksum, grid, clock, flow, stored, blocks, contacts)
     if (checksum%sum%text() /= written) then
       info = 1
       message = path//': damaged, its content does not have its checksum'
