@@ -3,20 +3,28 @@
 `test_multigrid` prints one line `solution NAME CELLS ITERATIONS CHECKSUM` for each of its systems.
 """
 
+import os
 import subprocess
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-BUILD = Path(__file__).parents[1] / "build"
+from run_cases import MPI_SETTINGS, ROOT
+
+BUILD = ROOT / "build"
 
 
 @cache
 def solutions(*command: str) -> list[str]:
     """The lines of a run of the program."""
     done = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300, check=True
+        command,
+        env={**os.environ, **MPI_SETTINGS},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
     )
     return [line for line in done.stdout.splitlines() if line.startswith("solution ")]
 

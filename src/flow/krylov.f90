@@ -17,14 +17,15 @@ module krylov_m
 
   integer, parameter :: solved = 0          !! the residual is small enough
   integer, parameter :: not_converged = 1   !! stopped after `max_it` iterations
-  integer, parameter :: broken_down = 2     !! matrix or preconditioner not positive, or not a number
+  integer, parameter :: broken_down = 2     !! matrix or preconditioner not positive, or NaN
 
   integer, parameter :: worth_threads = 8192   !! fewer cells are the work of one thread
 
   !> Arrays of the solvers, own cells and one halo cell; allocated once.
   type :: krylov_work_t
-    real(wp), allocatable, dimension(:, :, :) :: r, z, p, q   !! residual, M r or M s, direction, A p
-    real(wp), allocatable, dimension(:, :, :) :: shadow, y, t !! first residual, M p, A M s; BiCGSTAB only
+    real(wp), allocatable, dimension(:, :, :) :: r, z   !! residual, M r
+    real(wp), allocatable, dimension(:, :, :) :: p, q   !! direction, A p or A M p
+    real(wp), allocatable, dimension(:, :, :) :: shadow, y, t   !! BiCGSTAB: first r, M p, A M r
     logical :: singular = .false.                !! constants are in the null space of the operator
     real(wp), allocatable :: is_open(:, :, :)    !! 1 in own cells with an open face, else 0
     real(wp) :: n_open = 0.0_wp                  !! cells of all processes with an open face
@@ -99,7 +100,7 @@ contains
     real(wp), intent(out) :: residual                   !! max |r| at the end
     integer, intent(out) :: info                        !! one of the codes above
     type(krylov_work_t), intent(inout) :: work
-    real(wp), intent(in), optional :: relative          !! stop also at max |r| <= relative*max |r_0|
+    real(wp), intent(in), optional :: relative          !! ... or at max |r| <= relative*max |r_0|
     real(wp) :: bound, rz, rz_before, pq
 
     call first_residual(op, b, x, work, residual)
@@ -134,7 +135,7 @@ contains
   !> Solve A x = b for any regular A; two products with A and M per iteration.
   !!
   !! Source: van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992), preconditioned from the right.
-  !! When the residual is nearly orthogonal to its shadow, the iteration starts again from where it is.
+  !! When the residual is nearly orthogonal to its shadow, the iteration starts again where it is.
   subroutine bicgstab(op, prec, b, x, tol, max_it, its, residual, info, work, relative)
     class(linear_operator_t), intent(inout) :: op
     class(preconditioner_t), intent(inout) :: prec
@@ -146,7 +147,7 @@ contains
     real(wp), intent(out) :: residual                   !! max |r| at the end
     integer, intent(out) :: info                        !! one of the codes above
     type(krylov_work_t), intent(inout) :: work
-    real(wp), intent(in), optional :: relative          !! stop also at max |r| <= relative*max |r_0|
+    real(wp), intent(in), optional :: relative          !! ... or at max |r| <= relative*max |r_0|
     real(wp), parameter :: orthogonal = 1.0e-14_wp      !! cosine of vectors at a right angle
     real(wp) :: bound, alpha, omega, rho, rho_before, norms(2), sums(2), p_max
     logical :: fresh   !! the iteration starts at the residual at hand

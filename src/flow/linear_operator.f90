@@ -25,6 +25,7 @@ module linear_operator_m
     !> y = A x on the own cells.
     subroutine apply_operator_i(self, x, y)
       import :: linear_operator_t, wp
+      implicit none
       class(linear_operator_t), intent(inout) :: self
       real(wp), intent(inout), contiguous :: x(:, :, :)   !! its halo is filled here
       real(wp), intent(inout), contiguous :: y(:, :, :)
@@ -33,6 +34,7 @@ module linear_operator_m
     !> z = M r on the own cells, with M near the inverse of A, symmetric and positive.
     subroutine apply_preconditioner_i(self, r, r_max, z)
       import :: preconditioner_t, wp
+      implicit none
       class(preconditioner_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: r(:, :, :)
       real(wp), intent(in) :: r_max   !! largest |r| of all processes, > 0

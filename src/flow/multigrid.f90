@@ -1,9 +1,10 @@
 !> Geometric multigrid as a preconditioner: one symmetric V(2,2)-cycle in single precision.
 !!
-!! Cells are joined by two in every direction whose spacing is within `alike` of the smallest, down to
-!! one cell; an odd number of cells leaves a last cell of half the size, with its true centre distance.
-!! Transfers are piecewise constant: sums down, copies up. Red-black Gauss-Seidel, colours taken in
-!! reversed order after the coarse correction, so the cycle is a symmetric matrix.
+!! Cells are joined by two in every direction whose spacing is within `alike` of the smallest, down
+!! to one cell; an odd number of cells leaves a last cell of half the size, with its true centre
+!! distance. Coefficients of a coarse face are sums over its finer faces times the ratio of centre
+!! distances, transfers are piecewise constant: sums down, copies up. Red-black Gauss-Seidel with
+!! the colours in reversed order after the coarse correction, so the cycle is a symmetric matrix.
 !!
 !! Finer levels stay on the processes as long as their blocks begin at odd cells and hold more than
 !! two; the first level where this ends is put together on every process and solved there, with the
@@ -13,18 +14,18 @@ module multigrid_m
   use kinds_m, only: wp, sp
   use grid_m, only: grid_t
   use linear_operator_m, only: preconditioner_t
-  use multigrid_level_m, only: level_t, level_init, set_equations, coarsen_coefficients, load_line, &
-    unload_line, relax_plane, restrict_plane, prolong_plane, fill_halo
+  use multigrid_level_m, only: level_t, level_init, set_equations, coarsen_coefficients, &
+    load_line, unload_line, relax_plane, restrict_plane, prolong_plane, fill_halo
   use parallel_m, only: nproc, global_max, global_min, gather_all
   implicit none
   private
   public :: multigrid_t
 
-  real(wp), parameter :: alike = 1.9_wp         !! spacings that differ by less are coarsened together
-  integer, parameter :: worth_threads = 4000    !! cells of a level from which threads share it
-  integer, parameter :: down(3) = [1, 0, 1]     !! colours before the coarse correction; the first, 0, is
-                                                !! done when the right side is loaded
-  integer, parameter :: up(4) = [1, 0, 1, 0]    !! colours after it
+  real(wp), parameter :: alike = 1.9_wp        !! ratio of spacings that are coarsened together
+  integer, parameter :: worth_threads = 4000   !! cells of a level from which threads share it
+  integer, parameter :: down(3) = [1, 0, 1]    !! colours of the half sweeps before the coarse
+                                               !! correction; loading the right side is the first, 0
+  integer, parameter :: up(4) = [1, 0, 1, 0]   !! colours after it
 
   !> The planes of a level that a thread works on.
   type :: team_t
@@ -102,14 +103,14 @@ contains
     end where
   end subroutine join
 
-  !> Sizes, neighbours and arrays of level l; widths become those of the next level.
+  !> Sizes, neighbours and arrays of level l; widths and the own part become those of the next.
   subroutine plan_level(grid, n, h, width, l, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n(3), l
     real(wp), intent(in) :: h(3)
     real(wp), intent(inout) :: width(:, :)   !! (cell, d) [m]
     class(multigrid_t), intent(inout) :: self
-    integer :: d, a(3), b(3)
+    integer :: d
 
     associate (level => self%level(l))
       level%n = n
@@ -118,39 +119,43 @@ contains
       level%alone = grid%periodic .and. n == 1
       level%seam = any(level%wraps .and. modulo(n, 2) == 1)
       if (self%gathered == 0) then
-        if (self%in_parts) level%spread = can_be_spread(level, self%part_lo, self%part_hi)
-        if (.not. level%spread) self%gathered = l
+        if (self%in_parts) level%in_parts = can_be_in_parts(level, self%part_lo, self%part_hi)
+        if (.not. level%in_parts) self%gathered = l
       end if
-      level%lo = merge(self%part_lo, 1, level%spread)
-      level%hi = merge(self%part_hi, n, level%spread)
-      level%talks = level%wraps .or. (level%spread .and. .not. (grid%at_side(1, :) .and. grid%at_side(2, :)))
+      level%lo = merge(self%part_lo, 1, level%in_parts)
+      level%hi = merge(self%part_hi, n, level%in_parts)
+      level%talks = level%wraps &
+        .or. (level%in_parts .and. .not. (grid%at_side(1, :) .and. grid%at_side(2, :)))
       level%many = product(real(level%hi - level%lo + 1, wp)) >= worth_threads
       allocate (level%ratio(maxval(n) + 1, 3), source=1.0_wp)
       do d = 1, 3
         if (level%paired(d)) call join_widths(n(d), level%wraps(d), width(:, d), level%ratio(:, d))
       end do
-      a = level%lo
-      b = level%hi
-      if (l > 1 .or. gathers(self, l)) then
-        allocate (level%f(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_sp)
-        allocate (level%cf(a(1) - 1:b(1) + 1, a(2) - 1:b(2) + 1, a(3) - 1:b(3) + 1, 3), source=0.0_wp)
-      end if
-      a = self%part_lo
-      b = self%part_hi
+      if (l > 1 .or. gathers(self, l)) call allocate_system(level%lo, level%hi, level%f, level%cf)
       if (gathers(self, l)) then
-        allocate (self%part(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_sp)
-        allocate (self%part_cf(a(1) - 1:b(1) + 1, a(2) - 1:b(2) + 1, a(3) - 1:b(3) + 1, 3), source=0.0_wp)
-      else if (level%spread) then
-        where (level%paired)
-          self%part_lo = (a + 1)/2
-          self%part_hi = (b + 1)/2
-        end where
+        call allocate_system(self%part_lo, self%part_hi, self%part, self%part_cf)
+      else
+        self%part_lo = merge((self%part_lo + 1)/2, self%part_lo, level%paired .and. level%in_parts)
+        self%part_hi = merge((self%part_hi + 1)/2, self%part_hi, level%paired .and. level%in_parts)
       end if
     end associate
   end subroutine plan_level
 
+  !> Arrays for a right side and coefficients of some cells.
+  subroutine allocate_system(lo, hi, f, cf)
+    integer, intent(in) :: lo(3), hi(3)
+    real(sp), allocatable, intent(out) :: f(:, :, :)
+    real(wp), allocatable, intent(out) :: cf(:, :, :, :)
+    integer :: a(3), b(3)
+
+    a = lo - 1
+    b = hi + 1
+    allocate (f(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3)), source=0.0_sp)
+    allocate (cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+  end subroutine allocate_system
+
   !> May the level stay on the processes? All give the same answer.
-  function can_be_spread(level, lo, hi) result(can)
+  function can_be_in_parts(level, lo, hi) result(can)
     type(level_t), intent(in) :: level
     integer, intent(in) :: lo(3), hi(3)   !! block of this process
     logical :: can
@@ -162,7 +167,7 @@ contains
     yes = merge(1.0_wp, 0.0_wp, can)
     call global_min(yes)
     can = yes(1) > 0.0_wp
-  end function can_be_spread
+  end function can_be_in_parts
 
   !> Is level l put together from the blocks of many processes?
   pure logical function gathers(self, l)
@@ -177,7 +182,7 @@ contains
     integer, intent(in) :: n                   !! cells of this level
     logical, intent(in) :: wraps
     real(wp), intent(inout) :: width(:)        !! of the cells of this, then of the next level [m]
-    real(wp), intent(inout) :: ratio(:)        !! (coarse face) distance on this level to that on the next
+    real(wp), intent(inout) :: ratio(:)        !! (coarse face) distance here to that on the next
     integer :: i, n_next
 
     n_next = (n + 1)/2
@@ -191,7 +196,7 @@ contains
       ratio(i) = ratio(i)/distance(i, n_next)
     end do
   contains
-    !> Distance of the centres beside lower face i of m cells; half a cell at the sides of the domain.
+    !> Distance of the centres beside lower face i of m cells; half a cell at sides of the domain.
     pure real(wp) function distance(i, m)
       integer, intent(in) :: i, m
 
@@ -409,9 +414,10 @@ contains
     real(wp), intent(in) :: factor   !! back to the size of the unknown
     real(wp), intent(inout), contiguous :: z(self%lo(1) - 1:, self%lo(2) - 1:, self%lo(3) - 1:)
     real(sp) :: line(2*(self%level(l)%z(1) - self%level(l)%a(1) - 1))
-    integer :: j, k, first, last, low(3), high(3)
+    integer :: j, k, first, last, low(3), high(3), offset
 
     associate (level => self%level(l), lo => self%lo, hi => self%hi)
+      offset = 1 - level%lo(1)
       low = merge(lo, level%lo, l == 1)
       high = merge(hi, level%hi, l == 1)
       call my_planes(crew, low(3), high(3), first, last)
@@ -419,7 +425,7 @@ contains
         do j = low(2), high(2)
           call unload_line(level, line, j, k)
           if (l == 1) then
-            z(lo(1):hi(1), j, k) = factor*real(line(lo(1) - level%lo(1) + 1:hi(1) - level%lo(1) + 1), wp)
+            z(lo(1):hi(1), j, k) = factor*real(line(offset + lo(1):offset + hi(1)), wp)
           else
             level%f(:, j, k) = line(:high(1) - low(1) + 1)
           end if

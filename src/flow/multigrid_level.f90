@@ -1,13 +1,13 @@
 !> One grid of the multigrid cycle: its coefficients and the loops over its cells.
 !!
-!! The equation of a level is scaled by its diagonal D from both sides, so that its own diagonal is
-!! one. With $$ \hat x = D^{1/2} x, \quad \hat b = D^{-1/2} b $$ the Gauss-Seidel update of a cell is
-!! $$ \hat x_c = \hat b_c + \sum_f \hat c_f \hat x_{nb} $$ in single precision.
+!! The equation of a level is scaled by its diagonal D from both sides, so that its own diagonal
+!! is one. With $$ \hat x = D^{1/2} x, \quad \hat b = D^{-1/2} b $$ the Gauss-Seidel update of a
+!! cell is $$ \hat x_c = \hat b_c + \sum_f \hat c_f \hat x_{nb} $$ in single precision.
 !!
 !! Cells i = 2p-1 and i = 2p of a line in x form pair p. Arrays hold (p, m, j, k) with m = 1 for the
 !! odd and m = 2 for the even cell, so the cells of one colour of a line lie side by side: colour 0
-!! is m = 1 in lines with even j+k and m = 2 in the others. Lines are filled up with empty pairs to a
-!! multiple of eight. All indices are global, so the colours do not depend on the processes.
+!! is m = 1 in lines with even j+k and m = 2 in the others. Lines are filled up with empty pairs to
+!! a multiple of eight. All indices are global, so the colours do not depend on the processes.
 module multigrid_level_m
   use kinds_m, only: wp, sp
   use parallel_m, only: halo_exchange
@@ -21,7 +21,7 @@ module multigrid_level_m
   type :: level_t
     integer :: n(3) = 0                !! cells of the whole level
     integer :: lo(3) = 1, hi(3) = 0    !! first and last cell held here
-    logical :: spread = .false.        !! each process holds its block; else each holds all cells
+    logical :: in_parts = .false.      !! each process holds its block; else each holds all cells
     logical :: wraps(3) = .false.      !! periodic, with more than one cell
     logical :: alone(3) = .false.      !! periodic with one cell, which is its own neighbour
     logical :: talks(3) = .false.      !! halo cells have to be filled
@@ -29,10 +29,10 @@ module multigrid_level_m
     logical :: paired(3) = .false.     !! directions in which two cells make one of the next level
     logical :: many = .false.          !! cells enough for several threads
     integer :: a(3) = 1, z(3) = 0      !! bounds of the arrays over (p, j, k)
-    real(wp), allocatable :: ratio(:, :)      !! (coarse face, d) centre distance here to that of the next level
-    real(wp), allocatable :: cf(:, :, :, :)   !! coefficients of the lower faces; not on the finest level
+    real(wp), allocatable :: ratio(:, :)      !! (coarse face, d) centre distance to the next level's
+    real(wp), allocatable :: cf(:, :, :, :)   !! coefficients of the lower faces; not on the finest
     real(sp), allocatable :: f(:, :, :)       !! cells lo:hi, right side, later the correction
-    real(sp), allocatable :: c(:, :, :, :, :) !! scaled coefficients of the lower faces, (p, m, j, k, d)
+    real(sp), allocatable :: c(:, :, :, :, :) !! scaled coefficients, (p, m, j, k, d)
     real(sp), allocatable :: x(:, :, :, :)    !! scaled unknown
     real(sp), allocatable :: b(:, :, :, :)    !! scaled right side
     real(sp), allocatable :: s(:, :, :, :)    !! D**(-1/2), zero in closed cells
@@ -86,7 +86,7 @@ contains
     real(wp), intent(in), contiguous :: cf(self%lo(1) - 1:, self%lo(2) - 1:, self%lo(3) - 1:, :)
     real(wp), intent(in) :: unit
     integer, intent(in) :: k
-    real(sp), parameter :: least = 1.0e-30_sp   !! diagonal of an open cell, so that no root overflows
+    real(sp), parameter :: least = 1.0e-30_sp   !! diagonal of open cells: no root overflows
     real(wp) :: w(3)
     real(sp) :: diagonal, root
     integer :: p, m, i, j
@@ -183,7 +183,7 @@ contains
             select case (d)
             case (1); line = line*fine%ratio(lo(1):last, 1)
             case (2); line = line*fine%ratio(j, 2)
-            case (3); line = line*fine%ratio(k, 3)
+            case default; line = line*fine%ratio(k, 3)
             end select
           end associate
         end do
@@ -296,7 +296,8 @@ contains
       !$omp simd
       do p = a(1) + 1, z(1) - 1
         x(p, m, j, k) = b(p, m, j, k) &
-          + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
+          + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
+          + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
           + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
           + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1)
       end do
@@ -321,9 +322,10 @@ contains
     end do
   end subroutine add_residual
 
-  !> Right side of the next level in its plane `kc`: sums of the residuals of the cells it is made of.
+  !> Right side of the next level in its plane `kc`: sums of the residuals of the finer cells.
   !!
-  !! The cells of colour 1 were relaxed last and have no residual, unless cells of equal colour touch.
+  !! The cells of colour 1 were relaxed last and have no residual, unless cells of equal colour
+  !! touch.
   subroutine restrict_plane(self, kc, lo, hi, f)
     type(level_t), intent(in) :: self
     integer, intent(in) :: kc
@@ -390,7 +392,7 @@ contains
     real(sp), intent(inout) :: x(self%a(1):self%z(1), 2, self%a(2):self%z(2), self%a(3):self%z(3))
 
     if (self%talks(1)) call fill_ends(self, x)
-    if (self%spread) then
+    if (self%in_parts) then
       call exchange(x, [2*(self%z(1) - self%a(1) + 1), self%z(2:3) - self%a(2:3) + 1])
     else
       if (self%wraps(2)) then
@@ -424,7 +426,7 @@ contains
 
     first = self%a(1) + 1
     last = (self%hi(1) + 1)/2
-    if (self%spread) then
+    if (self%in_parts) then
       self%edge(2, :, :, :) = x(first, :, :, :)
       self%edge(3, :, :, :) = x(last, :, :, :)
       call exchange(self%edge, [4, 2*(self%z(2) - self%a(2) + 1), self%z(3) - self%a(3) + 1])

@@ -23,10 +23,10 @@ module linear_systems_m
     procedure :: apply => apply_faces
   end type face_operator_t
 
-  integer, parameter :: n_blocks = 7, samples = 4   !! blocks in the tank; points per edge of a face
+  integer, parameter :: n_blocks = 7, samples = 4   !! blocks in the tank, points per edge of a face
   real(wp), parameter :: edge = 0.02_wp             !! of the seven cubes of a block [m]
-  real(wp), parameter :: place(3, n_blocks) = 0.01_wp*reshape([5, 5, 3, 15, 5, 3, 24, 6, 3, 10, 4, 6, &
-    20, 6, 7, 14, 5, 10, 23, 4, 13], [3, n_blocks])   !! centres [m]
+  real(wp), parameter :: place(3, n_blocks) = 0.01_wp*reshape([5, 5, 3, 15, 5, 3, 24, 6, 3, &
+    10, 4, 6, 20, 6, 7, 14, 5, 10, 23, 4, 13], [3, n_blocks])   !! centres [m]
 
 contains
 
@@ -71,8 +71,9 @@ contains
           do i = grid%lo(1), grid%hi(1) + e(1)
             w = open_share(grid, turn, face_of(wrapped(grid, [i, j, k]), d), d)
             number = number_of(grid, [i, j, k], d)
-            if (w > 0.0_wp .and. w < 1.0_wp .and. uniform(2, 1, number) < 0.1_wp) &
+            if (w > 0.0_wp .and. w < 1.0_wp .and. uniform(2, 1, number) < 0.1_wp) then
               w = 10.0_wp**(-9*uniform(2, 2, number))
+            end if
             op%open(i, j, k, d) = w
             op%cf(i, j, k, d) = w*grid%area(d)/(grid%h(d)*0.5_wp*(density(grid, [i, j, k]) &
               + density(grid, [i, j, k] - e)))
@@ -250,7 +251,8 @@ contains
 
       i = wrapped(grid, c)
       x = pi*grid%centre(i, [1, 2, 3])/grid%length
-      flux = sum(cos(x*[2, 1, 3]))*cos(2*x(1) + x(2) - x(3)) + uniform(3, d, number_of(grid, i, d)) - 0.5_wp
+      flux = sum(cos(x*[2, 1, 3]))*cos(2*x(1) + x(2) - x(3)) - 0.5_wp
+      flux = flux + uniform(3, d, number_of(grid, i, d))
       flux = flux*op%open(c(1), c(2), c(3), d)*grid%area(d)
     end function flux
   end subroutine set_right_side

@@ -116,8 +116,8 @@ contains
       system%x = 0.0_wp
       call solve(method, prec, 0.0_wp, 1.0e-11_wp, 5000, system)
       call check('end of '//trim(method_name(method))//', '//name, system%info, solved)
-      call check(trim(method_name(method))//', '//name, energy_error(system%grid, dense, system%x), &
-        0.0_wp, 1.0e-8_wp)
+      call check(trim(method_name(method))//', '//name, &
+        energy_error(system%grid, dense, system%x), 0.0_wp, 1.0e-8_wp)
     end do
   end subroutine both_methods
 
@@ -271,7 +271,8 @@ contains
       call check('goes on from a first guess', system%info == solved .and. system%residual <= small)
       y = system%b
       call system%op%apply(system%x, y)
-      call check('the residual is that of the solution', norm(system%b - y) <= 1.01_wp*small*sqrt(720.0_wp))
+      call check('the residual is that of the solution', &
+        norm(system%b - y) <= 1.01_wp*small*sqrt(720.0_wp))
       call solve(method, multigrid, 1.01_wp*small, 0.0_wp, 100, system)
       call check('nothing left to do', system%info == solved .and. system%its == 0)
       system%b = 0.0_wp
@@ -308,8 +309,8 @@ contains
     call check('solution without a mean', exact_dot(system%x, system%work%is_open, 1), 0.0_wp, &
       1.0e-11_wp*norm(system%x))
     call system%op%apply(system%x, system%work%q)
-    call check('solves but for the mean', norm(system%b - mean*system%work%is_open - system%work%q), &
-      0.0_wp, 1.0e-8_wp*norm(system%b))
+    call check('solves but for the mean', &
+      norm(system%b - mean*system%work%is_open - system%work%q), 0.0_wp, 1.0e-8_wp*norm(system%b))
     call make_system([10, 6, 12], unit_box, 'open', walls, 7, system)
     call find_null_space(system%grid, system%op%cf, system%work)
     call check('open box is not singular', .not. system%work%singular)
