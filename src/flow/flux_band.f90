@@ -28,6 +28,7 @@ module flux_band_m
     integer, allocatable :: at(:)            !! place in the arrays above with their halo, from 1
     real(wp), allocatable :: r(:)            !! volume balance of the cell [V]
     real(wp), allocatable :: diagonal(:)     !! sum of the conductances of its faces
+    real(wp), allocatable :: open(:)         !! its open volume at the end of the step [V]
     real(wp), allocatable :: s(:), phi(:), terms(:)   !! work of the solver
     integer, allocatable :: root(:), group(:), order(:), spare(:)
 
@@ -36,9 +37,10 @@ module flux_band_m
     integer, allocatable :: first(:)         !! (2 parts + 1)
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
     integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
-    integer(i8), allocatable :: count(:)     !! (2 parts) cells, and cells at an open side
+    integer(i8), allocatable :: vents(:)     !! (parts) cells at an open side
     integer(i8), allocatable :: bins(:, :)
-    real(wp), allocatable :: total(:), before(:), largest(:)
+    real(wp), allocatable :: total(:)        !! (2 parts) sums of r, then of the open volume [V]
+    real(wp), allocatable :: energy(:), before(:), largest(:)
     logical, allocatable :: active(:)        !! (parts) still to be solved
   end type flux_band_t
 
@@ -67,40 +69,42 @@ contains
     type(flux_band_t), intent(inout) :: self
 
     allocate (self%at(n), self%root(n), self%group(n), self%order(n), self%spare(n))
-    allocate (self%r(n), self%s(n), self%phi(n), self%diagonal(n), self%terms(n))
+    allocate (self%r(n), self%s(n), self%phi(n), self%diagonal(n), self%open(n), self%terms(n))
   end subroutine allocate_lists
 
   subroutine allocate_parts(n, self)
     integer, intent(in) :: n
     type(flux_band_t), intent(inout) :: self
 
-    allocate (self%first(2*n + 1), self%home(n), self%count(2*n), self%bins(bin_size, n))
-    allocate (self%total(n), self%before(n), self%largest(n), self%active(n))
+    allocate (self%first(2*n + 1), self%home(n), self%vents(n), self%bins(bin_size, 2*n))
+    allocate (self%total(2*n), self%energy(n), self%before(n), self%largest(n), self%active(n))
   end subroutine allocate_parts
 
   !> Twice the room in the lists, the entries kept.
   subroutine grow_lists(self)
     type(flux_band_t), intent(inout) :: self
     integer, allocatable :: at(:)
-    real(wp), allocatable :: r(:), diagonal(:)
+    real(wp), allocatable :: r(:), diagonal(:), open(:)
     integer :: n
 
     n = self%n
     call move_alloc(self%at, at)
     call move_alloc(self%r, r)
     call move_alloc(self%diagonal, diagonal)
+    call move_alloc(self%open, open)
     deallocate (self%root, self%group, self%order, self%spare, self%s, self%phi, self%terms)
     call allocate_lists(2*n, self)
     self%at(1:n) = at(1:n)
     self%r(1:n) = r(1:n)
     self%diagonal(1:n) = diagonal(1:n)
+    self%open(1:n) = open(1:n)
   end subroutine grow_lists
 
   !> Append a cell to the list; call in the order of the grid.
-  subroutine add_cell(grid, cell, r, diagonal, self)
+  subroutine add_cell(grid, cell, r, diagonal, open, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: cell(3)
-    real(wp), intent(in) :: r, diagonal
+    real(wp), intent(in) :: r, diagonal, open
     type(flux_band_t), intent(inout) :: self
 
     if (self%n == size(self%at)) call grow_lists(self)
@@ -109,6 +113,7 @@ contains
     self%at(self%n) = place(grid, cell)
     self%r(self%n) = r
     self%diagonal(self%n) = diagonal
+    self%open(self%n) = open
   end subroutine add_cell
 
   !> Place of a cell in the arrays with one halo cell, counted from 1.
@@ -288,8 +293,8 @@ contains
     call global_sum(self%held)
     self%parts = int(sum(self%held))
     if (self%parts > size(self%home)) then
-      deallocate (self%first, self%home, self%count, self%bins)
-      deallocate (self%total, self%before, self%largest, self%active)
+      deallocate (self%first, self%home, self%vents, self%bins)
+      deallocate (self%total, self%energy, self%before, self%largest, self%active)
       call allocate_parts(2*self%parts, self)
     end if
     self%home(1:self%parts) = 0_i8
@@ -380,26 +385,31 @@ contains
     self%at(1:self%n) = self%spare(1:self%n)
     self%r(1:self%n) = self%terms(1:self%n)
     self%diagonal(1:self%n) = self%s(1:self%n)
+    do l = 1, self%n
+      self%s(l) = self%open(self%order(l))
+    end do
+    self%open(1:self%n) = self%s(1:self%n)
   end subroutine sort_by_group
 
-  !> Cells, cells at an open side and the sum of r of each part over all processes.
+  !> Cells at an open side, sum of r and sum of the open volume of each part, over all processes.
   subroutine sum_by_part(grid, self)
     type(grid_t), intent(in) :: grid
     type(flux_band_t), intent(inout) :: self
     integer :: c, l, n
 
     n = self%parts
-    self%count(1:2*n) = 0_i8
+    self%vents(1:n) = 0_i8
     do c = 1, n
-      self%count(c) = int(self%first(2*c + 1) - self%first(2*c - 1), i8)
       do l = self%first(2*c - 1), self%first(2*c + 1) - 1
-        if (at_open_side(cell_at(grid, self%at(l)))) self%count(n + c) = self%count(n + c) + 1_i8
+        if (at_open_side(cell_at(grid, self%at(l)))) self%vents(c) = self%vents(c) + 1_i8
       end do
       self%bins(:, c) = no_terms
+      self%bins(:, n + c) = no_terms
       call exact_add(self%r(self%first(2*c - 1):self%first(2*c + 1) - 1), self%bins(:, c))
+      call exact_add(self%open(self%first(2*c - 1):self%first(2*c + 1) - 1), self%bins(:, n + c))
     end do
-    call global_sum(self%count(1:2*n))
-    call exact_totals(self%bins(:, 1:n), self%total(1:n))
+    call global_sum(self%vents(1:n))
+    call exact_totals(self%bins(:, 1:2*n), self%total(1:2*n))
   contains
     !> Can this cell exchange through an open side of the domain?
     logical function at_open_side(c)

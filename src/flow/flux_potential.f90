@@ -97,12 +97,12 @@ contains
       end do
       call exact_add(band%terms(band%first(2*c):band%first(2*c + 1) - 1), band%bins(:, c))
     end do
-    call exact_totals(band%bins(:, 1:band%parts), band%total(1:band%parts))
+    call exact_totals(band%bins(:, 1:band%parts), band%energy(1:band%parts))
     do c = 1, band%parts
       if (.not. band%active(c)) cycle
       step = 0.0_wp
-      if (.not. start) step = band%total(c)/band%before(c)
-      band%before(c) = band%total(c)
+      if (.not. start) step = band%energy(c)/band%before(c)
+      band%before(c) = band%energy(c)
       call turn(band%first(2*c), band%first(2*c + 1) - 1, band%at, band%r, band%diagonal, step, &
                 size(band%p), band%p)
     end do
@@ -138,12 +138,12 @@ contains
         call exact_add(band%terms(a:b), band%bins(:, c))
       end associate
     end do
-    call exact_totals(band%bins(:, 1:band%parts), band%total(1:band%parts))
+    call exact_totals(band%bins(:, 1:band%parts), band%energy(1:band%parts))
     do c = 1, band%parts
       if (.not. band%active(c)) cycle
-      band%active(c) = band%total(c) > 0.0_wp   ! else nothing is left but round-off
+      band%active(c) = band%energy(c) > 0.0_wp   ! else nothing is left but round-off
       if (.not. band%active(c)) cycle
-      call move(band%first(2*c), band%first(2*c + 1) - 1, band%at, band%before(c)/band%total(c), &
+      call move(band%first(2*c), band%first(2*c + 1) - 1, band%at, band%before(c)/band%energy(c), &
                 size(band%p), band%p, band%s, band%phi, band%r, band%largest(c))
     end do
   end subroutine advance

@@ -37,6 +37,7 @@ module liquid_transport_m
 
   real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
   real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
+  real(wp), parameter :: immobile = 1.0e-14_wp      !! share of liquid or gas that does not move
   real(wp), parameter :: closed_volume = 1.0e-12_wp !! open volume of a closed cell [V]
   integer, parameter :: max_late_iterations = 1000
 
@@ -276,7 +277,8 @@ contains
     call fill_scalar_halo(grid, self%c)
   end subroutine sweep
 
-  !> Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit.
+  !> Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit. Rests at
+  !! round-off of liquid in gas or of gas in liquid stay where they are instead of spreading.
   subroutine mixed_outflow(grid, d, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d
@@ -290,6 +292,8 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           share = self%w(i, j, k)/merge(self%v(i, j, k), 1.0_wp, self%v(i, j, k) > 0.0_wp)
+          if (share < immobile) share = 0.0_wp
+          if (share > 1.0_wp - immobile) share = 1.0_wp
           self%out_low(i, j, k) = max(-self%q(i, j, k, d), 0.0_wp)*share
           self%out_high(i, j, k) = max(self%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp)*share
         end do

@@ -5,11 +5,10 @@
 !! The flux of the projected velocity fits to the order of the step only. The rest r is taken away
 !! by `Q_f := Q_f - k_f (phi_up - phi_low)` with `sum_f k_f (phi_c - phi_nb) = r_c` on the band of
 !! cells that a body cuts before or after the step and one ring around; k is the open area in the
-!! mean of the step. Each connected part of the band keeps its own mean of r (rounding, and in
-!! sealed pockets a volume that has nowhere to go) unless it reaches an open side, where it may
-!! exchange. With the carried volume Vt on the right the errors of one step are made good by the
-!! next.
-!!
+!! mean of the step. What the r of a connected part of the band sum up to (rounding; the volume
+!! that has nowhere to go in a sealed pocket; bodies that overlap) stays in its cells as an equal
+!! share of their open volume, unless the part reaches an open side, where it may exchange. With the
+!! carried volume Vt on the right the errors of one step are made good by the next.
 module open_flux_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo, unit_step, side_open, side_outflow
@@ -172,29 +171,33 @@ contains
           outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
                     + (q(i, j, k + 1, 3) - q(i, j, k, 3))
           room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
-          call add_cell(grid, [i, j, k], (room_left - outflow)/grid%volume, diagonal, band)
+          call add_cell(grid, [i, j, k], (room_left - outflow)/grid%volume, diagonal, &
+                        1.0_wp - new%alpha(i, j, k), band)
         end do
       end do
     end do
   end subroutine list_band
 
-  !> Take the mean of r out of each part without an open side; parts that balance then need no
-  !! solution.
+  !> What the balances of a part without an open side sum up to is taken out of its cells in
+  !! proportion to their open volume, so that closing cells still empty. Parts that balance then
+  !! need no solution.
   subroutine balance_parts(grid, self)
     type(grid_t), intent(in) :: grid
     type(open_flux_t), intent(inout) :: self
     integer :: c, l
-    real(wp) :: mean
+    real(wp) :: share
 
     associate (band => self%band)
       call sum_by_part(grid, band)
       do c = 1, band%parts
-        mean = 0.0_wp
-        if (band%count(band%parts + c) == 0_i8) mean = band%total(c)/real(band%count(c), wp)
-        self%unmatched = max(self%unmatched, abs(mean))
+        share = 0.0_wp
+        if (band%vents(c) == 0_i8) then
+          share = band%total(c)/max(band%total(band%parts + c), tiny(share))
+        end if
+        self%unmatched = max(self%unmatched, abs(share))
         band%largest(c) = 0.0_wp
         do l = band%first(2*c - 1), band%first(2*c + 1) - 1
-          band%r(l) = band%r(l) - mean
+          band%r(l) = band%r(l) - share*band%open(l)
           band%largest(c) = max(band%largest(c), abs(band%r(l)))
         end do
       end do

@@ -2,7 +2,7 @@
 program test_liquid_transport
   use kinds_m, only: wp, pi
   use case_types_m, only: case_t, fluid_t, water_t
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t, n_halo, side_slip
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
@@ -29,6 +29,7 @@ program test_liquid_transport
   call box_through_the_surface()
   call box_leaves_through_the_top()
   call hexapod_through_the_surface()
+  call no_way_out()
   call still_water()
   call two_basins()
   call finish_checks()
@@ -389,6 +390,39 @@ contains
     call check('box leaves: room', worst, 0.0_wp, 2.0e-12_wp)
     call check('box leaves: no liquid through the top', flow%liquid_inflow, 0.0_wp, 0.0_wp)
   end subroutine box_leaves_through_the_top
+
+  !> A box swells in a closed tank: the volume has nowhere to go, yet no liquid is lost, all bounds
+  !! hold and the cells that close give all they had.
+  subroutine no_way_out()
+    type(grid_t) :: grid
+    type(solid_geometry_t) :: old, new
+    type(flow_t) :: flow
+    type(liquid_transport_t) :: transport
+    real(wp) :: low(3, 1), high(3, 1), before, bound, held
+    type(fluid_t) :: fluid
+    integer :: step
+
+    fluid%water_level = 0.1013_wp
+    call box_at(place(0.0_wp), half, low, high)
+    call start(tank_cells, tank, walls, low, high, fluid, [water_t ::], grid, old, new, flow, &
+               transport)
+    grid%side(2, 3) = side_slip
+    before = liquid_volume(grid, flow%liquid)
+    bound = 0.0_wp
+    held = 0.0_wp
+    do step = 1, 8
+      call set_boxes(grid, low, high, old)
+      call box_at(place(0.0_wp), half + 0.002_wp*real(step, wp), low, high)
+      call set_boxes(grid, low, high, new)
+      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
+      bound = max(bound, out_of_bounds(grid, flow))
+      held = max(held, abs(transport%held)/grid%volume)
+    end do
+    call check('no way out: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, 1.0e-14_wp)
+    call check('no way out: bounds', bound, 0.0_wp, 1.0e-12_wp)
+    call check('no way out: closed cells are empty', held, 0.0_wp, 1.0e-10_wp)
+    call check('no way out: it is told', transport%flux%unmatched > 0.01_wp)
+  end subroutine no_way_out
 
   !> Level inside a cell, boxes through the surface: nothing moves, each row has one C^.
   subroutine still_water()
