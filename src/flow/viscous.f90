@@ -430,7 +430,7 @@ contains
 
     start = bodies%motion
     s_body = bodies%motion
-    call velocity_scale(flow, bodies, scale)
+    call velocity_scale(grid, flow%u, bodies, scale)
     where (self%mass <= 0.0_wp) flow%u = 0.0_wp   ! the wall's; `impose_rigid_velocity` sets them
     self%s = flow%u
     call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
@@ -502,17 +502,20 @@ contains
     end function sum_bodies
   end subroutine solve_viscous
 
-  !> Largest velocity of fluid and bodies [m/s]; never zero.
-  subroutine velocity_scale(flow, bodies, scale)
-    type(flow_t), intent(in) :: flow
+  !> Largest velocity of the fluid in own cells and of the bodies [m/s]; never zero.
+  subroutine velocity_scale(grid, u, bodies, scale)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:, :)
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(out) :: scale
     real(wp) :: m(1)
 
-    m = maxval(abs(flow%u))
+    associate (a => grid%lo, z => grid%hi)
+      m = maxval(abs(u(a(1):z(1), a(2):z(2), a(3):z(3), :)))
+    end associate
     call global_max(m)
-    scale = max(m(1), 1.0e-12_wp)
-    if (bodies%n > 0) scale = max(scale, maxval(abs(bodies%motion(1:3, :))))
+    scale = max(m(1), 1.0e-12_wp, maxval([0.0_wp, abs(bodies%motion(1:3, :))]))
   end subroutine velocity_scale
 
   !> Momentum and angular momentum over dt of a motion of body b.
