@@ -20,12 +20,12 @@ module hdf5_file_m
   use hdf5, only: h5dopen_f, h5dread_f, h5dset_extent_f, h5dwrite_f, h5fclose_f, h5fcreate_f
   use hdf5, only: h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f
   use hdf5, only: h5oclose_f, h5oopen_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, h5pset_chunk_f
-  use hdf5, only: h5pset_deflate_f, h5pset_fclose_degree_f, h5pset_fill_time_f
+  use hdf5, only: h5pset_alloc_time_f, h5pset_deflate_f, h5pset_fclose_degree_f, h5pset_fill_time_f
   use hdf5, only: h5pset_fill_value_f, h5pset_shuffle_f, h5sclose_f, h5screate_f
   use hdf5, only: h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f
   use hdf5, only: h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f
   use hdf5, only: h5tset_strpad_f
-  use hdf5, only: H5_INTEGER_KIND, H5_REAL_KIND, H5D_FILL_TIME_ALLOC_F, H5F_ACC_RDONLY_F
+  use hdf5, only: H5_INTEGER_KIND, H5D_ALLOC_TIME_EARLY_F, H5_REAL_KIND, H5D_FILL_TIME_ALLOC_F, H5F_ACC_RDONLY_F
   use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
   use hdf5, only: h5kind_to_type, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F
   use hdf5, only: H5P_FILE_ACCESS_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_C_S1
@@ -107,8 +107,8 @@ contains
 
   !> Trouble of one process of a shared file becomes that of all.
   !!
-  !! A process in trouble may find that the others wait for it inside MPI (seen with a full disk): then
-  !! nothing is left but to end them all, though this is a lower procedure.
+  !! A process in trouble may find that the others wait for it inside MPI (seen with a full disk):
+  !! then nothing is left but to end them all, though this is a lower procedure.
   subroutine agree(self)
     class(h5_file_t), intent(inout) :: self
     real(wp), parameter :: patience = 3.0_wp   ! [s]
@@ -785,6 +785,8 @@ contains
       call h5pset_shuffle_f(list, status)
       call self%check(status, 'create '//name)
       call h5pset_deflate_f(list, deflate_level, status)
+      call self%check(status, 'create '//name)
+      call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status)   ! as many processes need it
       call self%check(status, 'create '//name)
     end if
     call set_fill(self, name, kind, list)

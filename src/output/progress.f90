@@ -19,6 +19,7 @@ module progress_m
     logical :: shown = .false.            !! on this process, and not forbidden by --quiet
     logical :: fluid = .true.
     integer :: lines = 0
+    integer :: last_step = -1             !! of the last line
     integer :: warnings = 0
     integer :: first_step = 0             !! where this part of the run began
     real(wp) :: first_time = 0.0_wp       !! likewise [s]
@@ -51,7 +52,7 @@ contains
     yes = yes .and. self%shown
   end function line_due
 
-  !> Write one line; the header first where it is time for it.
+  !> Write one line, if this step has none yet; the header first where it is time for it.
   subroutine write_line(self, clock, row, blocks)
     type(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
@@ -60,7 +61,8 @@ contains
     character(160) :: line
     integer :: released, moving
 
-    if (.not. self%shown) return
+    if (.not. self%shown .or. clock%step == self%last_step) return
+    self%last_step = clock%step
     if (modulo(self%lines, lines_per_header) == 0) write (output_unit, '(a)') header(self%fluid)
     self%lines = self%lines + 1
     self%last_line = wall_clock()

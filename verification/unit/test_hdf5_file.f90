@@ -15,6 +15,7 @@ program test_hdf5_file
   call test_columns()
   call test_read_while_open()
   call test_shared_blocks()
+  call test_go_on_together()
   call test_trouble()
   call remove(path)
   call finish_checks()
@@ -218,6 +219,41 @@ contains
     call file%close()
     call check_file('no trouble with a shared file', file)
   end subroutine test_shared_blocks
+
+  !> All processes together go on in a file that one process began.
+  subroutine test_go_on_together()
+    type(h5_file_t) :: file
+    type(h5_column_t) :: field
+    integer, parameter :: layers = 12
+    real(sp) :: a(layers)
+    real(wp) :: x(layers)
+    integer :: first, last, i
+
+    first = 1 + (layers*my_rank())/nproc()
+    last = (layers*(my_rank() + 1))/nproc()
+    a = [(sqrt(real(i, sp)), i=1, layers)]
+    if (is_root()) then
+      call file%create(path, .false.)
+      call file%new_column('/field', 'm', file_real32, [layers], 1, field, chunk_layers=layers)
+      do i = 1, 3
+        call file%append_block(field, [1], [layers], -a)
+      end do
+      call file%close()
+    end if
+    call meet()
+    call file%open(path, .true., .true.)
+    call file%open_column('/field', file_real32, field)
+    call file%resize(field, 2_i8)
+    call file%append_block(field, [first], [last - first + 1], a(first:last))
+    call file%close()
+    call check_file('a file of one process goes on', file)
+    if (.not. is_root()) return
+    call file%open(path, .false., .false.)
+    call file%open_column('/field', file_real32, field)
+    call file%read_row(field, 3, x)
+    call check('the new row stands in it', x, real(a, wp), 0.0_wp)
+    call file%close()
+  end subroutine test_go_on_together
 
   subroutine test_trouble()
     type(h5_file_t) :: file
