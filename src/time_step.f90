@@ -90,6 +90,7 @@ contains
     call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction)
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
+    if (case%fluid%single_phase) sim%transport%incoming = 1.0_wp
     call momentum_init(sim%grid, sim%momentum)
     call stage_init(sim%grid, sim%blocks%n, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)

@@ -16,7 +16,7 @@ module momentum_conservative_m
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
-  use boundary_m, only: fill_velocity_halo, fill_scalar_halo
+  use boundary_m, only: fill_velocity_halo
   use tvd_m, only: tvd5
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells, late_values, move_late
   implicit none
@@ -29,7 +29,6 @@ module momentum_conservative_m
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
     real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
-    real(wp), allocatable :: room(:, :, :)          !! open volume before the sweep [m3]
     real(wp), allocatable :: mass(:, :, :)
       !! of the fluid in the cell after the sweeps [kg]
     real(wp), allocatable :: late(:), late_mass(:)
@@ -48,7 +47,7 @@ contains
     b = grid%hi + n_halo
     allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%carried(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%mass, self%room, source=self%carried)
+    allocate (self%mass, source=self%carried)
     allocate (self%late(0), self%late_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
@@ -106,13 +105,10 @@ contains
     integer :: i, j, k, m, e(3)
 
     e = unit_step(:, d)
-    self%room = transport%v
-    call fill_scalar_halo(grid, self%room)
     call sweep(grid, old, d, transport)
     do m = 1, 3
       call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), &
-                            self%room, &
-                            u(:, :, :, m), self%mixed_near, self%carried)
+                            transport%v_before, u(:, :, :, m), self%mixed_near, self%carried)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
