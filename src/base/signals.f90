@@ -1,4 +1,7 @@
 !> SIGINT and SIGTERM set a flag; the time loop looks at it and ends in good order.
+!!
+!! SIGXFSZ, a file beyond the user's limit, is left to the write that then fails: it is trouble with
+!! files like a full disk.
 module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
   use kinds_m, only: wp
@@ -10,6 +13,7 @@ module signals_m
 
   integer, parameter :: signal_interrupt = 2    !! the number POSIX systems give SIGINT
   integer, parameter :: signal_terminate = 15   !! and SIGTERM
+  integer, parameter :: signal_file_size = 25   !! and SIGXFSZ
 
   integer(c_int), volatile :: caught = 0
 
@@ -25,12 +29,13 @@ module signals_m
 
 contains
 
-  !> From now on the two signals only set a flag. Call it after `parallel_init`.
+  !> From now on the signals end nothing by themselves. Call it after `parallel_init`.
   subroutine catch_signals()
     type(c_funptr) :: previous
 
     previous = c_signal(int(signal_interrupt, c_int), c_funloc(remember))
     previous = c_signal(int(signal_terminate, c_int), c_funloc(remember))
+    previous = c_signal(int(signal_file_size, c_int), c_funloc(remember))
   end subroutine catch_signals
 
   !> The signal that any process caught, or zero; all processes call this and get the same answer.
@@ -47,7 +52,7 @@ contains
   subroutine remember(number) bind(c)
     integer(c_int), value :: number
 
-    caught = number
+    if (number /= signal_file_size) caught = number
   end subroutine remember
 
 end module signals_m

@@ -25,8 +25,9 @@ module hdf5_file_m
   use hdf5, only: h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f
   use hdf5, only: h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f
   use hdf5, only: h5tset_strpad_f
-  use hdf5, only: H5_INTEGER_KIND, H5D_ALLOC_TIME_EARLY_F, H5_REAL_KIND, H5D_FILL_TIME_ALLOC_F, H5F_ACC_RDONLY_F
-  use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
+  use hdf5, only: H5_INTEGER_KIND, H5_REAL_KIND, H5D_ALLOC_TIME_EARLY_F, H5D_FILL_TIME_ALLOC_F
+  use hdf5, only: H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F
+  use hdf5, only: H5F_SCOPE_LOCAL_F
   use hdf5, only: h5kind_to_type, H5P_DATASET_CREATE_F, H5P_DATASET_XFER_F, H5P_DEFAULT_F
   use hdf5, only: H5P_FILE_ACCESS_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, H5T_C_S1
   use hdf5, only: H5T_CSET_UTF8_F, H5T_FORTRAN_S1, H5T_IEEE_F32LE, H5T_IEEE_F64LE

@@ -1,0 +1,476 @@
+"""The result files of real runs: names and units of the contract, values that fit together, what is
+left after faults, and that ParaView's reader sees them."""
+
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import pyvista
+
+from run_cases import CASES, ROOT
+from same_bits import differences
+
+MICS = ROOT / "mics"
+CASE = CASES / "ranks" / "coupled.nml"
+GRAVITY = np.array([0.0, 0.0, -9.81])
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+T, N = "T", "N"
+BODY_ROWS = {
+    "time": ("s", ()),
+    "position": ("m", (N, 3)),
+    "quaternion": ("1", (N, 4)),
+    "velocity": ("m/s", (N, 3)),
+    "angular_velocity": ("rad/s", (N, 3)),
+    "fluid_force": ("N", (N, 3)),
+    "fluid_torque": ("N m", (N, 3)),
+    "contact_force": ("N", (N, 3)),
+    "contact_torque": ("N m", (N, 3)),
+    "contacts": ("1", (N,)),
+    "on_floor": ("1", (N,)),
+}
+SERIES = {
+    "time": "s",
+    "dt": "s",
+    "cfl": "1",
+    "divergence_max": "1/s",
+    "pressure_passes": "1",
+    "solver_iterations": "1",
+    "liquid_volume": "m3",
+    "liquid_volume_drift": "1",
+    "kinetic_energy_fluid": "J",
+    "kinetic_energy_bodies": "J",
+    "potential_energy_bodies": "J",
+    "contact_energy": "J",
+    "max_overlap": "m",
+    "contact_courant_max": "1",
+    "substeps": "1",
+    "wall_time": "s",
+}
+UNITS_OF_FIELDS = {"liquid": "1", "solid": "1", "pressure": "Pa", "velocity": "m/s"}
+OF_THE_FLUID = {
+    "cfl",
+    "divergence_max",
+    "pressure_passes",
+    "solver_iterations",
+    "liquid_volume",
+    "liquid_volume_drift",
+    "kinetic_energy_fluid",
+}
+
+
+def start(
+    output: Path | None, *more: str | Path, case: Path = CASE, **settings
+) -> subprocess.Popen:
+    """Start a quiet run on one thread."""
+    where = [] if output is None else ["--output", str(output)]
+    return subprocess.Popen(
+        [MICS, "--quiet", "--threads", "1", *where, *map(str, more), str(case)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **settings,
+    )
+
+
+def run(output: Path | None, *more: str | Path, case: Path = CASE, **settings) -> tuple[int, str]:
+    """Run to the end; the exit code and what was said on standard error."""
+    process = start(output, *more, case=case, **settings)
+    said = process.communicate(timeout=300)[1]
+    return process.returncode, said
+
+
+def opened(path: Path) -> h5py.File:
+    return h5py.File(path, "r", locking=False)
+
+
+@pytest.fixture(scope="module")
+def wet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a coupled run with a fixed, a free and a dropped block."""
+    output = tmp_path_factory.mktemp("output") / "wet"
+    code, said = run(output)
+    assert code == 0, said
+    return output
+
+
+@pytest.fixture(scope="module")
+def dry(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run without fluid."""
+    output = tmp_path_factory.mktemp("output") / "dry"
+    code, said = run(output, case=CASES / "ranks" / "dry.nml")
+    assert code == 0, said
+    return output
+
+
+@pytest.fixture(scope="module")
+def fluid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run without blocks."""
+    output = tmp_path_factory.mktemp("output") / "fluid"
+    code, said = run(output, case=CASES / "ranks" / "stream.nml")
+    assert code == 0, said
+    return output
+
+
+def test_names_units_and_shapes(wet: Path) -> None:
+    with opened(wet / "run.h5") as h5:
+        assert h5.attrs["format"] == "mics-run"
+        assert h5.attrs["format_version"] == 1
+        rows, bodies = len(h5["series/time"]), len(h5["bodies/mass"])
+        assert bodies == 3
+        for name, (units, extent) in BODY_ROWS.items():
+            wanted = (rows, *(bodies if n == N else n for n in extent))
+            assert h5[f"bodies/{name}"].shape == wanted, name
+            assert h5[f"bodies/{name}"].attrs["units"] == units, name
+        assert {n: d.attrs["units"] for n, d in h5["series"].items()} == SERIES
+        assert all(d.shape == (rows,) for d in h5["series"].values())
+        assert set(h5["bodies"]) == {*BODY_ROWS, "shape", "mass", "fixed", "release_time"}
+        for axis, cells in zip("xyz", (24, 16, 32), strict=True):
+            assert h5[f"grid/{axis}"].shape == (cells + 1,)
+        assert h5["grid/z"][-1] == pytest.approx(0.2, abs=1e-15)
+
+        def has_units(name: str, item: h5py.Group | h5py.Dataset) -> None:
+            assert not isinstance(item, h5py.Dataset) or "units" in item.attrs, name
+
+        h5.visititems(has_units)
+
+
+def test_provenance(wet: Path) -> None:
+    with opened(wet / "run.h5") as h5:
+        made = dict(h5["provenance"].attrs)
+        assert made["namelist"] == CASE.read_text()
+        for default in ("cfl_max = 0.5", "gas_density = 1.204", "coupling = 'monolithic'"):
+            assert default in made["parameters"]
+        assert made["threads"] == made["ranks"] == 1
+        assert made["exit_status"] == 0
+        assert made["started"] <= made["finished"]
+        assert {"version", "git_revision", "compiler", "flags"} <= made.keys()
+        assert len(h5["timers/name"]) == len(h5["timers/seconds"]) == len(h5["timers/calls"]) > 0
+
+
+def test_shapes(wet: Path) -> None:
+    """Volume of the tetrahedra, and the closed surface around them."""
+    with opened(wet / "run.h5") as h5:
+        for name, shape in h5["shapes"].items():
+            points = shape["points"][:]
+            a, b, c, d = np.moveaxis(points[shape["tets"][:]], 1, 0)
+            volumes = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
+            assert volumes.sum() == pytest.approx(shape.attrs["volume"], rel=1e-12), name
+            centroid = (volumes[:, None] * (a + b + c + d) / 4).sum(0)
+            assert np.abs(centroid).max() < 1e-12 * shape.attrs["volume"], name
+            a, b, c = np.moveaxis(points[shape["triangles"][:]], 1, 0)
+            inside = np.einsum("ij,ij->i", np.cross(a, b), c).sum() / 6
+            assert inside == pytest.approx(shape.attrs["volume"], rel=1e-12), name
+            assert shape.attrs["inertia"].shape == (3, 3)
+        mass = h5["bodies/mass"][0]
+        assert mass == pytest.approx(2300 * h5["shapes/hexapod"].attrs["volume"], rel=1e-14)
+
+
+def test_rows(wet: Path) -> None:
+    with opened(wet / "run.h5") as h5:
+        t = h5["series/time"][:]
+        assert np.array_equal(t, h5["bodies/time"][:])
+        assert t[0] == 0
+        assert t[-1] == 0.08
+        assert np.allclose(np.diff(t), h5["series/dt"][1:], rtol=0, atol=1e-15)
+        assert np.all(np.diff(h5["series/wall_time"][:]) > 0)
+        q = h5["bodies/quaternion"][:]
+        assert np.all(q[0, :, 0] >= 0)
+        assert np.allclose(np.linalg.norm(q, axis=2), 1, rtol=0, atol=1e-14)
+        assert np.all(np.einsum("tni,tni->tn", q[1:], q[:-1]) > 0.9)
+        for name in ("fluid_force", "fluid_torque", "contact_force", "contact_torque", "contacts"):
+            assert not h5[f"bodies/{name}"][0].any(), name
+        assert np.abs(h5["series/liquid_volume_drift"][:]).max() < 1e-9
+
+
+def test_forces_change_the_momentum(wet: Path) -> None:
+    """M dU/dt = fluid + contact + M g over every step of the free blocks, to round-off."""
+    with opened(wet / "run.h5") as h5:
+        dt, mass = h5["series/dt"][1:], h5["bodies/mass"][:]
+        force = h5["bodies/fluid_force"][1:] + h5["bodies/contact_force"][1:]
+        v = h5["bodies/velocity"][:]
+        change = mass[:, None] * np.diff(v, axis=0) / dt[:, None, None] - mass[:, None] * GRAVITY
+        moved = h5["bodies/time"][:-1][:, None] >= h5["bodies/release_time"][:] - 1e-12
+        moved &= h5["bodies/fixed"][:] == 0
+        first = np.flatnonzero(moved[:, 2])[0]
+        assert np.allclose(v[: first + 1, 2], 0)
+        moved[first, 2] = False  # given its first velocity in this step
+        assert moved.sum() > 20
+        largest = np.abs(force[moved]).max()
+        assert np.abs(change - force)[moved].max() < 1e-10 * largest
+
+
+def test_frames_of_the_fluid(wet: Path) -> None:
+    """Frames hold the liquid that the series counts, at the times of rows."""
+    with opened(wet / "run.h5") as run_h5, opened(wet / "fields.vtkhdf") as h5:
+        steps, data = h5["VTKHDF/Steps"], h5["VTKHDF/CellData"]
+        times = steps["Values"][:]
+        assert len(times) == steps.attrs["NSteps"] == 5
+        assert times[0] == 0
+        assert times[-1] == 0.08
+        assert np.all(times[1:] >= 0.02 * np.arange(1, 5) - 1e-12)
+        volume = np.prod(h5["VTKHDF"].attrs["Spacing"])
+        row = np.searchsorted(run_h5["series/time"][:], times)
+        assert np.array_equal(run_h5["series/time"][:][row], times)
+        for name, units in {
+            "liquid": "1",
+            "solid": "1",
+            "pressure": "Pa",
+            "velocity": "m/s",
+        }.items():
+            assert data[name].dtype == np.float32
+            assert data[name].attrs["units"] == units
+            assert data[name].compression == "gzip"
+            assert np.isfinite(data[name][:]).all()
+        for frame in range(5):
+            liquid = (data["liquid"][frame].astype(float) * (1.0 - data["solid"][frame])).sum()
+            wanted = run_h5["series/liquid_volume"][row[frame]]
+            assert liquid * volume == pytest.approx(wanted, rel=1e-6)
+
+
+def seen_by_vtk(path: Path, frame: int) -> pyvista.DataSet:
+    """A frame as the reader of ParaView and pyvista gives it."""
+    reader = pyvista.get_reader(path).reader
+    reader.UpdateInformation()
+    reader.SetStep(frame)
+    reader.Update()
+    return pyvista.wrap(reader.GetOutput())
+
+
+def test_vtk_reads_the_fluid(wet: Path) -> None:
+    with opened(wet / "fields.vtkhdf") as h5:
+        for frame in (0, 2, 4):
+            seen = seen_by_vtk(wet / "fields.vtkhdf", frame)
+            assert seen.dimensions == (25, 17, 33)
+            assert seen.bounds == pytest.approx((0, 0.15, 0, 0.1, 0, 0.2), abs=1e-12)
+            for name in ("liquid", "solid", "pressure"):
+                wanted = h5[f"VTKHDF/CellData/{name}"][frame]
+                assert np.array_equal(seen.cell_data[name].reshape(wanted.shape), wanted)
+            wanted = h5["VTKHDF/CellData/velocity"][frame]
+            assert np.array_equal(seen.cell_data["velocity"].reshape(wanted.shape), wanted)
+
+
+def rotation(q: np.ndarray) -> np.ndarray:
+    """Body axes to space."""
+    w, v = q[0], q[1:]
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
+
+
+def test_vtk_reads_the_blocks(wet: Path) -> None:
+    """Points and their velocities follow from the poses in run.h5."""
+    with opened(wet / "run.h5") as h5, opened(wet / "blocks.vtkhdf") as frames:
+        times = frames["VTKHDF/Steps/Values"][:]
+        assert np.array_equal(times, opened(wet / "fields.vtkhdf")["VTKHDF/Steps/Values"][:])
+        for frame in (0, 1, 4):
+            seen = seen_by_vtk(wet / "blocks.vtkhdf", frame)
+            row = int(np.flatnonzero(h5["bodies/time"][:] == times[frame])[0])
+            first = 0
+            for body, name in enumerate(h5["bodies/shape"][:]):
+                shape = h5[f"shapes/{name.decode()}"]
+                turn = rotation(h5["bodies/quaternion"][row, body])
+                arm = shape["points"][:] @ turn.T
+                part = slice(first, first + len(arm))
+                first += len(arm)
+                at = h5["bodies/position"][row, body] + arm
+                v = h5["bodies/velocity"][row, body] + np.cross(
+                    h5["bodies/angular_velocity"][row, body], arm
+                )
+                assert np.allclose(seen.points[part], at, rtol=0, atol=1e-7)
+                assert np.allclose(seen.point_data["velocity"][part], v, rtol=1e-6, atol=1e-6)
+                triangles = len(shape["triangles"])
+                assert (seen.cell_data["body"] == body).sum() == triangles
+            assert seen.n_points == first
+
+
+def test_divergence_from_the_restart_file(wet: Path) -> None:
+    """The last restart file gives the divergence that the last row reports."""
+    newest = max(wet.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
+    with opened(newest) as h5, opened(wet / "run.h5") as run_h5:
+        assert h5["clock/t"][0] == run_h5["series/time"][-1]
+        h = np.array([0.15 / 24, 0.1 / 16, 0.2 / 32])
+        out = np.zeros((32, 16, 24))
+        for d in range(3):
+            flux = h5["flow/open"][d] * (h.prod() / h[d]) * h5["flow/uf"][d]
+            flux += h5["flow/solid_flux"][d]
+            flux = np.moveaxis(flux, 2 - d, 0)
+            out += np.moveaxis(flux[1:] - flux[:-1], 0, 2 - d)[:32, :16, :24]
+        reported = run_h5["series/divergence_max"][-1]
+        assert np.abs(out).max() / h.prod() == pytest.approx(reported, rel=1e-4, abs=1e-12)
+
+
+def test_dry(dry: Path) -> None:
+    assert not (dry / "fields.vtkhdf").exists()
+    assert (dry / "blocks.vtkhdf").exists()
+    with opened(dry / "run.h5") as h5:
+        for name, column in h5["series"].items():
+            assert (
+                np.isnan(column[:]).all() if name in OF_THE_FLUID else np.isfinite(column[:]).all()
+            )
+
+
+def test_fluid_alone(fluid: Path) -> None:
+    assert not (fluid / "blocks.vtkhdf").exists()
+    with opened(fluid / "run.h5") as h5:
+        assert h5["bodies/position"].shape == (len(h5["series/time"]), 0, 3)
+        assert h5["bodies/mass"].shape == (0,)
+        assert np.isfinite(h5["series/kinetic_energy_fluid"][:]).all()
+
+
+def but_restarts(found: list[str]) -> list[str]:
+    """Differences apart from restart files of another time or name."""
+    return [line for line in found if not line.startswith("restart-")]
+
+
+def test_restart_gives_the_same_bits(wet: Path, tmp_path: Path) -> None:
+    """From the restart file in the middle, into a copy."""
+    code, said = run(tmp_path / "copy", "--restart", wet / "restart-a.h5")
+    assert code == 0, said
+    assert but_restarts(differences(wet, tmp_path / "copy")) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal(wet: Path, tmp_path: Path, number: int) -> None:
+    """A run that is stopped has saved its state and goes on as if nothing had happened."""
+    output = tmp_path / "run"
+    process = start(output)
+    while not has_rows(output, 4) and process.poll() is None:
+        time.sleep(0.002)
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    if process.returncode == 0:
+        pytest.skip("the run was faster than the signal")
+    assert process.returncode == 128 + number
+    with opened(output / "run.h5") as h5:
+        assert h5["provenance"].attrs["exit_status"] == 128 + number
+    newest = max(output.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
+    code, said = run(None, "--restart", newest)
+    assert code == 0, said
+    assert but_restarts(differences(wet, output)) == []
+
+
+def has_rows(output: Path, rows: int) -> bool:
+    """Does the growing file show so many rows? It may be caught while it is written."""
+    try:
+        with opened(output / "run.h5") as h5:
+            return len(h5["series/wall_time"]) >= rows
+    except (OSError, KeyError, RuntimeError):
+        return False
+
+
+def test_killed_at_any_time(wet: Path, tmp_path: Path) -> None:
+    """What a killed run has written can be read, and is what it would have been."""
+    rng = np.random.default_rng(1)
+    for trial in range(8):
+        output = tmp_path / f"run-{trial}"
+        process = start(output)
+        while not has_rows(output, 1) and process.poll() is None:
+            time.sleep(0.002)
+        time.sleep(0.4 * rng.random())
+        process.kill()
+        process.communicate(timeout=60)
+        check_what_is_left(output, wet)
+
+
+def check_what_is_left(output: Path, whole: Path) -> None:
+    with opened(output / "run.h5") as h5, opened(whole / "run.h5") as full:
+        rows = min(len(h5[f"series/{name}"]) for name in SERIES)
+        rows = min([rows, *(len(h5[f"bodies/{name}"]) for name in BODY_ROWS)])
+        assert rows > 0
+        for name in set(SERIES) - {"wall_time"}:
+            found, wanted = h5[f"series/{name}"][: rows - 1], full[f"series/{name}"][: rows - 1]
+            assert np.array_equal(found, wanted, equal_nan=True), name
+        found, wanted = (f["bodies/position"][: rows - 1] for f in (h5, full))
+        assert np.array_equal(found, wanted)
+    for name, data in {"fields": "CellData/pressure", "blocks": "Points"}.items():
+        path = output / f"{name}.vtkhdf"
+        with opened(path) as h5, opened(whole / path.name) as full:
+            frames = int(h5["VTKHDF/Steps"].attrs["NSteps"])
+            total = int(full["VTKHDF/Steps"].attrs["NSteps"])
+            complete = frames * len(full[f"VTKHDF/{data}"]) // total
+            found, wanted = (f[f"VTKHDF/{data}"][:complete] for f in (h5, full))
+            assert np.array_equal(found, wanted), name
+    for path in output.glob("restart-?.h5"):
+        with opened(path) as h5:
+            assert np.isfinite(h5["flow/u"][:]).all()
+
+
+def test_older_results_are_kept(wet: Path, tmp_path: Path) -> None:
+    output = tmp_path / "run"
+    for _ in range(3):
+        code, said = run(output, case=CASES / "ranks" / "dry.nml")
+        assert code == 0, said
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.bak-1", "run.bak-2"]
+
+
+def test_other_folders_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("important")
+    code, said = run(tmp_path)
+    assert code == 2
+    assert "not empty" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_no_room_for_files(tmp_path: Path) -> None:
+    """A limit stands for a full disk: exit code 4, the file is named, older rows can be read."""
+
+    def no_large_files() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000))
+
+    code, said = run(tmp_path / "run", preexec_fn=no_large_files)
+    assert code == 4, said
+    assert "cannot write" in said
+    assert "File too large" in said
+    with opened(tmp_path / "run" / "run.h5") as h5:
+        rows = min(len(column) for column in h5["series"].values())
+        assert rows > 5
+        assert np.isfinite(h5["series/liquid_volume"][:rows]).all()
+        assert h5["provenance"].attrs["exit_status"] == 4
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_no_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    code, said = run(tmp_path / "run")
+    tmp_path.chmod(0o700)
+    assert code == 4, said
+
+
+def test_damaged_restart(wet: Path, tmp_path: Path) -> None:
+    path = tmp_path / "restart-a.h5"
+    data = bytearray((wet / "restart-a.h5").read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    code, said = run(tmp_path / "copy", "--restart", path)
+    assert code == 4
+    assert "checksum" in said
+    code, said = run(tmp_path / "copy", "--restart", tmp_path / "missing.h5")
+    assert code == 4
+    assert "missing.h5" in said
+    assert not (tmp_path / "copy").exists()
+
+
+def test_changed_case(wet: Path, tmp_path: Path) -> None:
+    """t_end may be raised and intervals may change; nothing else."""
+    other = tmp_path / "other.nml"
+    other.write_text(CASE.read_text().replace("water_level = 0.0913", "water_level = 0.09"))
+    code, said = run(tmp_path / "copy", "--restart", wet / "restart-a.h5", case=other)
+    assert code == 2
+    assert "water_level" in said
+    longer = CASE.read_text().replace("t_end = 0.08", "t_end = 0.09")
+    other.write_text(longer.replace("field_interval = 0.02", "field_interval = 0.01"))
+    shutil.copytree(wet, tmp_path / "longer")
+    newest = max(wet.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
+    code, said = run(None, "--restart", tmp_path / "longer" / newest.name, case=other)
+    assert code == 0, said
+    with opened(tmp_path / "longer" / "run.h5") as h5:
+        assert h5["series/time"][-1] == 0.09
+        assert np.all(np.diff(h5["series/time"][:]) > 0)
+        assert "t_end = 0.09" in h5["provenance"].attrs["namelist"]
