@@ -42,6 +42,12 @@ class Machine:
         threads = ["--threads", str(self.threads)] if self.threads else []
         return [*start, str(self.program), "--quiet", *threads]
 
+    @property
+    def patience(self) -> dict[str, str]:
+        """Threads that share a core must not spin while they wait."""
+        crowded = self.ranks * max(1, self.threads) > (os.cpu_count() or 1)
+        return {"OMP_WAIT_POLICY": "passive"} if crowded else {}
+
 
 def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     """Run one case file into a fresh folder; the seconds it took."""
@@ -50,7 +56,7 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     began = time.perf_counter()
     done = subprocess.run(
         [*machine.command, *options, "--output", str(output), str(case)],
-        env={**os.environ, **MPI_SETTINGS},
+        env={**os.environ, **MPI_SETTINGS, **machine.patience},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
