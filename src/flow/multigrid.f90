@@ -1,4 +1,5 @@
-!> Geometric multigrid as a preconditioner: one symmetric V(2,2)-cycle in single precision.
+!> Geometric multigrid as a preconditioner: one symmetric V-cycle in single precision, two sweeps
+!! before and after the coarse correction on the finest level, four on the others.
 !!
 !! Cells are joined by two in every direction whose spacing is within `alike` of the smallest, down
 !! to one cell; an odd number of cells leaves a last cell of half the size, with its true centre
@@ -23,9 +24,9 @@ module multigrid_m
 
   real(wp), parameter :: alike = 1.9_wp        !! ratio of spacings that are coarsened together
   integer, parameter :: worth_threads = 4000   !! cells of a level from which threads share it
-  integer, parameter :: down(3) = [1, 0, 1]    !! colours of the half sweeps before the coarse
-                                               !! correction; loading the right side is the first, 0
-  integer, parameter :: up(4) = [1, 0, 1, 0]   !! colours after it
+  !> Colours of two sweeps from zero (loading the right side is the first half sweep, of colour 0),
+  !! of two more sweeps, and of two sweeps after the coarse correction.
+  integer, parameter :: start(3) = [1, 0, 1], down(4) = [0, 1, 0, 1], up(4) = [1, 0, 1, 0]
 
   !> The planes of a level that a thread works on.
   type :: team_t
@@ -316,13 +317,15 @@ contains
       if (.not. has_work(self%level(l), team, crew)) cycle
       call load(self, crew, l, scale(1.0_wp, -r_exponent), r)
       if (l == coarsest) exit
-      call smooth(self%level(l), crew, down)
+      call smooth(self%level(l), crew, start)
+      if (l > 1) call smooth(self%level(l), crew, down)
       call restrict(self, crew, l)
     end do
     do l = coarsest, 1, -1
       if (.not. has_work(self%level(l), team, crew)) cycle
       if (l < coarsest) then
         call prolong(self, crew, l)
+        if (l > 1) call smooth(self%level(l), crew, up)
         call smooth(self%level(l), crew, up)
       end if
       call unload(self, crew, l, scale(1.0_wp, r_exponent - self%unit_exponent), z)
