@@ -88,7 +88,7 @@ contains
     call system%multigrid%setup(system%op%cf)
   end subroutine prepare
 
-  !> x.My = y.Mx, x.Mx > 0, M(2 x) = 2 Mx to the bit; closed cells give nothing.
+  !> x.My = y.Mx, x.Mx > 0; M(2 x) = 2 Mx to the bit, on 5 threads too; closed cells give nothing.
   subroutine test_form(name, system)
     character(*), intent(in) :: name
     type(system_t), intent(inout) :: system
@@ -109,7 +109,9 @@ contains
     asymmetry = (exact_dot(x, my, 1) - exact_dot(y, mx, 1))/sqrt(xmx*ymy)
     call check(name//': symmetric', asymmetry, 0.0_wp, 1.0e-6_wp)
     call check(name//': positive', xmx > 0.0_wp .and. ymy > 0.0_wp)
+    if (nproc() == 1) call set_threads(5)
     call system%multigrid%apply(2.0_wp**80*x, 2.0_wp**79, m2x)
+    call set_threads(1)
     call check(name//': scales', all(abs(m2x - 2.0_wp**80*mx) <= 0))
     call check(name//': closed cells stay zero', closed_cells_zero(system, mx))
   end subroutine test_form
@@ -150,18 +152,17 @@ contains
     end do
   end function closed_cells_zero
 
-  !> One process: the same bits on 1, 2 and 5 threads. The checksum goes to standard output.
+  !> One process: the same bits on 1 and 2 threads. The checksum goes to standard output.
   subroutine test_bits(name, system)
     character(*), intent(in) :: name
     type(system_t), intent(inout) :: system
-    integer, parameter :: threads(3) = [1, 2, 5]
     real(wp), allocatable :: first(:, :, :)
     real(wp) :: residual
     integer :: t, info
 
     allocate (first, source=system%x)
-    do t = 1, merge(size(threads), 1, nproc() == 1)
-      call set_threads(threads(t))
+    do t = 1, merge(2, 1, nproc() == 1)
+      call set_threads(t)
       system%x = 0.0_wp
       call conjugate_gradient(system%op, system%multigrid, system%b, system%x, 0.0_wp, 200, &
         system%its, residual, info, system%work, relative=1.0e-6_wp)
