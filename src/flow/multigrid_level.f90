@@ -29,7 +29,7 @@ module multigrid_level_m
     logical :: paired(3) = .false.     !! directions in which two cells make one of the next level
     logical :: many = .false.          !! cells enough for several threads
     integer :: a(3) = 1, z(3) = 0      !! bounds of the arrays over (p, j, k)
-    real(wp), allocatable :: ratio(:, :)      !! (coarse face, d) centre distance to the next level's
+    real(wp), allocatable :: ratio(:, :)      !! (coarse face, d) centre distance to the next one's
     real(wp), allocatable :: cf(:, :, :, :)   !! coefficients of the lower faces; not on the finest
     real(sp), allocatable :: f(:, :, :)       !! cells lo:hi, right side, later the correction
     real(sp), allocatable :: c(:, :, :, :, :) !! scaled coefficients, (p, m, j, k, d)
