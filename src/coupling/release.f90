@@ -48,8 +48,9 @@ contains
       character(*), intent(in) :: what
 
       warnings = warnings + 1
-      if (is_root()) write (error_unit, '(5a)') 'mics: warning: body ', to_text(b), what, &
-        to_text(time), ' s'
+      if (.not. is_root()) return
+      write (error_unit, '(5a)') 'mics: warning: body ', to_text(b), what, to_text(time), ' s'
+      flush (error_unit)
     end subroutine warn
   end subroutine release_due_blocks
 
