@@ -1,0 +1,285 @@
+!> Projection around held and free blocks, hydrostatic balance, pressure in closed cells.
+program test_pressure
+  use kinds_m, only: wp
+  use vectors_m, only: quaternion_from_axis
+  use grid_m, only: n_halo, unit_step
+  use mixture_m, only: mix_fluid, face_mean
+  use boundary_m, only: fill_velocity_halo
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init, set_pressure_system, &
+    solve_pressure, face_acceleration, cell_mean_of_faces, predict_face_velocity, divergence, &
+    extend_pressure
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: closed(2, 3) = 'no_slip', &
+    tank(2, 3) = reshape([character(8) :: 'no_slip', 'no_slip', 'slip', 'slip', 'no_slip', &
+                          'open'], [2, 3]), &
+    channel(2, 3) = reshape([character(8) :: 'periodic', 'periodic', 'slip', 'slip', 'no_slip', &
+                             'open'], [2, 3])
+  integer, parameter :: cells(3) = [12, 8, 12]
+  real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
+  real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
+  type(one_body_t) :: box
+  type(pressure_t) :: system
+  type(pressure_report_t) :: report
+  integer :: seed = 77
+
+  call held_box('closed box', closed, 'cg', 'multigrid')
+  call held_box('open tank', tank, 'cg', 'multigrid')
+  call held_box('jacobi', tank, 'cg', 'jacobi')
+  call held_box('bicgstab', tank, 'bicgstab', 'multigrid')
+  call free_box()
+  call still_water()
+  call accelerations_at_faces()
+  call closed_cells()
+  call finish_checks()
+
+contains
+
+  !> A tilted box in liquid below and gas above, random face velocity through the open faces.
+  subroutine build(sides, free)
+    character(*), intent(in) :: sides(2, 3)
+    logical, intent(in) :: free
+
+    box = one_body_t()
+    call describe(cells, length, sides, 'box', [0.043_wp, 0.031_wp, 0.037_wp], &
+                  [0.0613_wp, 0.0389_wp, 0.0571_wp], box%case)
+    box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
+    box%case%body(1)%fixed = .not. free
+    box%case%body(1)%velocity = [0.3_wp, -0.2_wp, -0.1_wp]
+    box%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
+    box%case%numerics%divergence_tolerance = 1.0e-8_wp
+    call place(box)
+    box%flow%c(:, :, 8:) = 0.0_wp
+    box%flow%c(:, :, 7) = 0.3_wp
+    call mix_fluid(box%case%fluid, box%flow)
+    call pressure_init(box%grid, 1, system)
+    call stir()
+  end subroutine build
+
+  !> Random face velocity, zero on walls, the same on both sides of a period.
+  subroutine stir()
+    real(wp) :: row(cells(1) + 1)
+    integer :: j, k, d
+
+    do d = 1, 3
+      do k = 1, cells(3) + 1
+        do j = 1, cells(2) + 1
+          call random_numbers(seed, row)
+          box%flow%uf(1:cells(1) + 1, j, k, d) = 0.1_wp*row
+        end do
+      end do
+    end do
+    associate (n => cells, uf => box%flow%uf)
+      uf(n(1) + 1, :, :, 1) = 0.0_wp
+      uf(1, :, :, 1) = 0.0_wp
+      uf(:, [1, n(2) + 1], :, 2) = 0.0_wp
+      uf(:, :, 1, 3) = 0.0_wp
+      if (box%case%boundary%kind(2, 3) /= 'open') uf(:, :, n(3) + 1, 3) = 0.0_wp
+    end associate
+  end subroutine stir
+
+  subroutine solve()
+    call set_pressure_system(box%grid, box%case%numerics, box%solid%open, box%flow%rho, system)
+    call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
+    call solve_pressure(box%grid, box%case%numerics, box%solid, box%flow%rho, dt, box%flow, &
+                        box%bodies, system, report)
+  end subroutine solve
+
+  !> Largest |div u| of fluid and solid in the cells that can move, worked out here [1/s].
+  function largest_divergence() result(worst)
+    real(wp) :: worst
+    real(wp) :: net
+    integer :: i, j, k, d, s, f(3)
+
+    worst = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          net = 0.0_wp
+          do d = 1, 3
+            do s = 0, 1
+              f = [i, j, k] + s*unit_step(:, d)
+              net = net + real(2*s - 1, wp)*(box%flow%solid_flux(f(1), f(2), f(3), d) &
+                + box%solid%open(f(1), f(2), f(3), d)*box%grid%area(d)*box%flow%uf(f(1), f(2), &
+                                                                                  f(3), d))
+            end do
+          end do
+          if (box%solid%alpha(i, j, k) < 1.0_wp) worst = max(worst, abs(net)/box%grid%volume)
+        end do
+      end do
+    end do
+  end function largest_divergence
+
+  !> A moving but held box: the fluid makes way, and the velocity has changed by -dt grad(phi)/rho.
+  subroutine held_box(name, sides, solver, preconditioner)
+    character(*), intent(in) :: name, sides(2, 3), solver, preconditioner
+    real(wp), allocatable :: before(:, :, :, :)
+    real(wp) :: expected
+    integer, parameter :: at(3) = [3, 2, 7]
+
+    call build(sides, .false.)
+    if (name == 'closed box') box%bodies%motion = 0.0_wp
+    box%case%numerics%pressure_solver = solver
+    box%case%numerics%preconditioner = preconditioner
+    allocate (before, source=box%flow%uf)
+    call solve()
+    call check(name//': converged', report%converged .and. report%passes > 0)
+    call check(name//': divergence told', report%divergence, largest_divergence(), 1.0e-12_wp)
+    call check(name//': divergence', largest_divergence() < 1.0e-8_wp)
+    expected = -dt*(box%flow%p(at(1), at(2), at(3)) - box%flow%p(at(1), at(2), at(3) - 1)) &
+               /(0.01_wp*0.5_wp*(box%flow%rho(at(1), at(2), at(3) - 1) &
+                                 + box%flow%rho(at(1), at(2), at(3))))
+    call check(name//': change of velocity', box%flow%uf(3, 2, 7, 3) - before(3, 2, 7, 3), &
+               expected, 1.0e-12_wp)
+    call check(name//': walls stay closed', all(abs(box%flow%uf(1, 1:8, 1:12, 1)) <= 0.0_wp))
+  end subroutine held_box
+
+  !> A free box: velocity and motion together lose their divergence, and what the one gains in
+  !! momentum along the period the other loses.
+  subroutine free_box()
+    real(wp), allocatable :: before(:, :, :, :)
+    real(wp) :: motion(6), force(6, 1), gain(6), fluid_gain
+    integer :: i, j, k
+
+    call build(channel, .true.)
+    box%flow%uf(cells(1) + 1, :, :, 1) = box%flow%uf(1, :, :, 1)
+    allocate (before, source=box%flow%uf)
+    motion = box%bodies%motion(:, 1)
+    call solve()
+    call check('free box: converged', report%converged)
+    call check('free box: divergence', largest_divergence() < 1.0e-8_wp)
+    call check('free box: it was pushed', all(abs(box%bodies%motion(:, 1) - motion) > 1.0e-5_wp))
+    gain(1:3) = box%bodies%mass(1)*(box%bodies%motion(1:3, 1) - motion(1:3))
+    gain(4:6) = matmul(box%bodies%inertia(:, :, 1), box%bodies%motion(4:6, 1) - motion(4:6))
+    call force_from_faces(box%grid, box%solid, box%bodies, system%operator%flux, &
+                          system%phi_total, force)
+    call check('free box: momentum is force times step', gain(1:3), dt*force(1:3, 1), 1.0e-14_wp)
+    call check('free box: spin is torque times step', gain(4:6), dt*force(4:6, 1), 1.0e-15_wp)
+    fluid_gain = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          fluid_gain = fluid_gain + box%grid%volume*box%solid%open(i, j, k, 1) &
+            *face_mean(box%flow%rho(i, j, k), box%flow%rho(merge(cells(1), i - 1, i == 1), j, k)) &
+            *(box%flow%uf(i, j, k, 1) - before(i, j, k, 1))
+        end do
+      end do
+    end do
+    call check('free box: momentum of fluid and box', fluid_gain + gain(1), 0.0_wp, 1.0e-13_wp)
+    call check('free box: momentum changes hands', abs(gain(1)) > 1.0e-5_wp)
+  end subroutine free_box
+
+  !> Liquid under gas around a held tilted box, level inside a cell: nothing moves, and the pressure
+  !! is the weight above.
+  subroutine still_water()
+    real(wp) :: expected, worst, g(3)
+    integer :: k
+
+    call build(tank, .false.)
+    g = box%case%fluid%gravity
+    box%bodies%motion = 0.0_wp
+    box%case%numerics%divergence_tolerance = 1.0e-9_wp
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, system%a_face)
+    box%flow%uf = dt*system%a_face
+    call solve()
+    call check('still water: converged', report%converged)
+    worst = maxval(abs(box%flow%uf(1:12, 1:8, 1:13, :)), mask=box%solid%open(1:12, 1:8, 1:13, :) &
+                   > 0.0_wp)
+    call check('still water stays', worst, 0.0_wp, 1.0e-10_wp)
+    expected = 0.0_wp
+    do k = cells(3), 1, -1
+      expected = expected - g(3)*box%grid%h(3)*face_mean(box%flow%rho(1, 1, k), &
+                 merge(0.0_wp, box%flow%rho(1, 1, min(k + 1, cells(3))), k == cells(3)))
+      call check('still water: weight above', box%flow%p(2, 3, k), expected, 1.0e-5_wp)
+    end do
+  end subroutine still_water
+
+  !> Accelerations, their cell means by open shares, the face velocity predicted from cells.
+  subroutine accelerations_at_faces()
+    real(wp), parameter :: g(3) = [0.5_wp, -0.25_wp, -9.81_wp], rho = 1000.0_wp, nu = 1.0e-3_wp
+    real(wp), allocatable :: a_face(:, :, :, :), a_cell(:, :, :, :)
+    real(wp) :: short, largest
+    integer :: i
+
+    call build(tank, .false.)
+    box%flow%rho = rho
+    box%flow%mu = rho*nu
+    allocate (a_face, a_cell, source=box%flow%uf)
+    do i = 1 - n_halo, cells(1) + n_halo
+      box%flow%p(i, :, :) = 40.0_wp*box%grid%centre(i, 1)**2
+    end do
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a_face)
+    call check('acceleration: gravity less gradient', a_face(4, 3, 2, 1), &
+               0.5_wp - 80.0_wp*box%grid%face(4, 1)/rho, 1.0e-13_wp)
+    call check('acceleration: walls', abs(a_face(1, 3, 2, 1)) + abs(a_face(13, 3, 2, 1)), 0.0_wp, &
+               0.0_wp)
+    call check('acceleration: open top', a_face(4, 3, 13, 3), &
+               -9.81_wp + box%flow%p(4, 3, 12)/(0.005_wp*rho), 1.0e-12_wp)
+    call cell_mean_of_faces(box%grid, box%solid%open, a_face, a_cell)
+    i = findloc(box%solid%open(1:12, 4, 6, 1) > 0.0_wp .and. box%solid%open(1:12, 4, 6, 1) &
+                < 1.0_wp, .true., 1)
+    call check('a face is partly open', i > 1)
+    associate (w => box%solid%open(i:i + 1, 4, 6, 1))
+      call check('mean of faces by open shares', a_cell(i, 4, 6, 1)*sum(w), &
+                 dot_product(w, a_face(i:i + 1, 4, 6, 1)), 1.0e-13_wp)
+    end associate
+
+    box%flow%u(:, :, :, 1) = 0.7_wp
+    call fill_velocity_halo(box%grid, box%flow%u)
+    a_face = 2.0_wp
+    a_cell = 0.5_wp
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a_face, a_cell, box%flow)
+    short = dt/(1.0_wp + 2.0_wp*nu*dt*3.0_wp/0.01_wp**2)
+    call check('predicted face velocity', box%flow%uf(5, 3, 3, 1), 0.7_wp + 1.5_wp*short, &
+               1.0e-15_wp)
+    call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
+    call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
+    box%flow%solid_flux = 0.0_wp
+    call divergence(box%grid, 0.0_wp*box%solid%open + 1.0_wp, box%flow%uf, box%flow%solid_flux, &
+                    system%active, system%rhs, largest)
+    call check('divergence: largest', largest, maxval(abs(system%rhs(1:12, 1:8, 1:12))) &
+               /box%grid%volume, 1.0e-12_wp)
+    call check('divergence: wall cell', system%rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
+               + 1.5_wp*short), 1.0e-16_wp)
+  end subroutine accelerations_at_faces
+
+  !> Cells that cannot move take the pressure of their height; under a closed floor, from above.
+  subroutine closed_cells()
+    real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp]
+    real(wp) :: worst
+    integer :: k
+
+    call build(tank, .false.)
+    do k = 1, cells(3)
+      box%flow%p(:, :, k) = hydrostatic(k)
+    end do
+    system%active = .true.
+    system%active(4:8, 3:7, 3:9) = .false.
+    system%active(:, :, 1) = .false.
+    system%active(2:3, 2:3, 2) = .false.
+    where (.not. system%active) box%flow%p = 1.0e9_wp
+    call extend_pressure(box%grid, g, box%flow%rho, system%active, system%known, box%flow%p)
+    worst = 0.0_wp
+    do k = 1, cells(3)
+      worst = max(worst, maxval(abs(box%flow%p(1:12, 1:8, k) - hydrostatic(k))))
+    end do
+    call check('closed cells: hydrostatic', worst, 0.0_wp, 1.0e-9_wp)
+    call check('closed cells: halo', box%flow%p(5, 5, -1), hydrostatic(1), 1.0e-9_wp)
+  end subroutine closed_cells
+
+  !> Weight per area above the centre of the cells of height k, zero half a cell above the top [Pa].
+  function hydrostatic(k) result(p)
+    integer, intent(in) :: k
+    real(wp) :: p
+    integer :: m
+
+    p = 0.5_wp*box%flow%rho(1, 1, cells(3))
+    do m = k, cells(3) - 1
+      p = p + face_mean(box%flow%rho(1, 1, m), box%flow%rho(1, 1, m + 1))
+    end do
+    p = 9.81_wp*box%grid%h(3)*p
+  end function hydrostatic
+
+end program test_pressure
