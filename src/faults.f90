@@ -27,9 +27,10 @@ contains
 
     if (.not. report%contacts_solved) call set(sim, 'blocks move too fast for any body step', fault)
     if (.not. report%viscous_converged) call set(sim, 'the viscous stage did not converge', fault)
-    if (.not. report%pressure_converged) &
+    if (.not. report%pressure_converged) then
       call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
                //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
+    end if
     call look_at_blocks(sim, fault)
   end subroutine find_fault
 
@@ -66,8 +67,9 @@ contains
       do s = 1, 2
         if (grid%side(s, d) == side_periodic) cycle
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
-        if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp) &
+        if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0) then
           beyond = beyond - grid%length(d)
+        end if
         left = left .or. beyond > 0.0_wp
       end do
     end do

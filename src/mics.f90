@@ -9,6 +9,7 @@ program mics
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, set_threads, &
     global_max
+  use patience_m, only: spin_briefly
   use signals_m, only: catch_signals, signal_caught
   use command_line_m, only: options_t, read_command_line, print_help
   use namelist_text_m, only: read_text
@@ -32,6 +33,7 @@ program mics
   type(fault_t) :: fault
   integer :: code, signal = 0
 
+  call spin_briefly()
   call parallel_init()
   call read_options()
   call read_and_check()
