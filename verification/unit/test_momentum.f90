@@ -1,0 +1,268 @@
+!> Transport of momentum: uniform velocity, balance, order of accuracy, moving boxes.
+program test_momentum
+  use kinds_m, only: wp, pi
+  use case_types_m, only: fluid_t, water_t
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t, flow_init
+  use boundary_m, only: fill_velocity_halo
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use extended_fraction_m, only: extend_fraction
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
+    finish_transport
+  use liquid_fill_m, only: fill_liquid
+  use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
+    momentum_late, mass_through
+  use box_solid_m, only: set_boxes, simple_grid
+  use check_m, only: check, finish_checks
+  implicit none
+  real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp], &
+    stream(3) = [0.7_wp, -0.4_wp, 0.3_wp]   !! uniform velocity [m/s]
+  logical, parameter :: everywhere(3) = .true., sideways(3) = [.true., .true., .false.]
+  type(grid_t) :: grid
+  type(solid_geometry_t) :: old, new
+  type(flow_t) :: flow
+  type(liquid_transport_t) :: transport
+  type(momentum_t) :: momentum
+  type(fluid_t) :: fluid
+
+  call check('mass of a mixed volume', mass_through(fluid_t(liquid_density=10.0_wp, &
+    gas_density=2.0_wp), 0.5_wp, 0.1_wp), 1.8_wp, 1.0e-15_wp)
+  call uniform_through_an_interface()
+  call momentum_of_a_period()
+  call boxes_in_uniform_fluid()
+  call order_of_accuracy()
+  call finish_checks()
+
+contains
+
+  !> Boxes of liquid and of solid in gas.
+  subroutine start(n, length, periodic, water, low, high)
+    integer, intent(in) :: n(3)
+    real(wp), intent(in) :: length(3)
+    logical, intent(in) :: periodic(3)
+    type(water_t), intent(in) :: water(:)
+    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, boxes) solid [m]
+
+    call simple_grid(n, length, grid, periodic)
+    call flow_init(grid, flow)
+    call solid_geometry_init(grid, old)
+    call solid_geometry_init(grid, new)
+    call liquid_transport_init(grid, gravity, transport)
+    call momentum_init(grid, momentum)
+    call set_boxes(grid, low, high, old)
+    call set_boxes(grid, low, high, new)
+    call fill_liquid(grid, fluid, water, new, flow)
+    call extend_fraction(grid, new, transport%extension, flow)
+  end subroutine start
+
+  !> One step of liquid and momentum.
+  subroutine carry(dt, step)
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: step
+    integer :: n
+
+    call begin_transport(grid, old, new, dt, step, transport, flow)
+    call momentum_begin(grid, fluid, flow%liquid, flow%room, flow%c, flow%u, momentum)
+    do n = 1, 3
+      call momentum_sweep(grid, fluid, old, transport%order(n), transport, flow%u, momentum)
+    end do
+    call momentum_late(grid, fluid, transport, flow%u, momentum)
+    call finish_transport(grid, new, transport, flow)
+  end subroutine carry
+
+  !> Face velocity of a vortex about the y axis, zero on the sides and free of divergence, with a
+  !! uniform stream.
+  subroutine vortex(speed, with_stream)
+    real(wp), intent(in) :: speed, with_stream(3)
+    integer :: i, k
+
+    do k = 1, grid%n(3) + 1
+      do i = 1, grid%n(1) + 1
+        flow%uf(i, :, k, 1) = with_stream(1) + (psi(speed, i, k + 1) - psi(speed, i, k))/grid%h(3)
+        flow%uf(i, :, k, 3) = with_stream(3) - (psi(speed, i + 1, k) - psi(speed, i, k))/grid%h(1)
+      end do
+    end do
+    flow%uf(:, :, :, 2) = with_stream(2)
+  end subroutine vortex
+
+  !> Stream function of the vortex at a corner of cell (i, k) [m2/s].
+  pure function psi(speed, i, k) result(value)
+    real(wp), intent(in) :: speed   !! [m/s]
+    integer, intent(in) :: i, k
+    real(wp) :: value
+
+    value = speed*grid%length(1)/pi*sin(pi*real(i - 1, wp)/real(grid%n(1), wp)) &
+            *sin(pi*real(k - 1, wp)/real(grid%n(3), wp))
+  end function psi
+
+  !> Largest change of a velocity that was uniform, in cells that hold more than the given share.
+  function deviation(least_room) result(worst)
+    real(wp), intent(in) :: least_room   !! [V]
+    real(wp) :: worst
+    integer :: d
+
+    worst = 0.0_wp
+    associate (n => grid%n)
+      do d = 1, 3
+        worst = max(worst, maxval(abs(flow%u(1:n(1), 1:n(2), 1:n(3), d) - stream(d)), &
+                                  mask=flow%room(1:n(1), 1:n(2), 1:n(3)) > least_room*grid%volume))
+      end do
+    end associate
+  end function deviation
+
+  !> A uniform velocity carried by another, sheared flow through boxes of liquid stays.
+  subroutine uniform_through_an_interface()
+    real(wp) :: nothing(3, 0)
+    integer :: step, d
+
+    call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
+               [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], &
+               nothing, nothing)
+    call vortex(0.2_wp, stream)
+    do d = 1, 3
+      flow%u(:, :, :, d) = stream(d)
+    end do
+    do step = 1, 8
+      call carry(2.5e-3_wp, step)
+    end do
+    call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
+    call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
+               > 50)
+  end subroutine uniform_through_an_interface
+
+  !> Total momentum of a domain without sides, velocity and liquid of any form.
+  subroutine momentum_of_a_period()
+    real(wp) :: nothing(3, 0), before(3), after(3), scale
+    integer :: i, j, k, step
+
+    call start([16, 8, 12], [0.16_wp, 0.08_wp, 0.12_wp], everywhere, &
+               [water_t([0.033_wp, 0.011_wp, 0.027_wp], [0.091_wp, 0.057_wp, 0.083_wp])], &
+               nothing, nothing)
+    call vortex(0.2_wp, stream)
+    do k = 1, 12
+      do j = 1, 8
+        do i = 1, 16
+          flow%u(i, j, k, :) = [sin(0.9_wp*i), 0.3_wp + cos(0.7_wp*j)*sin(1.3_wp*k), &
+                                cos(0.4_wp*i*j)]
+        end do
+      end do
+    end do
+    call fill_velocity_halo(grid, flow%u)
+    before = total_momentum()
+    scale = total_mass()
+    do step = 1, 6
+      call carry(2.5e-3_wp, step)
+    end do
+    after = total_momentum()
+    call check('momentum of a period', after, before, 1.0e-14_wp*scale)
+    call check('mass of a period', total_mass(), scale, 1.0e-14_wp*scale)
+  end subroutine momentum_of_a_period
+
+  function total_momentum() result(p)
+    real(wp) :: p(3)
+    integer :: d
+
+    associate (n => grid%n)
+      do d = 1, 3
+        p(d) = sum(mass_through(fluid, flow%room(1:n(1), 1:n(2), 1:n(3)), &
+                                flow%liquid(1:n(1), 1:n(2), 1:n(3))) &
+                   *flow%u(1:n(1), 1:n(2), 1:n(3), d))
+      end do
+    end associate
+  end function total_momentum
+
+  function total_mass() result(m)
+    real(wp) :: m
+
+    associate (n => grid%n)
+      m = sum(mass_through(fluid, flow%room(1:n(1), 1:n(2), 1:n(3)), &
+                           flow%liquid(1:n(1), 1:n(2), 1:n(3))))
+    end associate
+  end function total_mass
+
+  !> A box dips into liquid, moves sideways and leaves through the open top; cells open and close,
+  !! the fluid keeps its velocity.
+  subroutine boxes_in_uniform_fluid()
+    real(wp), parameter :: half(3) = [0.033_wp, 0.027_wp, 0.0318_wp]
+    real(wp) :: low(3, 1), high(3, 1), centre(3), worst
+    integer :: step, d, small
+
+    fluid%water_level = 0.1013_wp
+    centre = [0.0771_wp, 0.0613_wp, 0.15_wp]
+    low(:, 1) = centre - half
+    high(:, 1) = centre + half
+    call start([16, 12, 20], [0.16_wp, 0.12_wp, 0.2_wp], sideways, [water_t ::], low, high)
+    do d = 1, 3
+      flow%u(:, :, :, d) = stream(d)
+    end do
+    call fill_velocity_halo(grid, flow%u)
+    worst = 0.0_wp
+    small = 0
+    do step = 1, 20
+      call set_boxes(grid, low, high, old)
+      centre(3) = 0.15_wp - 0.05_wp*sin(2.0_wp*pi*real(step, wp)/20.0_wp)
+      centre(1) = 0.0771_wp + 0.01_wp*sin(4.0_wp*pi*real(step, wp)/20.0_wp)
+      low(:, 1) = centre - half
+      high(:, 1) = centre + half
+      call set_boxes(grid, low, high, new)
+      call carry(0.01_wp, step)
+      worst = max(worst, deviation(1.0e-9_wp))
+      do d = 1, 3   ! the velocity stage gives closed cells the velocity of the body
+        where (new%alpha >= 1.0_wp) flow%u(:, :, :, d) = stream(d)
+      end do
+      small = max(small, transport%small_count)
+    end do
+    call check('uniform velocity around a moving box', worst, 0.0_wp, 1.0e-9_wp)
+    call check('cells opened and closed', small > 0)
+    print '(a, es9.2)', 'moving box: largest change of a uniform velocity ', worst
+    fluid = fluid_t()
+  end subroutine boxes_in_uniform_fluid
+
+  !> A smooth velocity rides on a uniform stream in one phase; the step is refined with the grid.
+  subroutine order_of_accuracy()
+    real(wp) :: coarse, fine
+
+    coarse = wave_error(16, 0.25_wp)
+    fine = wave_error(32, 0.25_wp)
+    print '(a, 2es10.2)', 'smooth wave: errors at 16 and 32 cells ', coarse, fine
+    call check('second order', coarse/fine > 3.8_wp)
+    call check('error at 32 cells', fine < 8.0e-3_wp)
+  end subroutine order_of_accuracy
+
+  !> Mean error of a sine wave after half a period at a given Courant number.
+  function wave_error(n, courant) result(error)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: courant
+    real(wp) :: error
+    real(wp) :: nothing(3, 0), dt, exact(n)
+    integer :: i, step, steps
+
+    fluid%single_phase = .true.
+    call start([n, 4, 4], [1.0_wp, 0.25_wp, 0.25_wp], everywhere, [water_t ::], nothing, nothing)
+    flow%uf(:, :, :, 1) = 1.0_wp
+    flow%u(:, :, :, 1) = 1.0_wp
+    do i = 1, n
+      flow%u(i, :, :, 2) = wave(grid%face(i, 1))
+    end do
+    call fill_velocity_halo(grid, flow%u)
+    steps = nint(0.5_wp*n/courant)
+    dt = 0.5_wp/real(steps, wp)
+    do step = 1, steps
+      call carry(dt, step)
+    end do
+    do i = 1, n
+      exact(i) = wave(grid%face(i, 1) - 0.5_wp)
+    end do
+    error = sum(abs(flow%u(1:n, 2, 2, 2) - exact))/real(n, wp)
+    fluid%single_phase = .false.
+  end function wave_error
+
+  !> Mean of a sine over the cell above face x.
+  pure function wave(x) result(value)
+    real(wp), intent(in) :: x   !! [m]
+    real(wp) :: value
+
+    value = (cos(2.0_wp*pi*x) - cos(2.0_wp*pi*(x + grid%h(1))))/(2.0_wp*pi*grid%h(1))
+  end function wave
+
+end program test_momentum
