@@ -156,7 +156,10 @@ def pattern(run: Run) -> Finding:
     """The paper on figure 6 (e): all dropped blocks lie on the three of the floor, pattern A."""
     kind, low = classify(run)
     statement = "all dropped blocks lie on the fixed ones (pattern A)"
-    return Finding(statement, kind == "A", f"pattern {kind}; dropped blocks on the floor: {low}")
+    b = run.bodies
+    released = int(b.present(-1)[b.dropped].sum())
+    figures = f"pattern {kind}; dropped blocks on the floor: {low}"
+    return Finding(statement, kind == "A", f"{figures}; {released} of {b.dropped.size} released")
 
 
 def depth(run: Run, limit: float = 1e-3) -> Finding:
@@ -194,19 +197,17 @@ def demanded_level(run: Run, row: int) -> float:
 
 
 def measured_level(run: Run, t: float, guess: float) -> float:
-    """Mean height [m] of the surface at time `t` [s], over the columns without solid near it.
+    """Mean height [m] of the surface at time `t` [s], over all columns of cells.
 
-    Only the cells within five cells of `guess` [m] are summed, so bubbles under blocks and drops
-    on the walls do not count.
+    Blocks through the surface count as the liquid around them, which `liquid` continues in them;
+    so waves of any length cancel. Only cells within five cells of `guess` [m] are summed: bubbles
+    under blocks and drops on the walls do not count.
     """
     fields, grid = run.fields(t), run.grid
     step = float(grid.spacing[2])
     middle = int((guess - grid.low[2]) / step)
     low, high = max(0, middle - 5), min(len(grid.z) - 1, middle + 6)
-    free = fields.solid[low:high].max(axis=0) < 1e-6
-    if not free.any():
-        raise ValueError("no column is free of solid near the surface")
-    columns = fields.liquid[low:high].sum(axis=0, dtype=np.float64)[free]
+    columns = fields.liquid[low:high].sum(axis=0, dtype=np.float64)
     return float(grid.z[low] + step * columns.mean())
 
 

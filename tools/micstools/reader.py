@@ -71,7 +71,7 @@ class Bodies:
     shape: list[str]  # names of the shapes (N)
     mass: Array  # (N) [kg]
     fixed: NDArray[np.bool_]  # (N)
-    release_time: Array  # (N) [s]
+    release_time: Array  # (N) true time of release, infinite for blocks not released yet [s]
     time: Array  # (T) [s]
     position: Array  # (T, N, 3) [m]
     quaternion: Array  # (T, N, 4) w, x, y, z
@@ -286,13 +286,23 @@ def _read_bodies(h5: h5py.File) -> Bodies:
     per_body = ("shape", "mass", "fixed", "release_time")
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
     complete = min(len(group[name]) for name in rows)
+    values = {name: group[name][:complete] for name in rows}
     return Bodies(
         shape=[_text(name) for name in group["shape"][:]],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
-        release_time=group["release_time"][:],
-        **{name: group[name][:complete] for name in rows},
+        release_time=_true_release(group["release_time"][:], values),
+        **values,
     )
+
+
+def _true_release(due: Array, rows: dict[str, Array]) -> Array:
+    """Release times (N) [s]; infinite for a block that is due but still waits for room, which shows
+    in that it has neither moved nor felt a force since."""
+    signs = [rows[name] for name in ("velocity", "fluid_force", "contact_force")]
+    alive = np.any([(np.nan_to_num(sign) != 0).any(axis=(0, 2)) for sign in signs], axis=0)
+    waited = (due > 0) & (due < rows["time"][-1]) & ~alive
+    return np.where(waited, np.inf, due)
 
 
 def _read_series(h5: h5py.File) -> Series:

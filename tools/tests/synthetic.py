@@ -128,6 +128,7 @@ def _write_bodies(
     group["fixed"] = np.array([1, 1, 1] + [0] * (n - 3), dtype=np.int32)
     group["release_time"] = np.array([0.0, 0, 0] + [float(k) for k in range(n - 3)])
     velocity = np.gradient(position, time, axis=0)
+    velocity[np.abs(velocity) < 1e-12] = 0.0
     force = mass * np.gradient(velocity, time, axis=0)
     force[..., 2] += mass * 9.81 * (np.linalg.norm(velocity, axis=2) > 0)
     for name, values in {

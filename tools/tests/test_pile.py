@@ -47,6 +47,16 @@ def test_a_pile_with_blocks_still_to_come_is_no_pattern(make_run) -> None:
     assert not pile.at_rest(run).seen
 
 
+def test_a_block_that_waits_for_room_is_not_there(make_run) -> None:
+    motion = Motion(places=places((0.06, 0.05, 0.12), (0.15, 0.05, 0.16)), t_end=3.0)
+    run = make_run(motion)  # the second one stays at its starting pose without any force
+    assert run.bodies.release_time[-1] == np.inf
+    assert run.bodies.present(-1).tolist() == [True] * 4 + [False]
+    assert pile.classify(run) == ("other", [])
+    assert "1 of 2 released" in pile.pattern(run).figures
+    assert list(pile.turning_before_touch(run)) == [3]
+
+
 def test_front_and_back_walls(make_run) -> None:
     ends = places((0.06, 0.0303, 0.12), (0.2, 0.0697, 0.12))
     run = make_run(Motion(places=ends, t_end=3.0, field_step=3.0))
