@@ -2,9 +2,9 @@
 !!
 !! The mixture density carries the inertia of the bodies into the projection; the force on a body is
 !! the volume integral of -grad p + div tau over it; then the cells take the rigid velocity by mass
-!! average. Known (measured): the average thickens the body, the added mass comes out 9 % too
-!! large at
-!! 12 cells per diameter, and the last average leaves some divergence, which the report shows.
+!! average. Known (measured, docs/decisions/coupling.md): the average thickens the body and the
+!! force lags, so a released sphere starts some per cent off, by an amount that depends on the step;
+!! and the last average leaves some divergence, which the report shows.
 !! Source: Yoshikawa et al. (2008), section 3 (2); order of the steps as in Sharma & Patankar
 !! (2005).
 module mass_average_m
