@@ -1,0 +1,176 @@
+!> Whole steps: still water, length of the step, a release, a fall without fluid.
+program test_time_step
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use liquid_fill_m, only: liquid_volume
+  use diagnostics_m, only: step_report_t
+  use time_step_m, only: simulation_t, simulation_init, resume, take_step
+  use check_m, only: check, finish_checks
+  implicit none
+  real(wp), parameter :: g = 9.81_wp
+
+  call still_water()
+  call length_of_steps()
+  call release_into_water()
+  call fall_without_fluid()
+  call go_on_from_the_state()
+  call finish_checks()
+
+contains
+
+  !> A tank half full, with boxes of 4 cm.
+  subroutine tank(n_bodies, case)
+    integer, intent(in) :: n_bodies
+    type(case_t), intent(out) :: case
+
+    case%run%t_end = 1.0_wp
+    case%run%dt = 2.0e-3_wp
+    case%grid%cells = [12, 8, 12]
+    case%grid%length = [0.12_wp, 0.08_wp, 0.12_wp]
+    case%fluid%water_level = 0.0613_wp
+    case%numerics%divergence_tolerance = 1.0e-8_wp
+    allocate (case%shape(1), case%body(n_bodies), case%drop(0), case%water(0))
+    case%shape(1)%name = 'box'
+    case%shape(1)%kind = 'box'
+    case%shape(1)%size = [0.04_wp, 0.03_wp, 0.035_wp]
+    case%body%shape = 'box'
+  end subroutine tank
+
+  subroutine start(case, sim)
+    type(case_t), intent(in) :: case
+    type(simulation_t), intent(inout) :: sim
+    type(shape_t) :: shapes(1)
+    character(:), allocatable :: message
+
+    call make_shape(case%shape(1), shapes(1), message)
+    call simulation_init(case, shapes, sim)
+  end subroutine start
+
+  !> A held block through the level: nothing moves, no liquid is lost, and it is carried.
+  subroutine still_water()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp) :: before, mass
+    integer :: step
+
+    call tank(1, case)
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.0571_wp]
+    case%body(1)%fixed = .true.
+    call start(case, sim)
+    before = liquid_volume(sim%grid, sim%flow%liquid)
+    do step = 1, 3
+      call take_step(sim, report)
+    end do
+    mass = 0.04_wp*0.03_wp*(998.2_wp*(0.0613_wp - 0.0396_wp) + 1.204_wp*(0.0746_wp - 0.0613_wp))
+    call check('still water: converged', report%pressure_converged .and. report%viscous_converged)
+    call check('still water: three steps', sim%clock%t, 6.0e-3_wp, 1.0e-15_wp)
+    call check('still water: no motion', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, :))), 0.0_wp, &
+               1.0e-8_wp)
+    call check('still water: volume', liquid_volume(sim%grid, sim%flow%liquid), before, &
+               1.0e-14_wp*before)
+    call check('still water: open space below the level', before, 0.12_wp*0.08_wp*0.0613_wp &
+               - 0.04_wp*0.03_wp*(0.0613_wp - 0.0396_wp), 1.0e-14_wp*before)
+    call check('still water: buoyancy', sim%blocks%fluid_force(3, 1), mass*g, 1.0e-6_wp*mass*g)
+  end subroutine still_water
+
+  !> Steps obey the Courant number of fluid and blocks, and land on a release.
+  subroutine length_of_steps()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+
+    call tank(2, case)
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.09_wp]
+    case%body(1)%velocity = [0.0_wp, 0.0_wp, -4.0_wp]
+    case%body(2)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
+    case%body(2)%release_time = 2.0e-3_wp
+    call start(case, sim)
+    call take_step(sim, report)
+    call check('a fast block shortens the step', sim%clock%dt <= 0.5_wp*0.01_wp/4.0_wp)
+    call check('Courant number', report%cfl <= 0.5_wp + 1.0e-12_wp)
+    call check('not released before its time', .not. sim%blocks%present(2))
+    do while (sim%clock%t < 2.0e-3_wp - 1.0e-9_wp)
+      call take_step(sim, report)
+    end do
+    call check('a step ends at the release', sim%clock%t, 2.0e-3_wp, 1.0e-12_wp)
+    call take_step(sim, report)
+    call check('released', sim%blocks%present(2))
+  end subroutine length_of_steps
+
+  !> The liquid in the place of a released block is not lost.
+  subroutine release_into_water()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp) :: before, row(2)
+
+    call tank(1, case)
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
+    case%body(1)%release_time = 2.0e-3_wp
+    call start(case, sim)
+    before = liquid_volume(sim%grid, sim%flow%liquid)
+    row(1) = sum(sim%flow%liquid(1:12, 1:8, 7))
+    call take_step(sim, report)
+    call check('before: full tank', before, 0.12_wp*0.08_wp*0.0613_wp, 1.0e-14_wp*before)
+    call take_step(sim, report)
+    row(2) = sum(sim%flow%liquid(1:12, 1:8, 7))
+    call check('release: it is there', sim%blocks%present(1))
+    call check('release: volume', liquid_volume(sim%grid, sim%flow%liquid), before, &
+               1.0e-12_wp*before)
+    call check('release: the level has risen by the block', row(2) - row(1), &
+               0.04_wp*0.03_wp*0.035_wp, 0.05_wp*0.04_wp*0.03_wp*0.035_wp)
+    call check('release: it falls', sim%blocks%v(3, 1) < 0.0_wp)
+  end subroutine release_into_water
+
+  !> Without fluid a block falls by g t.
+  subroutine fall_without_fluid()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    integer :: step
+
+    call tank(1, case)
+    case%run%physics = 'dry'
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.08_wp]
+    call start(case, sim)
+    do step = 1, 10
+      call take_step(sim, report)
+    end do
+    call check('dry: speed', sim%blocks%v(3, 1), -g*0.02_wp, 1.0e-14_wp)
+    call check('dry: height', sim%blocks%x(3, 1), 0.08_wp - 0.5_wp*g*0.02_wp**2, 1.0e-15_wp)
+  end subroutine fall_without_fluid
+
+  !> What is worked out from the state is what a run without break has.
+  subroutine go_on_from_the_state()
+    type(simulation_t) :: whole, broken
+
+    call four_steps(0, whole)
+    call four_steps(3, broken)
+    call check('same velocity', all(abs(whole%flow%u - broken%flow%u) <= 0.0_wp))
+    call check('same liquid', all(abs(whole%flow%liquid - broken%flow%liquid) <= 0.0_wp))
+    call check('same block', all(abs(whole%blocks%x - broken%blocks%x) <= 0.0_wp))
+    call check('it moves', maxval(abs(whole%flow%u)) > 0.01_wp)
+  end subroutine go_on_from_the_state
+
+  !> A block falls through the level; before one step the solids and halos are worked out anew.
+  subroutine four_steps(anew, sim)
+    integer, intent(in) :: anew   !! number of that step, 0: none
+    type(simulation_t), intent(inout) :: sim
+    type(case_t) :: case
+    type(step_report_t) :: report
+    integer :: step
+
+    call tank(1, case)
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.0771_wp]
+    case%body(1)%velocity = [0.1_wp, 0.0_wp, -0.5_wp]
+    call start(case, sim)
+    do step = 1, 4
+      if (step == anew) call resume(sim)
+      call take_step(sim, report)
+    end do
+  end subroutine four_steps
+
+end program test_time_step
