@@ -19,7 +19,7 @@ program test_viscous
     long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
-  real(wp) :: force(6, 1), z, worst, momentum(2)
+  real(wp) :: force(6, 1), z, worst, momentum(2), film, drag
   integer :: k, n, iterations
   logical :: converged
 
@@ -55,6 +55,15 @@ program test_viscous
              1.0e-7_wp*momentum(1))
   call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
              5.0_wp*force(1, 1), 1.0e-7_wp*momentum(1))
+
+  ! The film above the wall, centre inside: mass m, drag 2 mu A^2/V_o, nothing else.
+  call make_wall(heights(2))
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
+  call solve_viscous(grid, wall, 5.0_wp, flow, viscous, force, iterations, converged)
+  film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
+  drag = 2.0_wp*mu*grid%area(3)**2/(film*grid%volume)
+  call check('film cell', flow%u(2, 2, 2, 1), speed*5.0_wp*drag/(rho*film*grid%volume &
+                                                               + 5.0_wp*drag), 1.0e-7_wp)
   call finish_checks()
   call parallel_final()
 contains
