@@ -13,6 +13,7 @@ program test_time_step
 
   call still_water()
   call length_of_steps()
+  call spinning_ball()
   call release_into_water()
   call fall_without_fluid()
   call go_on_from_the_state()
@@ -99,6 +100,24 @@ contains
     call take_step(sim, report)
     call check('released', sim%blocks%present(2))
   end subroutine length_of_steps
+
+  !> A ball that spins moves its surface, not the fluid; its surface speed counts all the same.
+  subroutine spinning_ball()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp), parameter :: spin = 400.0_wp   !! [rad/s]
+
+    call tank(1, case)
+    case%shape(1)%kind = 'sphere'
+    case%shape(1)%size = [0.04_wp, 0.0_wp, 0.0_wp]
+    case%body(1)%position = [0.0613_wp, 0.0389_wp, 0.03_wp]
+    case%body(1)%angular_velocity = [0.0_wp, spin, 0.0_wp]
+    call start(case, sim)
+    call take_step(sim, report)
+    call check('a spinning ball shortens the step', sim%clock%dt, 0.5_wp*0.01_wp/(spin*0.02_wp), &
+               0.1_wp*0.5_wp*0.01_wp/(spin*0.02_wp))
+  end subroutine spinning_ball
 
   !> The liquid in the place of a released block is not lost.
   subroutine release_into_water()
