@@ -29,6 +29,7 @@ module time_step_m
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
+  use buoyancy_m, only: displaced_force
   use coupling_m, only: advance_velocity
   use clock_m, only: clock_t, clock_init
   use parallel_m, only: global_max
@@ -55,6 +56,7 @@ module time_step_m
     type(contacts_t) :: contacts
     type(overlap_t) :: overlap
     logical :: wet = .true.                !! there is a fluid
+    logical, allocatable :: felt(:)        !! blocks that have felt the fluid
     logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
     type(clock_t) :: clock
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
@@ -82,7 +84,7 @@ contains
     call blocks_init(case, shapes, sim%blocks)
     call contacts_init(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
-    allocate (sim%waiting(sim%blocks%n), source=.false.)
+    allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return
     call flow_init(sim%grid, sim%flow)
@@ -111,6 +113,7 @@ contains
     type(simulation_t), intent(inout) :: sim
 
     if (.not. sim%wet) return
+    if (sim%clock%step > 0) sim%felt = sim%blocks%present
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_velocity_halo(sim%grid, sim%flow%u)
     call fill_scalar_halo(sim%grid, sim%flow%p)
@@ -128,6 +131,7 @@ contains
     type(stage_report_t) :: stage
 
     call release(sim, report)
+    if (sim%wet) call first_force(sim)
     call choose_step(sim, report)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                dt => sim%clock%dt)
@@ -195,6 +199,25 @@ contains
     call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
   end subroutine release
+
+  !> A block that has just appeared feels the buoyancy of its place; after each step the fluid
+  !! force of
+  !! that step takes over.
+  subroutine first_force(sim)
+    type(simulation_t), intent(inout) :: sim
+    integer :: b
+
+    if (all(sim%felt .or. .not. sim%blocks%present)) return
+    call copy_motion(sim%blocks, sim%stage%bodies)
+    call displaced_force(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
+                         sim%stage%buoyancy, sim%stage%from_level)
+    do b = 1, sim%blocks%n
+      if (sim%felt(b) .or. .not. sim%blocks%present(b)) cycle
+      sim%blocks%fluid_force(:, b) = sim%stage%from_level(1:3, b)
+      sim%blocks%fluid_torque(:, b) = sim%stage%from_level(4:6, b)
+      sim%felt(b) = .true.
+    end do
+  end subroutine first_force
 
   !> The present solids become those of the start of the step.
   subroutine swap_solids(sim)

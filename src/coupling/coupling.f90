@@ -35,6 +35,7 @@ contains
 
     stage%total = 0.0_wp
     call set_velocity()
+    call motion_at_start(blocks, stage)
     if (case%numerics%coupling == 'mics') then
       call mass_average_stage(case, grid, solid, dt, flow, stage, report)
       call set_velocity()
@@ -52,5 +53,20 @@ contains
       call copy_motion(blocks, stage%bodies)
     end subroutine set_velocity
   end subroutine advance_velocity
+
+  !> The bodies at their new place with the motion they had when the step began.
+  subroutine motion_at_start(blocks, stage)
+    type(blocks_t), intent(in) :: blocks
+    type(stage_t), intent(inout) :: stage
+    integer :: b
+
+    stage%at_start = stage%bodies
+    do b = 1, blocks%n
+      if (.not. stage%bodies%free(b)) cycle
+      stage%at_start%motion(1:3, b) = blocks%v_start(:, b)
+      stage%at_start%motion(4:6, b) = matmul(stage%bodies%inverse_inertia(:, :, b), &
+                                             blocks%l_start(:, b))
+    end do
+  end subroutine motion_at_start
 
 end module coupling_m

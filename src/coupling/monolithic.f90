@@ -17,7 +17,8 @@ module monolithic_m
   use viscous_m, only: build_viscous, solve_viscous
   use pressure_m, only: set_pressure_system, solve_pressure, face_acceleration, &
     cell_mean_of_faces, &
-                        predict_face_velocity, extend_pressure
+                        predict_face_velocity, face_velocity_at_walls, &
+                        extend_pressure
   use buoyancy_m, only: hydrostatic_correction
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies
   use boundary_m, only: fill_velocity_halo
@@ -60,6 +61,8 @@ contains
       call fill_velocity_halo(grid, flow%u)
       call halo_exchange(p%a_cell, n_halo)
       call predict_face_velocity(grid, dt, flow%rho, p%a_face, p%a_cell, flow)
+      call face_velocity_at_walls(grid, solid, self%at_start, dt, flow%rho, p%a_face, p%a_cell, &
+                                  flow)
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, bodies, p, &
                           report%pressure)
 

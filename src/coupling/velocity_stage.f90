@@ -20,6 +20,8 @@ module velocity_stage_m
 
   type :: stage_t
     type(rigid_motion_t) :: bodies
+    type(rigid_motion_t) :: at_start
+      !! the same with the motion at the start of the step
     type(viscous_t) :: viscous
     type(pressure_t) :: pressure
     type(buoyancy_t) :: buoyancy
@@ -46,6 +48,7 @@ contains
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     call rigid_motion_init(n, self%bodies)
+    call rigid_motion_init(n, self%at_start)
     call viscous_init(grid, n, self%viscous)
     call pressure_init(grid, n, self%pressure)
     call buoyancy_init(self%buoyancy)

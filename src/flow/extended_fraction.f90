@@ -23,7 +23,9 @@ module extended_fraction_m
 
   real(wp), parameter :: unknown = -1.0_wp           !! C^ not found yet
   real(wp), parameter :: least_open_volume = 0.02_wp !! open share of a cell with a value of its own
-  real(wp), parameter :: same_liquid = 1.0e-9_wp     !! liquid that the row's value may miss [V]
+  !> Liquid that the row's value may miss [V]: more than the divergence left by the pressure solve
+  !! moves in many steps (1e-8 in a step at the default tolerance), far less than shows.
+  real(wp), parameter :: same_liquid = 1.0e-6_wp
   real(wp), parameter :: nearly_pure = 1.0e-8_wp     !! share of gas or liquid that has no plane
   integer, parameter :: plane_passes = 2             !! their normals depend on each other
 

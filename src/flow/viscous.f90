@@ -65,7 +65,8 @@ contains
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, source=self%mass)
+    allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, &
+              source=self%mass)
     allocate (self%first(n_bodies + 1), source=1)
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
@@ -107,7 +108,7 @@ contains
     self%diagonal = self%diagonal + self%mass
     where (self%mass > 0.0_wp)
       self%inverse = 1.0_wp/self%diagonal
-    elsewhere
+    else where
       self%inverse = 0.0_wp
     end where
   end subroutine build_viscous
