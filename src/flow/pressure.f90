@@ -373,9 +373,8 @@ contains
         !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
     integer :: i, j, k, d, e(3)
-    real(wp) :: nu, steps
+    real(wp) :: nu
 
-    steps = 2.0_wp*sum(1.0_wp/grid%h**2)*dt
     do d = 1, 3
       e = unit_step(:, d)
       !$omp parallel do private(i, j, nu) schedule(static)
@@ -386,7 +385,7 @@ contains
               nu = face_mean(flow%mu(il, jl, kl), flow%mu(i, j, k)) &
                    /face_mean(rho(il, jl, kl), rho(i, j, k))
               flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
-                + dt/(1.0_wp + nu*steps)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), &
+                + face_step(grid, dt, nu)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), &
                     a_cell(i, j, k, d)))
             end associate
           end do
@@ -419,6 +418,16 @@ contains
     end subroutine sides_of_direction
   end subroutine predict_face_velocity
 
+  !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
+  pure function face_step(grid, dt, nu) result(step)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in) :: nu   !! kinematic viscosity [m2/s]
+    real(wp) :: step
+
+    step = dt/(1.0_wp + 2.0_wp*nu*dt*sum(1.0_wp/grid%h**2))
+  end function face_step
+
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
   !! that
   !! of the cell to that of the wall, where the leg through the face ends; the rest is the cell's.
@@ -442,9 +451,8 @@ contains
                                     grid%lo(3) - n_halo:, :), contiguous :: a_face, a_cell
     type(flow_t), intent(inout) :: flow
     integer :: m, d, f(3), low(3), sides
-    real(wp) :: total, steps
+    real(wp) :: total
 
-    steps = 2.0_wp*sum(1.0_wp/grid%h**2)*dt
     do m = 1, solid%n_leg
       f = solid%leg(1:3, m)
       d = solid%leg(4, m)
@@ -474,7 +482,7 @@ contains
 
       if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
-      dt_face = dt/(1.0_wp + nu*steps)
+      dt_face = face_step(grid, dt, nu)
       do a = 1, 3
         x_wall(a) = grid%centre(c(a), a)
       end do
