@@ -38,6 +38,7 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: self
     type(stage_report_t), intent(inout) :: report
+    real(wp) :: free(6, self%bodies%n)   !! motion with weight and contact only
     real(wp), parameter :: weightless(3) = 0.0_wp
 
     associate (p => self%pressure, bodies => self%bodies)
@@ -51,11 +52,14 @@ contains
       call hydrostatic_correction(grid, case%fluid, solid, bodies, p%operator%flux, flow%c, &
                                   flow%rho, &
                                   self%buoyancy, self%from_level)
+      free = bodies%motion
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
 
       call build_viscous(grid, solid, bodies, flow%rho, flow%mu, dt, self%viscous)
       call solve_viscous(grid, bodies, dt, flow, self%viscous, self%from_viscosity, &
                          report%viscous_iterations, report%viscous_converged)
+      bodies%motion = free   ! to round-off the motion that the forces give, not the solver's
+      call push_bodies(dt, self%from_pressure + self%from_level + self%from_viscosity, bodies)
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
 
       call fill_velocity_halo(grid, flow%u)
