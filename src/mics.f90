@@ -18,6 +18,7 @@ program mics
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
   use tet_mesh_m, only: shape_t
+  use initial_state_m, only: check_initial_state
   use output_m, only: output_t, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
@@ -103,6 +104,7 @@ contains
     call read_case(text, case, problems)
     call make_shapes(case, shapes, problems)
     call check_case(case, shapes, problems)
+    call check_initial_state(case, problems)
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) return
     if (is_root()) call print_plan(output_unit, case, shapes)

@@ -15,6 +15,7 @@ module time_step_m
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
     finish_transport
   use liquid_fill_m, only: fill_liquid, raise_surface
+  use initial_state_m, only: read_initial_liquid, read_initial_velocity
   use extended_fraction_m, only: extend_fraction
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
@@ -97,6 +98,7 @@ contains
     call stage_init(sim%grid, sim%blocks%n, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
+    call read_initial_liquid(case%fluid, sim%grid, sim%flow)
     call extend_fraction(sim%grid, sim%solid, sim%transport%extension, sim%flow)
     call mix_fluid(case%fluid, sim%flow)
     do d = 1, 3
@@ -104,6 +106,7 @@ contains
       sim%flow%uf(:, :, :, d) = case%fluid%velocity(d)
     end do
     call fill_velocity_halo(sim%grid, sim%flow%u)
+    call read_initial_velocity(case%fluid, sim%grid, sim%flow)
     call copy_motion(sim%blocks, sim%stage%bodies)
     call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, report)
   end subroutine simulation_init

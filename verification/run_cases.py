@@ -4,6 +4,9 @@ usage: python verification/run_cases.py [CASE ...] [--program ./mics] [--ranks N
 
 Every *.nml of a case folder is run into OUT/<case>/<name of the file>; then the folder's check.py
 gets all of these result folders. The exit code is the number of cases that failed.
+
+A prepare.py in the folder is run first, in OUT/<case>: it writes the initial states that the case
+files name, and may write further case files there.
 """
 
 import argparse
@@ -49,13 +52,23 @@ class Machine:
         return {"OMP_WAIT_POLICY": "passive"} if crowded else {}
 
 
+def prepare(name: str, work: Path) -> list[Path]:
+    """Make what a case needs in a folder; all its case files. They run in that folder."""
+    work.mkdir(parents=True, exist_ok=True)
+    script = CASES / name / "prepare.py"
+    if script.exists():
+        subprocess.run([sys.executable, str(script)], cwd=work, check=True)
+    return sorted([*(CASES / name).glob("*.nml"), *work.glob("*.nml")])
+
+
 def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     """Run one case file into a fresh folder; the seconds it took."""
     shutil.rmtree(output, ignore_errors=True)
     output.parent.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
     done = subprocess.run(
-        [*machine.command, *options, "--output", str(output), str(case)],
+        [*machine.command, *options, "--output", str(output.resolve()), str(case.resolve())],
+        cwd=output.parent,
         env={**os.environ, **MPI_SETTINGS, **machine.patience},
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -75,7 +88,7 @@ def names() -> list[str]:
 def verify(name: str, out: Path, machine: Machine) -> tuple[bool, str]:
     """Run all files of a case and its check; whether it holds, and the report."""
     folders, lines = [], []
-    for case in sorted((CASES / name).glob("*.nml")):
+    for case in prepare(name, out / name):
         folder = out / name / case.stem
         seconds = run(case, folder, machine)
         lines.append(f"{name}/{case.name}: {seconds:.1f} s")

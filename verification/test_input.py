@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from run_cases import CASES, MPI_SETTINGS, ROOT, Machine
+from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, prepare
 
 INPUT = sorted((ROOT / "input").glob("*.nml"))
 GOOD = [*INPUT, *sorted(CASES.glob("*/*.nml"))]
@@ -86,11 +86,14 @@ def mics(
 @pytest.mark.parametrize("case", GOOD, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_good_case_is_planned(case: Path, tmp_path: Path) -> None:
     """--check prints a plan, ends with 0 and writes nothing."""
+    if (case.parent / "prepare.py").exists():
+        prepare(case.parent.name, tmp_path)
+    before = sorted(tmp_path.iterdir())
     done = mics(["--check", str(case)], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     for heading in ("Run", "Tank", "Time steps", "Memory", "Files in"):
         assert f"\n{heading}" in f"\n{done.stdout}"
-    assert list(tmp_path.iterdir()) == []
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_plan_tells_the_numbers(tmp_path: Path) -> None:

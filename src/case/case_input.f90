@@ -62,6 +62,7 @@ contains
     case%run%title = ''
     case%run%output = 'mics-out'
     case%bed%file = ''
+    case%fluid%initial_state = ''
   end subroutine set_empty
 
   !> Number of groups of a name.
@@ -309,6 +310,7 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(fluid_t), intent(inout) :: fluid
 
+    fluid%line = v%group%line
     call v%item('liquid_density', fluid%liquid_density)
     call v%item('liquid_viscosity', fluid%liquid_viscosity)
     call v%item('gas_density', fluid%gas_density)
@@ -318,6 +320,7 @@ contains
     call v%item('surface_tension', fluid%surface_tension)
     call v%item('single_phase', fluid%single_phase)
     call v%item('velocity', fluid%velocity)
+    call v%item('initial_state', fluid%initial_state)
 
     call require_density(v, 'liquid_density', fluid%liquid_density)
     call require_density(v, 'gas_density', fluid%gas_density)

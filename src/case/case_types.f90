@@ -49,6 +49,8 @@ module case_types_m
     real(wp) :: surface_tension = 0.0_wp            !! [N/m]
     logical :: single_phase = .false.
     real(wp) :: velocity(3) = 0.0_wp                !! uniform initial velocity [m/s]
+    character(:), allocatable :: initial_state      !! HDF5 file; '': none
+    integer :: line = 0                             !! of the case file, where the group begins
   end type fluid_t
 
   type :: water_t
