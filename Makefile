@@ -37,7 +37,7 @@ help:
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
 	@echo 'make run      deps, build, run $(CASE), draw the pictures'
 	@echo 'make test     deps, all builds, every quick test'
-	@echo 'make verify   the same with the long tests'
+	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
 	@echo 'make lint     style of the Fortran and Python sources'
 	@echo 'make clean    remove what make has built'
@@ -94,10 +94,11 @@ run: deps
 	$(PYTHON) tools/plot_history.py mics-out
 
 test: deps
-	@verification/run_tests -m 'not slow'
+	@verification/run_tests
 
 verify: deps
-	@verification/run_tests
+	@$(MAKE) --no-print-directory
+	@$(PYTHON) verification/verify.py
 
 mutate: deps
 	@$(PYTHON) verification/mutate.py

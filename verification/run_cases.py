@@ -1,24 +1,37 @@
 """Run verification cases and their checks.
 
 usage: python verification/run_cases.py [CASE ...] [--program ./mics] [--ranks N] [--threads N]
+                                        [--cost SECONDS]
 
-Every *.nml of a case folder is run into OUT/<case>/<name of the file>; then the folder's check.py
-gets all of these result folders. The exit code is the number of cases that failed.
+Every run of a case (see verification/README.md) goes into OUT/<case>/<name of the run>; then the
+folder's check.py gets all of them. The exit code is the number of cases that failed.
 
 A prepare.py in the folder is run first, in OUT/<case>: it writes the initial states that the case
 files name, and may write further case files there.
 """
 
 import argparse
+import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import f90nml
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from micstools.checks import Checks  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
 CASES = ROOT / "verification" / "cases"
 MPI_SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -26,6 +39,8 @@ MPI_SETTINGS = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1",
 }
+COST = 10.0
+"""Seconds on one core that a run takes which does not say so."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +67,69 @@ class Machine:
         return {"OMP_WAIT_POLICY": "passive"} if crowded else {}
 
 
+@dataclass(frozen=True)
+class Planned:
+    """One run of a case."""
+
+    case: str
+    name: str
+    text: str  # of the case file
+    cost: float  # about that many seconds on one core
+
+    def write(self, work: Path) -> Path:
+        """Put the case file into a folder of its own beside the results."""
+        path = work / "cases" / f"{self.name}.nml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(self.text)
+        return path
+
+
+def names() -> list[str]:
+    """All cases that have a check."""
+    return sorted(path.parent.name for path in CASES.glob("*/check.py"))
+
+
 def prepare(name: str, work: Path) -> list[Path]:
     """Make what a case needs in a folder; all its case files. They run in that folder."""
     work.mkdir(parents=True, exist_ok=True)
+    for old in work.glob("*.nml"):
+        old.unlink()
     script = CASES / name / "prepare.py"
     if script.exists():
         subprocess.run([sys.executable, str(script)], cwd=work, check=True)
     return sorted([*(CASES / name).glob("*.nml"), *work.glob("*.nml")])
+
+
+def planned(case: str, work: Path, cost: float = float("inf")) -> list[Planned]:
+    """The runs of a case that cost no more than `cost`: every *.nml, and for every table in
+    variants.toml the file `from` (case.nml) with some values changed."""
+    folder, found = CASES / case, []
+    for path in prepare(case, work):
+        text = path.read_text()
+        stated = re.search(r"^! cost: ([\d.]+) s", text, re.MULTILINE)
+        found.append(Planned(case, path.stem, text, float(stated[1]) if stated else COST))
+    if (folder / "variants.toml").is_file():
+        tables = tomllib.loads((folder / "variants.toml").read_text())
+        for name, table in tables.items():
+            base = folder / table.pop("from", "case.nml")
+            own_cost = float(table.pop("cost", COST))
+            found.append(Planned(case, name, changed(base.read_text(), table), own_cost))
+    return [run for run in found if run.cost <= cost]
+
+
+def changed(text: str, groups: dict[str, Any]) -> str:
+    """A case file with other values: for each group a table, or a list of tables for a group that
+    is repeated, one for each occurrence in order. A group that is not there is added."""
+    case = f90nml.reads(text)
+    for group, values in groups.items():
+        present = case.get(group, [])
+        present = list(present) if isinstance(present, list) else [present]
+        for k, table in enumerate(values if isinstance(values, list) else [values]):
+            if k < len(present):
+                present[k].update(table)
+            else:
+                case.add_cogroup(group, table)
+    return f"{case}\n"
 
 
 def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
@@ -80,22 +151,28 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
     return time.perf_counter() - began
 
 
-def names() -> list[str]:
-    """All cases that have a check."""
-    return sorted(path.parent.name for path in CASES.glob("*/check.py"))
+def checker(case: str) -> ModuleType:
+    """The check.py of a case: `check(runs)`, and `VARIES` if its runs leave the defaults."""
+    path = CASES / case / "check.py"
+    spec = importlib.util.spec_from_file_location(f"check_{case}", path)
+    if spec is None or spec.loader is None:
+        raise RuntimeError(f"cannot read {path}")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-def verify(name: str, out: Path, machine: Machine) -> tuple[bool, str]:
-    """Run all files of a case and its check; whether it holds, and the report."""
+def verify(name: str, out: Path, machine: Machine, cost: float = float("inf")) -> tuple[bool, str]:
+    """Run all of a case that costs no more than `cost`, and its check; whether it holds, and the
+    report."""
     folders, lines = [], []
-    for case in prepare(name, out / name):
-        folder = out / name / case.stem
+    for plan in planned(name, out / name, cost):
+        folder, case = out / name / plan.name, plan.write(out / name)
         seconds = run(case, folder, machine)
-        lines.append(f"{name}/{case.name}: {seconds:.1f} s")
-        folders.append(str(folder))
-    check = [sys.executable, str(CASES / name / "check.py"), *folders]
-    done = subprocess.run(check, capture_output=True, text=True, check=False)
-    return done.returncode == 0, "\n".join([*lines, done.stdout + done.stderr])
+        lines.append(f"{name}/{plan.name}: {seconds:.1f} s")
+        folders.append(folder)
+    checks: Checks = checker(name).check([Run(folder) for folder in folders])
+    return checks.failed == 0, "\n".join([*lines, checks.text(), ""])
 
 
 def main() -> None:
@@ -106,12 +183,13 @@ def main() -> None:
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "cases")
+    parser.add_argument("--cost", type=float, default=float("inf"), help="leave out longer runs")
     given = parser.parse_args()
     machine = Machine(given.program.resolve(), given.ranks, given.threads)
     failed = 0
     for name in given.case:
         try:
-            holds, report = verify(name, given.out, machine)
+            holds, report = verify(name, given.out, machine, given.cost)
         except RuntimeError as problem:
             holds, report = False, str(problem)
         print(report, flush=True)

@@ -29,6 +29,30 @@ def test_checks_hold_fail_and_are_never_empty(capsys) -> None:
     assert "FAILED" in capsys.readouterr().out
 
 
+def test_rows_for_information_and_bounds() -> None:
+    checks = Checks("mixed")
+    checks.close("only told", 2.0, 1.0, 0.1, counts=False)
+    assert checks.failed == 1  # nothing that counts
+    checks.within("between", 1.5, 1.0, 2.0)
+    assert checks.failed == 0
+    checks.within("past", 2.5, 1.0, 2.0)
+    assert checks.failed == 1
+    assert [r.error for r in checks.results] == ["+100 %", "0", "+0.5"]
+
+
+def test_observed_order() -> None:
+    checks = Checks("study")
+    second = {n: 3.0 * (1 + 0.5 / n**2) for n in (24.0, 6.0, 12.0)}
+    checks.study("with a reference", second, 3.0)
+    checks.study("without", second)
+    known, unknown = checks.studies
+    assert known.cells == (6.0, 12.0, 24.0)
+    assert known.orders == pytest.approx((2.0, 2.0))
+    assert known.errors[0] == pytest.approx(0.5 / 36)
+    assert unknown.orders == pytest.approx((2.0,))
+    assert unknown.errors[-1] == 0.0
+
+
 class FakeRun:
     """Grid and sides only."""
 

@@ -14,6 +14,7 @@ from micstools.buoyancy import buoyancy_rows  # noqa: E402
 from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("numerics divergence_tolerance",)
 SPEED_BAND = {1e-6: 1e-6, 1e-10: 1e-9}  # divergence tolerance [1/s]: largest speed [m/s]
 
 
