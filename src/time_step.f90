@@ -13,7 +13,7 @@ module time_step_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    finish_transport
+    begin_part, finish_transport
   use liquid_fill_m, only: fill_liquid, raise_surface
   use initial_state_m, only: read_initial_liquid, read_initial_velocity
   use extended_fraction_m, only: extend_fraction
@@ -40,6 +40,8 @@ module time_step_m
   public :: simulation_t, simulation_init, resume, take_step
 
   real(wp), parameter :: least_open = 0.5_wp   !! share of a face whose velocity limits the step
+  real(wp), parameter :: part_courant = 0.5_wp !! Courant number above which the transport is parted
+  integer, parameter :: max_parts = 100        !! of the transport of one step
 
   !> Everything that lives as long as the run.
   type :: simulation_t
@@ -94,7 +96,7 @@ contains
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction)
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
     if (case%fluid%single_phase) sim%transport%incoming = 1.0_wp
-    call momentum_init(sim%grid, sim%momentum)
+    call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
     call stage_init(sim%grid, sim%blocks%n, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
@@ -148,7 +150,7 @@ contains
         call update_solid(sim%fraction, grid, blocks, sim%solid)
         call toc(sim%timer_solid)
         call tic(sim%timer_transport)
-        call transport(sim, dt)
+        call transport(sim, dt, parts_of_step(report%cfl))
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
         call advance_velocity(case, grid, sim%solid, dt, flow, blocks, sim%stage, stage)
@@ -233,24 +235,39 @@ contains
   end subroutine swap_solids
 
   !> Liquid and momentum through the faces, direction by direction; new density and viscosity.
-  subroutine transport(sim, dt)
+  subroutine transport(sim, dt, parts)
     type(simulation_t), intent(inout) :: sim
-    real(wp), intent(in) :: dt   !! [s]
-    integer :: n, d
+    real(wp), intent(in) :: dt      !! [s]
+    integer, intent(in) :: parts    !! in which the volumes of the step move
+    integer :: n, part
 
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
                carrier => sim%transport)
-      call begin_transport(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow)
-      call momentum_begin(grid, fluid, flow%liquid, flow%room, flow%c, flow%u, sim%momentum)
-      do n = 1, 3
-        d = carrier%order(n)
-        call momentum_sweep(grid, fluid, sim%before, d, carrier, flow%u, sim%momentum)
+      call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
+      do part = 1, parts
+        call begin_part(grid, sim%before, part, sim%clock%step, carrier)
+        call momentum_begin(grid, fluid, carrier%w, carrier%v, carrier%c, flow%u, sim%momentum)
+        do n = 1, 3
+          call momentum_sweep(grid, fluid, sim%before, carrier%order(n), carrier, flow%u, &
+                              sim%momentum)
+        end do
+        call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
       end do
-      call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
       call finish_transport(grid, sim%solid, carrier, flow)
       call mix_fluid(fluid, flow)
     end associate
   end subroutine transport
+
+  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant number
+  !! that the sweeps can follow; one where `cfl_max` keeps the step that short.
+  pure function parts_of_step(courant) result(parts)
+    real(wp), intent(in) :: courant   !! of the whole step [-]
+    integer :: parts
+    real(wp), parameter :: round_off = 1.0e-9_wp
+
+    parts = ceiling(min(courant/part_courant - round_off, real(max_parts, wp)))
+    parts = max(parts, 1)
+  end function parts_of_step
 
   !> Length of the step: what stability allows, or less to land on a release or on the end.
   subroutine choose_step(sim, report)

@@ -26,7 +26,6 @@ module not_yet_m
     entry_t('boundary', 'z_min_velocity', '*'), entry_t('boundary', 'z_max_velocity', '*'), &
     entry_t('fluid', 'surface_tension', '*'), &
     entry_t('numerics', 'momentum', 'c_ismac'), &
-    entry_t('numerics', 'advection', 'upwind'), &
     entry_t('numerics', 'solid_fraction', 'subcell'), &
     entry_t('contact', 'model', 'surface'), &
     entry_t('shape', 'kind', 'cylinder'), entry_t('shape', 'kind', 'tetrapod'), &

@@ -32,7 +32,7 @@ module liquid_transport_m
   implicit none
   private
   public :: liquid_transport_t, liquid_transport_init
-  public :: transport_liquid, begin_transport, sweep, small_cells, finish_transport
+  public :: transport_liquid, begin_transport, begin_part, sweep, small_cells, finish_transport
   public :: late_values, move_late
 
   real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
@@ -50,8 +50,13 @@ module liquid_transport_m
     type(extended_fraction_t) :: extension
     real(wp) :: incoming(2, 3) = 0.0_wp       !! liquid share of what enters through a side
     integer :: order(3) = [1, 2, 3]           !! directions of this step's sweeps
-    !> Volumes through the lower faces, all and liquid, positive along the axis; faces lo..hi+1
-    !! [m3]. Those of small donors are zero during the sweeps and stand there after `small_cells`.
+    integer :: parts = 1                      !! equal parts in which the volumes of the step move
+    !> Volumes through the lower faces in the whole step, positive along the axis [m3].
+    real(wp), allocatable :: q_step(:, :, :, :)
+    real(wp) :: inflow = 0.0_wp               !! of liquid through the sides in this step [m3]
+    !> Volumes through the lower faces in this part of the step, all and liquid, positive along the
+    !! axis; faces lo..hi+1 [m3]. Those of small donors are zero during the sweeps and stand there
+    !! after `small_cells`.
     real(wp), allocatable :: q(:, :, :, :), g(:, :, :, :)
     !> Running liquid and open volume, after and before the last `sweep` or `small_cells`; the halo
     !! of the open volume is filled [m3].
@@ -96,7 +101,7 @@ contains
     call open_flux_init(grid, self%flux)
     call extended_fraction_init(gravity, self%extension)
     allocate (self%q(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%g, source=self%q)
+    allocate (self%g, self%q_step, source=self%q)
     allocate (self%w(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%v, self%w_before, self%v_before, self%c, source=self%w)
     allocate (self%out_low, self%out_high, self%value, source=self%w)
@@ -130,46 +135,72 @@ contains
   end subroutine allocate_small
 
   !> The whole transport of one step, for callers that carry nothing else.
-  subroutine transport_liquid(grid, old, new, dt, step, self, flow)
+  subroutine transport_liquid(grid, old, new, dt, step, self, flow, parts)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies at the begin and the end of the step
     real(wp), intent(in) :: dt     !! [s]
     integer, intent(in) :: step    !! number of the step; it picks the order of the directions
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
-    integer :: n
+    integer, intent(in), optional :: parts   !! in which the volumes of the step move, else 1
+    integer :: n, part
 
-    call begin_transport(grid, old, new, dt, step, self, flow)
-    do n = 1, 3
-      call sweep(grid, old, self%order(n), self)
+    call begin_transport(grid, old, new, dt, self, flow, parts)
+    do part = 1, self%parts
+      call begin_part(grid, old, part, step, self)
+      do n = 1, 3
+        call sweep(grid, old, self%order(n), self)
+      end do
+      call small_cells(grid, self)
     end do
-    call small_cells(grid, self)
     call finish_transport(grid, new, self, flow)
   end subroutine transport_liquid
 
-  !> Volumes through the faces, small cells, running values.
-  subroutine begin_transport(grid, old, new, dt, step, self, flow)
+  !> Volumes through the faces in the step, running values.
+  subroutine begin_transport(grid, old, new, dt, self, flow, parts)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
     real(wp), intent(in) :: dt
-    integer, intent(in) :: step
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(in) :: flow   !! liquid, room, c (halo filled) and uf of the begin
+    integer, intent(in), optional :: parts
     integer :: k
 
-    self%order = orders(:, 1 + modulo(step, size(orders, 2)))
-    call find_open_flux(grid, old, new, flow%room, flow%uf, dt, self%flux, self%q)
+    self%parts = 1
+    if (present(parts)) self%parts = parts
+    call find_open_flux(grid, old, new, flow%room, flow%uf, dt, self%flux, self%q_step)
     !$omp parallel do schedule(static)
     do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
       self%w(:, :, k) = flow%liquid(:, :, k)
       self%v(:, :, k) = flow%room(:, :, k)
       self%c(:, :, k) = flow%c(:, :, k)
-      self%g(:, :, k, :) = 0.0_wp
     end do
     self%clamped = 0.0_wp
+    self%inflow = 0.0_wp
+  end subroutine begin_transport
+
+  !> An equal part of the step's volumes, and the small cells for it.
+  !!
+  !! Where the fluid moves further than the sweeps can follow, the same volumes go in several parts.
+  !! The open volume of a cell then runs in equal parts too, so the last part ends at that of the new
+  !! geometry whatever their number.
+  subroutine begin_part(grid, old, part, step, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    integer, intent(in) :: part   !! 1..parts
+    integer, intent(in) :: step   !! number of the step; both pick the order of the directions
+    type(liquid_transport_t), intent(inout) :: self
+    integer :: k
+
+    self%order = orders(:, 1 + modulo(step + part - 1, size(orders, 2)))
+    !$omp parallel do schedule(static)
+    do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
+      self%q(:, :, k, :) = self%q_step(:, :, k, :)/real(self%parts, wp)
+      self%g(:, :, k, :) = 0.0_wp
+    end do
     call find_small_cells(grid, old, self)
     call find_late_faces(grid, self)
-  end subroutine begin_transport
+  end subroutine begin_part
 
   !> Cells that would give nearly all they hold, or hold nearly nothing.
   subroutine find_small_cells(grid, old, self)
@@ -541,7 +572,7 @@ contains
     share = min(max(w/merge(v, 1.0_wp, v > 0.0_wp), 0.0_wp), 1.0_wp)
   end function share_of
 
-  !> The small cells give: w and v are final, q and g are complete.
+  !> The small cells give: w and v are final for this part, q and g are complete.
   subroutine small_cells(grid, self)
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self
@@ -564,6 +595,7 @@ contains
         self%g(f(1), f(2), f(3), f(4)) = self%late_g(l)
       end associate
     end do
+    self%inflow = self%inflow + inflow_of_sides(grid, self)
   end subroutine small_cells
 
   !> What small cells hold per mass of a carried quantity once all has come in:
@@ -672,11 +704,11 @@ contains
     call fill_scalar_halo(grid, flow%liquid)
     call fill_scalar_halo(grid, flow%room)
     call extend_fraction(grid, new, self%extension, flow)
-    flow%liquid_inflow = flow%liquid_inflow + inflow_of_sides(grid, self)
+    flow%liquid_inflow = flow%liquid_inflow + self%inflow
     call count_small_cells(grid, new, self)
   end subroutine finish_transport
 
-  !> Liquid that came in through the sides of the domain in this step [m3].
+  !> Liquid that came in through the sides of the domain in this part of the step [m3].
   function inflow_of_sides(grid, self) result(inflow)
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self

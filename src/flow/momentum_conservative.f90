@@ -8,7 +8,8 @@
 !! velocity
 !! to round-off through any interface and any opening or closing cell. u~ is the fifth-order TVD
 !! value,
-!! carried to the mean over the slab that leaves the donor; first order next to the interface.
+!! carried to the mean over the slab that leaves the donor; that of the donor next to the interface,
+!! and everywhere with `advection = 'upwind'`.
 !! Source: consistent transport after Rudman (1998); departs from the velocity form of the paper's
 !! eq. (5), which moves water momentum into air at a density ratio of 830.
 module momentum_conservative_m
@@ -17,7 +18,7 @@ module momentum_conservative_m
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
-  use tvd_m, only: tvd5
+  use tvd_m, only: tvd5, scheme_of, tvd_scheme
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells, late_values, move_late
   implicit none
   private
@@ -26,6 +27,7 @@ module momentum_conservative_m
   real(wp), parameter :: pure_share = 1.0e-6_wp   !! shares this close count as one phase
 
   type :: momentum_t
+    integer :: scheme = tvd_scheme                  !! of the carried velocity
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
     real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
@@ -38,11 +40,13 @@ module momentum_conservative_m
 contains
 
   !> Allocate the work arrays.
-  subroutine momentum_init(grid, self)
+  subroutine momentum_init(grid, self, advection)
     type(grid_t), intent(in) :: grid
     type(momentum_t), intent(out) :: self
+    character(*), intent(in), optional :: advection   !! name of the scheme, else 'tvd5'
     integer :: a(3), b(3)
 
+    if (present(advection)) self%scheme = scheme_of(advection)
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
@@ -108,7 +112,8 @@ contains
     call sweep(grid, old, d, transport)
     do m = 1, 3
       call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), &
-                            transport%v_before, u(:, :, :, m), self%mixed_near, self%carried)
+                            transport%v_before, u(:, :, :, m), self%mixed_near, self%scheme, &
+                            self%carried)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
@@ -184,7 +189,7 @@ contains
 
   !> Momentum through the lower faces: mass times the mean velocity of the slab that leaves the
   !! donor.
-  subroutine carried_momentum(grid, fluid, e, q, g, room, u, mixed_near, carried)
+  subroutine carried_momentum(grid, fluid, e, q, g, room, u, mixed_near, scheme, carried)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     integer, intent(in) :: e(3)
@@ -193,6 +198,7 @@ contains
       contiguous :: q, g, room, u
     logical, intent(in), contiguous :: mixed_near(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                   grid%lo(3) - n_halo:)
+    integer, intent(in) :: scheme
     real(wp), intent(inout), contiguous :: carried(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                    grid%lo(3) - n_halo:)
     integer :: i, j, k
@@ -222,8 +228,8 @@ contains
                                         tiny(1.0_wp))
           value = tvd5(behind2, behind, donor, ahead, ahead2)
           value = donor + max(0.0_wp, 1.0_wp - courant)*(value - donor)
-          if (merge(mixed_near(i - e(1), j - e(2), k - e(3)), mixed_near(i, j, k), &
-                    forward)) value = donor
+          if (scheme /= tvd_scheme .or. merge(mixed_near(i - e(1), j - e(2), k - e(3)), &
+                                              mixed_near(i, j, k), forward)) value = donor
           carried(i, j, k) = mass_through(fluid, q(i, j, k), g(i, j, k))*value
         end do
       end do

@@ -7,12 +7,23 @@ module tvd_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: tvd5
+  public :: tvd5, scheme_of, tvd_scheme, upwind_scheme
+
+  integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
+  integer, parameter :: upwind_scheme = 2   !! value of the donor cell
 
   real(wp), parameter :: limit_outer = 4.0_wp   !! b, = (3 - k)/(1 - k) with k = 1/3
   real(wp), parameter :: limit_inner = 2.0_wp   !! b_1
 
 contains
+
+  !> Scheme of a name of the case file.
+  pure function scheme_of(name) result(scheme)
+    character(*), intent(in) :: name   !! 'tvd5' | 'upwind'
+    integer :: scheme
+
+    scheme = merge(upwind_scheme, tvd_scheme, trim(name) == 'upwind')
+  end function scheme_of
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
   !!

@@ -429,10 +429,9 @@ contains
 
   !> What the contract promises for later is refused as such.
   subroutine test_not_yet()
-    call expect(base//'&numerics momentum=''c_ismac'' advection=''upwind'' ' &
+    call expect(base//'&numerics momentum=''c_ismac'' ' &
       //'solid_fraction=''subcell''/', &
       '&numerics momentum = ''c_ismac'': not available yet, so far: ''conservative'' (line 3)|' &
-      //'&numerics advection = ''upwind'': not available yet, so far: ''tvd5'' (line 3)|' &
       //'&numerics solid_fraction = ''subcell'': not available yet, so far: ''exact'' (line 3)')
     call expect(base//'&boundary x_min=''inflow'' x_max=''outflow''/', &
       '&boundary x_min = ''inflow'': not available yet, so far: ''no_slip'', ''slip'', ''open'',' &

@@ -23,9 +23,11 @@ program test_liquid_transport
   real(wp), parameter :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]
   real(wp), parameter :: half(3) = [0.033_wp, 0.027_wp, 0.0318_wp]   !! of the moving box [m]
 
-  call ball_in_uniform_stream()
+  call ball_in_uniform_stream(80, 1)
+  call ball_in_uniform_stream(20, 4)
   call column_in_rotation()
-  call box_under_water()
+  call box_under_water(1)
+  call box_under_water(3)
   call box_through_the_surface()
   call box_leaves_through_the_top()
   call hexapod_through_the_surface()
@@ -99,7 +101,8 @@ contains
   end function room_error
 
   !> A ball of liquid goes once around a periodic domain, cells not cubes.
-  subroutine ball_in_uniform_stream()
+  subroutine ball_in_uniform_stream(steps, parts)
+    integer, intent(in) :: steps, parts   !! of the turn, of each step
     type(grid_t) :: grid
     type(solid_geometry_t) :: old, new
     type(flow_t) :: flow
@@ -107,7 +110,6 @@ contains
     real(wp) :: nothing(3, 0), before, worst, shape_error
     real(wp), allocatable :: start_liquid(:, :, :)
     integer :: step, i, j, k
-    integer, parameter :: steps = 80
 
     call start([24, 16, 20], spread(0.24_wp, 1, 3), .not. walls, nothing, nothing, fluid_t(), &
                [water_t ::], grid, old, new, flow, transport)
@@ -126,7 +128,7 @@ contains
     flow%uf(:, :, :, 3) = 0.24_wp
     worst = 0.0_wp
     do step = 1, steps
-      call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow)
+      call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow, parts)
       worst = max(worst, out_of_bounds(grid, flow))
     end do
     shape_error = misplaced(grid, flow%liquid, start_liquid)/before
@@ -216,7 +218,8 @@ contains
 
   !> A box on a loop deep under water, fluid moved by the correction alone: all liquid, all the
   !! time.
-  subroutine box_under_water()
+  subroutine box_under_water(parts)
+    integer, intent(in) :: parts   !! of each step
     type(grid_t) :: grid
     type(solid_geometry_t) :: old, new
     type(flow_t) :: flow
@@ -238,7 +241,7 @@ contains
       angle = 2.0_wp*pi*real(step, wp)/60.0_wp
       call box_at(place(angle), half, low, high)
       call set_boxes(grid, low, high, new)
-      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
+      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow, parts)
       worst = max(worst, room_error(grid, new, flow))
       impure = max(impure, maxval(abs(flow%liquid(1:16, 1:12, 1:16) - flow%room(1:16, 1:12, 1:16))))
       small = max(small, transport%small_count)

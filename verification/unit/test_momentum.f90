@@ -8,7 +8,7 @@ program test_momentum
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    finish_transport
+    begin_part, finish_transport
   use liquid_fill_m, only: fill_liquid
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
     momentum_late, mass_through
@@ -27,10 +27,12 @@ program test_momentum
 
   call check('mass of a mixed volume', mass_through(fluid_t(liquid_density=10.0_wp, &
     gas_density=2.0_wp), 0.5_wp, 0.1_wp), 1.8_wp, 1.0e-15_wp)
-  call uniform_through_an_interface()
+  call uniform_through_an_interface(1)
+  call uniform_through_an_interface(3)
   call momentum_of_a_period()
   call boxes_in_uniform_fluid()
   call order_of_accuracy()
+  call donor_value()
   call finish_checks()
 
 contains
@@ -56,17 +58,21 @@ contains
   end subroutine start
 
   !> One step of liquid and momentum.
-  subroutine carry(dt, step)
+  subroutine carry(dt, step, parts)
     real(wp), intent(in) :: dt
     integer, intent(in) :: step
-    integer :: n
+    integer, intent(in), optional :: parts   !! of the step, else 1
+    integer :: n, part
 
-    call begin_transport(grid, old, new, dt, step, transport, flow)
-    call momentum_begin(grid, fluid, flow%liquid, flow%room, flow%c, flow%u, momentum)
-    do n = 1, 3
-      call momentum_sweep(grid, fluid, old, transport%order(n), transport, flow%u, momentum)
+    call begin_transport(grid, old, new, dt, transport, flow, parts)
+    do part = 1, transport%parts
+      call begin_part(grid, old, part, step, transport)
+      call momentum_begin(grid, fluid, transport%w, transport%v, transport%c, flow%u, momentum)
+      do n = 1, 3
+        call momentum_sweep(grid, fluid, old, transport%order(n), transport, flow%u, momentum)
+      end do
+      call momentum_late(grid, fluid, transport, flow%u, momentum)
     end do
-    call momentum_late(grid, fluid, transport, flow%u, momentum)
     call finish_transport(grid, new, transport, flow)
   end subroutine carry
 
@@ -111,7 +117,8 @@ contains
   end function deviation
 
   !> A uniform velocity carried by another, sheared flow through boxes of liquid stays.
-  subroutine uniform_through_an_interface()
+  subroutine uniform_through_an_interface(parts)
+    integer, intent(in) :: parts   !! of each step
     real(wp) :: nothing(3, 0)
     integer :: step, d
 
@@ -123,11 +130,12 @@ contains
       flow%u(:, :, :, d) = stream(d)
     end do
     do step = 1, 8
-      call carry(2.5e-3_wp, step)
+      call carry(2.5e-3_wp*real(parts, wp), step, parts)
     end do
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
     call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
                > 50)
+    call check('parts keep cells from being small', transport%small_open, 0)
   end subroutine uniform_through_an_interface
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.
@@ -256,6 +264,27 @@ contains
     error = sum(abs(flow%u(1:n, 2, 2, 2) - exact))/real(n, wp)
     fluid%single_phase = .false.
   end function wave_error
+
+  !> With 'upwind' a face carries the value of its donor: u_i := (1 - C) u_i + C u_(i-1).
+  subroutine donor_value()
+    real(wp), parameter :: courant = 0.3_wp
+    real(wp) :: nothing(3, 0), before(0:16)
+
+    fluid%single_phase = .true.
+    call start([16, 4, 4], [1.0_wp, 0.25_wp, 0.25_wp], everywhere, [water_t ::], nothing, nothing)
+    call momentum_init(grid, momentum, 'upwind')
+    flow%uf(:, :, :, 1) = 1.0_wp
+    flow%u(:, :, :, 1) = 1.0_wp
+    flow%u(1:16, :, :, 2) = spread(spread(sin([1.0_wp, 2.0_wp, 4.0_wp, 4.5_wp, 9.0_wp, 7.0_wp, &
+      6.0_wp, 2.5_wp, 3.0_wp, 5.5_wp, 8.0_wp, 0.5_wp, 1.5_wp, 6.5_wp, 7.5_wp, 5.0_wp]), 2, &
+      size(flow%u, 2)), 3, size(flow%u, 3))
+    call fill_velocity_halo(grid, flow%u)
+    before = flow%u(0:16, 2, 2, 2)
+    call carry(courant*grid%h(1), 1)
+    call check('value of the donor', flow%u(1:16, 2, 2, 2), &
+               (1.0_wp - courant)*before(1:16) + courant*before(0:15), 1.0e-14_wp)
+    fluid%single_phase = .false.
+  end subroutine donor_value
 
   !> Mean of a sine over the cell above face x.
   pure function wave(x) result(value)
