@@ -20,7 +20,7 @@ module time_step_m
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
   use mixture_m, only: mix_fluid
-  use boundary_m, only: fill_velocity_halo, fill_scalar_halo
+  use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
@@ -109,6 +109,7 @@ contains
     end do
     call fill_velocity_halo(sim%grid, sim%flow%u)
     call read_initial_velocity(case%fluid, sim%grid, sim%flow)
+    call set_side_velocity(sim%grid, sim%flow%uf)
     call copy_motion(sim%blocks, sim%stage%bodies)
     call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, report)
   end subroutine simulation_init

@@ -293,7 +293,36 @@ contains
           //side_name(3 - s, d)//' = '//quoted_text(trim(boundary%kind(3 - s, d))))
       end do
     end do
+    do d = 1, 3
+      do s = 1, 2
+        if (.not. (v%good(side_name(s, d)) .and. v%good(side_name(s, d)//'_velocity'))) cycle
+        call require_side_velocity(v, side_name(s, d)//'_velocity', trim(boundary%kind(s, d)), &
+                                   boundary%velocity(:, s, d), s, d)
+      end do
+    end do
   end subroutine visit_boundary
+
+  !> A wall moves in its own plane, an inflow enters the tank, the other sides have no velocity.
+  subroutine require_side_velocity(v, variable, kind, velocity, s, d)
+    type(group_visitor_t), intent(inout) :: v
+    character(*), intent(in) :: variable, kind
+    real(wp), intent(in) :: velocity(3)   !! [m/s]
+    integer, intent(in) :: s, d           !! 1 lower or 2 upper side; direction
+    character(1), parameter :: axis(3) = ['x', 'y', 'z']
+    character(8), parameter :: sign_word(2) = ['positive', 'negative']
+
+    select case (kind)
+    case ('no_slip', 'slip')
+      call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own plane, ' &
+                     //'the '//axis(d)//' component must be 0')
+    case ('inflow')
+      call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must enter the ' &
+                     //'tank, the '//axis(d)//' component must be '//sign_word(s))
+    case default
+      call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows have a ' &
+                     //'velocity, not a side that is '//quoted_text(kind))
+    end select
+  end subroutine require_side_velocity
 
   !> Name of a side of the tank: `x_min`, `x_max`, `y_min`, ...
   pure function side_name(s, d) result(name)

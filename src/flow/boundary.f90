@@ -5,11 +5,12 @@
 !! right.
 module boundary_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, side_no_slip, side_slip, side_periodic
+  use grid_m, only: grid_t, n_halo, side_no_slip, side_slip, side_open, &
+                    side_periodic, side_inflow, side_outflow
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: fill_scalar_halo, fill_velocity_halo, is_wall
+  public :: fill_scalar_halo, fill_velocity_halo, set_side_velocity, is_wall, gives_pressure
 
 contains
 
@@ -20,6 +21,34 @@ contains
 
     wall = side == side_no_slip .or. side == side_slip
   end function is_wall
+
+  !> A side where the pressure is given half a cell beyond the last cell, so the flow is free.
+  pure function gives_pressure(side) result(given)
+    integer, intent(in) :: side
+    logical :: given
+
+    given = side == side_open .or. side == side_outflow
+  end function gives_pressure
+
+  !> Normal velocity at the sides where it is given: none through walls, that of an inflow.
+  pure subroutine set_side_velocity(grid, uf)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(inout), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                              grid%lo(3) - n_halo:, :)   !! lower faces [m/s]
+    integer :: d, s, a(3), b(3)
+
+    do d = 1, 3
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
+        if (gives_pressure(grid%side(s, d))) cycle
+        a = grid%lo
+        b = grid%hi
+        a(d) = merge(1, grid%n(d) + 1, s == 1)
+        b(d) = a(d)
+        uf(a(1):b(1), a(2):b(2), a(3):b(3), d) = grid%side_velocity(d, s, d)
+      end do
+    end do
+  end subroutine set_side_velocity
 
   !> Halo of a cell value with zero normal gradient at every side of the domain.
   subroutine fill_scalar_halo(grid, a)
@@ -42,7 +71,8 @@ contains
 
   !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd
   !! in the
-  !! normal component only), open sides carry the value of the last cell outward.
+  !! normal component only), an inflow has its own velocity outside, open sides and outflows carry
+  !! the value of the last cell outward.
   subroutine fill_velocity_halo(grid, u)
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
@@ -60,6 +90,9 @@ contains
           if (grid%side(s, d) == side_no_slip .or. (grid%side(s, d) == side_slip .and. c == d)) then
             factor = -1.0_wp
             shift = 2.0_wp*grid%side_velocity(c, s, d)
+          else if (grid%side(s, d) == side_inflow) then
+            factor = 0.0_wp
+            shift = grid%side_velocity(c, s, d)
           end if
           do m = 1, n_halo
             call mirror_plane(u(:, :, :, c), d, ghost_layer(grid, s, d, m), &

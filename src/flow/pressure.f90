@@ -13,8 +13,8 @@ module pressure_m
   use case_types_m, only: numerics_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use grid_m, only: grid_t, n_halo, unit_step, side_open
-  use boundary_m, only: fill_scalar_halo
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_m, only: fill_scalar_halo, set_side_velocity, gives_pressure
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, solid_face_flux, force_from_cells, &
                           add_cell_flux, nearest_arm
@@ -133,7 +133,7 @@ contains
     case default   ! 'none' needs nothing
     end select
   contains
-    !> A side of the domain: closed, or open with p = 0 half a cell away.
+    !> A side of the domain: the velocity is given, or the pressure half a cell away.
     subroutine side_coefficients(face, cell)
       integer, intent(in) :: face, cell
       integer :: a(3), b(3), shift(3)
@@ -142,7 +142,7 @@ contains
       b = grid%hi
       a(d) = face
       b(d) = face
-      if (grid%side(s, d) /= side_open) then
+      if (.not. gives_pressure(grid%side(s, d))) then
         self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
         return
       end if
@@ -276,7 +276,7 @@ contains
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
               a(i, j, k, d) = 0.0_wp
-              if (grid%side(s, d) == side_open) a(i, j, k, d) = (rho_w(c(1), c(2), &
+              if (gives_pressure(grid%side(s, d))) a(i, j, k, d) = (rho_w(c(1), c(2), &
                   c(3))*gravity(d) &
                 + outward*p(c(1), c(2), c(3))/(0.5_wp*grid%h(d)))/rho(c(1), c(2), c(3))
             end do
@@ -393,13 +393,14 @@ contains
       end do
       if (.not. grid%periodic(d)) call sides_of_direction()
     end do
+    call set_side_velocity(grid, flow%uf)
   contains
-    !> Walls: the wall's own normal velocity. Open sides: the velocity of the last cell.
+    !> Sides with a given pressure: the velocity of the last cell.
     subroutine sides_of_direction()
       integer :: s, lower(3), upper(3), c(3)
 
       do s = 1, 2
-        if (.not. grid%at_side(s, d)) cycle
+        if (.not. (grid%at_side(s, d) .and. gives_pressure(grid%side(s, d)))) cycle
         lower = grid%lo
         upper = grid%hi
         lower(d) = merge(1, grid%n(d) + 1, s == 1)
@@ -408,8 +409,7 @@ contains
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
-              flow%uf(i, j, k, d) = 0.0_wp
-              if (grid%side(s, d) == side_open) flow%uf(i, j, k, d) = flow%u(c(1), c(2), c(3), d) &
+              flow%uf(i, j, k, d) = flow%u(c(1), c(2), c(3), d) &
                 + dt*(a_face(i, j, k, d) - a_cell(c(1), c(2), c(3), d))
             end do
           end do

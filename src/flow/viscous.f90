@@ -12,7 +12,8 @@ module viscous_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
   use vectors_m, only: cross
-  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
+  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip, &
+                    side_inflow
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -46,6 +47,10 @@ module viscous_m
     real(wp), allocatable :: work(:, :)        !! (*, 6)
     real(wp), allocatable :: body_matrix(:, :, :)
       !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
+    integer :: n_side = 0                      !! half legs to sides that move
+    integer, allocatable :: side_cell(:, :)    !! (3, *)
+    real(wp), allocatable :: side_pull(:, :)
+      !! (3, *) conductance times velocity of the side [kg m/s2]
     real(wp), allocatable :: spin_drag(:)
       !! 2 mu V of the body: torque per angular velocity [N m s]
     integer, allocatable :: wall_body(:)       !! body of each leg as found, before grouping
@@ -60,10 +65,14 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_bodies
     type(viscous_t), intent(out) :: self
-    integer :: a(3), b(3)
+    integer :: a(3), b(3), m(3), n
 
     a = grid%lo - n_halo
     b = grid%hi + n_halo
+    m = grid%hi - grid%lo + 1
+    n = 2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))
+    if (.not. any(abs(grid%side_velocity) > 0.0_wp)) n = 0
+    allocate (self%side_cell(3, n), self%side_pull(3, n))
     allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, &
               source=self%mass)
@@ -95,6 +104,7 @@ contains
     integer :: d
 
     self%n_wall = 0
+    self%n_side = 0
     self%diagonal = 0.0_wp
     do d = 1, 3
       call unknown_masses(grid, solid, rho, dt, d, self)
@@ -207,7 +217,8 @@ contains
                     nearest_arm(grid, x_wall, bodies%x(:, body)))
     end subroutine wall_leg
 
-    !> Half a leg to a wall of the domain at rest; slip walls hold the normal component only.
+    !> Half a leg to a wall of the domain or to an inflow, which pulls the cell towards the velocity
+    !! of the side; slip walls hold the normal component only.
     subroutine side_leg(face)
       integer, intent(in) :: face
       integer :: s, c(3)
@@ -218,9 +229,17 @@ contains
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       if (solid%inside(c(1), c(2), c(3)) /= 0) return
       value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
-      if (grid%side(s, d) == side_no_slip) call add_diagonal(c, value)
-      if (grid%side(s, d) == side_slip) self%diagonal(c(1), c(2), c(3), d) = &
-        self%diagonal(c(1), c(2), c(3), d) + value
+      select case (grid%side(s, d))
+      case (side_no_slip, side_inflow)
+        call add_diagonal(c, value)
+        if (.not. any(abs(grid%side_velocity(:, s, d)) > 0.0_wp)) return
+        self%n_side = self%n_side + 1
+        self%side_cell(:, self%n_side) = c
+        self%side_pull(:, self%n_side) = value*grid%side_velocity(:, s, d)
+      case (side_slip)
+        self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
+      case default   ! open sides and outflows hold nothing
+      end select
     end subroutine side_leg
   end subroutine legs_of_direction
 
@@ -436,6 +455,7 @@ contains
     self%s = flow%u
     call apply_viscous(grid, bodies, dt, self, self%s, s_body, self%y, y_body)
     self%r = self%mass*flow%u
+    call add_side_pull(self)
     do b = 1, bodies%n
       r_body(:, b) = inertial_momentum(bodies, b, dt, start(:, b))
     end do
@@ -503,7 +523,19 @@ contains
     end function sum_bodies
   end subroutine solve_viscous
 
-  !> Largest velocity of the fluid in own cells and of the bodies [m/s]; never zero.
+  !> What the moving sides pull goes to the right side.
+  pure subroutine add_side_pull(self)
+    type(viscous_t), intent(inout) :: self
+    integer :: m
+
+    do m = 1, self%n_side
+      associate (c => self%side_cell(:, m))
+        self%r(c(1), c(2), c(3), :) = self%r(c(1), c(2), c(3), :) + self%side_pull(:, m)
+      end associate
+    end do
+  end subroutine add_side_pull
+
+  !> Largest velocity of the fluid in own cells, of the bodies and of the sides [m/s]; never zero.
   subroutine velocity_scale(grid, u, bodies, scale)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
@@ -516,7 +548,8 @@ contains
       m = maxval(abs(u(a(1):z(1), a(2):z(2), a(3):z(3), :)))
     end associate
     call global_max(m)
-    scale = max(m(1), 1.0e-12_wp, maxval([0.0_wp, abs(bodies%motion(1:3, :))]))
+    scale = max(m(1), 1.0e-12_wp, maxval([0.0_wp, abs(bodies%motion(1:3, :))]), &
+                maxval(abs(grid%side_velocity)))
   end subroutine velocity_scale
 
   !> Momentum and angular momentum over dt of a motion of body b.

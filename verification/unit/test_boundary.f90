@@ -4,14 +4,19 @@ program test_boundary
   use case_types_m, only: grid_input_t, boundary_input_t
   use grid_m, only: grid_t, grid_init, n_halo, side_no_slip, side_slip, side_open, side_periodic, &
     side_inflow, side_outflow
-  use boundary_m, only: fill_scalar_halo, fill_velocity_halo, is_wall
+  use boundary_m, only: fill_scalar_halo, fill_velocity_halo, set_side_velocity, &
+    is_wall, gives_pressure
   use check_m, only: check, finish_checks
   implicit none
   real(wp), parameter :: lid(3) = [0.5_wp, -0.25_wp, 0.0_wp]   !! velocity of a moving wall [m/s]
+  real(wp), parameter :: stream(3) = [0.75_wp, 0.5_wp, -1.25_wp]   !! of an inflow [m/s]
 
   call check('walls', all([is_wall(side_no_slip), is_wall(side_slip)]))
   call check('no walls', .not. any([is_wall(side_open), is_wall(side_periodic), &
                                     is_wall(side_inflow), is_wall(side_outflow)]))
+  call check('pressure given', all([gives_pressure(side_open), gives_pressure(side_outflow)]))
+  call check('no pressure given', .not. any([gives_pressure(side_no_slip), &
+    gives_pressure(side_slip), gives_pressure(side_periodic), gives_pressure(side_inflow)]))
   call all_halos('tank', [6, 4, 5], reshape([character(8) :: &
                  'periodic', 'periodic', 'no_slip', 'slip', 'no_slip', 'open'], [2, 3]))
   call all_halos('other way round', [4, 5, 6], reshape([character(8) :: &
@@ -20,6 +25,8 @@ program test_boundary
                  'no_slip', 'open', 'slip', 'slip', 'slip', 'no_slip'], [2, 3]))
   call all_halos('one periodic cell', [5, 1, 4], reshape([character(8) :: &
                  'slip', 'slip', 'periodic', 'periodic', 'open', 'open'], [2, 3]))
+  call all_halos('river', [6, 4, 5], reshape([character(8) :: &
+                 'inflow', 'outflow', 'slip', 'slip', 'no_slip', 'inflow'], [2, 3]))
   call finish_checks()
 
 contains
@@ -42,6 +49,11 @@ contains
     where (boundary%kind(2, :) == 'no_slip')
       boundary%velocity(1, 2, :) = lid(1)
       boundary%velocity(2, 2, :) = lid(2)
+    end where
+    where (boundary%kind == 'inflow')
+      boundary%velocity(1, :, :) = stream(1)
+      boundary%velocity(2, :, :) = stream(2)
+      boundary%velocity(3, :, :) = stream(3)
     end where
     call grid_init(input, boundary, grid)
     allocate (u(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
@@ -75,9 +87,40 @@ contains
       end do
     end do
     call check(name//': cells of the domain keep their values', inside, 0.0_wp, 0.0_wp)
+    u = -1.0e30_wp
+    call set_side_velocity(grid, u)
+    call check(name//': normal velocity of the sides', side_errors(grid, u), 0.0_wp, 0.0_wp)
     call check(name//': scalar', worst(1), 0.0_wp, 0.0_wp)
     call check(name//': velocity', worst(2), 0.0_wp, 0.0_wp)
   end subroutine all_halos
+
+  !> Largest error of the face velocity where a side gives it; elsewhere it must be untouched.
+  pure function side_errors(grid, uf) result(worst)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: uf(1 - n_halo:, 1 - n_halo:, 1 - n_halo:, :)
+    real(wp) :: worst
+    real(wp) :: expected
+    integer :: i, j, k, d, s, at(3)
+
+    worst = 0.0_wp
+    do d = 1, 3
+      do k = 1, grid%n(3) + 1
+        do j = 1, grid%n(2) + 1
+          do i = 1, grid%n(1) + 1
+            at = [i, j, k]
+            expected = -1.0e30_wp
+            s = merge(1, 2, at(d) == 1)
+            if ((at(d) == 1 .or. at(d) == grid%n(d) + 1) .and. .not. grid%periodic(d) &
+                .and. all(at <= grid%n .or. [1, 2, 3] == d)) then
+              if (is_wall(grid%side(s, d))) expected = grid%side_velocity(d, s, d)
+              if (grid%side(s, d) == side_inflow) expected = stream(d)
+            end if
+            worst = max(worst, abs(uf(i, j, k, d) - expected))
+          end do
+        end do
+      end do
+    end do
+  end function side_errors
 
   !> A value that tells the cell and the component, exact in any order of summing.
   pure function original(at, c) result(value)
@@ -118,7 +161,10 @@ contains
       if (.not. is_wall(grid%side(s, d))) beyond = 1
       beyond = min(beyond, grid%n(d))
       from(d) = merge(beyond, grid%n(d) + 1 - beyond, s == 1)
-      if (grid%side(s, d) == side_no_slip) then
+      if (grid%side(s, d) == side_inflow) then
+        shift = shift + factor*stream(c)
+        factor = 0.0_wp
+      else if (grid%side(s, d) == side_no_slip) then
         if (s == 2) shift = shift + factor*2.0_wp*lid(c)
         factor = -factor
       else if (grid%side(s, d) == side_slip .and. c == d) then

@@ -315,6 +315,15 @@ contains
       //' one of ''no_slip'', ''slip'', ''open'', ''periodic'' (line 3)')
     call expect(base//'&boundary left=''slip''/', &
       '&boundary left = ''slip'': unknown variable, nearest known: x_min (line 3)')
+    call expect(base//'&boundary z_max=''no_slip'' z_max_velocity=1,2,0 x_min_velocity=0,0,-1/', '')
+    call expect(base//'&boundary z_min_velocity=0,0,1 y_max=''slip'' y_max_velocity=3,2,1 ' &
+      //'z_max_velocity=1,0,0/', &
+      '&boundary y_max_velocity = 3, 2, 1: a wall moves in its own plane, the y component must ' &
+      //'be 0 (line 3)|' &
+      //'&boundary z_min_velocity = 0, 0, 1: a wall moves in its own plane, the z component must ' &
+      //'be 0 (line 3)|' &
+      //'&boundary z_max_velocity = 1, 0, 0: only walls and inflows have a velocity, not a side ' &
+      //'that is ''open'' (line 3)')
   end subroutine test_sides
 
   subroutine test_fluid_and_numerics()
@@ -438,8 +447,6 @@ contains
       //' ''periodic'' (line 3)|&boundary x_max = ''outflow'': not available yet, so far:' &
       //' ''no_slip'', ''slip'', ''open'', ''periodic'' (line 3)')
     call expect(base//'&boundary z_max_velocity=0,0,0/', '')
-    call expect(base//'&boundary z_min_velocity=0,1,0/', &
-      '&boundary z_min_velocity = 0, 1, 0: not available yet (line 3)')
     call expect(base//'&fluid surface_tension=0.0/', '')
     call expect(base//'&fluid surface_tension=0.072/', &
       '&fluid surface_tension = 0.072: not available yet (line 3)')

@@ -16,7 +16,7 @@ program test_viscous
   type(rigid_motion_t) :: wall
   type(viscous_t) :: viscous
   real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, &
-    long_time = 1.0e14_wp
+    lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
   real(wp) :: force(6, 1), z, worst, momentum(2), film, drag
@@ -64,6 +64,19 @@ program test_viscous
   drag = 2.0_wp*mu*grid%area(3)**2/(film*grid%volume)
   call check('film cell', flow%u(2, 2, 2, 1), speed*5.0_wp*drag/(rho*film*grid%volume &
                                                                + 5.0_wp*drag), 1.0e-7_wp)
+
+  ! The upper side moves too: shear flow between two moving walls.
+  grid%side_velocity(1, 2, 3) = lid
+  call viscous_init(grid, 1, viscous)
+  call make_wall(heights(1))
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+  call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+  worst = 0.0_wp
+  do k = 2, 8
+    z = (grid%centre(k, 3) - heights(1))/(depth - heights(1))
+    worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - (1.0_wp - z)*speed - z*lid)))
+  end do
+  call check('linear profile below a moving side', worst, 0.0_wp, 1.0e-7_wp)
   call finish_checks()
   call parallel_final()
 contains

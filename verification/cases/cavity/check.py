@@ -1,0 +1,87 @@
+"""Lid-driven cavity at Re = 100 and 1000 against an independent solution.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.profiles import Array, cubic, table, with_ends  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+BANDS = {100: 0.01 * 64, 1000: 0.03 * 128}  # lid speeds, times the cells along a side
+MIDDLE = np.array([0.5])
+
+
+def reference(reynolds: int) -> dict[str, Array]:
+    """Coordinate and velocity (n, 2) along the two middle lines."""
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for row in table(Path(__file__).parent / f"re{reynolds}.csv"):
+        lines.setdefault(row["line"], []).append((float(row["coordinate"]), float(row["own"])))
+    return {name: np.array(points) for name, points in lines.items()}
+
+
+def middle_lines(run: Run) -> dict[str, tuple[Array, Array]]:
+    """u over height on x = 0.5 and w over x on z = 0.5 at the end, walls included."""
+    fields = run.fields(run.field_times[-1])
+    x, _, z = run.grid.centres
+    u, w = fields.velocity[:, 0, :, 0], fields.velocity[:, 0, :, 2]
+    return {
+        "u_at_x0p5": (with_ends(0, z, 1), with_ends(0, cubic(MIDDLE, x, u)[:, 0], 1)),
+        "v_at_y0p5": (with_ends(0, x, 1), with_ends(0, cubic(MIDDLE, z, w.T)[:, 0], 0)),
+    }
+
+
+def compare(run: Run, reynolds: int, checks: Checks) -> float:
+    """Profiles against the reference, and rest of the flow; the largest error [lid speeds]."""
+    cells, worst = run.grid.x.size - 1, 0.0
+    for name, points in reference(reynolds).items():
+        places, values = middle_lines(run)[name]
+        error = float(np.abs(cubic(points[:, 0], places, values) - points[:, 1]).max())
+        worst = max(worst, error)
+        label = f"Re {reynolds}, {cells} cells, {name}: largest error [lid speeds]"
+        checks.below(label, error, BANDS[reynolds] / cells)
+    energy, time = run.series.kinetic_energy_fluid, run.series.time / run.series.time[-1]
+    before, last = energy[(time > 0.8) & (time <= 0.9)].mean(), energy[time > 0.9].mean()
+    label = f"Re {reynolds}, {cells} cells: energy of the last tenth against that before"
+    checks.below(label, float(last / before - 1.0), 1e-3)
+    return worst
+
+
+def check(runs: list[Run]) -> Checks:
+    """Profiles along the middle lines at steady state, for each grid."""
+    checks = Checks("lid-driven cavity")
+    for reynolds in BANDS:
+        errors: dict[float, float] = {}
+        finest = None
+        for run in runs:
+            if round(1.0 / float(run.value("fluid", "liquid_viscosity", 1.0))) != reynolds:
+                continue
+            cells = run.grid.x.size - 1
+            finest = run if not errors or cells > max(errors) else finest
+            errors[cells] = compare(run, reynolds, checks)
+            sound(run, checks)
+        checks.study(f"Re {reynolds}: largest error [lid speeds]", errors, 0.0)
+        if finest is None:
+            continue
+        ours, wanted = middle_lines(finest), reference(reynolds)
+        cells = int(max(errors))
+        for name, symbol in {"u_at_x0p5": "u over z", "v_at_y0p5": "w over x"}.items():
+            points = wanted[name]
+            checks.figure(
+                f"Re = {reynolds}: {symbol}",
+                "coordinate / side",
+                "velocity / lid speed",
+                {f"{cells} cells": ours[name]},
+                {"reference": (points[:, 0], points[:, 1])},
+            )
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
