@@ -152,13 +152,18 @@ def run(case: Path, output: Path, machine: Machine, *options: str) -> float:
 
 
 def checker(case: str) -> ModuleType:
-    """The check.py of a case: `check(runs)`, and `VARIES` if its runs leave the defaults."""
+    """The check.py of a case: `check(runs)`, and `VARIES` if its runs leave the defaults. It may
+    import modules beside it, whose names must differ from case to case."""
     path = CASES / case / "check.py"
     spec = importlib.util.spec_from_file_location(f"check_{case}", path)
     if spec is None or spec.loader is None:
         raise RuntimeError(f"cannot read {path}")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
     return module
 
 
