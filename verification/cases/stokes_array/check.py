@@ -1,0 +1,58 @@
+"""Drag of a simple cubic array of spheres in Stokes flow against the exact series."""
+
+import numpy as np
+
+from micstools.balance import faces
+from micstools.checks import Checks, sound
+from micstools.reader import Run
+
+DRAG_BAND, SCATTER_BAND, BALANCE_BAND = 0.015, 0.01, 1e-3
+
+
+def drag_factor(share: float) -> float:
+    """Drag over 6 pi mu a U of a sphere in a simple cubic array that fills a share of space, U
+    the mean velocity over all space: series of Sangani and Acrivos (1982)."""
+    k = share ** (1 / 3)
+    inverse = 1 - 1.7601 * k + share - 1.5593 * share**2 + 3.9799 * k**8 - 3.0734 * k**10
+    return 1 / inverse
+
+
+def mean_velocity(run: Run) -> np.ndarray:
+    """Volume flux through every layer of faces across x over the area of the layer [m/s]."""
+    state, periodic = run.restart(), (True, True, True)
+    opened = faces(state, "flow/open", run.grid, periodic)[0]
+    velocity = faces(state, "flow/uf", run.grid, periodic)[0]
+    return np.asarray((opened * velocity).mean(axis=(0, 1)))
+
+
+def check(runs: list[Run]) -> Checks:
+    """Drag from the mean flow that a given force drives, and from the force on the sphere."""
+    checks, study, same_grid = Checks("Stokes flow through an array of spheres"), {}, {}
+    for run in runs:
+        edge, g = float(run.grid.high[0]), float(run.value("fluid", "gravity", [0.0] * 3)[0])
+        density = float(run.value("fluid", "liquid_density", 998.2))
+        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0))
+        diameter = float(run.value("shape", "size", 1.0))
+        cells = diameter / float(run.grid.spacing[0])
+        volume = run.shapes["sphere"].volume
+        flow = mean_velocity(run)
+        name = f"{run.folder.name}, {cells:.0f} cells per diameter"
+        factor = density * g * edge**3 / (3 * np.pi * viscosity * diameter * float(flow.mean()))
+        exact = drag_factor(volume / edge**3)
+        checks.close(f"{name}: drag / (6 pi mu a U)", factor, exact, DRAG_BAND, cells > 10)
+        force = float(run.bodies.fluid_force[-1, 0, 0])
+        driven = density * g * (edge**3 - volume)
+        checks.close(f"{name}: force on the sphere [N]", force, driven, BALANCE_BAND)
+        unequal = float(np.ptp(flow) / flow.mean())
+        checks.below(f"{name}: difference of the flow through layers", unequal, 1e-5)
+        sound(run, checks)
+        if abs(cells - 12) < 0.1:
+            same_grid[run.folder.name] = factor
+        if run.folder.name in ("case", f"cells_{cells:02.0f}"):
+            study[round(cells)] = factor
+    if len(same_grid) > 1:
+        found = list(same_grid.values())
+        scatter = (max(found) - min(found)) / float(np.mean(found))
+        checks.below(f"scatter over {len(found)} places at 12 cells", scatter, SCATTER_BAND)
+    checks.study("drag / (6 pi mu a U)", study, exact, "cells per diameter")
+    return checks
