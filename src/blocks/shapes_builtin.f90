@@ -1,4 +1,4 @@
-!> The built-in blocks as tetrahedra: hexapod, cube, box, sphere.
+!> The built-in blocks as tetrahedra; those of cuboids and the sphere are built here.
 !!
 !! Blocks made of cubes are cut into smaller cuboids and each of these into five tetrahedra,
 !! mirrored from one to the next so that they fit. With an even `refinement` the cut has every
@@ -9,6 +9,7 @@ module shapes_builtin_m
   use tet_mesh_m, only: shape_t, surface_of_tets
   use vectors_m, only: cross
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin
+  use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
   use contact_sphere_placement_m, only: place_at_centroids, place_one_sphere
   implicit none
   private
@@ -17,6 +18,15 @@ module shapes_builtin_m
   integer, parameter :: max_refinement = 8
   real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
   integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
+
+  !> Places along one direction of a lattice.
+  type :: line_t
+    real(wp), allocatable :: x(:)        !! (0:parts) planes between the parts [m]
+    integer, allocatable :: place(:)     !! (parts) the place a part belongs to
+    integer, allocatable :: plane(:)     !! (0:places) the planes between the places, in x
+  end type line_t
+
+  real(wp), parameter :: reef_frame = 0.2_wp   !! width of the bars of a reef cube [its edge]
 
   !> The five tetrahedra of a cuboid; corner 1 + a + 2b + 4c is the upper one in x, y, z where
   !! a, b, c = 1. The second set is the mirror image, for every other cuboid.
@@ -35,32 +45,13 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(out) :: shape
     character(:), allocatable, intent(out) :: message
-    integer, parameter :: single(1, 1, 1) = 1
 
     message = problem_with(input)
     if (len(message) > 0) return
     shape%name = input%name
     shape%kind = input%kind
     shape%density = input%density
-    select case (trim(input%kind))
-    case ('hexapod')
-      call build_cuboids(hexapod_cubes(), spread(input%size(1), 1, 3), &
-                         input%refinement*[1, 1, 1], shape)
-      shape%smallest_edge = input%size(1)
-    case ('cube')
-      call build_cuboids(single, spread(input%size(1), 1, 3), input%refinement*[1, 1, 1], shape)
-      shape%smallest_edge = input%size(1)
-    case ('box')
-      call build_cuboids(single, input%size, &
-                         input%refinement*max(1, nint(input%size/minval(input%size))), shape)
-      shape%smallest_edge = minval(input%size)
-    case ('sphere')
-      call build_sphere(0.5_wp*input%size(1), sphere_frequency*input%refinement, shape)
-      shape%smallest_edge = input%size(1)
-    case default
-      message = 'kind = '''//trim(input%kind)//''' has no builder'
-      return
-    end select
+    call build_form(input, shape)
     call finish_shape(shape)
     if (trim(input%kind) == 'sphere') then
       call place_one_sphere(0.5_wp*input%size(1), shape)
@@ -71,6 +62,59 @@ contains
                        maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius))
   end subroutine make_shape
 
+  !> Points, tetrahedra, facets and smallest edge of a block.
+  subroutine build_form(input, shape)
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(inout) :: shape
+    integer, parameter :: single(1, 1, 1) = 1
+    type(line_t) :: line(3)
+    real(wp) :: bar(3)
+    integer :: r, d
+
+    r = input%refinement
+    associate (size => input%size)
+      shape%smallest_edge = size(1)
+      select case (trim(input%kind))
+      case ('hexapod')
+        do d = 1, 3
+          line(d) = line_of(spread(size(1), 1, 3), [r, r, r])
+        end do
+        call build_cuboids(hexapod_cubes(), line, shape)
+      case ('cube')
+        do d = 1, 3
+          line(d) = line_of(size(1:1), [r])
+        end do
+        call build_cuboids(single, line, shape)
+      case ('box')
+        do d = 1, 3
+          line(d) = line_of(size(d:d), [r*max(1, nint(size(d)/minval(size)))])
+        end do
+        call build_cuboids(single, line, shape)
+        shape%smallest_edge = minval(size)
+      case ('reef_cube')
+        bar = [reef_frame, 1.0_wp - 2.0_wp*reef_frame, reef_frame]
+        do d = 1, 3
+          line(d) = line_of(bar*size(1), r*nint(bar/reef_frame))
+        end do
+        call build_cuboids(1 - hexapod_cubes(), line, shape)   ! the frame around a hexapod
+        shape%smallest_edge = reef_frame*size(1)
+      case ('sphere')
+        call build_sphere(0.5_wp*size(1), sphere_frequency*r, shape)
+      case ('cylinder')
+        call build_cylinder(size(1), size(2), r, shape)
+        shape%smallest_edge = minval(size(:2))
+      case ('tetrapod')
+        call build_tetrapod(size(1), r, shape)
+        shape%smallest_edge = tetrapod_tip*size(1)
+      case ('dolos')
+        call build_dolos(size(1), r, shape)
+        shape%smallest_edge = dolos_tip*size(1)
+      case default
+        error stop 'build_form: unknown kind'
+      end select
+    end associate
+  end subroutine build_form
+
   !> What is wrong with a `&shape` group; empty if nothing is.
   pure function problem_with(input) result(message)
     type(shape_input_t), intent(in) :: input
@@ -80,14 +124,16 @@ contains
     message = ''
     n_size = 1
     select case (trim(input%kind))
-    case ('hexapod', 'cube', 'sphere')
+    case ('hexapod', 'cube', 'sphere', 'tetrapod', 'dolos', 'reef_cube')
     case ('box')
       n_size = 3
-    case ('cylinder', 'tetrapod', 'dolos', 'reef_cube', 'file')
+    case ('cylinder')
+      n_size = 2
+    case ('file')
       message = 'kind = '''//trim(input%kind)//''' is not available yet'
       return
     case default
-      message = 'kind = '''//trim(input%kind)//''' is unknown: hexapod, cube, box or sphere'
+      message = 'kind = '''//trim(input%kind)//''' is unknown'
       return
     end select
     if (any(input%size(:n_size) <= 0.0_wp)) message = 'size must be positive [m]'
@@ -117,57 +163,78 @@ contains
     full(2, 2, :) = 1
   end function hexapod_cubes
 
-  !> Tetrahedra and facets of a body made of equal cuboids on a lattice, centred at the origin.
-  pure subroutine build_cuboids(full, edge, parts, shape)
-    integer, intent(in) :: full(:, :, :)   !! 1 where a cuboid stands
-    real(wp), intent(in) :: edge(3)        !! of a cuboid [m]
-    integer, intent(in) :: parts(3)        !! smaller cuboids along each edge
-    type(shape_t), intent(inout) :: shape
-    integer, allocatable :: number(:, :, :)
-    integer :: n(3), fine(3), i, j, k, m
+  !> Places along one direction: their widths, centred, each cut into parts of equal width.
+  pure function line_of(width, parts) result(line)
+    real(wp), intent(in) :: width(:)   !! [m]
+    integer, intent(in) :: parts(:)
+    type(line_t) :: line
+    integer :: m, k, i
 
-    n = [size(full, 1), size(full, 2), size(full, 3)]
-    fine = n*parts
-    allocate (number(0:fine(1), 0:fine(2), 0:fine(3)), source=0)
-    allocate (shape%tet(4, 5*sum(full)*product(parts)), shape%flow_tet(4, 5*sum(full)))
-    do k = 1, fine(3)
-      do j = 1, fine(2)
-        do i = 1, fine(1)
-          if (full(1 + (i - 1)/parts(1), 1 + (j - 1)/parts(2), 1 + (k - 1)/parts(3)) == 0) cycle
-          number(i - 1:i, j - 1:j, k - 1:k) = 1
+    allocate (line%x(0:sum(parts)), line%place(sum(parts)), line%plane(0:size(parts)))
+    line%plane(0) = 0
+    line%x(0) = -0.5_wp*sum(width)
+    i = 0
+    do m = 1, size(width)
+      do k = 1, parts(m)
+        i = i + 1
+        line%place(i) = m
+        line%x(i) = sum(width(:m - 1)) - 0.5_wp*sum(width) + width(m)*real(k, wp)/real(parts(m), wp)
+      end do
+      line%plane(m) = i
+    end do
+  end function line_of
+
+  !> Tetrahedra and facets of a body made of cuboids on a lattice, centred at the origin.
+  pure subroutine build_cuboids(full, line, shape)
+    integer, intent(in) :: full(:, :, :)   !! 1 where a cuboid stands
+    type(line_t), intent(in) :: line(3)    !! places in x, y, z
+    type(shape_t), intent(inout) :: shape
+    integer :: fine(size(line(1)%place), size(line(2)%place), size(line(3)%place))
+    integer, allocatable :: number(:, :, :), corner(:, :, :)
+    integer :: i, j, k, m
+
+    fine = full(line(1)%place, line(2)%place, line(3)%place)
+    allocate (number(0:size(fine, 1), 0:size(fine, 2), 0:size(fine, 3)), source=0)
+    allocate (shape%tet(4, 5*sum(fine)), shape%flow_tet(4, 5*sum(full)))
+    do k = 1, size(fine, 3)
+      do j = 1, size(fine, 2)
+        do i = 1, size(fine, 1)
+          if (fine(i, j, k) == 1) number(i - 1:i, j - 1:j, k - 1:k) = 1
         end do
       end do
     end do
     allocate (shape%point(3, sum(number)))
     m = 0
-    do k = 0, fine(3)
-      do j = 0, fine(2)
-        do i = 0, fine(1)
+    do k = 0, size(fine, 3)
+      do j = 0, size(fine, 2)
+        do i = 0, size(fine, 1)
           if (number(i, j, k) == 0) cycle
           m = m + 1
           number(i, j, k) = m
-          shape%point(:, m) = edge*(real([i, j, k], wp)/real(parts, wp) - 0.5_wp*real(n, wp))
+          shape%point(:, m) = [line(1)%x(i), line(2)%x(j), line(3)%x(k)]
         end do
       end do
     end do
-    call cut_into_tets(full, parts, number, shape%tet)
-    call cut_into_tets(full, [1, 1, 1], number(::parts(1), ::parts(2), ::parts(3)), shape%flow_tet)
-    call cuboid_facets(full, number(::parts(1), ::parts(2), ::parts(3)), shape)
+    call cut_into_tets(fine, number, shape%tet)
+    allocate (corner(size(full, 1) + 1, size(full, 2) + 1, size(full, 3) + 1), &
+              source=number(line(1)%plane, line(2)%plane, line(3)%plane))
+    call cut_into_tets(full, corner, shape%flow_tet)
+    call cuboid_facets(full, corner, shape)
   end subroutine build_cuboids
 
-  !> Five tetrahedra in every part of the cuboids present.
-  pure subroutine cut_into_tets(full, parts, number, tet)
-    integer, intent(in) :: full(:, :, :), parts(3)
-    integer, intent(in) :: number(0:, 0:, 0:)   !! of the lattice points
-    integer, intent(out) :: tet(:, :)           !! (4, 5*parts present)
+  !> Five tetrahedra in every cuboid present.
+  pure subroutine cut_into_tets(full, number, tet)
+    integer, intent(in) :: full(:, :, :)        !! 1 where a cuboid stands
+    integer, intent(in) :: number(:, :, :)      !! of the lattice points
+    integer, intent(out) :: tet(:, :)           !! (4, 5*cuboids)
     integer :: corner(8), i, j, k, m, t
 
     m = 0
-    do k = 1, ubound(number, 3)
-      do j = 1, ubound(number, 2)
-        do i = 1, ubound(number, 1)
-          if (full(1 + (i - 1)/parts(1), 1 + (j - 1)/parts(2), 1 + (k - 1)/parts(3)) == 0) cycle
-          corner = reshape(number(i - 1:i, j - 1:j, k - 1:k), [8])
+    do k = 1, size(full, 3)
+      do j = 1, size(full, 2)
+        do i = 1, size(full, 1)
+          if (full(i, j, k) == 0) cycle
+          corner = reshape(number(i:i + 1, j:j + 1, k:k + 1), [8])
           do t = 1, 5
             m = m + 1
             tet(:, m) = corner(five_tets(:, t, mod(i + j + k, 2)))
@@ -180,7 +247,7 @@ contains
   !> The free faces of the cuboids.
   pure subroutine cuboid_facets(full, number, shape)
     integer, intent(in) :: full(:, :, :)
-    integer, intent(in) :: number(0:, 0:, 0:)   !! of the lattice points
+    integer, intent(in) :: number(:, :, :)   !! of the lattice points
     type(shape_t), intent(inout) :: shape
     integer :: around(0:size(full, 1) + 1, 0:size(full, 2) + 1, 0:size(full, 3) + 1)
     integer :: face(4, 6*sum(full)), corner(8), i, j, k, d, s, m, c(3)
@@ -192,7 +259,7 @@ contains
       do j = 1, size(full, 2)
         do i = 1, size(full, 1)
           if (full(i, j, k) == 0) cycle
-          corner = reshape(number(i - 1:i, j - 1:j, k - 1:k), [8])
+          corner = reshape(number(i:i + 1, j:j + 1, k:k + 1), [8])
           do d = 1, 3
             do s = 1, 2
               c = [i, j, k]
@@ -300,20 +367,22 @@ contains
     point(:, number) = x
   end subroutine find_or_add
 
-  !> Mass, surface and, where the flow has no coarser parts, its parts.
+  !> Mass, surface and, where the flow has no coarser parts, its parts. The sums over the fewest
+  !! tetrahedra have the least round-off.
   pure subroutine finish_shape(shape)
     type(shape_t), intent(inout) :: shape
     real(wp) :: centroid(3)
     integer :: m
 
-    call volume_and_centroid(shape%point, shape%tet, shape%volume, centroid)
-    shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
-    shape%inertia = inertia_about_origin(shape%point, shape%tet, shape%density)
     call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
-    if (allocated(shape%flow_tet)) return
-    shape%flow_tet = shape%tet
-    shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
-    shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+    if (.not. allocated(shape%flow_tet)) then
+      shape%flow_tet = shape%tet
+      shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
+      shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+    end if
+    call volume_and_centroid(shape%point, shape%flow_tet, shape%volume, centroid)
+    shape%point = shape%point - spread(centroid, 2, size(shape%point, 2))
+    shape%inertia = inertia_about_origin(shape%point, shape%flow_tet, shape%density)
   end subroutine finish_shape
 
 end module shapes_builtin_m

@@ -5,7 +5,9 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, surface_of_tets
+  public :: shape_t, surface_of_tets, most_facet_corners
+
+  integer, parameter :: most_facet_corners = 48   !! of one polygon of the surface
 
   type :: shape_t
     character(name_length) :: name = '', kind = ''

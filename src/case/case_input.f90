@@ -445,7 +445,7 @@ contains
     shape%line = v%group%line
     if (.not. allocated(shape%file)) shape%file = ''
     call v%needed('name', 'what &body and &drop call the shape')
-    call v%needed('kind', '''hexapod'', ''cube'', ''box'' or ''sphere''')
+    call v%needed('kind', 'the form, such as ''hexapod''')
     call v%name('name', shape%name)
     call v%option('kind', shape%kind, &
                   'hexapod cube box sphere cylinder tetrapod dolos reef_cube file')

@@ -25,8 +25,6 @@ module not_yet_m
     entry_t('numerics', 'momentum', 'c_ismac'), &
     entry_t('numerics', 'solid_fraction', 'subcell'), &
     entry_t('contact', 'model', 'surface'), &
-    entry_t('shape', 'kind', 'cylinder'), entry_t('shape', 'kind', 'tetrapod'), &
-    entry_t('shape', 'kind', 'dolos'), entry_t('shape', 'kind', 'reef_cube'), &
     entry_t('shape', 'kind', 'file'), entry_t('shape', 'file', '*'), &
     entry_t('shape', 'spheres', 'inscribed'), entry_t('shape', 'spheres', 'dense'), &
     entry_t('bed', '', '')]

@@ -23,7 +23,7 @@ module body_shares_m
   use kinds_m, only: wp
   use vectors_m, only: cross, rotation_matrix
   use grid_m, only: grid_t, unit_step
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, most_facet_corners
   implicit none
   private
   public :: body_shares_t, share_work_t, find_body_shares, full_cell, full_face
@@ -33,7 +33,7 @@ module body_shares_m
   real(wp), parameter :: full_face = 1.0e-9_wp        !! a face lacking less is closed
   real(wp), parameter :: on_plane = 1.0e-13_wp     !! corners so near a grid plane are on it [cells]
   real(wp), parameter :: near_face = 1.0e-12_wp    !! a gap that parts no cell from a tetrahedron
-  integer, parameter :: max_polygon = 32              !! corners of a facet cut to a cell
+  integer, parameter :: max_polygon = most_facet_corners + 12   !! corners of a facet cut to a cell
 
   !> Corners of the outward face opposite each corner of a tetrahedron.
   integer, parameter :: opposite(3, 4) = reshape([2, 3, 4, 1, 4, 3, 1, 2, 4, 1, 3, 2], [3, 4])

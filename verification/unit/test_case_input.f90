@@ -201,7 +201,7 @@ contains
       '&water max: missing, required: the upper corner of the box of liquid [m] (line 3)')
     call expect(base//'&shape/', &
       '&shape name: missing, required: what &body and &drop call the shape (line 3)|' &
-      //'&shape kind: missing, required: ''hexapod'', ''cube'', ''box'' or ''sphere'' (line 3)')
+      //'&shape kind: missing, required: the form, such as ''hexapod'' (line 3)')
     call expect(base//'&shape name=''a'' kind=''sphere''/', &
       '&shape size: missing, required: the diameter [m] (line 3)')
     call expect(cube//'&body shape=''c''/', &
@@ -395,7 +395,8 @@ contains
     call expect(base//a//'''box'' size=1,0,1/', '&shape size = 1, 0, 1: must be positive [m] ' &
       //'(line 3)')
     call expect(base//a//'''ball'' size=1/', '&shape kind = ''ball'': unknown, must be one of' &
-      //' ''hexapod'', ''cube'', ''box'', ''sphere'' (line 3)')
+      //' ''hexapod'', ''cube'', ''box'', ''sphere'', ''cylinder'', ''tetrapod'', ''dolos'', ' &
+      //'''reef_cube'' (line 3)')
     call expect(base//a//'''cube'' size=1 density=0 scale=0 refinement=0 sphere_spacing=-1/', &
       '&shape density = 0: must be positive [kg/m3] (line 3)|' &
       //'&shape scale = 0: must be positive [-] (line 3)|' &
@@ -454,13 +455,11 @@ contains
       '&contact model = ''surface'': not available yet, so far: ''spheres'' (line 3)')
     call expect(base//'&bed file=''a.stl''/', '&bed: this group is not available yet (line 3)')
     call expect(base//'&shape name=''a'' kind=''dolos'' size=1 spheres=''dense''/', &
-      '&shape kind = ''dolos'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ' &
-      //'''sphere''' &
-      //' (line 3)|&shape spheres = ''dense'': not available yet, so far: ''centroid'' (line 3)')
+      '&shape spheres = ''dense'': not available yet, so far: ''centroid'' (line 3)')
     call expect(base//'&shape name=''a'' kind=''file'' file=''a.msh''/', &
       '&shape kind = ''file'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ' &
-      //'''sphere''' &
-      //' (line 3)|&shape file = ''a.msh'': not available yet (line 3)')
+      //'''sphere'', ''cylinder'', ''tetrapod'', ''dolos'', ''reef_cube'' (line 3)|' &
+      //'&shape file = ''a.msh'': not available yet (line 3)')
   end subroutine test_not_yet
 
   !> Faults of form, of type, of range and between groups come out together.

@@ -18,8 +18,12 @@ program test_solid_fraction
   real(wp), parameter :: identity(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
   integer :: seed_value = 4711
 
-  call random_poses([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 100)
-  call random_poses([60, 10, 25], [0.3_wp, 0.1_wp, 0.2_wp], 100)
+  call random_poses('hexapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 100)
+  call random_poses('hexapod', [60, 10, 25], [0.3_wp, 0.1_wp, 0.2_wp], 100)
+  call random_poses('cylinder', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+  call random_poses('tetrapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+  call random_poses('dolos', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+  call random_poses('reef_cube', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
   call against_tetrahedra()
   call faces_on_grid_planes()
   call degenerate_poses()
@@ -106,18 +110,20 @@ contains
   end subroutine fill
 
   !> Shares times cell volumes give the volume and the centroid, in one object moved many times.
-  subroutine random_poses(n, length, poses)
+  subroutine random_poses(kind, n, length, poses)
+    character(*), intent(in) :: kind
     integer, intent(in) :: n(3), poses
     real(wp), intent(in) :: length(3)
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
     type(solid_fraction_t) :: fraction
-    real(wp) :: worst(3), centroid(3)
+    real(wp) :: worst(3), centroid(3), size_m(3)
     integer :: p, m
 
     grid = make_grid(n, length)
-    call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], reshape(0.5_wp*length, [3, 1]), &
+    size_m = [merge(d, 2*d, kind == 'hexapod'), 2*d, 0.0_wp]
+    call make_bodies(kind, size_m, reshape(0.5_wp*length, [3, 1]), &
                          reshape(identity, [4, 1]), blocks)
     call solid_geometry_init(grid, solid, 1)
     call solid_fraction_init(grid, blocks, fraction)
@@ -138,8 +144,8 @@ contains
         worst(3) = max(worst(3), abs(sum(solid%cell_alpha(:last))*grid%volume/whole - 1.0_wp))
       end associate
     end do
-    call check('hexapod: shares add up to the volume', worst([1, 3]), [0.0_wp, 0.0_wp], 1e-12_wp)
-    call check('hexapod: centroids add up to the centroid', worst(2), 0.0_wp, 1e-12_wp)
+    call check(kind//': shares add up to the volume', worst([1, 3]), [0.0_wp, 0.0_wp], 1e-12_wp)
+    call check(kind//': centroids add up to the centroid', worst(2), 0.0_wp, 1e-12_wp)
   end subroutine random_poses
 
   !> One of the attitudes that turn the axes into each other, with the round-off of real numbers.
