@@ -33,6 +33,7 @@ module time_step_m
   use buoyancy_m, only: displaced_force
   use coupling_m, only: advance_velocity
   use clock_m, only: clock_t, clock_init
+  use surface_tension_m, only: capillary_step
   use parallel_m, only: global_max
   use timers_m, only: timer, tic, toc
   implicit none
@@ -189,6 +190,7 @@ contains
     report%viscous_converged = stage%viscous_converged
     report%small_cells = sim%transport%small_count
     report%sealed_cells = sim%solid%n_sealed
+    report%curvature_fallback = sim%stage%tension%fallback
   end subroutine tell
 
   !> Blocks whose time has come; the liquid in their place raises the free surface.
@@ -280,6 +282,8 @@ contains
     rate = courant_rate(sim)
     if (sim%case%run%cfl_max > 0.0_wp .and. rate > 0.0_wp) allowed = min(allowed, &
         sim%case%run%cfl_max/rate)
+    if (sim%case%run%cfl_max > 0.0_wp .and. sim%wet) allowed = min(allowed, &
+        capillary_step(sim%case%fluid, minval(sim%grid%h, sim%grid%n > 1)))
     call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
     report%cfl = sim%clock%dt*rate
   end subroutine choose_step

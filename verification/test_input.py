@@ -38,8 +38,8 @@ BAD = {
         "&contact restitution = 1.5: must be above 0 and at most 1 (line 5)",
     ),
     "not yet": (
-        TANK + "&fluid surface_tension = 0.07 /",
-        "&fluid surface_tension = 0.07: not available yet (line 4)",
+        TANK + "&bed file = 'sand.stl' /",
+        "&bed: this group is not available yet (line 4)",
     ),
     "no end": (
         TANK + "&fluid",

@@ -52,6 +52,7 @@ SERIES = {
     "max_overlap": "m",
     "contact_courant_max": "1",
     "substeps": "1",
+    "curvature_fallback": "1",
     "wall_time": "s",
 }
 UNITS_OF_FIELDS = {"liquid": "1", "solid": "1", "pressure": "Pa", "velocity": "m/s"}
@@ -60,6 +61,7 @@ OF_THE_FLUID = {
     "divergence_max",
     "pressure_passes",
     "solver_iterations",
+    "curvature_fallback",
     "liquid_volume",
     "liquid_volume_drift",
     "kinetic_energy_fluid",

@@ -14,6 +14,7 @@ module case_check_m
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use drops_m, only: draw_drop
+  use surface_tension_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use neighbours_m, only: nearest_shift
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
@@ -62,6 +63,7 @@ contains
 
     if (case%grid%faulty .or. case%boundary%faulty) return
     call check_water(case, problems)
+    call check_capillary_step(case, problems)
     if (case%run%physics == 'fluid') return
     call check_lengths(case, shapes, problems)
     call set_scene(case, shapes, scene)
@@ -88,6 +90,20 @@ contains
       end if
     end do
   end subroutine check_water
+
+  !> A fixed step must be stable with explicit surface tension.
+  subroutine check_capillary_step(case, problems)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: problems
+    real(wp) :: limit
+
+    if (case%run%physics == 'dry' .or. case%run%cfl_max > 0.0_wp) return
+    limit = capillary_step(case%fluid, minval(case%grid%length/real(case%grid%cells, wp), &
+                                              case%grid%cells > 1))
+    if (case%run%dt <= limit) return
+    call problems%add('&run dt', case%run%dt, 'unstable with surface tension, must be at most ' &
+      //brief(limit)//' s here; or cfl_max > 0 lets the step shrink', case%run%line)
+  end subroutine check_capillary_step
 
   !> No shape in use is longer than half a period.
   subroutine check_lengths(case, shapes, problems)

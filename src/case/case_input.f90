@@ -211,6 +211,7 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(run_t), intent(inout) :: run
 
+    run%line = v%group%line
     call v%needed('t_end', 'the simulated time [s]')
     call v%item('title', run%title)
     call v%option('physics', run%physics, 'coupled fluid dry')

@@ -5,6 +5,7 @@ module case_plan_m
   use case_types_m, only: case_t, is_given
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
   use tet_mesh_m, only: shape_t
+  use surface_tension_m, only: capillary_step
   implicit none
   private
   public :: print_plan
@@ -189,6 +190,9 @@ contains
       if (.not. case%fluid%single_phase) then
         call entry(unit, 'liquid transport', brief(0.5_wp*h/speed)//' s at '//brief(speed) &
                    //' m/s, half a cell a step')
+      end if
+      if (capillary_step(case%fluid, h) < huge(h)) then
+        call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')
       end if
     end if
     if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes)

@@ -24,6 +24,7 @@ module case_types_m
     logical :: stop_when_settled = .false.
     real(wp) :: rest_speed = 1.0e-3_wp              !! [m/s]
     real(wp) :: rest_time = 0.5_wp                  !! [s]
+    integer :: line = 0                             !! of the case file, where the group begins
   end type run_t
 
   type :: grid_input_t

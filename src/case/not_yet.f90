@@ -21,7 +21,6 @@ module not_yet_m
     entry_t('boundary', 'y_max', 'inflow'), entry_t('boundary', 'y_max', 'outflow'), &
     entry_t('boundary', 'z_min', 'inflow'), entry_t('boundary', 'z_min', 'outflow'), &
     entry_t('boundary', 'z_max', 'inflow'), entry_t('boundary', 'z_max', 'outflow'), &
-    entry_t('fluid', 'surface_tension', '*'), &
     entry_t('numerics', 'momentum', 'c_ismac'), &
     entry_t('numerics', 'solid_fraction', 'subcell'), &
     entry_t('contact', 'model', 'surface'), &

@@ -5,6 +5,7 @@ module coupling_m
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
+  use surface_tension_m, only: find_tension
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies
@@ -34,6 +35,7 @@ contains
     type(stage_report_t), intent(out) :: report
 
     stage%total = 0.0_wp
+    call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
     call set_velocity()
     call motion_at_start(blocks, stage)
     if (case%numerics%coupling == 'mics') then

@@ -20,6 +20,7 @@ module mass_average_m
   use pressure_m, only: pressure_report_t, set_pressure_system, solve_pressure, face_acceleration, &
                         cell_mean_of_faces, predict_face_velocity, divergence
   use buoyancy_m, only: displaced_force
+  use surface_tension_m, only: add_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
@@ -150,6 +151,7 @@ contains
       if (first) then
         call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho_mixture, flow%p, &
                                p%a_face)
+        call add_tension(grid, stage%rho_mixture, stage%tension, p%a_face)
         call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
         flow%u = flow%u + dt*p%a_cell
         call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, &

@@ -20,6 +20,7 @@ module monolithic_m
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
   use buoyancy_m, only: hydrostatic_correction
+  use surface_tension_m, only: find_tension, add_tension, force_from_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies
   use boundary_m, only: fill_velocity_halo
   use parallel_m, only: halo_exchange
@@ -46,9 +47,12 @@ contains
       call build_rigid_flux(grid, solid, bodies, p%active, p%operator%flux)
 
       call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face)
+      call add_tension(grid, flow%rho, self%tension, p%a_face)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call force_from_faces(grid, solid, bodies, p%operator%flux, flow%p, self%from_pressure)
+      call force_from_tension(grid, solid, bodies, p%operator%flux, self%tension, self%terms, &
+                              self%from_pressure)
       call hydrostatic_correction(grid, case%fluid, solid, bodies, p%operator%flux, flow%c, &
                                   flow%rho, &
                                   self%buoyancy, self%from_level)
@@ -103,6 +107,8 @@ contains
       held%motion = 0.0_wp
       flow%p = 0.0_wp
       call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face)
+      call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
+      call add_tension(grid, flow%rho, stage%tension, p%a_face)
       flow%uf = dt*p%a_face
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, held, p, report%pressure)
       call extend_pressure(grid, case%fluid%gravity, flow%rho, p%active, p%known, flow%p)

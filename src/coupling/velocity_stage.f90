@@ -7,6 +7,7 @@ module velocity_stage_m
   use viscous_m, only: viscous_t, viscous_init
   use pressure_m, only: pressure_t, pressure_report_t, pressure_init
   use buoyancy_m, only: buoyancy_t, buoyancy_init
+  use surface_tension_m, only: surface_tension_t
   use rigid_body_m, only: blocks_t, space_tensor
   implicit none
   private
@@ -25,6 +26,7 @@ module velocity_stage_m
     type(viscous_t) :: viscous
     type(pressure_t) :: pressure
     type(buoyancy_t) :: buoyancy
+    type(surface_tension_t) :: tension
     type(solid_geometry_t) :: whole                !! the domain without solids, for the mixture
     real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
     real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures

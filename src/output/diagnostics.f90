@@ -24,6 +24,7 @@ module diagnostics_m
     integer :: substeps = 0
     integer :: small_cells = 0                !! cells that the transport treated as small
     integer :: sealed_cells = 0               !! cells without any open face that held fluid
+    integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
     integer :: warnings = 0                   !! printed in this step
     logical :: pressure_converged = .true., viscous_converged = .true., contacts_solved = .true.
   end type step_report_t
@@ -43,17 +44,20 @@ module diagnostics_m
     real(wp) :: max_overlap = 0.0_wp          !! [m]
     real(wp) :: contact_courant_max = 0.0_wp
     real(wp) :: substeps = 0.0_wp
+    real(wp) :: curvature_fallback = 0.0_wp   !! cells whose curvature does not come from heights
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 16
+  integer, parameter :: n_columns = 17
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
     'liquid_volume_drift', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
-    'max_overlap', 'contact_courant_max', 'substeps', 'wall_time']
+    'max_overlap', 'contact_courant_max', 'substeps', 'curvature_fallback', &
+    'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
-    '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', 's']
+    '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
+    's']
 
 contains
 
@@ -97,12 +101,14 @@ contains
       row%liquid_volume = row%cfl
       row%liquid_volume_drift = row%cfl
       row%kinetic_energy_fluid = row%cfl
+      row%curvature_fallback = row%cfl
       return
     end if
     row%cfl = report%cfl
     row%divergence_max = report%divergence_max
     row%pressure_passes = real(report%pressure_passes, wp)
     row%solver_iterations = real(report%solver_iterations, wp)
+    row%curvature_fallback = real(report%curvature_fallback, wp)
     call sum_fluid(grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
     if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
       (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
@@ -182,7 +188,7 @@ contains
          row%kinetic_energy_bodies, &
          row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
          row%contact_courant_max, &
-         row%substeps, row%wall_time]
+         row%substeps, row%curvature_fallback, row%wall_time]
   end function row_values
 
 end module diagnostics_m

@@ -123,6 +123,7 @@ class Series:
     max_overlap: Array
     contact_courant_max: Array
     substeps: Array
+    curvature_fallback: Array
     wall_time: Array
 
 

@@ -1,0 +1,43 @@
+"""A drop without gravity stays at rest, with the pressure jump of Young and Laplace.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+CAPILLARY_BAND = 1e-8  # max|u| mu/sigma
+JUMP_BAND = 0.01
+SHAPES = {"plane": (0.004, 1), "space": (0.007, 2)}  # radius [m], curvature times radius
+
+
+def check(runs: list[Run]) -> Checks:
+    """Largest velocity and pressure jump in the final state."""
+    checks = Checks("static drop")
+    for run in runs:
+        name = run.folder.name
+        radius, main_curvatures = SHAPES[name]
+        sigma = float(run.value("fluid", "surface_tension", 0.0))
+        mu = float(run.value("fluid", "liquid_viscosity", 0.0))
+        state = run.restart()
+        speed = float(np.abs(state["flow/u"]).max())
+        checks.below(f"{name}: capillary number", speed * mu / sigma, CAPILLARY_BAND)
+        p, c = state["flow/p"], state["flow/c"]
+        jump = float(p[c > 1 - 1e-8].mean() - p[c < 1e-8].mean())
+        exact = main_curvatures * sigma / radius
+        checks.close(f"{name}: pressure jump [Pa]", jump, exact, JUMP_BAND)
+        fallen = f"{run.series.curvature_fallback[-1]:.0f}"
+        checks.true(f"{name}: cells without heights at the end", True, fallen, counts=False)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
