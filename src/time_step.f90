@@ -20,6 +20,7 @@ module time_step_m
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
   use mixture_m, only: mix_fluid
+  use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, blocks_init
@@ -96,7 +97,11 @@ contains
     call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction)
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
-    if (case%fluid%single_phase) sim%transport%incoming = 1.0_wp
+    if (case%fluid%single_phase) then
+      sim%transport%incoming = 1.0_wp
+    else
+      sim%transport%level = case%fluid%water_level
+    end if
     call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
     call stage_init(sim%grid, sim%blocks%n, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
@@ -111,8 +116,11 @@ contains
     call fill_velocity_halo(sim%grid, sim%flow%u)
     call read_initial_velocity(case%fluid, sim%grid, sim%flow)
     call set_side_velocity(sim%grid, sim%flow%uf)
+    call outflow_init(sim%grid, case%fluid, sim%flow%sides)
+    call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)
     call copy_motion(sim%blocks, sim%stage%bodies)
     call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, report)
+    call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
 
   !> What follows from the state after it was read: solids in the grid, density, halos.
@@ -155,6 +163,7 @@ contains
         call transport(sim, dt, parts_of_step(report%cfl))
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
+        call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
         call advance_velocity(case, grid, sim%solid, dt, flow, blocks, sim%stage, stage)
         call toc(sim%timer_velocity)
       end if

@@ -630,6 +630,7 @@ contains
     integer :: d, i
 
     call check_names(case, v%problems)
+    if (.not. case%boundary%faulty) call check_streams(list, case, v)
     if (case%grid%faulty .or. case%boundary%faulty) return
     do i = 1, list%n
       if (list%group(i)%name == 'grid') exit
@@ -644,6 +645,38 @@ contains
         //side_name(2, d)//' must both be ''slip'' or ''periodic''')
     end do
   end subroutine check_together
+
+  !> What enters through an inflow must find a way out; an outflow needs a level to keep, and gravity
+  !! along it.
+  subroutine check_streams(list, case, v)
+    type(namelist_text_t), intent(in) :: list
+    type(case_t), intent(in) :: case
+    type(group_visitor_t), intent(inout) :: v
+    logical :: way_out
+    integer :: d, s, i
+
+    if (case%run%physics == 'dry') return
+    do i = 1, list%n
+      if (list%group(i)%name == 'boundary') exit
+    end do
+    if (i > list%n) return
+    call v%start_reading(list%group(i))
+    way_out = any(case%boundary%kind == 'open' .or. case%boundary%kind == 'outflow')
+    associate (fluid => case%fluid)
+      do d = 1, 3
+        do s = 1, 2
+          call v%require(side_name(s, d), case%boundary%kind(s, d) /= 'inflow' .or. way_out, &
+            'what flows in must leave, another side must be ''open'' or ''outflow''')
+          if (case%boundary%kind(s, d) /= 'outflow') cycle
+          if (.not. any(abs(fluid%gravity) > 0.0_wp)) cycle
+          call v%require(side_name(s, d), maxloc(abs(fluid%gravity), 1) /= d, &
+            'gravity acts across this side, it can be ''open''')
+          call v%require(side_name(s, d), fluid%single_phase .or. is_given(fluid%water_level), &
+            'needs &fluid water_level, the level it keeps')
+        end do
+      end do
+    end associate
+  end subroutine check_streams
 
   !> Names of shapes are unique, capital or small letters apart.
   subroutine check_names(case, problems)

@@ -15,12 +15,6 @@ module not_yet_m
   end type entry_t
 
   type(entry_t), parameter :: table(*) = [ &
-    entry_t('boundary', 'x_min', 'inflow'), entry_t('boundary', 'x_min', 'outflow'), &
-    entry_t('boundary', 'x_max', 'inflow'), entry_t('boundary', 'x_max', 'outflow'), &
-    entry_t('boundary', 'y_min', 'inflow'), entry_t('boundary', 'y_min', 'outflow'), &
-    entry_t('boundary', 'y_max', 'inflow'), entry_t('boundary', 'y_max', 'outflow'), &
-    entry_t('boundary', 'z_min', 'inflow'), entry_t('boundary', 'z_min', 'outflow'), &
-    entry_t('boundary', 'z_max', 'inflow'), entry_t('boundary', 'z_max', 'outflow'), &
     entry_t('numerics', 'momentum', 'c_ismac'), &
     entry_t('numerics', 'solid_fraction', 'subcell'), &
     entry_t('contact', 'model', 'surface'), &

@@ -14,7 +14,8 @@ module buoyancy_m
   use kinds_m, only: wp
   use vectors_m, only: cross
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t, n_halo, unit_step, side_open
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_m, only: gives_pressure
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t, nearest_arm
@@ -194,9 +195,9 @@ contains
       f = solid%face(1:3, m)
       if (.not. flux%mine(m)) cycle
       low = f - unit_step(:, d)
-      if (low(d) == 0 .and. grid%side(1, d) == side_open) then
+      if (low(d) == 0 .and. gives_pressure(grid%side(1, d))) then
         head = 0.5_wp*rho(f(1), f(2), f(3))*gravity(d)*grid%h(d)
-      else if (f(d) == grid%n(d) + 1 .and. grid%side(2, d) == side_open) then
+      else if (f(d) == grid%n(d) + 1 .and. gives_pressure(grid%side(2, d))) then
         head = 0.5_wp*rho(low(1), low(2), low(3))*gravity(d)*grid%h(d)
       else
         head = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*gravity(d)*grid%h(d)

@@ -56,7 +56,8 @@ contains
       call push_bodies(dt, stage%from_level, bodies)
       stage%total = stage%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, stage%rho_mixture)
-      call set_pressure_system(grid, case%numerics, stage%whole%open, stage%rho_mixture, p)
+      call set_pressure_system(grid, case%numerics, stage%whole%open, stage%rho_mixture, p, &
+                               flow%sides)
       call build_rigid_flux(grid, stage%whole, bodies, p%active, p%operator%flux)
       do pass = 1, case%numerics%coupling_passes
         call average_cells(grid, solid, bodies, flow, stage%rho_mixture)
@@ -150,7 +151,7 @@ contains
       p%a_face = 0.0_wp
       if (first) then
         call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho_mixture, flow%p, &
-                               p%a_face)
+                               p%a_face, flow%sides)
         call add_tension(grid, stage%rho_mixture, stage%tension, p%a_face)
         call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
         flow%u = flow%u + dt*p%a_cell
@@ -181,7 +182,8 @@ contains
     associate (p => stage%pressure)
       call solve_pressure(grid, case%numerics, stage%whole, stage%rho_mixture, dt, flow, none, p, &
                           projection)
-      call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, p%a_face)
+      call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, p%a_face, &
+                             flow%sides)
       call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
     end associate
     flow%u = flow%u + dt*stage%pressure%a_cell

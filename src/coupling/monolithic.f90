@@ -43,14 +43,16 @@ contains
     real(wp), parameter :: weightless(3) = 0.0_wp
 
     associate (p => self%pressure, bodies => self%bodies)
-      call set_pressure_system(grid, case%numerics, solid%open, flow%rho, p)
+      call set_pressure_system(grid, case%numerics, solid%open, flow%rho, p, flow%sides)
       call build_rigid_flux(grid, solid, bodies, p%active, p%operator%flux)
 
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face, &
+                             flow%sides)
       call add_tension(grid, flow%rho, self%tension, p%a_face)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
-      call force_from_faces(grid, solid, bodies, p%operator%flux, flow%p, self%from_pressure)
+      call force_from_faces(grid, solid, bodies, p%operator%flux, flow%p, self%from_pressure, &
+                            flow%sides)
       call force_from_tension(grid, solid, bodies, p%operator%flux, self%tension, self%terms, &
                               self%from_pressure)
       call hydrostatic_correction(grid, case%fluid, solid, bodies, p%operator%flux, flow%c, &
@@ -74,7 +76,7 @@ contains
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, bodies, p, &
                           report%pressure)
 
-      call face_acceleration(grid, weightless, flow%rho, flow%rho, p%phi_total, p%a_face)
+      call face_acceleration(grid, weightless, flow%rho, flow%rho, p%phi_total, p%a_face, flow%sides)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
@@ -100,13 +102,14 @@ contains
     held = stage%bodies
     held%free = .false.
     associate (p => stage%pressure, dt => case%run%dt)
-      call set_pressure_system(grid, case%numerics, solid%open, flow%rho, p)
+      call set_pressure_system(grid, case%numerics, solid%open, flow%rho, p, flow%sides)
       call build_rigid_flux(grid, solid, held, p%active, p%operator%flux)
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, held, p, report%pressure)
       allocate (uf, source=flow%uf)
       held%motion = 0.0_wp
       flow%p = 0.0_wp
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, p%a_face, &
+                             flow%sides)
       call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
       call add_tension(grid, flow%rho, stage%tension, p%a_face)
       flow%uf = dt*p%a_face

@@ -2,6 +2,7 @@
 module fields_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
+  use outflow_m, only: outflow_t
   implicit none
   private
   public :: flow_t, flow_init
@@ -21,6 +22,7 @@ module fields_m
                                                 !! [-]
     real(wp), allocatable :: rho(:, :, :)       !! density of the fluid, from c [kg/m3]
     real(wp), allocatable :: mu(:, :, :)        !! viscosity of the fluid, from c [Pa s]
+    type(outflow_t) :: sides(2, 3)              !! what lies outside the sides that are outflows
     real(wp) :: liquid_initial = 0.0_wp         !! sum of `liquid` at t = 0 [m3]
     real(wp) :: liquid_inflow = 0.0_wp          !! time integral of the net inflow of liquid [m3]
   end type flow_t

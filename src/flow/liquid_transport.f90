@@ -17,7 +17,8 @@
 module liquid_transport_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
-  use grid_m, only: grid_t, n_halo, unit_step
+  use case_types_m, only: absent, is_given
+  use grid_m, only: grid_t, n_halo, unit_step, side_inflow, side_outflow
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -49,6 +50,7 @@ module liquid_transport_m
     type(open_flux_t) :: flux
     type(extended_fraction_t) :: extension
     real(wp) :: incoming(2, 3) = 0.0_wp       !! liquid share of what enters through a side
+    real(wp) :: level = absent                !! an inflow brings liquid below it [m]
     integer :: order(3) = [1, 2, 3]           !! directions of this step's sweeps
     integer :: parts = 1                      !! equal parts in which the volumes of the step move
     !> Volumes through the lower faces in the whole step, positive along the axis [m3].
@@ -487,34 +489,60 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d
     type(liquid_transport_t), intent(inout) :: self
-    integer :: i, j, k, a(3), b(3), e(3)
+    integer :: i, j, k, s, e(3), a(3), b(3), inner(3)
 
     if (grid%periodic(d)) return
     e = unit_step(:, d)
-    if (grid%at_side(1, d)) then
-      a = merge(0, grid%lo, e == 1)
-      b = merge(a, grid%hi, e == 1)
+    do s = 1, 2
+      if (.not. grid%at_side(s, d)) cycle
+      a = grid%lo
+      b = grid%hi
+      a(d) = merge(0, grid%n(d) + 1, s == 1)
+      b(d) = a(d)
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
-            self%out_high(i, j, k) = max(self%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp) &
-                                     *self%incoming(1, d)
+            inner = [i, j, k] + merge(e, -e, s == 1)
+            if (s == 1) then
+              self%out_high(i, j, k) = max(self%q(inner(1), inner(2), inner(3), d), 0.0_wp) &
+                                       *incoming_share(grid, self, s, d, inner)
+            else
+              self%out_low(i, j, k) = max(-self%q(i, j, k, d), 0.0_wp) &
+                                      *incoming_share(grid, self, s, d, inner)
+            end if
           end do
         end do
       end do
-    end if
-    if (grid%at_side(2, d)) then
-      a = merge(grid%hi + 1, grid%lo, e == 1)
-      b = merge(a, grid%hi, e == 1)
-      do k = a(3), b(3)
-        do j = a(2), b(2)
-          do i = a(1), b(1)
-            self%out_low(i, j, k) = max(-self%q(i, j, k, d), 0.0_wp)*self%incoming(2, d)
-          end do
-        end do
-      end do
-    end if
+    end do
   end subroutine outflow_of_sides
+
+  !> Liquid share of what enters through side s of direction d into a cell: an inflow brings liquid
+  !! below its level, through an outflow comes back what stands there.
+  pure function incoming_share(grid, self, s, d, at) result(share)
+    type(grid_t), intent(in) :: grid
+    type(liquid_transport_t), intent(in) :: self
+    integer, intent(in) :: s, d, at(3)
+    real(wp) :: share
+    integer :: axis
+    real(wp) :: bounds(2)   ! of the face along the vertical
+
+    share = self%incoming(s, d)
+    if (grid%side(s, d) == side_outflow) share = self%c(at(1), at(2), at(3))
+    if (grid%side(s, d) /= side_inflow .or. .not. is_given(self%level)) return
+    axis = maxloc(abs(self%extension%vertical%up), 1)
+    bounds = grid%face(at(axis) + [0, 1], axis)
+    if (axis == d) bounds = bounds(s)
+    if (self%extension%vertical%up(axis) > 0.0_wp) then
+      share = self%level - bounds(1)
+    else
+      share = bounds(2) - self%level
+    end if
+    if (axis == d) then
+      share = merge(1.0_wp, 0.0_wp, share >= 0.0_wp)
+    else
+      share = min(max(share/grid%h(axis), 0.0_wp), 1.0_wp)
+    end if
+  end function incoming_share
 
   !> Exchange two arrays without copying.
   pure subroutine swap(a, b)

@@ -18,6 +18,7 @@ module pressure_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, solid_face_flux, force_from_cells, &
                           add_cell_flux, nearest_arm
+  use outflow_m, only: outflow_t, reach, pressure_outside, mean_velocity
   use mixture_m, only: face_mean
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
@@ -95,7 +96,9 @@ contains
 
   !> Coefficients of the system for the open shares and densities at hand, and of its
   !! preconditioner.
-  subroutine set_pressure_system(grid, numerics, open, rho, self)
+  !!
+  !! `sides` tells what lies outside the outflows; without it the pressure there is zero.
+  subroutine set_pressure_system(grid, numerics, open, rho, self, sides)
     type(grid_t), intent(in) :: grid
     type(numerics_t), intent(in) :: numerics
     real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
@@ -103,6 +106,7 @@ contains
     real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                             grid%lo(3) - n_halo:)       !! [kg/m3]
     type(pressure_t), intent(inout) :: self
+    type(outflow_t), intent(in), optional :: sides(2, 3)
     integer :: i, j, k, d, s, e(3), face
     real(wp) :: area_over_h
 
@@ -136,7 +140,7 @@ contains
     !> A side of the domain: the velocity is given, or the pressure half a cell away.
     subroutine side_coefficients(face, cell)
       integer, intent(in) :: face, cell
-      integer :: a(3), b(3), shift(3)
+      integer :: a(3), b(3), c(3)
 
       a = grid%lo
       b = grid%hi
@@ -146,17 +150,29 @@ contains
         self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
         return
       end if
-      shift = (cell - face)*e
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
-            self%operator%cf(i, j, k, d) = 2.0_wp*open(i, j, k, d)*area_over_h &
-                                           /rho(i + shift(1), j + shift(2), k + shift(3))
+            c = [i, j, k] + (cell - face)*e
+            self%operator%cf(i, j, k, d) = open(i, j, k, d)*grid%area(d) &
+              /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
           end do
         end do
       end do
     end subroutine side_coefficients
   end subroutine set_pressure_system
+
+  !> Length over which the pressure difference of a cell to the outside acts [m].
+  pure function side_reach(grid, s, d, cell, rho, sides) result(length)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, cell(3)
+    real(wp), intent(in) :: rho   !! of the cell [kg/m3]
+    type(outflow_t), intent(in), optional :: sides(2, 3)
+    real(wp) :: length
+
+    length = 0.5_wp*grid%h(d)
+    if (present(sides)) length = reach(sides(s, d), cell, length, rho)
+  end function side_reach
 
   !> Own cells that have a face through which fluid can move.
   subroutine mark_active(grid, cf, active)
@@ -231,8 +247,10 @@ contains
   !!
   !! Gravity, pressure gradient and density live at the same face, so still water stays still. The
   !! density rho_w that has weight is the fluid's; rho is it too, or that of the mixture. Zero on
-  !! walls; on an open side p = 0 half a cell away.
-  subroutine face_acceleration(grid, gravity, rho_w, rho, p, a)
+  !! walls and inflows; on an open side p = 0 half a cell away. Outside an outflow (`sides`) lies
+  !! what `outflow_m` says: its pressure comes from weight, so it counts only with gravity, and a
+  !! pressure correction sees none.
+  subroutine face_acceleration(grid, gravity, rho_w, rho, p, a, sides)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
@@ -242,8 +260,11 @@ contains
                                           grid%lo(3) - n_halo:)     !! [Pa], halo filled
     real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                              grid%lo(3) - n_halo:, :)
+    type(outflow_t), intent(in), optional :: sides(2, 3)
     integer :: i, j, k, d, e(3)
+    logical :: heavy
 
+    heavy = any(abs(gravity) > 0.0_wp)
     do d = 1, 3
       e = unit_step(:, d)
       !$omp parallel do private(i, j) schedule(static)
@@ -262,7 +283,7 @@ contains
   contains
     subroutine sides_of_direction()
       integer :: s, lower(3), upper(3), c(3)
-      real(wp) :: outward
+      real(wp) :: outward, outside, length
 
       do s = 1, 2
         if (.not. grid%at_side(s, d)) cycle
@@ -276,9 +297,12 @@ contains
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
               a(i, j, k, d) = 0.0_wp
-              if (gives_pressure(grid%side(s, d))) a(i, j, k, d) = (rho_w(c(1), c(2), &
-                  c(3))*gravity(d) &
-                + outward*p(c(1), c(2), c(3))/(0.5_wp*grid%h(d)))/rho(c(1), c(2), c(3))
+              if (.not. gives_pressure(grid%side(s, d))) cycle
+              outside = 0.0_wp
+              if (heavy .and. present(sides)) outside = pressure_outside(sides(s, d), c)
+              length = side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides)
+              a(i, j, k, d) = (rho_w(c(1), c(2), c(3))*gravity(d)*0.5_wp*grid%h(d) &
+                + outward*(p(c(1), c(2), c(3)) - outside))/(length*rho(c(1), c(2), c(3)))
             end do
           end do
         end do
@@ -362,6 +386,10 @@ contains
   !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt
   !! keeps the
   !! steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
+  !!
+  !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
+  !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
+  !! that `a_face` does not hold, so half of it goes to the cell, too.
   subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
@@ -394,10 +422,36 @@ contains
       if (.not. grid%periodic(d)) call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
+    do d = 1, 3
+      call drag_of_outflows()
+    end do
   contains
+    !> Cells beside an outflow take half of what the face gained by the drag of the side.
+    subroutine drag_of_outflows()
+      integer :: s, lower(3), upper(3), f(3)
+
+      do s = 1, 2
+        if (.not. (grid%at_side(s, d) .and. flow%sides(s, d)%active)) cycle
+        lower = grid%lo
+        upper = grid%hi
+        lower(d) = merge(1, grid%n(d), s == 1)
+        upper(d) = lower(d)
+        do k = lower(3), upper(3)
+          do j = lower(2), upper(2)
+            do i = lower(1), upper(1)
+              f = [i, j, k] + merge(0, 1, s == 1)*unit_step(:, d)
+              flow%u(i, j, k, d) = flow%u(i, j, k, d) + 0.5_wp*(flow%uf(f(1), f(2), f(3), d) &
+                - flow%u(i, j, k, d) + dt*(a_cell(i, j, k, d) - a_face(f(1), f(2), f(3), d)))
+            end do
+          end do
+        end do
+      end do
+    end subroutine drag_of_outflows
+
     !> Sides with a given pressure: the velocity of the last cell.
     subroutine sides_of_direction()
       integer :: s, lower(3), upper(3), c(3)
+      real(wp) :: share, mean
 
       do s = 1, 2
         if (.not. (grid%at_side(s, d) .and. gives_pressure(grid%side(s, d)))) cycle
@@ -409,8 +463,10 @@ contains
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
-              flow%uf(i, j, k, d) = flow%u(c(1), c(2), c(3), d) &
-                + dt*(a_face(i, j, k, d) - a_cell(c(1), c(2), c(3), d))
+              share = 0.5_wp*grid%h(d)/side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), flow%sides)
+              mean = merge(-1.0_wp, 1.0_wp, s == 1)*mean_velocity(flow%sides(s, d), c)
+              flow%uf(i, j, k, d) = share*(flow%u(c(1), c(2), c(3), d) &
+                - dt*a_cell(c(1), c(2), c(3), d)) + (1.0_wp - share)*mean + dt*a_face(i, j, k, d)
             end do
           end do
         end do
@@ -592,7 +648,7 @@ contains
       self%phi_pass(a(1):z(1), a(2):z(2), a(3):z(3)) = self%phi(a(1):z(1), a(2):z(2), a(3):z(3))
     end associate
     call fill_scalar_halo(grid, self%phi_pass)
-    call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_face)
+    call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_face, flow%sides)
     flow%uf = flow%uf + dt*self%a_face
     self%phi_total = self%phi_total + self%phi_pass
     call force_from_cells(bodies, self%operator%flux, self%phi, grid%lo - 1, self%operator%push)

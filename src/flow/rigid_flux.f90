@@ -9,7 +9,8 @@ module rigid_flux_m
   use kinds_m, only: wp
   use vectors_m, only: cross
   use grid_m, only: grid_t, n_halo, unit_step
-  use boundary_m, only: is_wall
+  use boundary_m, only: gives_pressure
+  use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use exact_sum_m, only: exact_sums
@@ -121,14 +122,16 @@ contains
         4*n_face), self%work(4*n_face, 6))
   end subroutine make_room
 
-  !> A lower face of index i that lies on a wall of the domain: no fluid and no pressure there.
+  !> A lower face of index i on a side of the domain where no pressure is given: what a body does
+  !! there moves no fluid, and nothing pushes from outside.
   pure function closed_side(grid, i, d) result(closed)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: i, d
     logical :: closed
 
-    closed = (i == 1 .and. is_wall(grid%side(1, d))) .or. &
-             (i == grid%n(d) + 1 .and. is_wall(grid%side(2, d)))
+    closed = .not. grid%periodic(d) .and. &
+             ((i == 1 .and. .not. gives_pressure(grid%side(1, d))) .or. &
+              (i == grid%n(d) + 1 .and. .not. gives_pressure(grid%side(2, d))))
   end function closed_side
 
   !> Each face belongs to one process: that of the cell above it, or at the upper end of the domain
@@ -166,8 +169,9 @@ contains
 
   !> Force and torque of a cell field of pressure on each body, face by face:
   !! $$ F_k = \sum_f s_f (p_{low} - p_{high}) $$
-  !! The pressure of cells without open faces counts as it stands.
-  subroutine force_from_faces(grid, solid, bodies, self, p, force)
+  !! The pressure of cells without open faces counts as it stands. With `sides` that outside an
+  !! outflow counts, too; a pressure correction is zero there.
+  subroutine force_from_faces(grid, solid, bodies, self, p, force, sides)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -176,6 +180,7 @@ contains
                                           grid%lo(3) - n_halo:)   !! [Pa], halo filled
     real(wp), intent(out) :: force(:, :)
       !! (6, bodies) force, torque about the centre of mass [N, N m]
+    type(outflow_t), intent(in), optional :: sides(2, 3)
     integer :: b, m, t, f(3), e(3)
 
     do b = 1, bodies%n
@@ -190,13 +195,19 @@ contains
       force(:, b) = exact_sums(self%work(1:t, :))
     end do
   contains
-    !> Pressure of a cell; zero outside an open side.
+    !> Pressure of a cell, or outside the tank; zero outside an open side.
     pure function side_value(c) result(value)
       integer, intent(in) :: c(3)
       real(wp) :: value
+      integer :: d
 
       value = 0.0_wp
-      if (all((c >= 1 .and. c <= grid%n) .or. grid%periodic)) value = p(c(1), c(2), c(3))
+      if (all((c >= 1 .and. c <= grid%n) .or. grid%periodic)) then
+        value = p(c(1), c(2), c(3))
+      else if (present(sides)) then
+        d = findloc((c < 1 .or. c > grid%n) .and. .not. grid%periodic, .true., 1)
+        value = pressure_outside(sides(merge(1, 2, c(d) < 1), d), c)
+      end if
     end function side_value
   end subroutine force_from_faces
 

@@ -5,7 +5,8 @@
 !!     liquid    (nz, ny, nx)      share of liquid in the open part of the cell, 0..1 [-]
 !!     velocity  (nz, ny, nx, 3)   velocity at the centre of the cell, x y z last [m/s]
 !!
-!! `liquid` takes the place of `water_level` and `&water`, `velocity` that of `&fluid velocity`. The
+!! `liquid` takes the place of `water_level` and `&water` (beside inflows and outflows
+!! `water_level` stays, as their level), `velocity` that of `&fluid velocity`. The
 !! velocity of the faces is the mean of the two cells, made free of divergence by the first
 !! projection. `micstools.initial_state` writes such a file.
 module initial_state_m
@@ -46,7 +47,7 @@ contains
       'the file holds neither ''liquid'' nor ''velocity''')
     if (liquid) then
       call check_values(liquid_name, case%grid%cells, 0.0_wp, 1.0_wp, 'shares between 0 and 1')
-      if (is_given(case%fluid%water_level) .or. size(case%water) > 0 &
+      if ((is_given(case%fluid%water_level) .and. .not. streams(case)) .or. size(case%water) > 0 &
           .or. case%fluid%single_phase) then
         call note('''liquid'' of the file takes the place of water_level, single_phase and '// &
                   '&water, give one only')
@@ -107,6 +108,13 @@ contains
       if (file%info /= 0) call note(file%message)
     end subroutine check_values
   end subroutine check_initial_state
+
+  !> Has the case a side that goes by the water level?
+  pure logical function streams(case)
+    type(case_t), intent(in) :: case
+
+    streams = any(case%boundary%kind == 'inflow' .or. case%boundary%kind == 'outflow')
+  end function streams
 
   !> Does the case name a file?
   pure logical function is_named(fluid)

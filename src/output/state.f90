@@ -118,7 +118,26 @@ contains
     call visitor%cells('/flow/open', '1', grid, .true., 3, solid%open)
     call visitor%real_number('/flow/liquid_initial', 'm3', flow%liquid_initial)
     call visitor%real_number('/flow/liquid_inflow', 'm3', flow%liquid_inflow)
+    call visit_outflows(visitor, flow)
   end subroutine visit_flow
+
+  !> The slowly following velocity of each outflow.
+  subroutine visit_outflows(visitor, flow)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(flow_t), intent(inout) :: flow
+    character(5), parameter :: name(2, 3) = reshape(['x_min', 'x_max', 'y_min', 'y_max', &
+                                                     'z_min', 'z_max'], [2, 3])
+    integer :: s, d
+
+    do d = 1, 3
+      do s = 1, 2
+        if (.not. flow%sides(s, d)%active) cycle
+        associate (mean => flow%sides(s, d)%mean)
+          call visitor%reals('/flow/outflow_'//name(s, d), 'm/s', shape(mean), mean)
+        end associate
+      end do
+    end do
+  end subroutine visit_outflows
 
   subroutine visit_blocks(visitor, blocks)
     class(state_visitor_t), intent(inout) :: visitor

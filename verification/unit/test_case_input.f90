@@ -312,7 +312,7 @@ contains
       '&boundary z_max = ''periodic'': needs periodic on both sides, but z_min = ''slip'' (line 3)')
     call expect(base//'&boundary y_min=''no-slip''/', &
       '&boundary y_min = ''no-slip'': unknown, must be' &
-      //' one of ''no_slip'', ''slip'', ''open'', ''periodic'' (line 3)')
+      //' one of ''no_slip'', ''slip'', ''open'', ''periodic'', ''inflow'', ''outflow'' (line 3)')
     call expect(base//'&boundary left=''slip''/', &
       '&boundary left = ''slip'': unknown variable, nearest known: x_min (line 3)')
     call expect(base//'&boundary z_max=''no_slip'' z_max_velocity=1,2,0 x_min_velocity=0,0,-1/', '')
@@ -324,6 +324,24 @@ contains
       //'be 0 (line 3)|' &
       //'&boundary z_max_velocity = 1, 0, 0: only walls and inflows have a velocity, not a side ' &
       //'that is ''open'' (line 3)')
+    call expect(base//'&fluid water_level=0.1/'//lf//'&boundary x_min=''inflow'' x_max=''outflow'' ' &
+      //'x_min_velocity=0.2,0.1,0/', '')
+    call expect(base//'&boundary x_min=''inflow'' x_max=''inflow'' y_min=''inflow'' ' &
+      //'y_min_velocity=1,0,0 x_max_velocity=0.1,0,0/', &
+      '&boundary x_min_velocity (by default): an inflow must enter the tank, the x component ' &
+      //'must be positive (line 3)|' &
+      //'&boundary x_max_velocity = 0.1, 0, 0: an inflow must enter the tank, the x component ' &
+      //'must be negative (line 3)|' &
+      //'&boundary y_min_velocity = 1, 0, 0: an inflow must enter the tank, the y component ' &
+      //'must be positive (line 3)')
+    call expect(base//'&boundary x_min=''inflow'' x_min_velocity=1,0,0 z_max=''slip''/', &
+      '&boundary x_min = ''inflow'': what flows in must leave, another side must be ''open'' or ' &
+      //'''outflow'' (line 3)')
+    call expect(base//'&boundary x_min=''outflow'' z_max=''outflow''/', &
+      '&boundary x_min = ''outflow'': needs &fluid water_level, the level it keeps (line 3)|' &
+      //'&boundary z_max = ''outflow'': gravity acts across this side, it can be ''open'' ' &
+      //'(line 3)')
+    call expect(base//'&fluid single_phase=T/'//lf//'&boundary x_min=''outflow''/', '')
   end subroutine test_sides
 
   subroutine test_fluid_and_numerics()
@@ -443,10 +461,6 @@ contains
       //'solid_fraction=''subcell''/', &
       '&numerics momentum = ''c_ismac'': not available yet, so far: ''conservative'' (line 3)|' &
       //'&numerics solid_fraction = ''subcell'': not available yet, so far: ''exact'' (line 3)')
-    call expect(base//'&boundary x_min=''inflow'' x_max=''outflow''/', &
-      '&boundary x_min = ''inflow'': not available yet, so far: ''no_slip'', ''slip'', ''open'',' &
-      //' ''periodic'' (line 3)|&boundary x_max = ''outflow'': not available yet, so far:' &
-      //' ''no_slip'', ''slip'', ''open'', ''periodic'' (line 3)')
     call expect(base//'&boundary z_max_velocity=0,0,0/', '')
     call expect(base//'&fluid surface_tension=0.0/', '')
     call expect(base//'&fluid surface_tension=0.072/', &

@@ -12,6 +12,8 @@ program test_time_step
   real(wp), parameter :: g = 9.81_wp
 
   call still_water()
+  call water_beside_outflow()
+  call uniform_current()
   call length_of_steps()
   call spinning_ball()
   call release_into_water()
@@ -76,6 +78,55 @@ contains
                - 0.04_wp*0.03_wp*(0.0613_wp - 0.0396_wp), 1.0e-14_wp*before)
     call check('still water: buoyancy', sim%blocks%fluid_force(3, 1), mass*g, 1.0e-6_wp*mass*g)
   end subroutine still_water
+
+  !> Water at rest at the level an outflow keeps, and a held block that sticks out of that side.
+  subroutine water_beside_outflow()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp) :: weight
+    integer :: step
+
+    call tank(1, case)
+    case%boundary%kind(2, 1) = 'outflow'
+    case%body(1)%position = [0.1113_wp, 0.0389_wp, 0.0371_wp]   ! 1.1 of 4 cm outside
+    case%body(1)%fixed = .true.
+    call start(case, sim)
+    do step = 1, 3
+      call take_step(sim, report)
+    end do
+    weight = 998.2_wp*g*0.04_wp*0.03_wp*0.035_wp
+    call check('outflow: water at rest', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, :))), 0.0_wp, &
+               1.0e-8_wp)
+    call check('outflow: no push on a block in the side', sim%blocks%fluid_force(1, 1), 0.0_wp, &
+               1.0e-6_wp*weight)
+    call check('outflow: nothing has left', sim%flow%liquid_inflow, 0.0_wp, 1.0e-16_wp)
+  end subroutine water_beside_outflow
+
+  !> In by one side and out by the other; the liquid of the balance is that of the level.
+  subroutine uniform_current()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp), parameter :: speed = 0.3_wp   !! [m/s]
+    integer :: step
+
+    call tank(0, case)
+    case%boundary%kind(:, 1) = [character(8) :: 'outflow', 'inflow']
+    case%boundary%kind(:, 2) = 'slip'
+    case%boundary%kind(1, 3) = 'slip'
+    case%boundary%velocity(1, 2, 1) = -speed
+    case%fluid%velocity(1) = -speed
+    call start(case, sim)
+    do step = 1, 5
+      call take_step(sim, report)
+      call check('current: stays uniform', maxval(abs(sim%flow%u(1:12, 1:8, 1:12, 1) + speed)) &
+                 + maxval(abs(sim%flow%u(1:12, 1:8, 1:12, 2:3))), 0.0_wp, 1.0e-8_wp)
+    end do
+    call check('current: as much out as in', abs(sim%flow%liquid_inflow) <= 1.0e-12_wp)
+    call check('current: what enters', -sum(sim%transport%g(13, 1:8, 1:12, 1)), &
+               speed*sim%clock%dt*0.08_wp*0.0613_wp, 1.0e-15_wp)
+  end subroutine uniform_current
 
   !> Steps obey the Courant number of fluid and blocks, and land on a release.
   subroutine length_of_steps()

@@ -1,0 +1,241 @@
+!> Sides of kind 'outflow': they keep a water level and let waves leave.
+!!
+!! Half a cell outside the last cell the pressure is that of a column of water at rest, raised or
+!! lowered so that the level is the given one, and a part that yields to a passing wave,
+!! $$ p = \int \rho g\,dz + C \rho_l [\, c (u - \bar u) - g (\eta - \eta_0)\, ], \quad
+!!    c = \sqrt{g H} $$
+!! u is the outward velocity of the face, eta the level of the last column of cells, eta_0 the given
+!! level, H its height above the floor. A long wave that runs out has u - u_bar = (g/c)(eta - eta_0)
+!! and meets no resistance (the linear condition of a characteristic that brings nothing in); one of
+!! phase speed c' is reflected by (c - c')/(c + c'). u enters implicitly.
+!!
+!! u_bar follows u in the time T = 4 L/c, L the length of the tank: a steady current leaves at the
+!! given level whatever its profile, and the level of a tank comes back without overshoot (the
+!! slowest wave is critically damped), while waves, shorter than T, hardly change u_bar.
+module outflow_m
+  use kinds_m, only: wp
+  use case_types_m, only: fluid_t, is_given
+  use grid_m, only: grid_t, n_halo, side_outflow
+  use parallel_m, only: global_max
+  implicit none
+  private
+  public :: outflow_t, outflow_init, start_outflow, update_outflow
+  public :: reach, pressure_outside, mean_velocity
+
+  real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
+
+  !> One side of the tank; maps over its faces, whole on every process. Empty for other kinds.
+  type :: outflow_t
+    logical :: active = .false.     !! the side is an outflow
+    integer :: along(2) = 0         !! the two directions in the side
+    integer :: up = 0               !! which of them is the vertical, 0: no gravity
+    logical :: upward = .true.      !! coordinate grows against gravity
+    logical :: levelled = .false.   !! a level is kept
+    real(wp) :: depth = 0.0_wp      !! of the given level above the floor [m]
+    real(wp) :: celerity = 0.0_wp   !! of long waves [m/s]
+    real(wp) :: memory = 0.0_wp     !! time in which the mean velocity follows [s]
+    real(wp), allocatable :: c(:, :)          !! liquid share of the last cells [-]
+    real(wp), allocatable :: velocity(:, :)   !! outward velocity of the faces [m/s]
+    real(wp), allocatable :: mean(:, :)       !! the same, followed slowly; part of the state [m/s]
+    real(wp), allocatable :: pressure(:, :)   !! outside, of a face at its mean velocity [Pa]
+    real(wp), allocatable :: impulse(:, :)
+      !! dt times what a velocity beyond the mean adds to the pressure [kg/m2]
+  end type outflow_t
+
+contains
+
+  !> The sides of a grid.
+  subroutine outflow_init(grid, fluid, sides)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(outflow_t), intent(out) :: sides(2, 3)
+    integer :: s, d, n(2)
+
+    do d = 1, 3
+      do s = 1, 2
+        associate (side => sides(s, d))
+          side%along = pack([1, 2, 3], [1, 2, 3] /= d)
+          side%active = grid%side(s, d) == side_outflow
+          n = merge(grid%n(side%along), 0, side%active)
+          allocate (side%c(n(1), n(2)), side%velocity(n(1), n(2)), side%mean(n(1), n(2)), &
+                    side%pressure(n(1), n(2)), side%impulse(n(1), n(2)), source=0.0_wp)
+          if (side%active) call set_vertical(grid, fluid, d, side)
+        end associate
+      end do
+    end do
+  end subroutine outflow_init
+
+  !> Where up is, how deep the water, and with it the speed of long waves.
+  pure subroutine set_vertical(grid, fluid, d, side)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    integer, intent(in) :: d
+    type(outflow_t), intent(inout) :: side
+    integer :: axis
+
+    if (.not. any(abs(fluid%gravity) > 0.0_wp)) return
+    axis = maxloc(abs(fluid%gravity), 1)
+    side%up = findloc(side%along, axis, 1)
+    side%upward = fluid%gravity(axis) < 0.0_wp
+    side%levelled = is_given(fluid%water_level) .and. .not. fluid%single_phase .and. side%up > 0
+    if (.not. side%levelled) return
+    side%depth = fluid%water_level - grid%origin(axis)
+    if (.not. side%upward) side%depth = grid%length(axis) - side%depth
+    if (side%depth <= 0.0_wp) return
+    side%celerity = sqrt(abs(fluid%gravity(axis))*side%depth)
+    side%memory = 4.0_wp*grid%length(d)/side%celerity
+  end subroutine set_vertical
+
+  !> The mean velocity of the start is that of the faces.
+  subroutine start_outflow(grid, c, uf, sides)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)        !! C^ [-]
+    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:, :)    !! lower faces [m/s]
+    type(outflow_t), intent(inout) :: sides(2, 3)
+    integer :: s, d
+
+    do d = 1, 3
+      do s = 1, 2
+        if (.not. sides(s, d)%active) cycle
+        call gather(grid, s, d, c, uf, sides(s, d))
+        sides(s, d)%mean = sides(s, d)%velocity
+      end do
+    end do
+  end subroutine start_outflow
+
+  !> Pressure outside for a step of dt, from the liquid of its end and the velocity of its start.
+  subroutine update_outflow(grid, fluid, dt, c, uf, sides)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:, :)
+    type(outflow_t), intent(inout) :: sides(2, 3)
+    integer :: s, d
+
+    do d = 1, 3
+      do s = 1, 2
+        associate (side => sides(s, d))
+          if (.not. side%active) cycle
+          call gather(grid, s, d, c, uf, side)
+          if (side%memory > 0.0_wp) then
+            side%mean = side%mean + dt/(side%memory + dt)*side%c*(side%velocity - side%mean)
+          end if
+          side%impulse = dt*side%c*fluid%liquid_density*side%celerity
+          call set_pressure(grid, fluid, side)
+        end associate
+      end do
+    end do
+  end subroutine update_outflow
+
+  !> Liquid shares and outward velocities of a side, from the processes that touch it.
+  subroutine gather(grid, s, d, c, uf, side)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                           grid%lo(3) - n_halo:, :)
+    type(outflow_t), intent(inout) :: side
+    real(wp) :: values(2*size(side%c))
+    integer :: at(3), face(3), i, j, m, n
+
+    n = size(side%c)
+    values = elsewhere
+    if (grid%at_side(s, d)) then
+      at(d) = merge(1, grid%n(d), s == 1)
+      do j = grid%lo(side%along(2)), grid%hi(side%along(2))
+        do i = grid%lo(side%along(1)), grid%hi(side%along(1))
+          at(side%along) = [i, j]
+          face = at
+          if (s == 2) face(d) = grid%n(d) + 1
+          m = i + (j - 1)*size(side%c, 1)
+          values(m) = c(at(1), at(2), at(3))
+          values(n + m) = merge(-1.0_wp, 1.0_wp, s == 1)*uf(face(1), face(2), face(3), d)
+        end do
+      end do
+    end if
+    call global_max(values)
+    side%c = reshape(values(:n), shape(side%c))
+    side%velocity = reshape(values(n + 1:), shape(side%c))
+  end subroutine gather
+
+  !> Pressure of the columns at rest, less the weight of what stands above the given level.
+  pure subroutine set_pressure(grid, fluid, side)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(outflow_t), intent(inout) :: side
+    integer :: column
+
+    if (side%up == 0) return   ! no weight: the pressure stays zero
+    do column = 1, size(side%c, 3 - side%up)
+      if (side%up == 1) then
+        call one_column(side%c(:, column), side%pressure(:, column))
+      else
+        call one_column(side%c(column, :), side%pressure(column, :))
+      end if
+    end do
+  contains
+    pure subroutine one_column(c, p)
+      real(wp), intent(in) :: c(:)    !! along the vertical axis [-]
+      real(wp), intent(out) :: p(:)   !! [Pa]
+      real(wp) :: weight, above, head, rise
+      integer :: axis, k, l
+
+      axis = side%along(side%up)
+      above = 0.0_wp
+      head = 0.0_wp
+      do l = 1, size(c)
+        k = merge(size(c) + 1 - l, l, side%upward)   ! from the top down
+        weight = abs(fluid%gravity(axis))*grid%h(axis) &
+                 *(fluid%gas_density + (fluid%liquid_density - fluid%gas_density)*c(k))
+        head = head + 0.5_wp*(above + weight)
+        above = weight
+        p(k) = head
+      end do
+      if (.not. side%levelled) return
+      rise = grid%h(axis)*sum(c) - max(side%depth, 0.0_wp)
+      p = p - c*fluid%liquid_density*abs(fluid%gravity(axis))*rise
+    end subroutine one_column
+  end subroutine set_pressure
+
+  !> Length over which the pressure difference to the outside acts: half a cell, and as much water
+  !! as the wave takes along [m].
+  pure function reach(side, at, half, rho) result(length)
+    type(outflow_t), intent(in) :: side
+    integer, intent(in) :: at(3)     !! the cell
+    real(wp), intent(in) :: half     !! half a cell [m]
+    real(wp), intent(in) :: rho      !! density of the cell, that of the system [kg/m3]
+    real(wp) :: length
+
+    length = half
+    if (side%active) then
+      length = half + side%impulse(at(side%along(1)), at(side%along(2)))/rho
+    end if
+  end function reach
+
+  !> Pressure outside the side beside a cell, for a face at its mean velocity [Pa].
+  pure function pressure_outside(side, at) result(p)
+    type(outflow_t), intent(in) :: side
+    integer, intent(in) :: at(3)
+    real(wp) :: p
+
+    p = 0.0_wp
+    if (side%active) p = side%pressure(at(side%along(1)), at(side%along(2)))
+  end function pressure_outside
+
+  !> Mean outward velocity of the side beside a cell; zero where there is none [m/s].
+  pure function mean_velocity(side, at) result(u)
+    type(outflow_t), intent(in) :: side
+    integer, intent(in) :: at(3)
+    real(wp) :: u
+
+    u = 0.0_wp
+    if (side%active) u = side%mean(at(side%along(1)), at(side%along(2)))
+  end function mean_velocity
+
+end module outflow_m
