@@ -270,8 +270,8 @@ contains
     end associate
   end subroutine transport
 
-  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant number
-  !! that the sweeps can follow; one where `cfl_max` keeps the step that short.
+  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
+  !! number that the sweeps can follow; one where `cfl_max` keeps the step that short.
   pure function parts_of_step(courant) result(parts)
     real(wp), intent(in) :: courant   !! of the whole step [-]
     integer :: parts

@@ -646,8 +646,8 @@ contains
     end do
   end subroutine check_together
 
-  !> What enters through an inflow must find a way out; an outflow needs a level to keep, and gravity
-  !! along it.
+  !> What enters through an inflow must find a way out; an outflow needs a level to keep, and
+  !! gravity along it.
   subroutine check_streams(list, case, v)
     type(namelist_text_t), intent(in) :: list
     type(case_t), intent(in) :: case

@@ -76,7 +76,8 @@ contains
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, bodies, p, &
                           report%pressure)
 
-      call face_acceleration(grid, weightless, flow%rho, flow%rho, p%phi_total, p%a_face, flow%sides)
+      call face_acceleration(grid, weightless, flow%rho, flow%rho, p%phi_total, p%a_face, &
+                             flow%sides)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)

@@ -184,8 +184,8 @@ contains
   !> An equal part of the step's volumes, and the small cells for it.
   !!
   !! Where the fluid moves further than the sweeps can follow, the same volumes go in several parts.
-  !! The open volume of a cell then runs in equal parts too, so the last part ends at that of the new
-  !! geometry whatever their number.
+  !! The open volume of a cell then runs in equal parts too, so the last part ends at that
+  !! of the new geometry whatever their number.
   subroutine begin_part(grid, old, part, step, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old

@@ -324,8 +324,8 @@ contains
       //'be 0 (line 3)|' &
       //'&boundary z_max_velocity = 1, 0, 0: only walls and inflows have a velocity, not a side ' &
       //'that is ''open'' (line 3)')
-    call expect(base//'&fluid water_level=0.1/'//lf//'&boundary x_min=''inflow'' x_max=''outflow'' ' &
-      //'x_min_velocity=0.2,0.1,0/', '')
+    call expect(base//'&fluid water_level=0.1/'//lf//'&boundary x_min=''inflow'' ' &
+      //'x_max=''outflow'' x_min_velocity=0.2,0.1,0/', '')
     call expect(base//'&boundary x_min=''inflow'' x_max=''inflow'' y_min=''inflow'' ' &
       //'y_min_velocity=1,0,0 x_max_velocity=0.1,0,0/', &
       '&boundary x_min_velocity (by default): an inflow must enter the tank, the x component ' &

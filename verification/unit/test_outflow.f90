@@ -56,7 +56,7 @@ contains
     call update_outflow(grid, fluid, dt, flow%c, flow%uf, flow%sides)
   end subroutine update
 
-  !> At the level: hydrostatic, half a cell of gas at the top, mean of two weights from cell to cell.
+  !> At the level: hydrostatic, half a cell of gas at the top, then means of two weights.
   subroutine columns()
     real(wp) :: weight(5), p
     integer :: k
