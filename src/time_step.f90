@@ -13,7 +13,7 @@ module time_step_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    begin_part, finish_transport
+    begin_part, finish_transport, transport_liquid
   use liquid_fill_m, only: fill_liquid, raise_surface
   use initial_state_m, only: read_initial_liquid, read_initial_velocity
   use extended_fraction_m, only: extend_fraction
@@ -32,7 +32,7 @@ module time_step_m
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
   use buoyancy_m, only: displaced_force
-  use coupling_m, only: advance_velocity
+  use coupling_m, only: advance_velocity, note_start
   use clock_m, only: clock_t, clock_init
   use surface_tension_m, only: capillary_step
   use parallel_m, only: global_max
@@ -103,7 +103,7 @@ contains
       sim%transport%level = case%fluid%water_level
     end if
     call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
-    call stage_init(sim%grid, sim%blocks%n, sim%stage)
+    call stage_init(sim%grid, sim%blocks%n, case%numerics, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
     call read_initial_liquid(case%fluid, sim%grid, sim%flow)
@@ -150,6 +150,7 @@ contains
     call choose_step(sim, report)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                dt => sim%clock%dt)
+      if (sim%wet) call note_start(case, grid, sim%solid, flow, blocks, sim%stage)
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
@@ -246,7 +247,8 @@ contains
     call move_alloc(keep, sim%before)
   end subroutine swap_solids
 
-  !> Liquid and momentum through the faces, direction by direction; new density and viscosity.
+  !> Liquid and momentum through the faces, direction by direction; new density and viscosity. With
+  !! C-ISMAC momentum waits for the predictor, which uses the same volumes.
   subroutine transport(sim, dt, parts)
     type(simulation_t), intent(inout) :: sim
     real(wp), intent(in) :: dt      !! [s]
@@ -255,6 +257,12 @@ contains
 
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
                carrier => sim%transport)
+      if (sim%stage%implicit_momentum) then
+        call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow, parts)
+        sim%stage%c_ismac%q = carrier%q_step
+        call mix_fluid(fluid, flow)
+        return
+      end if
       call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
       do part = 1, parts
         call begin_part(grid, sim%before, part, sim%clock%step, carrier)

@@ -8,14 +8,35 @@ module coupling_m
   use surface_tension_m, only: find_tension
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
-  use mass_average_m, only: mass_average_stage, overlay_bodies
-  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion
+  use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
+  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion, keep_acceleration
   use rigid_body_m, only: blocks_t, set_velocity_after_fluid
   implicit none
   private
-  public :: advance_velocity
+  public :: advance_velocity, note_start
 
 contains
+
+  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration.
+  subroutine note_start(case, grid, solid, flow, blocks, stage)
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(flow_t), intent(in) :: flow
+    type(blocks_t), intent(in) :: blocks
+    type(stage_t), intent(inout) :: stage
+
+    if (.not. stage%implicit_momentum) return
+    call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
+    if (case%numerics%coupling == 'mics') then
+      call copy_motion(blocks, stage%bodies)
+      call density_of_mixture(grid, solid, stage%bodies, flow%rho, stage%rho_mixture)
+      call keep_acceleration(grid, case%fluid%gravity, stage%whole%open, stage%rho_mixture, flow, &
+                             stage)
+    else
+      call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
+    end if
+  end subroutine note_start
 
   !> Velocity of the fluid and of the bodies at the end of the step.
   !!

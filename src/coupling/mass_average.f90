@@ -16,19 +16,21 @@ module mass_average_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
-  use viscous_m, only: build_viscous, solve_viscous
+  use viscous_m, only: build_viscous
+  use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
   use pressure_m, only: pressure_report_t, set_pressure_system, solve_pressure, face_acceleration, &
                         cell_mean_of_faces, predict_face_velocity, divergence
   use buoyancy_m, only: displaced_force
   use surface_tension_m, only: add_tension
-  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies
+  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
+    predict_velocity, renew_acceleration
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
   use exact_sum_m, only: exact_sums
   implicit none
   private
-  public :: mass_average_stage, overlay_bodies
+  public :: mass_average_stage, overlay_bodies, density_of_mixture
 
   real(wp), parameter :: held_density = 1.0e6_wp   !! inertia of a fixed body in the mixture [kg/m3]
 
@@ -154,15 +156,20 @@ contains
                                p%a_face, flow%sides)
         call add_tension(grid, stage%rho_mixture, stage%tension, p%a_face)
         call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
-        flow%u = flow%u + dt*p%a_cell
+        if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
+        call accelerate_cells(grid, dt, flow, stage)
         call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, &
                            stage%viscous)
-        call solve_viscous(grid, stage%bodies, dt, flow, stage%viscous, stage%from_viscosity, &
-                           report%viscous_iterations, report%viscous_converged)
+        call predict_velocity(grid, stage%rho_mixture, dt, flow, stage, report)
+        if (stage%implicit_momentum) then   ! the force on a body has no part in advection
+          call advected_velocity(grid, stage%rho_mixture, dt, stage%viscous, stage%c_ismac, &
+                                 stage%u_before)
+        end if
         call halo_exchange(p%a_cell, n_halo)
       end if
       call fill_velocity_halo(grid, flow%u)
       call predict_face_velocity(grid, dt, stage%rho_mixture, p%a_face, p%a_cell, flow)
+      if (first) call renew_acceleration(dt, flow, stage)
     end associate
   end subroutine predict_mixture
 

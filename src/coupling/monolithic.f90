@@ -14,14 +14,15 @@ module monolithic_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, solid_face_flux, nearest_arm
-  use viscous_m, only: build_viscous, solve_viscous
+  use viscous_m, only: build_viscous
   use pressure_m, only: set_pressure_system, solve_pressure, face_acceleration, &
     cell_mean_of_faces, &
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
   use buoyancy_m, only: hydrostatic_correction
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
-  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies
+  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
+    predict_velocity, renew_acceleration
   use boundary_m, only: fill_velocity_halo
   use parallel_m, only: halo_exchange
   implicit none
@@ -50,7 +51,7 @@ contains
                              flow%sides)
       call add_tension(grid, flow%rho, self%tension, p%a_face)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
-      flow%u = flow%u + dt*p%a_cell
+      call accelerate_cells(grid, dt, flow, self)
       call force_from_faces(grid, solid, bodies, p%operator%flux, flow%p, self%from_pressure, &
                             flow%sides)
       call force_from_tension(grid, solid, bodies, p%operator%flux, self%tension, self%terms, &
@@ -62,8 +63,7 @@ contains
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
 
       call build_viscous(grid, solid, bodies, flow%rho, flow%mu, dt, self%viscous)
-      call solve_viscous(grid, bodies, dt, flow, self%viscous, self%from_viscosity, &
-                         report%viscous_iterations, report%viscous_converged)
+      call predict_velocity(grid, flow%rho, dt, flow, self, report)
       bodies%motion = free   ! to round-off the motion that the forces give, not the solver's
       call push_bodies(dt, self%from_pressure + self%from_level + self%from_viscosity, bodies)
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
@@ -73,6 +73,7 @@ contains
       call predict_face_velocity(grid, dt, flow%rho, p%a_face, p%a_cell, flow)
       call face_velocity_at_walls(grid, solid, self%at_start, dt, flow%rho, p%a_face, p%a_cell, &
                                   flow)
+      call renew_acceleration(dt, flow, self)
       call solve_pressure(grid, case%numerics, solid, flow%rho, dt, flow, bodies, p, &
                           report%pressure)
 

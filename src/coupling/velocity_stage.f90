@@ -4,14 +4,19 @@ module velocity_stage_m
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
-  use viscous_m, only: viscous_t, viscous_init
-  use pressure_m, only: pressure_t, pressure_report_t, pressure_init
+  use case_types_m, only: numerics_t
+  use fields_m, only: flow_t
+  use viscous_m, only: viscous_t, viscous_init, solve_viscous
+  use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init, face_acceleration, &
+    cell_mean_of_faces
   use buoyancy_m, only: buoyancy_t, buoyancy_init
-  use surface_tension_m, only: surface_tension_t
+  use surface_tension_m, only: surface_tension_t, add_tension
   use rigid_body_m, only: blocks_t, space_tensor
   implicit none
   private
   public :: stage_t, stage_report_t, stage_init, copy_motion, push_bodies
+  public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
 
   type :: stage_report_t
     type(pressure_report_t) :: pressure
@@ -24,6 +29,8 @@ module velocity_stage_m
     type(rigid_motion_t) :: at_start
       !! the same with the motion at the start of the step
     type(viscous_t) :: viscous
+    logical :: implicit_momentum = .false.         !! advection by C-ISMAC, in the predictor
+    type(c_ismac_t) :: c_ismac                     !! allocated for it only
     type(pressure_t) :: pressure
     type(buoyancy_t) :: buoyancy
     type(surface_tension_t) :: tension
@@ -41,9 +48,10 @@ module velocity_stage_m
 contains
 
   !> Allocate all work arrays for a grid and n bodies.
-  subroutine stage_init(grid, n, self)
+  subroutine stage_init(grid, n, numerics, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
+    type(numerics_t), intent(in) :: numerics
     type(stage_t), intent(out) :: self
     integer :: a(3), b(3)
 
@@ -52,6 +60,8 @@ contains
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
     call viscous_init(grid, n, self%viscous)
+    self%implicit_momentum = numerics%momentum == 'c_ismac'
+    if (self%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, self%c_ismac)
     call pressure_init(grid, n, self%pressure)
     call buoyancy_init(self%buoyancy)
     call solid_geometry_init(grid, self%whole, n)
@@ -61,6 +71,68 @@ contains
     allocate (self%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
   end subroutine stage_init
+
+  !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
+  !! solids change; `self%tension` is that of the start.
+  subroutine keep_acceleration(grid, gravity, open, rho, flow, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    type(flow_t), intent(in) :: flow
+    type(stage_t), intent(inout) :: self
+
+    call face_acceleration(grid, gravity, flow%rho, rho, flow%p, self%pressure%a_face, flow%sides)
+    call add_tension(grid, rho, self%tension, self%pressure%a_face)
+    call cell_mean_of_faces(grid, open, self%pressure%a_face, self%c_ismac%a_old)
+  end subroutine keep_acceleration
+
+  !> Add gravity and old pressure to the cells; with C-ISMAC those of the start of the step, which
+  !! stand in `pressure%a_cell` then.
+  subroutine accelerate_cells(grid, dt, flow, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(inout) :: self
+
+    if (self%implicit_momentum) then
+      call begin_predictor(grid, flow%u, self%c_ismac)
+      self%c_ismac%a_new = self%pressure%a_cell
+      self%pressure%a_cell = self%c_ismac%a_old
+    end if
+    flow%u = flow%u + dt*self%pressure%a_cell
+  end subroutine accelerate_cells
+
+  !> With C-ISMAC: exchange the acceleration in the cells for that of the density at hand, once the
+  !! velocity of the faces is predicted.
+  subroutine renew_acceleration(dt, flow, self)
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(in) :: self
+
+    if (self%implicit_momentum) flow%u = flow%u + dt*(self%c_ismac%a_new - self%c_ismac%a_old)
+  end subroutine renew_acceleration
+
+  !> Viscosity, and with C-ISMAC advection, into a velocity that has gravity and old pressure in.
+  subroutine predict_velocity(grid, rho, dt, flow, self, report)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(inout) :: self
+    type(stage_report_t), intent(inout) :: report
+
+    if (self%implicit_momentum) then
+      call solve_predictor(grid, rho, self%bodies, dt, flow, self%viscous, self%c_ismac, &
+                           self%from_viscosity, report%viscous_iterations, report%viscous_converged)
+    else
+      call solve_viscous(grid, self%bodies, dt, flow, self%viscous, self%from_viscosity, &
+                         report%viscous_iterations, report%viscous_converged)
+    end if
+  end subroutine predict_velocity
 
   !> What the flow has to know of the blocks, at their present pose and velocity.
   subroutine copy_motion(blocks, bodies)

@@ -25,6 +25,7 @@ module viscous_m
   implicit none
   private
   public :: viscous_t, viscous_init, build_viscous, solve_viscous, open_share
+  public :: apply_viscous, force_of_legs, velocity_scale, inertial_momentum, wrench   ! for C-ISMAC
 
   real(wp), parameter :: least_theta = 1.0e-3_wp    !! shortest leg, in cells
   real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's

@@ -46,7 +46,7 @@ contains
 
   subroutine ready()
     call place(block)
-    call stage_init(block%grid, 1, stage)
+    call stage_init(block%grid, 1, block%case%numerics, stage)
     call copy_motion(block%blocks, stage%bodies)
     call start_flow(block%case, block%grid, block%solid, block%flow, stage, report)
     call fill_velocity_halo(block%grid, block%flow%u)
