@@ -1,8 +1,10 @@
 !> C-ISMAC: the paper's implicit predictor, in velocity and delta form.
 !!
 !! The change of the velocity in the predictor, `delta = u* - u^n`, follows from
-!! $$ \rho\Big[\delta + \Delta t\, a\, (u_f\cdot\nabla)_{up}\, \delta\Big] - \Delta t \nabla\cdot\mu\nabla\delta
-!!    = \Delta t \Big[\rho g - \nabla p^n + \nabla\cdot\mu\nabla u^n - \rho (u_f\cdot\nabla) u^n\Big] $$
+!! $$ \rho\Big[\delta + \Delta t\, a\, (u_f\cdot\nabla)_{up}\, \delta\Big]
+!!    - \Delta t \nabla\cdot\mu\nabla\delta
+!!    = \Delta t \Big[\rho g - \nabla p^n + \nabla\cdot\mu\nabla u^n
+!!    - \rho (u_f\cdot\nabla) u^n\Big] $$
 !! The right side has the accurate advection (fifth-order TVD, or the donor's value), the left side
 !! that of first order, whose matrix is diagonally dominant at any Courant number. Where the flow is
 !! steady delta is zero, so neither the step nor the first-order operator leaves a trace in it. The
@@ -14,9 +16,9 @@
 !! the form of div(u u) in which a uniform velocity stays whatever the bodies or the rounding of the
 !! divergence do.
 !!
-!! Density and pressure of the right side are those of the start of the step. With the density of its
-!! end, a cell that the surface has left would fall with the pressure gradient of the liquid over the
-!! density of the gas, 830 g, and what advection makes of that no projection takes back.
+!! Density and pressure of the right side are those of the start of the step. With the density of
+!! its end, a cell that the surface has left would fall with the pressure gradient of the liquid
+!! over the density of the gas, 830 g, and what advection makes of that no projection takes back.
 !!
 !! Source: Yoshikawa et al. (2008) name the method; its form after Ikohagi, Shin & Daiguji (1992),
 !! who weight the first-order operator by 1/2. Departure: 3/4, since 1/2 beside a fifth-order right
@@ -62,7 +64,7 @@ module momentum_c_ismac_m
 
   type :: c_ismac_t
     integer :: scheme = tvd_scheme                 !! of the advection on the right side
-    real(wp), allocatable :: q(:, :, :, :)         !! volumes through the lower faces in the step [m3]
+    real(wp), allocatable :: q(:, :, :, :)         !! volumes of the step, lower faces [m3]
     real(wp), allocatable :: u_old(:, :, :, :)     !! velocity u^n, halo filled [m/s]
     !> Gravity less pressure gradient over density at u^n, and with the density at u* [m/s2].
     real(wp), allocatable :: a_old(:, :, :, :), a_new(:, :, :, :)
@@ -191,10 +193,11 @@ contains
 
   !> Solve for the velocity u*, in place, together with the motion of the free bodies.
   !!
-  !! On entry `flow%u` is u^n with gravity and old pressure in, `bodies%motion` likewise, `viscous` is
-  !! built and `begin_predictor` done; on return viscosity and advection are in too. `force` is what
-  !! viscosity did to each body [N, N m].
-  subroutine solve_predictor(grid, rho, bodies, dt, flow, viscous, self, force, iterations, converged)
+  !! On entry `flow%u` is u^n with gravity and old pressure in, `bodies%motion` likewise, `viscous`
+  !! is built and `begin_predictor` done; on return viscosity and advection are in too. `force` is
+  !! what viscosity did to each body [N, N m].
+  subroutine solve_predictor(grid, rho, bodies, dt, flow, viscous, self, force, iterations, &
+                             converged)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                             grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
@@ -264,9 +267,10 @@ contains
             inflow = 0.0_wp
             do d = 1, 3
               e = unit_step(:, d)
-              op%low(i, j, k, d) = share_of(rho(i, j, k), self%q(i, j, k, d), i*e(1) + j*e(2) &
-                                            + k*e(3), 1, d)
-              op%high(i, j, k, d) = share_of(rho(i, j, k), -self%q(i + e(1), j + e(2), k + e(3), d), &
+              op%low(i, j, k, d) = share_of(rho(i, j, k), self%q(i, j, k, d), &
+                                            i*e(1) + j*e(2) + k*e(3), 1, d)
+              op%high(i, j, k, d) = share_of(rho(i, j, k), &
+                                             -self%q(i + e(1), j + e(2), k + e(3), d), &
                                              i*e(1) + j*e(2) + k*e(3), 2, d)
               inflow = inflow + op%low(i, j, k, d) + op%high(i, j, k, d)
               op%low(i, j, k, d) = op%low(i, j, k, d) + viscous%leg(i, j, k, d)
@@ -284,8 +288,8 @@ contains
     end associate
     call eliminate_bodies(bodies, dt, viscous, self%operator)
   contains
-    !> Conductance a rho q/dt of the volume that enters a cell through one face [kg/s]; none where it
-    !! enters with the velocity of the cell itself, through an open side of the domain.
+    !> Conductance a rho q/dt of the volume that enters a cell through one face [kg/s]; none where
+    !! it enters with the velocity of the cell itself, through an open side of the domain.
     pure function share_of(rho, q, cell, s, d) result(conductance)
       real(wp), intent(in) :: rho, q   !! [kg/m3], volume that enters [m3]
       integer, intent(in) :: cell, s, d
@@ -382,6 +386,11 @@ contains
                                         + op%k(l)*wall_velocity(motion(:, b), op%arm(:, l))
           end associate
         end do
+      end do
+      do l = 1, viscous%n_side
+        associate (c => viscous%side_cell(:, l))
+          op%y(c(1), c(2), c(3), :) = op%y(c(1), c(2), c(3), :) + viscous%side_pull(:, l)
+        end associate
       end do
       op%y = op%inverse*op%y
     end associate
@@ -514,8 +523,9 @@ contains
                      *(x(i + e(1), j + e(2), k + e(3), :) - x(i, j, k, :))
             end do
             do m = 1, 3
-              if (viscous%mass(i, j, k, m) > 0.0_wp) u(i, j, k, m) = u(i, j, k, m) &
-                                                                     + rate(m)/viscous%mass(i, j, k, m)
+              associate (mass => viscous%mass(i, j, k, m))
+                if (mass > 0.0_wp) u(i, j, k, m) = u(i, j, k, m) + rate(m)/mass
+              end associate
             end do
           end do
         end do
