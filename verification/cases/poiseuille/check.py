@@ -1,0 +1,96 @@
+"""Flow between plates and in ducts, driven by a body force along a periodic direction.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.geometry import Array  # noqa: E402
+from micstools.profiles import cubic, table, with_ends  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+BAND, BAND_CELLS = 0.01, 20  # of the largest velocity of the profile
+THIN = 3.0  # cells: a thinner layer at the wall is shown for information
+TIMES = {"t0p02": 0.02, "t0p05": 0.05, "t0p1": 0.1, "steady": 1.0}
+
+
+def exact(y: Array, t: float) -> Array:
+    """u nu/(G h^2) at heights y/h after nu t/h^2 = t: parabola less what the start still lacks."""
+    odd = np.arange(1, 400, 2)[:, None]
+    lack = 4.0 / (odd * np.pi) ** 3 * np.sin(odd * np.pi * y) * np.exp(-((odd * np.pi) ** 2) * t)
+    profile: Array = 0.5 * y * (1.0 - y) - lack.sum(axis=0)
+    return profile
+
+
+def check_series(checks: Checks) -> None:
+    """The series must be that of the table."""
+    rows = table(Path(__file__).parent / "plane.csv")
+    places = np.array([float(row["y_over_h"]) for row in rows])
+    for name, t in TIMES.items():
+        wanted = np.array([float(row[name]) for row in rows])
+        late = 10.0 if name == "steady" else t
+        far = float(np.abs(exact(places, late) - wanted).max())
+        checks.below(f"series against the table, {name}", far, 1e-7)
+
+
+def plane(run: Run, checks: Checks) -> float:
+    """Profiles of the start and the steady one at the cell centres; the steady error."""
+    z = run.grid.centres[2]
+    cells = z.size
+    ours: dict[str, tuple[Array, Array]] = {}
+    true: dict[str, tuple[Array, Array]] = {}
+    worst = 0.0
+    for t in TIMES.values():
+        fields = run.fields(t)
+        wanted, found = exact(z, fields.time), fields.velocity[:, 0, 0, 0]
+        worst = float(np.abs(found - wanted).max() / wanted.max())
+        ours[f"t = {t:g}"], true[f"exact, t = {t:g}"] = (z, found), (z, wanted)
+        if cells >= BAND_CELLS:
+            thin = np.sqrt(t) * cells < THIN
+            label = f"plane, {cells} cells, nu t/h2 = {t:g}: largest error"
+            checks.below(label, worst, BAND, counts=not thin)
+    if cells == BAND_CELLS:
+        checks.figure("start between plates", "z/h", "u nu/(G h2)", ours, true)
+    return worst
+
+
+def duct(run: Run, checks: Checks) -> None:
+    """Centre and mean velocity of the steady flow."""
+    u = run.fields(run.field_times[-1]).velocity[:, :, 0, 0]
+    y, z = run.grid.centres[1:]
+    width = float(run.grid.y[-1])
+    across = with_ends(0.0, cubic(np.array([0.5]), z, u.T)[:, 0], 0.0)
+    centre = cubic(np.array([0.5 * width]), with_ends(0.0, y, width), across)[0]
+    for row in table(Path(__file__).parent / "duct.csv"):
+        if abs(float(row["aspect"]) - width) < 1e-9:
+            checks.close(
+                f"duct {width:g}: centre velocity", float(centre), float(row["centre"]), BAND
+            )
+            checks.close(
+                f"duct {width:g}: mean velocity", float(u.mean()), float(row["mean"]), BAND
+            )
+
+
+def check(runs: list[Run]) -> Checks:
+    """Plane runs and ducts."""
+    checks = Checks("Poiseuille flow")
+    errors: dict[float, float] = {}
+    check_series(checks)
+    for run in runs:
+        sound(run, checks)
+        if run.folder.name.startswith("duct"):
+            duct(run, checks)
+        else:
+            errors[run.grid.z.size - 1] = plane(run, checks)
+    checks.study("plane: error of the steady profile", errors, 0.0)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

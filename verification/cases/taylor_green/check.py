@@ -1,0 +1,79 @@
+"""Decay of Taylor-Green vortices: order of accuracy, amplitude and kinetic energy.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.profiles import table  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+LEAST_ORDER, AMPLITUDE_BAND, BAND_CELLS = 1.9, 0.01, 32
+
+
+def reference(t: float) -> tuple[float, float]:
+    """Amplitude and mean kinetic energy at time t, a row of the table."""
+    for row in table(Path(__file__).parent / "reference.csv"):
+        if abs(float(row["t"]) - t) < 1e-9:
+            return float(row["amp_nu0p05"]), float(row["ke_nu0p05"])
+    raise ValueError(f"no row for t = {t}")
+
+
+def compare(run: Run) -> tuple[float, float, float]:
+    """Error in the root mean square, amplitude, and mean kinetic energy at the end."""
+    fields = run.fields(run.field_times[-1])
+    x, z = run.grid.centres[0][None, :], run.grid.centres[2][:, None]
+    u, w = fields.velocity[:, 0, :, 0], fields.velocity[:, 0, :, 2]
+    shape_u, shape_w = np.cos(x) * np.sin(z), -np.sin(x) * np.cos(z)
+    true = reference(round(float(run.series.time[-1]), 9))[0]
+    error = np.sqrt(((u - true * shape_u) ** 2 + (w - true * shape_w) ** 2).mean())
+    amplitude = 2.0 * (u * shape_u + w * shape_w).mean()
+    return float(error), float(amplitude), float(0.5 * (u**2 + w**2).mean())
+
+
+def check(runs: list[Run]) -> Checks:
+    """Errors over the grids, and bands on one of them."""
+    checks = Checks("Taylor-Green vortices")
+    errors: dict[str, dict[float, float]] = {"cells": {}, "courant": {}}
+    for run in runs:
+        sound(run, checks)
+        kind, cells = run.folder.name.split("_")[0], run.grid.x.size - 1
+        errors[kind][cells], amplitude, energy = compare(run)
+        wanted = reference(round(float(run.series.time[-1]), 9))
+        if cells == BAND_CELLS:
+            counts = kind == "cells"
+            label = "" if counts else ", longest step"
+            checks.close(
+                f"amplitude, {cells} cells{label}", amplitude, wanted[0], AMPLITUDE_BAND, counts
+            )
+            checks.close(
+                f"kinetic energy, {cells} cells{label}",
+                energy,
+                wanted[1],
+                2.0 * AMPLITUDE_BAND,
+                counts,
+            )
+    for kind, found in errors.items():
+        if len(found) < 2:
+            continue
+        cells = sorted(found)
+        slope = -np.polyfit(np.log(cells), np.log([found[n] for n in cells]), 1)[0]
+        label = {"cells": "dt as h^2", "courant": "longest step"}[kind]
+        checks.true(
+            f"order of accuracy, {label}, {cells[0]} to {cells[-1]} cells, at least {LEAST_ORDER}",
+            slope >= LEAST_ORDER,
+            f"{slope:.2f}",
+            counts=kind == "cells",
+        )
+        checks.study(f"error of the velocity, {label}", found, 0.0)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
