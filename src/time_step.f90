@@ -95,7 +95,9 @@ contains
     call flow_init(sim%grid, sim%flow)
     call solid_geometry_init(sim%grid, sim%solid, sim%blocks%n)
     call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)
-    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction)
+    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, &
+                             merge(case%numerics%subcells, 0, &
+                                   case%numerics%solid_fraction == 'subcell'))
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
     if (case%fluid%single_phase) then
       sim%transport%incoming = 1.0_wp

@@ -15,7 +15,6 @@ module not_yet_m
   end type entry_t
 
   type(entry_t), parameter :: table(*) = [ &
-    entry_t('numerics', 'solid_fraction', 'subcell'), &
     entry_t('contact', 'model', 'surface'), &
     entry_t('shape', 'kind', 'file'), entry_t('shape', 'file', '*'), &
     entry_t('shape', 'spheres', 'inscribed'), entry_t('shape', 'spheres', 'dense'), &

@@ -16,8 +16,8 @@
 !! face is therefore solid where the body touches it from either side, and full cells are closed
 !! all round.
 !!
-!! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron: those
-!! are off by up to 0.08 of a cell. Cutting the tetrahedra themselves gives the same shares to
+!! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron
+!! (`subcell_shares_m`): those are off by up to 0.08 of a cell. Cutting the tetrahedra themselves gives the same shares to
 !! round-off (tested), but takes all tetrahedra instead of the surface.
 module body_shares_m
   use kinds_m, only: wp
@@ -26,7 +26,8 @@ module body_shares_m
   use tet_mesh_m, only: shape_t, most_facet_corners
   implicit none
   private
-  public :: body_shares_t, share_work_t, find_body_shares, full_cell, full_face
+  public :: body_shares_t, share_work_t, find_body_shares, list_cut_tets, full_cell, full_face
+  public :: faces_of_tet, add_face, along, up   ! for counted shares
 
   real(wp), parameter :: least_share = 1.0e-13_wp     !! smaller shares are dropped
   real(wp), parameter :: full_cell = 1.0e-12_wp       !! a cell lacking less is full
@@ -93,15 +94,19 @@ module body_shares_m
 contains
 
   !> Find the shares of a body of some shape at a pose; nothing is done if they are known already.
-  subroutine find_body_shares(grid, shape, x, q, work, self)
+  !! When they have changed, `list_cut_tets` completes them.
+  subroutine find_body_shares(grid, shape, x, q, work, self, changed)
     type(grid_t), intent(in) :: grid
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: x(3), q(4)        !! centroid [m], attitude
     type(share_work_t), intent(inout) :: work
     type(body_shares_t), intent(inout) :: self
+    logical, intent(out) :: changed
     integer :: j
 
-    if (self%known .and. all(abs(self%x - x) <= 0.0_wp) .and. all(abs(self%q - q) <= 0.0_wp)) return
+    changed = .not. (self%known .and. all(abs(self%x - x) <= 0.0_wp) &
+                     .and. all(abs(self%q - q) <= 0.0_wp))
+    if (.not. changed) return
     self%x = x
     self%q = q
     self%known = .true.
@@ -117,9 +122,16 @@ contains
       call list_row(j, self, work)
     end do
     call hits_along_y(shape, self, work)
+  end subroutine find_body_shares
+
+  !> Tetrahedra of the cut cells among the cells listed.
+  subroutine list_cut_tets(work, self)
+    type(share_work_t), intent(inout) :: work
+    type(body_shares_t), intent(inout) :: self
+
     call mark_cut_cells(self, work)
     call pair_tets(self, work)
-  end subroutine find_body_shares
+  end subroutine list_cut_tets
 
   !> Corners in cells, from a base cell near the centroid; boxes around the facets and the body.
   subroutine place_corners(grid, shape, self, work)

@@ -8,7 +8,9 @@ module solid_fraction_m
   use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
   use solid_geometry_m, only: solid_geometry_t, no_hit
   use rigid_body_m, only: blocks_t
-  use body_shares_m, only: body_shares_t, share_work_t, find_body_shares, full_cell, full_face
+  use body_shares_m, only: body_shares_t, share_work_t, find_body_shares, list_cut_tets, &
+    full_cell, full_face
+  use subcell_shares_m, only: subcell_work_t, count_subcells
   use parallel_m, only: halo_exchange, global_sum
   implicit none
   private
@@ -19,6 +21,8 @@ module solid_fraction_m
   type :: solid_fraction_t
     type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body
     type(share_work_t), allocatable :: work(:)    !! (threads)
+    integer :: subcells = 0                       !! per direction, 0: exact shares
+    type(subcell_work_t), allocatable :: count(:) !! (threads)
     logical, allocatable :: near(:)               !! (n) present and in the cells kept here
     integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by
     !> First and last cell where the solids are kept: own cells and halo, less what is outside.
@@ -33,17 +37,20 @@ module solid_fraction_m
 contains
 
   !> Allocate the caches and work arrays.
-  subroutine solid_fraction_init(grid, blocks, self)
+  subroutine solid_fraction_init(grid, blocks, self, subcells)
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(out) :: self
+    integer, intent(in), optional :: subcells   !! counted per direction, else exact shares
     integer :: a(3), b(3)
 
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     self%low = merge(a, max(a, 1), grid%periodic)
     self%high = merge(b, min(b, grid%n), grid%periodic)
+    if (present(subcells)) self%subcells = subcells
     allocate (self%body(blocks%n), self%work(0:omp_get_max_threads() - 1))
+    allocate (self%count(0:omp_get_max_threads() - 1))
     allocate (self%near(blocks%n), source=.false.)
     allocate (self%first(3, blocks%n), self%last(3, blocks%n), source=0)
     allocate (self%source(2, 0), self%reached(0), self%stack(0))
@@ -126,11 +133,12 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(inout) :: self
-    integer :: b
+    integer :: b, t
+    logical :: changed
 
     if (size(self%work) < omp_get_max_threads()) then
-      deallocate (self%work)
-      allocate (self%work(0:omp_get_max_threads() - 1))
+      deallocate (self%work, self%count)
+      allocate (self%work(0:omp_get_max_threads() - 1), self%count(0:omp_get_max_threads() - 1))
     end if
     do b = 1, blocks%n
       self%near(b) = blocks%present(b)
@@ -138,11 +146,15 @@ contains
         call find_images(self, grid, b, blocks%x(:, b), blocks%shapes(blocks%shape(b))%radius)
       end if
     end do
-    !$omp parallel do schedule(dynamic, 1) if (count(self%near) > 1)
+    !$omp parallel do private(t, changed) schedule(dynamic, 1) if (count(self%near) > 1)
     do b = 1, blocks%n
       if (.not. self%near(b)) cycle
+      t = omp_get_thread_num()
       call find_body_shares(grid, blocks%shapes(blocks%shape(b)), blocks%x(:, b), blocks%q(:, b), &
-                            self%work(omp_get_thread_num()), self%body(b))
+                            self%work(t), self%body(b), changed)
+      if (.not. changed) cycle
+      if (self%subcells > 0) call count_subcells(self%subcells, self%count(t), self%body(b))
+      call list_cut_tets(self%work(t), self%body(b))
     end do
   end subroutine find_shares
 
