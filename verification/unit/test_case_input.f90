@@ -457,8 +457,8 @@ contains
 
   !> What the contract promises for later is refused as such.
   subroutine test_not_yet()
-    call expect(base//'&numerics solid_fraction=''subcell''/', &
-      '&numerics solid_fraction = ''subcell'': not available yet, so far: ''exact'' (line 3)')
+    call expect(base//'&numerics momentum=''c_ismac'' solid_fraction=''subcell'' ' &
+      //'advection=''upwind''/', '')
     call expect(base//'&boundary z_max_velocity=0,0,0/', '')
     call expect(base//'&fluid surface_tension=0.0/', '')
     call expect(base//'&fluid surface_tension=0.072/', '')
