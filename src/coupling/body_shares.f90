@@ -17,8 +17,8 @@
 !! all round.
 !!
 !! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron
-!! (`subcell_shares_m`): those are off by up to 0.08 of a cell. Cutting the tetrahedra themselves gives the same shares to
-!! round-off (tested), but takes all tetrahedra instead of the surface.
+!! (`subcell_shares_m`): those are off by up to 0.08 of a cell. Cutting the tetrahedra themselves
+!! gives the same shares to round-off (tested), but takes all tetrahedra instead of the surface.
 module body_shares_m
   use kinds_m, only: wp
   use vectors_m, only: cross, rotation_matrix

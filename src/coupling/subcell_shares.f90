@@ -5,8 +5,9 @@
 !! is cut into n x n squares likewise. A full cell is closed all round, as with exact shares, so no
 !! fluid is locked in a cell without room.
 !!
-!! Source: Yoshikawa et al. (2008) by way of Ushijima et al. (2006). What counting does not give stays
-!! exact: distances along grid lines, tetrahedra of cut cells, buoyancy.
+!! Source: the volume average of Yoshikawa et al. (2008), section 3 (2); that they take it by
+!! sub-cells is recalled from the earlier MICS papers. What counting does not give stays exact:
+!! distances along grid lines, tetrahedra of cut cells.
 module subcell_shares_m
   use kinds_m, only: wp
   use grid_m, only: unit_step
