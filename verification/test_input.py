@@ -41,6 +41,10 @@ BAD = {
         TANK + "&bed file = 'sand.stl' /",
         "&bed: this group is not available yet (line 4)",
     ),
+    "shape file": (
+        TANK + "&shape name = 'f' kind = 'file' file = 'missing.msh' /",
+        "&shape file = 'missing.msh': there is no such file, or it may not be read (line 4)",
+    ),
     "no end": (
         TANK + "&fluid",
         "&fluid: no '/' closes the group before the end of the text (line 4)",

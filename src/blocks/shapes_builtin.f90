@@ -7,16 +7,23 @@ module shapes_builtin_m
   use kinds_m, only: wp, pi
   use case_types_m, only: shape_input_t
   use tet_mesh_m, only: shape_t, surface_of_tets
-  use vectors_m, only: cross
+  use vectors_m, only: cross, norm
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
-  use contact_sphere_placement_m, only: place_at_centroids, place_one_sphere
+  use contact_sphere_placement_m, only: place_at_centroids, place_inscribed, place_one_sphere
+  use dense_spheres_m, only: place_densely
+  use shape_file_m, only: read_shape_file
+  use mesh_check_m, only: check_mesh
+  use surface_net_m, only: merge_flat_facets
+  use value_text_m, only: quoted_text
+  use errors_m, only: to_text
   implicit none
   private
   public :: make_shape, max_refinement
 
   integer, parameter :: max_refinement = 8
   real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
+  real(wp), parameter :: most_spheres = 2.0e4_wp, dense_spacing = 0.1_wp   !! [-], [smallest edge]
   integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
 
   !> Places along one direction of a lattice.
@@ -51,16 +58,87 @@ contains
     shape%name = input%name
     shape%kind = input%kind
     shape%density = input%density
-    call build_form(input, shape)
-    call finish_shape(shape)
-    if (trim(input%kind) == 'sphere') then
-      call place_one_sphere(0.5_wp*input%size(1), shape)
+    if (trim(input%kind) == 'file') then
+      call build_from_file(input, shape, message)
+      if (len(message) > 0) return
     else
-      call place_at_centroids(shape)
+      call build_form(input, shape)
     end if
+    call finish_shape(shape)
+    call place_spheres(input, shape, message)
+    if (len(message) > 0) return
     shape%radius = max(maxval(norm2(shape%point, 1)), &
                        maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius))
   end subroutine make_shape
+
+  !> Contact spheres as the group asks for; `message` says if they would be too many.
+  subroutine place_spheres(input, shape, message)
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(inout) :: shape
+    character(:), allocatable, intent(out) :: message
+    real(wp) :: spacing, expected
+
+    message = ''
+    if (shape%kind == 'sphere') then
+      call place_one_sphere(0.5_wp*input%size(1), shape)
+      return
+    end if
+    select case (trim(input%spheres))
+    case ('dense')
+      spacing = input%sphere_spacing
+      if (spacing <= 0.0_wp) spacing = dense_spacing*shape%smallest_edge
+      expected = surface_area(shape)/spacing**2
+      if (expected > most_spheres) then
+        message = 'sphere_spacing = '//to_text(spacing)//': about '//to_text(nint(min(expected, &
+          1.0e9_wp)))//' contact spheres, at most '//to_text(nint(most_spheres))
+        return
+      end if
+      call place_densely(spacing, shape)
+    case ('inscribed')
+      call place_inscribed(shape)
+    case default
+      call place_at_centroids(shape)
+    end select
+  end subroutine place_spheres
+
+  !> Area of the surface [m2].
+  pure function surface_area(shape) result(area)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: area
+    real(wp) :: x(3, 3)
+    integer :: t
+
+    area = 0.0_wp
+    do t = 1, size(shape%triangle, 2)
+      x = shape%point(:, shape%triangle(:, t))
+      area = area + 0.5_wp*norm(cross(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1)))
+    end do
+  end function surface_area
+
+  !> Tetrahedra of a file, in its axes. Flat regions of the surface become single facets; the
+  !! smallest edge is that of the cube with the same volume over surface.
+  subroutine build_from_file(input, shape, message)
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(inout) :: shape
+    character(:), allocatable, intent(out) :: message
+    real(wp) :: volume, centroid(3)
+    integer :: m
+
+    call read_shape_file(input%file, shape%point, shape%tet, message)
+    if (len(message) == 0) call check_mesh(shape%point, shape%tet, message)
+    if (len(message) > 0) then
+      message = 'file = '//quoted_text(input%file)//': '//message
+      return
+    end if
+    shape%point = input%scale*shape%point
+    shape%flow_tet = shape%tet
+    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
+    shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
+    shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
+    call merge_flat_facets(shape%point, shape%facet, shape%facet_point)
+    call volume_and_centroid(shape%point, shape%tet, volume, centroid)
+    shape%smallest_edge = 6.0_wp*volume/surface_area(shape)
+  end subroutine build_from_file
 
   !> Points, tetrahedra, facets and smallest edge of a block.
   subroutine build_form(input, shape)
@@ -130,8 +208,7 @@ contains
     case ('cylinder')
       n_size = 2
     case ('file')
-      message = 'kind = '''//trim(input%kind)//''' is not available yet'
-      return
+      n_size = 0
     case default
       message = 'kind = '''//trim(input%kind)//''' is unknown'
       return
@@ -147,9 +224,6 @@ contains
           > most_parts/real(input%refinement, wp)**3) then
         message = 'size: so slender a box would be cut too finely; build it of several boxes'
       end if
-    end if
-    if (trim(input%spheres) /= 'centroid') then
-      message = 'spheres = '''//trim(input%spheres)//''' is not available yet'
     end if
   end function problem_with
 

@@ -1,4 +1,5 @@
-!> Fewer, larger polygons for the same surface: flat regions become one polygon where it is convex.
+!> Fewer, larger polygons for the same surface: flat regions become one polygon where they are
+!! convex, and few convex ones elsewhere.
 module surface_net_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
@@ -9,107 +10,65 @@ module surface_net_m
 
   real(wp), parameter :: flat = 1.0e-12_wp     !! distance from a plane or line [size of the block]
 
+  !> The net while its polygons are joined. Edge e leads from corner e to the next corner of its
+  !! polygon; a piece is a set of polygons with the same label, that of one of them.
+  type :: net_t
+    real(wp) :: near = 0.0_wp                          !! what counts as flat [m]
+    real(wp), allocatable :: x(:, :)                   !! (3, edges) where each edge begins [m]
+    integer, allocatable :: twin(:), owner(:), next(:) !! of each edge; twin: the other side, or 0
+    integer, allocatable :: label(:)                   !! of each polygon
+    !> For each label: its polygons in a chain, their number, an edge at the border, edges there.
+    integer, allocatable :: head(:), chain(:), members(:), start(:), border(:)
+  end type net_t
+
 contains
 
-  !> Join the polygons of each flat region, if its border is one convex polygon, and drop corners
-  !! at which every polygon is straight. The net stays closed, and no corner of a joined polygon is
-  !! straight; a region where that cannot be keeps its polygons.
+  !> Join the polygons of flat regions to convex ones, drop corners at which no polygon bends, and
+  !! cut polygons at straight corners that others need. The net stays closed, its polygons flat, and
+  !! every corner of a polygon bends.
   pure subroutine merge_flat_facets(point, facet, facet_point)
     real(wp), intent(in) :: point(:, :)                       !! (3, n) [m]
     integer, allocatable, intent(inout) :: facet(:)           !! (facets + 1) first corner of each
     integer, allocatable, intent(inout) :: facet_point(:)     !! corners, closed net
-    integer :: region(size(facet) - 1), twin(size(facet_point)), owner(size(facet_point))
-    integer :: next(size(facet_point)), start(size(facet) - 1), part(size(facet) - 1)
-    integer :: border(size(facet) - 1)   ! edges at the border of each region
-    logical :: joined(size(facet) - 1), needed(size(point, 2)), changed
-    real(wp) :: near
-    integer, allocatable :: new_facet(:), new_point(:)
-    integer :: n, r, f, e
+    type(net_t) :: net
+    integer, allocatable :: region(:), new_facet(:), new_point(:)
+    logical, allocatable :: done(:)
+    integer :: n, f
 
-    near = flat*maxval(maxval(point, 2) - minval(point, 2))
-    call edge_twins(facet, facet_point, twin)
-    call owners(facet, owner, next)
-    call find_regions(point, facet, facet_point, twin, owner, near, region, n)
-    part = 0
-    start = 0
-    border = 0
-    do f = 1, size(facet) - 1
-      part(region(f)) = part(region(f)) + 1
-      do e = facet(f), facet(f + 1) - 1
-        if (.not. at_border(e, region, twin, owner)) cycle
-        border(region(f)) = border(region(f)) + 1
-        if (start(region(f)) == 0) start(region(f)) = e
-      end do
+    n = size(facet) - 1
+    net%near = flat*maxval(maxval(point, 2) - minval(point, 2))
+    allocate (net%x(3, size(facet_point)), source=point(:, facet_point))
+    allocate (net%twin(size(facet_point)), net%owner(size(facet_point)))
+    allocate (net%next(size(facet_point)), region(n), done(n))
+    allocate (net%label(n), net%head(n), net%chain(n), net%members(n), net%start(n), net%border(n))
+    call edge_twins(facet, facet_point, net%twin)
+    call owners(facet, net%owner, net%next)
+    call find_regions(facet, net, region)
+    net%label = region
+    call gather(facet, net)
+    do f = 1, n
+      done(f) = net%members(f) < 2
+      if (.not. done(f)) done(f) = is_convex(net, f)
     end do
-    do r = 1, n
-      joined(r) = part(r) > 1
-      if (joined(r)) joined(r) = is_convex(point, facet_point, region, twin, owner, next, &
-                                           start(r), border(r), near)
+    do f = 1, n
+      if (.not. done(region(f))) net%label(f) = f
     end do
-    do
-      call mark_needed(point, facet, facet_point, region, joined, twin, owner, next, start(:n), &
-                       near, needed)
-      changed = .false.
-      do r = 1, n
-        if (.not. joined(r)) cycle
-        if (.not. straight_corner_needed(point, facet_point, region, twin, owner, next, start(r), &
-                                         near, needed)) cycle
-        joined(r) = .false.
-        changed = .true.
-      end do
-      if (.not. changed) exit
-    end do
-    call write_net(facet, facet_point, region, joined(:n), needed, twin, owner, next, start(:n), &
-                   new_facet, new_point)
+    call gather(facet, net)
+    call join_pieces(facet, region, done, net)
+    call write_net(facet_point, size(point, 2), net, new_facet, new_point)
     call move_alloc(new_facet, facet)
     call move_alloc(new_point, facet_point)
   end subroutine merge_flat_facets
-
-  !> Old polygons of the regions left alone, then the joined ones without needless corners.
-  pure subroutine write_net(facet, facet_point, region, joined, needed, twin, owner, next, start, &
-                            new_facet, new_point)
-    integer, intent(in) :: facet(:), facet_point(:), region(:), twin(:), owner(:), next(:), start(:)
-    logical, intent(in) :: joined(:), needed(:)
-    integer, allocatable, intent(out) :: new_facet(:), new_point(:)
-    integer :: first(size(facet)), point(size(facet_point)), f, e, r, m, p
-
-    m = 1
-    p = 0
-    first(1) = 1
-    do f = 1, size(facet) - 1
-      if (joined(region(f))) cycle
-      do e = facet(f), facet(f + 1) - 1
-        p = p + 1
-        point(p) = facet_point(e)
-      end do
-      m = m + 1
-      first(m) = p + 1
-    end do
-    do r = 1, size(joined)
-      if (.not. joined(r)) cycle
-      e = start(r)
-      do
-        if (needed(facet_point(e))) then
-          p = p + 1
-          point(p) = facet_point(e)
-        end if
-        e = next_border_edge(e, region, twin, owner, next)
-        if (e == start(r)) exit
-      end do
-      m = m + 1
-      first(m) = p + 1
-    end do
-    new_facet = first(:m)
-    new_point = point(:p)
-  end subroutine write_net
 
   !> The other side of each directed edge; 0 if it has none or more than one.
   pure subroutine edge_twins(facet, facet_point, twin)
     integer, intent(in) :: facet(:), facet_point(:)
     integer, intent(out) :: twin(:)   !! edge e goes from corner e to the next of its polygon
-    integer :: head(maxval(facet_point)), chain(size(facet_point)), finish(size(facet_point))
-    integer :: owner(size(facet_point)), next(size(facet_point)), e, g, n
+    integer, allocatable :: head(:), chain(:), finish(:), owner(:), next(:)
+    integer :: e, g, n
 
+    n = size(facet_point)
+    allocate (head(maxval(facet_point)), chain(n), finish(n), owner(n), next(n))
     call owners(facet, owner, next)
     finish = facet_point(next)
     head = 0
@@ -146,35 +105,36 @@ contains
     end do
   end subroutine owners
 
-  !> Number the flat regions: polygons joined over edges that lie in the plane of the first one.
-  pure subroutine find_regions(point, facet, facet_point, twin, owner, near, region, n)
-    real(wp), intent(in) :: point(:, :), near
-    integer, intent(in) :: facet(:), facet_point(:), twin(:), owner(:)
-    integer, intent(out) :: region(:), n
-    integer :: queue(size(region)), first, last, f, g, e
+  !> Label the flat regions with their first polygons: those joined over edges that lie in the plane
+  !! of the first one.
+  pure subroutine find_regions(facet, net, region)
+    integer, intent(in) :: facet(:)
+    type(net_t), intent(in) :: net
+    integer, intent(out) :: region(:)
+    integer, allocatable :: queue(:)
+    integer :: first, last, f, g, e
     real(wp) :: normal(3), origin(3)
 
+    allocate (queue(size(region)))
     region = 0
-    n = 0
     do f = 1, size(region)
       if (region(f) > 0) cycle
-      n = n + 1
-      region(f) = n
-      origin = point(:, facet_point(facet(f)))
-      normal = facet_normal(point(:, facet_point(facet(f):facet(f + 1) - 1)))
+      region(f) = f
+      origin = net%x(:, facet(f))
+      normal = facet_normal(net%x(:, facet(f):facet(f + 1) - 1))
       queue(1) = f
       first = 1
       last = 1
       do while (first <= last)
         do e = facet(queue(first)), facet(queue(first) + 1) - 1
-          if (twin(e) == 0) cycle
-          g = owner(twin(e))
+          if (net%twin(e) == 0) cycle
+          g = net%owner(net%twin(e))
           if (region(g) > 0) cycle
-          associate (x => point(:, facet_point(facet(g):facet(g + 1) - 1)))
-            if (any(abs(matmul(normal, x - spread(origin, 2, size(x, 2)))) > near)) cycle
+          associate (x => net%x(:, facet(g):facet(g + 1) - 1))
+            if (any(abs(matmul(normal, x - spread(origin, 2, size(x, 2)))) > net%near)) cycle
             if (dot_product(facet_normal(x), normal) <= 0.0_wp) cycle
           end associate
-          region(g) = n
+          region(g) = f
           last = last + 1
           queue(last) = g
         end do
@@ -196,61 +156,171 @@ contains
     normal = normal/norm(normal)
   end function facet_normal
 
-  pure function at_border(e, region, twin, owner) result(yes)
-    integer, intent(in) :: e, region(:), twin(:), owner(:)
+  !> Chains, border edges and border lengths of all labels.
+  pure subroutine gather(facet, net)
+    integer, intent(in) :: facet(:)
+    type(net_t), intent(inout) :: net
+    integer :: f, e
+
+    net%head = 0
+    net%members = 0
+    net%start = 0
+    net%border = 0
+    do f = size(facet) - 1, 1, -1
+      associate (l => net%label(f))
+        net%chain(f) = net%head(l)
+        net%head(l) = f
+        net%members(l) = net%members(l) + 1
+        do e = facet(f), facet(f + 1) - 1
+          if (.not. at_border(e, net)) cycle
+          net%border(l) = net%border(l) + 1
+          net%start(l) = e
+        end do
+      end associate
+    end do
+  end subroutine gather
+
+  !> Join neighbours in the regions not done wherever the two are convex together, until no more
+  !! can be.
+  pure subroutine join_pieces(facet, region, done, net)
+    integer, intent(in) :: facet(:), region(:)
+    logical, intent(in) :: done(:)             !! of each region
+    type(net_t), intent(inout) :: net
+    integer :: e, f, g, a, b
+    logical :: joined, changed
+
+    do
+      changed = .false.
+      do e = 1, size(net%owner)
+        f = net%owner(e)
+        if (done(region(f)) .or. net%twin(e) == 0) cycle
+        g = net%owner(net%twin(e))
+        if (region(f) /= region(g) .or. net%label(f) == net%label(g)) cycle
+        a = merge(net%label(f), net%label(g), &
+                  net%members(net%label(f)) >= net%members(net%label(g)))
+        b = net%label(f) + net%label(g) - a
+        call try_to_join(facet, a, b, net, joined)
+        changed = changed .or. joined
+      end do
+      if (.not. changed) exit
+    end do
+  end subroutine join_pieces
+
+  !> Give piece b the label of a, if the two are convex together.
+  pure subroutine try_to_join(facet, a, b, net, joined)
+    integer, intent(in) :: facet(:), a, b
+    type(net_t), intent(inout) :: net
+    logical, intent(out) :: joined
+    integer :: f, e, last, old_start, old_border
+
+    old_start = net%start(a)
+    old_border = net%border(a)
+    net%border(a) = net%border(a) + net%border(b)
+    f = net%head(b)
+    last = f
+    do while (f > 0)
+      do e = facet(f), facet(f + 1) - 1
+        if (net%twin(e) == 0) cycle
+        if (net%label(net%owner(net%twin(e))) == a) net%border(a) = net%border(a) - 2
+      end do
+      last = f
+      f = net%chain(f)
+    end do
+    net%chain(last) = net%head(a)   ! b before a
+    f = net%head(b)
+    do
+      net%label(f) = a
+      if (f == last) exit
+      f = net%chain(f)
+    end do
+    net%start(a) = border_edge(facet, net%head(b), net)
+    joined = is_convex(net, a)
+    if (joined) then
+      net%head(a) = net%head(b)
+      net%members(a) = net%members(a) + net%members(b)
+      return
+    end if
+    net%start(a) = old_start
+    net%border(a) = old_border
+    net%chain(last) = 0
+    f = net%head(b)
+    do while (f > 0)
+      net%label(f) = b
+      f = net%chain(f)
+    end do
+  end subroutine try_to_join
+
+  !> An edge at the border of the piece whose chain begins with polygon `first`.
+  pure function border_edge(facet, first, net) result(e)
+    integer, intent(in) :: facet(:), first
+    type(net_t), intent(in) :: net
+    integer :: e
+    integer :: f
+
+    f = first
+    do while (f > 0)
+      do e = facet(f), facet(f + 1) - 1
+        if (at_border(e, net)) return
+      end do
+      f = net%chain(f)
+    end do
+    e = 0
+  end function border_edge
+
+  !> Does an edge part two pieces?
+  pure function at_border(e, net) result(yes)
+    integer, intent(in) :: e
+    type(net_t), intent(in) :: net
     logical :: yes
 
-    yes = twin(e) == 0
-    if (.not. yes) yes = region(owner(twin(e))) /= region(owner(e))
+    yes = net%twin(e) == 0
+    if (.not. yes) yes = net%label(net%owner(net%twin(e))) /= net%label(net%owner(e))
   end function at_border
 
-  !> The edge that follows at the border of the same region, going round inside it.
-  pure function next_border_edge(e, region, twin, owner, next) result(g)
-    integer, intent(in) :: e, region(:), twin(:), owner(:), next(:)
+  !> The edge that follows at the border of the same piece, going round inside it.
+  pure function next_at_border(e, net) result(g)
+    integer, intent(in) :: e
+    type(net_t), intent(in) :: net
     integer :: g
 
-    g = next(e)
-    do while (.not. at_border(g, region, twin, owner))
-      g = next(twin(g))
+    g = net%next(e)
+    do while (.not. at_border(g, net))
+      g = net%next(net%twin(g))
     end do
-  end function next_border_edge
+  end function next_at_border
 
-  !> Is the border of a region one polygon without inward corners, and not too long?
-  pure function is_convex(point, facet_point, region, twin, owner, next, start, border, &
-                          near) result(yes)
-    real(wp), intent(in) :: point(:, :), near
-    integer, intent(in) :: facet_point(:), region(:), twin(:), owner(:), next(:), start
-    integer, intent(in) :: border   !! edges at the border
+  !> Is the border of a piece one polygon without inward corners, and not too long?
+  pure function is_convex(net, label) result(yes)
+    type(net_t), intent(in) :: net
+    integer, intent(in) :: label
     logical :: yes
-    real(wp) :: normal(3), total(3), origin(3), a(3), b(3)
+    real(wp) :: total(3), origin(3), a(3), b(3)
     integer :: e, g, length, corners
 
     yes = .false.
     total = 0.0_wp
-    origin = point(:, facet_point(start))
     length = 0
-    e = start
+    e = net%start(label)
+    if (e == 0) return
+    origin = net%x(:, e)
     do
-      a = point(:, facet_point(e)) - origin
-      total = total + cross(a, point(:, facet_point(next(e))) - origin)
+      total = total + cross(net%x(:, e) - origin, net%x(:, net%next(e)) - origin)
       length = length + 1
-      e = next_border_edge(e, region, twin, owner, next)
-      if (e == start) exit
+      e = next_at_border(e, net)
+      if (e == net%start(label)) exit
     end do
-    if (length /= border .or. norm(total) <= 0.0_wp) return
-    normal = total/norm(total)
+    if (length /= net%border(label)) return
     corners = 0
-    e = start
     do
-      g = next_border_edge(e, region, twin, owner, next)
-      a = point(:, facet_point(next(e))) - point(:, facet_point(e))
-      b = point(:, facet_point(next(g))) - point(:, facet_point(g))
-      if (.not. straight(a, b, near)) then
-        if (dot_product(cross(a, b), normal) <= 0.0_wp) return
+      g = next_at_border(e, net)
+      a = net%x(:, net%next(e)) - net%x(:, e)
+      b = net%x(:, net%next(g)) - net%x(:, g)
+      if (.not. straight(a, b, net%near)) then
+        if (dot_product(cross(a, b), total) <= 0.0_wp) return
         corners = corners + 1
       end if
       e = g
-      if (e == start) exit
+      if (e == net%start(label)) exit
     end do
     yes = corners >= 3 .and. corners <= most_facet_corners
   end function is_convex
@@ -263,54 +333,91 @@ contains
     yes = norm(cross(a, b)) <= near*max(norm(a), norm(b)) .and. dot_product(a, b) > 0.0_wp
   end function straight
 
-  !> Corners at which some polygon of the net bends: all of those left alone, the bent ones of the
-  !! joined.
-  pure subroutine mark_needed(point, facet, facet_point, region, joined, twin, owner, next, start, &
-                              near, needed)
-    real(wp), intent(in) :: point(:, :), near
-    integer, intent(in) :: facet(:), facet_point(:), region(:), twin(:), owner(:), next(:), start(:)
-    logical, intent(in) :: joined(:)
-    logical, intent(out) :: needed(:)
-    integer :: f, r, e, g
+  !> The pieces as polygons, without the corners at which no piece bends.
+  pure subroutine write_net(facet_point, n_point, net, new_facet, new_point)
+    integer, intent(in) :: facet_point(:), n_point
+    type(net_t), intent(in) :: net
+    integer, allocatable, intent(out) :: new_facet(:), new_point(:)
+    integer, allocatable :: edge(:), first(:), corner(:)
+    logical, allocatable :: needed(:)
+    integer :: f, e, g, n, m, p
 
-    needed = .false.
-    do f = 1, size(facet) - 1
-      if (.not. joined(region(f))) needed(facet_point(facet(f):facet(f + 1) - 1)) = .true.
-    end do
-    do r = 1, size(start)
-      if (.not. joined(r)) cycle
-      e = start(r)
+    allocate (needed(n_point), source=.false.)
+    allocate (edge(size(facet_point)))
+    do f = 1, size(net%label)
+      if (net%label(f) /= f) cycle
+      e = net%start(f)
       do
-        g = next_border_edge(e, region, twin, owner, next)
-        if (.not. straight(point(:, facet_point(next(e))) - point(:, facet_point(e)), &
-                           point(:, facet_point(next(g))) - point(:, facet_point(g)), near)) then
+        g = next_at_border(e, net)
+        if (.not. straight(net%x(:, net%next(e)) - net%x(:, e), &
+                           net%x(:, net%next(g)) - net%x(:, g), net%near)) then
           needed(facet_point(g)) = .true.
         end if
         e = g
-        if (e == start(r)) exit
+        if (e == net%start(f)) exit
       end do
     end do
-  end subroutine mark_needed
-
-  !> Has the border of a region a straight corner that another polygon needs?
-  pure function straight_corner_needed(point, facet_point, region, twin, owner, next, start, near, &
-                                       needed) result(yes)
-    real(wp), intent(in) :: point(:, :), near
-    integer, intent(in) :: facet_point(:), region(:), twin(:), owner(:), next(:), start
-    logical, intent(in) :: needed(:)
-    logical :: yes
-    integer :: e, g
-
-    yes = .false.
-    e = start
-    do
-      g = next_border_edge(e, region, twin, owner, next)
-      yes = yes .or. (needed(facet_point(g)) .and. &
-                      straight(point(:, facet_point(next(e))) - point(:, facet_point(e)), &
-                               point(:, facet_point(next(g))) - point(:, facet_point(g)), near))
-      e = g
-      if (e == start) exit
+    allocate (first(size(facet_point)), corner(3*size(facet_point)))
+    first(1) = 1
+    m = 0
+    p = 0
+    do f = 1, size(net%label)
+      if (net%label(f) /= f) cycle
+      n = 0
+      e = net%start(f)
+      do
+        if (needed(facet_point(e))) then
+          n = n + 1
+          edge(n) = e
+        end if
+        e = next_at_border(e, net)
+        if (e == net%start(f)) exit
+      end do
+      call cut_at_straight_corners(edge(:n), facet_point, net, first, corner, m, p)
     end do
-  end function straight_corner_needed
+    new_facet = first(:m + 1)
+    new_point = corner(:p)
+  end subroutine write_net
+
+  !> Write a convex polygon; one with straight corners is cut in two at such a corner, and so on.
+  pure recursive subroutine cut_at_straight_corners(edge, facet_point, net, first, corner, m, p)
+    integer, intent(in) :: edge(:), facet_point(:)   !! edges that begin at its corners
+    type(net_t), intent(in) :: net
+    integer, intent(inout) :: first(:), corner(:)
+    integer, intent(inout) :: m, p                   !! polygons and corners written
+    integer :: k, l, n, far
+    real(wp) :: side(3), onward(3), height, highest
+
+    n = size(edge)
+    do k = 1, n
+      side = net%x(:, edge(k)) - net%x(:, edge(1 + modulo(k - 2, n)))
+      onward = net%x(:, edge(1 + modulo(k, n))) - net%x(:, edge(k))
+      if (.not. straight(side, onward, net%near)) cycle
+      highest = 0.0_wp
+      far = k
+      do l = 1, n
+        height = norm(cross(side, net%x(:, edge(l)) - net%x(:, edge(k))))
+        if (height <= highest) cycle
+        highest = height
+        far = l
+      end do
+      call cut_at_straight_corners(edge(part(k, far)), facet_point, net, first, corner, m, p)
+      call cut_at_straight_corners(edge(part(far, k)), facet_point, net, first, corner, m, p)
+      return
+    end do
+    corner(p + 1:p + n) = facet_point(edge)
+    p = p + n
+    m = m + 1
+    first(m + 1) = p + 1
+  contains
+    !> Places from a to b, going round.
+    pure function part(a, b) result(places)
+      integer, intent(in) :: a, b
+      integer :: places(1 + modulo(b - a, n))
+      integer :: i
+
+      places = [(1 + modulo(a - 1 + i, n), i=0, modulo(b - a, n))]
+    end function part
+  end subroutine cut_at_straight_corners
 
 end module surface_net_m

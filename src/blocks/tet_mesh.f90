@@ -5,7 +5,7 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, surface_of_tets, most_facet_corners
+  public :: shape_t, surface_of_tets, opposite, most_facet_corners
 
   integer, parameter :: most_facet_corners = 48   !! of one polygon of the surface
 
@@ -42,10 +42,11 @@ contains
     integer, intent(in) :: tet(:, :)                  !! (4, n), positive volume
     integer, allocatable, intent(out) :: triangle(:, :)   !! (3, m) counter-clockwise from outside
     integer, allocatable, intent(out) :: triangle_tet(:)  !! (m)
-    integer :: face(3, 4*size(tet, 2)), next(4*size(tet, 2)), head(n_point)
-    logical :: single(4*size(tet, 2))
+    integer, allocatable :: face(:, :), next(:), head(:)
+    logical, allocatable :: single(:)
     integer :: f, g, m
 
+    allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)), head(n_point), single(4*size(tet, 2)))
     head = 0       ! faces are chained by their smallest corner
     single = .true.
     do f = 1, size(face, 2)

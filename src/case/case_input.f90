@@ -461,6 +461,9 @@ contains
     call v%option('spheres', shape%spheres, 'centroid inscribed dense')
     call v%item('sphere_spacing', shape%sphere_spacing)
 
+    if (shape%kind == 'file') call v%needed('file', 'a Gmsh .msh file or a mics-shape file')
+    call v%require('file', shape%kind == 'file' .or. shape%file == '', &
+                   'only a shape of kind ''file'' is read from one')
     call require_length(v, 'size', pack(shape%size, is_given(shape%size)))
     call require_density(v, 'density', shape%density)
     call v%require('scale', shape%scale > 0.0_wp, 'must be positive [-]')

@@ -6,6 +6,7 @@ module case_plan_m
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
   use tet_mesh_m, only: shape_t
   use surface_tension_m, only: capillary_step
+  use contact_sphere_placement_m, only: height_errors
   implicit none
   private
   public :: print_plan
@@ -114,14 +115,14 @@ contains
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
     type(shape_t), intent(in) :: shapes(:)
-    character(*), parameter :: form = '(2x, a14, 1x, a8, 2(1x, a7), 4(1x, a12), 1x, a13)'
+    character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
     character(:), allocatable :: submerged
     real(wp) :: mass, g, diameter
     integer :: s
 
     if (size(shapes) == 0) return
     call heading(unit, 'Shapes')
-    write (unit, form) left('name', 14), left('kind', 8), 'tets', 'spheres', 'sphere [m]', &
+    write (unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
       'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
     g = norm2(case%fluid%gravity)
     do s = 1, size(shapes)
@@ -129,13 +130,40 @@ contains
       submerged = '-'
       if (wet) submerged = brief((mass - case%fluid%liquid_density*shapes(s)%volume)*g)
       diameter = 2*minval(shapes(s)%sphere_radius)
-      write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 8), &
+      write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
         right(to_text(size(shapes(s)%tet, 2)), 7), &
         right(to_text(size(shapes(s)%sphere_radius)), 7), &
         right(brief(diameter), 12), right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
         right(brief(mass*g), 12), right(submerged, 13)
     end do
+    do s = 1, size(shapes)
+      if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s)%file, shapes(s))
+      if (case%contact%model == 'spheres') call print_height_errors(unit, shapes(s))
+    end do
   end subroutine print_shapes
+
+  !> How long a block from a file is, so that a wrong unit shows.
+  subroutine print_file_shape(unit, file, shape)
+    integer, intent(in) :: unit
+    character(*), intent(in) :: file
+    type(shape_t), intent(in) :: shape
+
+    call entry(unit, trim(shape%name)//' from', file//', ' &
+               //triple(maxval(shape%point, 2) - minval(shape%point, 2))//' m, ' &
+               //to_text(size(shape%facet) - 1)//' facets')
+  end subroutine print_file_shape
+
+  !> A warning: what the contact spheres do to the heights of a block at rest.
+  subroutine print_height_errors(unit, shape)
+    integer, intent(in) :: unit
+    type(shape_t), intent(in) :: shape
+    real(wp) :: lowest, highest
+
+    call height_errors(shape, lowest, highest)
+    if (max(-lowest, highest) <= 0.0_wp) return
+    call entry(unit, 'warning', 'contact spheres of '//trim(shape%name)//' reach up to ' &
+               //brief(-lowest)//' m short of its surface and '//brief(highest)//' m beyond it')
+  end subroutine print_height_errors
 
   subroutine print_bodies(unit, case, shapes)
     integer, intent(in) :: unit

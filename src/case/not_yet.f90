@@ -16,8 +16,6 @@ module not_yet_m
 
   type(entry_t), parameter :: table(*) = [ &
     entry_t('contact', 'model', 'surface'), &
-    entry_t('shape', 'kind', 'file'), entry_t('shape', 'file', '*'), &
-    entry_t('shape', 'spheres', 'inscribed'), entry_t('shape', 'spheres', 'dense'), &
     entry_t('bed', '', '')]
 
 contains

@@ -414,7 +414,16 @@ contains
       //'(line 3)')
     call expect(base//a//'''ball'' size=1/', '&shape kind = ''ball'': unknown, must be one of' &
       //' ''hexapod'', ''cube'', ''box'', ''sphere'', ''cylinder'', ''tetrapod'', ''dolos'', ' &
-      //'''reef_cube'' (line 3)')
+      //'''reef_cube'', ''file'' (line 3)')
+    call expect(base//a//'''file''/', &
+      '&shape file: missing, required: a Gmsh .msh file or a mics-shape file (line 3)')
+    call expect(base//a//'''cube'' size=1 file=''a.msh''/', &
+      '&shape file = ''a.msh'': only a shape of kind ''file'' is read from one (line 3)')
+    call expect(base//a//'''cylinder'' size=1/', &
+      '&shape size = 1: 1 value given, 2 needed (line 3)')
+    call expect(base//a//'''cube'' size=1 spheres=''many''/', &
+      '&shape spheres = ''many'': unknown, must be one of ''centroid'', ''inscribed'', ' &
+      //'''dense'' (line 3)')
     call expect(base//a//'''cube'' size=1 density=0 scale=0 refinement=0 sphere_spacing=-1/', &
       '&shape density = 0: must be positive [kg/m3] (line 3)|' &
       //'&shape scale = 0: must be positive [-] (line 3)|' &
@@ -465,12 +474,6 @@ contains
     call expect(base//'&contact model=''surface''/', &
       '&contact model = ''surface'': not available yet, so far: ''spheres'' (line 3)')
     call expect(base//'&bed file=''a.stl''/', '&bed: this group is not available yet (line 3)')
-    call expect(base//'&shape name=''a'' kind=''dolos'' size=1 spheres=''dense''/', &
-      '&shape spheres = ''dense'': not available yet, so far: ''centroid'' (line 3)')
-    call expect(base//'&shape name=''a'' kind=''file'' file=''a.msh''/', &
-      '&shape kind = ''file'': not available yet, so far: ''hexapod'', ''cube'', ''box'', ' &
-      //'''sphere'', ''cylinder'', ''tetrapod'', ''dolos'', ''reef_cube'' (line 3)|' &
-      //'&shape file = ''a.msh'': not available yet (line 3)')
   end subroutine test_not_yet
 
   !> Faults of form, of type, of range and between groups come out together.

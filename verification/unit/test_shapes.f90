@@ -294,6 +294,8 @@ contains
       call check('cylinder: height', extent(3), 0.05_wp, 1e-15_wp)
       call check('cylinder: two ends and 6 r sides', size(s%facet) - 1, 2 + 6*r)
       call build('reef_cube', [0.05_wp, 0.0_wp, 0.0_wp], r, s)
+      call check('reef cube: eight rectangles around each window, and its four sides', &
+                 size(s%facet) - 1, 72)
       call check('reef cube: edges', maxval(s%point, 2) - minval(s%point, 2), &
                  [0.05_wp, 0.05_wp, 0.05_wp], 1e-15_wp)
     end do

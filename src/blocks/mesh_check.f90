@@ -1,0 +1,195 @@
+!> Makes a mesh of tetrahedra from outside fit for the program, or says what is wrong with it.
+module mesh_check_m
+  use kinds_m, only: wp
+  use errors_m, only: to_text
+  use polyhedron_m, only: tet_volume
+  use tet_mesh_m, only: surface_of_tets, opposite
+  use surface_net_m, only: edge_twins
+  use neighbours_m, only: bins_t, bins_build
+  implicit none
+  private
+  public :: check_mesh
+
+  real(wp), parameter :: flat_tet = 1.0e-9_wp    !! volume over longest edge cubed
+  real(wp), parameter :: same_place = 1.0e-9_wp  !! distance of points [size of the block]
+
+contains
+
+  !> Drop points no tetrahedron uses, turn tetrahedra of negative volume, and look for everything
+  !! that would make the volume or the surface wrong. `message` is empty if the mesh is good.
+  subroutine check_mesh(point, tet, message)
+    real(wp), allocatable, intent(inout) :: point(:, :)   !! (3, n)
+    integer, allocatable, intent(inout) :: tet(:, :)      !! (4, m)
+    character(:), allocatable, intent(out) :: message
+    integer, allocatable :: triangle(:, :), triangle_tet(:)
+    integer :: n
+
+    message = ''
+    if (size(tet, 2) == 0) then
+      message = 'holds no tetrahedra; a surface alone has to be meshed first (tools/make_shape.py)'
+      return
+    end if
+    call drop_unused(point, tet)
+    call turn_and_count_flat(point, tet, n)
+    if (n > 0) call add(to_text(n)//' tetrahedra are flat')
+    n = coinciding(point)
+    if (n > 0) call add(to_text(n)//' points stand in the place of another, join them')
+    n = overlapping_faces(size(point, 2), tet)
+    if (n > 0) call add('tetrahedra overlap at '//to_text(n)//' of their faces')
+    if (len(message) > 0) return
+    call surface_of_tets(size(point, 2), tet, triangle, triangle_tet)
+    n = bad_edges(triangle)
+    if (n > 0) call add('the surface meets itself along '//to_text(n)//' edges')
+    n = pieces(size(point, 2), tet)
+    if (n > 1) call add('falls into '//to_text(n)//' separate pieces')
+  contains
+    subroutine add(text)
+      character(*), intent(in) :: text
+
+      if (len(message) > 0) message = message//'; '
+      message = message//text
+    end subroutine add
+  end subroutine check_mesh
+
+  !> Keep the points in use, in their order.
+  pure subroutine drop_unused(point, tet)
+    real(wp), allocatable, intent(inout) :: point(:, :)
+    integer, intent(inout) :: tet(:, :)
+    integer, allocatable :: number(:)
+    integer :: i, k, n
+
+    allocate (number(size(point, 2)), source=0)
+    do i = 1, size(tet, 2)
+      number(tet(:, i)) = 1
+    end do
+    n = 0
+    do i = 1, size(number)
+      if (number(i) == 0) cycle
+      n = n + 1
+      number(i) = n
+      point(:, n) = point(:, i)
+    end do
+    point = point(:, :n)
+    do i = 1, size(tet, 2)
+      do k = 1, 4
+        tet(k, i) = number(tet(k, i))
+      end do
+    end do
+  end subroutine drop_unused
+
+  !> Give every tetrahedron a positive volume; the number of those without one worth the name.
+  pure subroutine turn_and_count_flat(point, tet, n)
+    real(wp), intent(in) :: point(:, :)
+    integer, intent(inout) :: tet(:, :)
+    integer, intent(out) :: n
+    real(wp) :: x(3, 4), v, longest
+    integer :: i, a, b
+
+    n = 0
+    do i = 1, size(tet, 2)
+      x = point(:, tet(:, i))
+      v = tet_volume(x)
+      longest = 0.0_wp
+      do a = 1, 3
+        do b = a + 1, 4
+          longest = max(longest, norm2(x(:, a) - x(:, b)))
+        end do
+      end do
+      if (abs(v) <= flat_tet*longest**3) n = n + 1
+      if (v < 0.0_wp) tet(1:2, i) = tet([2, 1], i)
+    end do
+  end subroutine turn_and_count_flat
+
+  !> Points with another of lower number in the same place.
+  function coinciding(point) result(n)
+    real(wp), intent(in) :: point(:, :)
+    integer :: n
+    type(bins_t) :: bins
+    real(wp) :: extent, near
+    integer :: c, i, j
+
+    extent = maxval(maxval(point, 2) - minval(point, 2))
+    near = same_place*extent
+    call bins_build(point - 0.5_wp*near, point + 0.5_wp*near, &
+                    extent/real(size(point, 2), wp)**(1.0_wp/3.0_wp), bins)
+    n = 0
+    do c = 1, size(bins%first) - 1
+      do i = bins%first(c) + 1, bins%first(c + 1) - 1
+        do j = bins%first(c), i - 1
+          if (all(abs(point(:, bins%item(i)) - point(:, bins%item(j))) <= near)) then
+            n = n + 1
+            exit
+          end if
+        end do
+      end do
+    end do
+  end function coinciding
+
+  !> Faces with two tetrahedra on the same side; of three at one face two are.
+  pure function overlapping_faces(n_point, tet) result(n)
+    integer, intent(in) :: n_point
+    integer, intent(in) :: tet(:, :)
+    integer :: n
+    integer, allocatable :: face(:, :), next(:), head(:)
+    integer :: f, g, m
+
+    allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)))
+    allocate (head(n_point), source=0)
+    n = 0
+    do f = 1, size(face, 2)
+      face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
+      face(:, f) = cshift(face(:, f), minloc(face(:, f), 1) - 1)
+      m = face(1, f)
+      g = head(m)
+      do while (g > 0)
+        if (all(face(:, g) == face(:, f))) n = n + 1
+        g = next(g)
+      end do
+      next(f) = head(m)
+      head(m) = f
+    end do
+  end function overlapping_faces
+
+  !> Edges of the surface that do not join just two triangles.
+  pure function bad_edges(triangle) result(n)
+    integer, intent(in) :: triangle(:, :)
+    integer :: n
+    integer, allocatable :: twin(:)
+    integer :: i
+
+    allocate (twin(size(triangle)))
+    call edge_twins([(1 + 3*i, i=0, size(triangle, 2))], reshape(triangle, [size(triangle)]), twin)
+    n = count(twin == 0)
+  end function bad_edges
+
+  !> Parts of the mesh that share no point with one another.
+  pure function pieces(n_point, tet) result(n)
+    integer, intent(in) :: n_point
+    integer, intent(in) :: tet(:, :)
+    integer :: n
+    integer, allocatable :: root(:)
+    integer :: i, k
+
+    allocate (root(n_point), source=[(i, i=1, n_point)])
+    do i = 1, size(tet, 2)
+      do k = 2, 4
+        root(top(root, tet(k, i))) = top(root, tet(1, i))
+      end do
+    end do
+    n = 0
+    do i = 1, n_point
+      if (root(i) == i) n = n + 1
+    end do
+  end function pieces
+
+  pure function top(root, i) result(r)
+    integer, intent(in) :: root(:), i
+    integer :: r
+
+    r = i
+    do while (root(r) /= r)
+      r = root(r)
+    end do
+  end function top
+
+end module mesh_check_m
