@@ -11,6 +11,7 @@ module contacts_m
   use neighbours_m, only: reserve
   use touches_m, only: touch_t, select_touching
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
     stored_energy, normal_force, tangential_force, tangential_slip
   implicit none
@@ -63,7 +64,11 @@ module contacts_m
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
     type(springs_t) :: springs                   !! the memory: part of the state of a run
     type(springs_t) :: before                    !! work: springs of the substep before
+    logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
+    type(contact_surface_t) :: surface
+    real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
+    real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     type(touch_t) :: touches
     type(touch_t) :: soon                        !! with those that may come before the substep ends
     type(groups_t) :: groups
@@ -100,7 +105,16 @@ contains
     contacts%substep_ratio = input%substep_ratio
     contacts%longest_substep = input%contact_time/20.0_wp
     contacts%courant_max = input%courant_max
-    call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
+    contacts%exact = input%model == 'surface'
+    if (contacts%exact) then
+      call contact_surface_init(input%courant_max, blocks, contacts%surface)
+      contacts%reach = contacts%surface%reach
+      contacts%smallest = contacts%surface%smallest
+    else
+      call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
+      contacts%reach = contacts%spheres%reach
+      contacts%smallest = contacts%smallest
+    end if
     n = blocks%n
     call partners_init(n, contacts%partners)
     allocate (contacts%force(3, -6:n), contacts%torque(3, -6:n), source=0.0_wp)
@@ -220,13 +234,13 @@ contains
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      speed = norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b))*contacts%spheres%reach(b)
+      speed = norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b))*contacts%reach(b)
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
     end do
     speed = sum(fastest)
-    if (.not. speed*limit <= contacts%courant_max*contacts%spheres%smallest) then
-      limit = contacts%courant_max*contacts%spheres%smallest/speed
+    if (.not. speed*limit <= contacts%courant_max*contacts%smallest) then
+      limit = contacts%courant_max*contacts%smallest/speed
     end if
   end function substep_limit
 
@@ -284,7 +298,11 @@ contains
     type(contacts_t), intent(inout) :: contacts
     integer :: b
 
-    call find_sphere_touches(walls, blocks, ahead, contacts%spheres, contacts%soon)
+    if (contacts%exact) then
+      call find_surface_touches(walls, blocks, ahead, contacts%surface, contacts%soon)
+    else
+      call find_sphere_touches(walls, blocks, ahead, contacts%spheres, contacts%soon)
+    end if
     call select_touching(contacts%soon, contacts%touches)
     call form_groups(contacts%touches, contacts%groups)
     contacts%frequency2 = 0.0_wp

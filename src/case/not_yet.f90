@@ -15,7 +15,6 @@ module not_yet_m
   end type entry_t
 
   type(entry_t), parameter :: table(*) = [ &
-    entry_t('contact', 'model', 'surface'), &
     entry_t('bed', '', '')]
 
 contains

@@ -1,0 +1,667 @@
+!> Touches of the exact surfaces of the blocks with one another and with the plane walls.
+!!
+!! A probe of one body (see `surface_features_m`) touches where it is inside the other; its depth is
+!! its distance from the surface of the other. A sharp edge touches an edge of the other where the
+!! two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
+!! points that carry it. Each depth has a fixed weight: the elastic energy is a function of
+!! position. Spheres touch as spheres, at one point.
+!!
+!! Pairs of bodies keep a list of the features that may touch until they have moved against one
+!! another by a skin. What comes out, and its order, do not depend on when the list was made.
+module contact_surface_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross, norm, rotation_matrix
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use neighbours_m, only: pair_list_t, near_pairs, reserve
+  use touches_m, only: touch_t, reserve_touches
+  use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
+    gather_facets, nearest_on_surface, segment_distance2
+  implicit none
+  private
+  public :: contact_surface_t, contact_surface_init, find_surface_touches
+
+  !> Probes of one body near the other, and the features of the other they may touch.
+  type :: probes_near_t
+    integer :: n = 0
+    integer, allocatable :: probe(:)
+    integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
+    integer :: n_facets = 0, n_edges = 0
+    integer, allocatable :: facet(:), edge(:)
+  end type probes_near_t
+
+  !> What may touch of a pair of bodies a > b, and the poses at which that was found.
+  type :: pair_t
+    integer :: a = 0, b = 0
+    real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
+    real(wp) :: valid = -1.0_wp                  !! way the bodies may move meanwhile [m]
+    real(wp) :: x_a(3) = 0.0_wp, x_b(3) = 0.0_wp, q_a(4) = 0.0_wp, q_b(4) = 0.0_wp
+    type(probes_near_t) :: of_a, of_b
+    integer :: n_crossings = 0
+    integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
+  end type pair_t
+
+  !> How far to look for features, and the lists of the search.
+  type :: search_t
+    real(wp) :: skin = 0.0_wp                    !! way bodies may move before lists are renewed [m]
+    real(wp) :: ahead = 0.0_wp                   !! longest way of a touch that comes soon [m]
+    type(near_list_t) :: guests, hosts, facets, edges
+  end type search_t
+
+  type :: contact_surface_t
+    type(surface_t), allocatable :: surface(:)   !! (shapes)
+    real(wp), allocatable :: reach(:)            !! (bodies) [m]
+    real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
+    type(search_t) :: search
+    real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
+    type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
+    integer, allocatable :: slot(:)              !! (near%n) place of each in `pairs`
+    type(pair_t), allocatable :: pairs(:)
+    logical, allocatable :: taken(:)             !! (size of pairs)
+    !> Bodies and poses of the list of pairs.
+    logical :: listed = .false.
+    logical, allocatable :: present(:)
+    real(wp), allocatable :: x(:, :), q(:, :)
+    real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
+    integer, allocatable :: old_slot(:), old_a(:), old_b(:)   !! work
+  end type contact_surface_t
+
+  real(wp), parameter :: skin_share = 0.2_wp     !! skin over the smallest d_s
+  real(wp), parameter :: wide_share = 0.15_wp    !! skin of the pairs over the largest reach
+  real(wp), parameter :: beside = 0.15_wp        !! sine of the angle by which a normal may leave the
+                                                 !! fan of an edge; its touch fades out on the way
+  real(wp), parameter :: least_sine2 = 1.0e-4_wp !! square of the sine of the angle of two edges
+
+contains
+
+  !> Make the features of all shapes and size the lists.
+  subroutine contact_surface_init(courant_max, blocks, self)
+    real(wp), intent(in) :: courant_max   !! C_s of eq. (6): bodies move less in a substep, over d_s
+    type(blocks_t), intent(in) :: blocks
+    type(contact_surface_t), intent(out) :: self
+    integer :: s, b
+
+    allocate (self%surface(size(blocks%shapes)))
+    do s = 1, size(blocks%shapes)
+      call surface_init(blocks%shapes(s), self%surface(s))
+    end do
+    allocate (self%reach(blocks%n), self%present(blocks%n))
+    allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
+    allocate (self%pairs(0), self%taken(0))
+    self%smallest = huge(1.0_wp)
+    do b = 1, blocks%n
+      self%reach(b) = self%surface(blocks%shape(b))%reach
+      self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
+    end do
+    if (blocks%n == 0) return
+    self%search%skin = skin_share*self%smallest
+    self%search%ahead = courant_max*self%smallest
+    self%wide_skin = wide_share*maxval(self%reach)
+  end subroutine contact_surface_init
+
+  !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.
+  subroutine find_surface_touches(walls, blocks, ahead, self, touches)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
+    type(contact_surface_t), intent(inout) :: self
+    type(touch_t), intent(inout) :: touches
+    integer :: a, b, p, w
+
+    do b = 1, blocks%n
+      if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
+    end do
+    if (pairs_may_be_missing(self, blocks)) call list_pairs(walls, blocks, self)
+    touches%n = 0
+    p = 1
+    do a = 1, blocks%n
+      if (.not. blocks%present(a)) cycle
+      if (.not. blocks%fixed(a)) then
+        do w = 1, walls%n
+          call touch_wall(walls, blocks, a, w, ahead, self, touches)
+        end do
+      end if
+      do while (p <= self%near%n)
+        if (self%near%a(p) /= a) exit
+        b = self%near%b(p)
+        if (.not. (blocks%fixed(a) .and. blocks%fixed(b))) then
+          call touch_pair(blocks, ahead, self%reach, self%turn, self%surface, self%search, &
+            self%pairs(self%slot(p)), touches)
+        end if
+        p = p + 1
+      end do
+    end do
+  end subroutine find_surface_touches
+
+  !> Whether a pair may have come near that is not in the list.
+  pure function pairs_may_be_missing(self, blocks) result(yes)
+    type(contact_surface_t), intent(in) :: self
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+    integer :: b
+
+    yes = .true.
+    if (.not. self%listed) return
+    do b = 1, blocks%n
+      if (blocks%present(b) .neqv. self%present(b)) return
+      if (.not. blocks%present(b)) cycle
+      if (norm(blocks%x(:, b) - self%x(:, b)) > 0.5_wp*(self%wide_skin - self%search%ahead)) return
+    end do
+    yes = .false.
+  end function pairs_may_be_missing
+
+  !> List the pairs of bodies whose bounding spheres may meet before a body has moved far; pairs
+  !! that were listed before keep their place.
+  subroutine list_pairs(walls, blocks, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contact_surface_t), intent(inout) :: self
+    integer :: p, m, n_old, place
+
+    n_old = self%near%n
+    call reserve(n_old, self%old_slot)
+    call reserve(n_old, self%old_a)
+    call reserve(n_old, self%old_b)
+    if (n_old > 0) then
+      self%old_slot(:n_old) = self%slot(:n_old)
+      self%old_a(:n_old) = self%near%a(:n_old)
+      self%old_b(:n_old) = self%near%b(:n_old)
+    end if
+    call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%wide_skin, self%near)
+    call reserve(self%near%n, self%slot)
+    self%taken = .false.
+    m = 1
+    do p = 1, self%near%n
+      self%slot(p) = 0
+      do while (m <= n_old)
+        if (self%old_a(m) > self%near%a(p)) exit
+        if (self%old_a(m) == self%near%a(p) .and. self%old_b(m) >= self%near%b(p)) exit
+        m = m + 1
+      end do
+      if (m > n_old) cycle
+      if (self%old_a(m) /= self%near%a(p) .or. self%old_b(m) /= self%near%b(p)) cycle
+      self%slot(p) = self%old_slot(m)
+      self%taken(self%slot(p)) = .true.
+    end do
+    place = 1
+    do p = 1, self%near%n
+      if (self%slot(p) == 0) then
+        do while (place <= size(self%taken))
+          if (.not. self%taken(place)) exit
+          place = place + 1
+        end do
+        call reserve_pairs(place, self)
+        self%taken(place) = .true.
+        self%slot(p) = place
+        self%pairs(place)%a = self%near%a(p)
+        self%pairs(place)%b = self%near%b(p)
+        self%pairs(place)%valid = -1.0_wp
+      end if
+      associate (pair => self%pairs(self%slot(p)))
+        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) pair%valid = -1.0_wp
+        pair%shift = self%near%shift(:, p)
+      end associate
+    end do
+    self%listed = .true.
+    self%present = blocks%present
+    self%x = blocks%x
+    self%q = blocks%q
+  end subroutine list_pairs
+
+  !> Make room for n pairs.
+  subroutine reserve_pairs(n, self)
+    integer, intent(in) :: n
+    type(contact_surface_t), intent(inout) :: self
+    type(pair_t), allocatable :: longer(:)
+    logical, allocatable :: longer_taken(:)
+    integer :: m
+
+    m = size(self%pairs)
+    if (n <= m) return
+    allocate (longer(max(n, 2*m, 16)))
+    longer(:m) = self%pairs
+    call move_alloc(longer, self%pairs)
+    allocate (longer_taken(size(self%pairs)), source=.false.)
+    longer_taken(:m) = self%taken
+    call move_alloc(longer_taken, self%taken)
+  end subroutine reserve_pairs
+
+  !> Touches of body a and wall w: its corners, or its lowest point where it is a sphere.
+  subroutine touch_wall(walls, blocks, a, w, ahead, self, touches)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, w
+    real(wp), intent(in) :: ahead   !! [s]
+    type(contact_surface_t), intent(in) :: self
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: above, gap, n(3), depth, arm(3)
+    integer :: i
+
+    above = walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, a))
+    if (above > self%reach(a) + self%search%ahead) return
+    gap = ahead*(norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a))
+    associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
+      if (above > self%reach(a) + gap) return
+      n = matmul(walls%normal(:, w), turn)
+      if (surface%ball > 0.0_wp) then
+        arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
+        call add_touch(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], walls%normal(:, w), &
+          surface%ball - above, 1.0_wp, surface%length, touches)
+        return
+      end if
+      do i = 1, surface%n_corners
+        depth = dot_product(n, surface%probe(:, i)) - above
+        if (depth <= -gap) cycle
+        arm = matmul(turn, surface%probe(:, i))
+        call add_touch(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], walls%normal(:, w), &
+          depth, surface%weight(i), surface%length, touches)
+      end do
+    end associate
+  end subroutine touch_wall
+
+  !> Append a touch.
+  subroutine add_touch(a, b, key, arm_a, arm_b, normal, depth, weight, length, touches)
+    integer, intent(in) :: a, b, key
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres [m]
+    real(wp), intent(in) :: normal(3)            !! from a to b
+    real(wp), intent(in) :: depth, weight, length   !! [m, -, m]
+    type(touch_t), intent(inout) :: touches
+    integer :: t
+
+    t = touches%n + 1
+    call reserve_touches(t, touches)
+    touches%n = t
+    touches%a(t) = a
+    touches%b(t) = b
+    touches%key(t) = key
+    touches%arm_a(:, t) = arm_a
+    touches%arm_b(:, t) = arm_b
+    touches%normal(:, t) = normal
+    touches%depth(t) = depth
+    touches%weight(t) = weight
+    touches%length(t) = length
+  end subroutine add_touch
+
+  !> Touches of a pair of bodies: probes of b, probes of a, crossing edges.
+  subroutine touch_pair(blocks, ahead, reach, turns, surface, search, pair, touches)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead                !! [s]
+    real(wp), intent(in) :: reach(:)             !! (bodies) [m]
+    real(wp), intent(in) :: turns(:, :, :)       !! (3, 3, bodies) body to space
+    type(surface_t), intent(in) :: surface(:)    !! (shapes)
+    type(search_t), intent(inout) :: search
+    type(pair_t), intent(inout) :: pair
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: to_b(3), gap, turn(3, 3), x(3)
+    integer :: a, b
+
+    a = pair%a
+    b = pair%b
+    if (way_since(blocks, reach, pair) > pair%valid) call list_features(blocks, turns, &
+      surface, search, pair)
+    if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
+    to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
+    gap = ahead*(norm(blocks%v(:, a) - blocks%v(:, b)) &
+      + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b))
+    associate (surface_a => surface(blocks%shape(a)), &
+      surface_b => surface(blocks%shape(b)), turn_a => turns(:, :, a), &
+      turn_b => turns(:, :, b))
+      if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
+        call touch_balls(a, b, to_b, gap, surface_a, surface_b, touches)
+        return
+      end if
+      turn = matmul(transpose(turn_b), turn_a)
+      x = matmul(-to_b, turn_b)
+      call touch_probes(.false., a, b, turn_a, to_b, transpose(turn), matmul(to_b, turn_a), gap, &
+        surface_b, surface_a, pair%of_b, touches)
+      call touch_probes(.true., a, b, turn_b, to_b, turn, x, gap, surface_a, surface_b, pair%of_a, &
+        touches)
+      call touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
+    end associate
+  end subroutine touch_pair
+
+  !> Largest way that points of the two bodies have moved since their features were listed [m].
+  pure function way_since(blocks, reach, pair) result(way)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: reach(:)
+    type(pair_t), intent(in) :: pair
+    real(wp) :: way
+
+    ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
+    associate (a => pair%a, b => pair%b)
+      way = norm((blocks%x(:, a) - pair%x_a) - (blocks%x(:, b) - pair%x_b)) &
+        + 2*reach(a)*norm2(blocks%q(:, a) - pair%q_a) + 2*reach(b)*norm2(blocks%q(:, b) - pair%q_b)
+    end associate
+  end function way_since
+
+  !> The one touch of two spheres.
+  subroutine touch_balls(a, b, to_b, gap, surface_a, surface_b, touches)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: to_b(3), gap   !! from the centre of a to that of b; [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: distance, depth, normal(3), arm(3)
+
+    distance = norm(to_b)
+    depth = surface_a%ball + surface_b%ball - distance
+    if (depth <= -gap) return
+    normal = to_b/max(distance, tiny(1.0_wp))
+    arm = (surface_a%ball - 0.5_wp*depth)*normal
+    call add_touch(a, b, 1, arm, arm - to_b, normal, depth, 1.0_wp, &
+      min(surface_a%length, surface_b%length), touches)
+  end subroutine touch_balls
+
+  !> Touches of the listed probes of one body (the guest) with the surface of the other (the host).
+  subroutine touch_probes(guest_is_a, a, b, turn_host, to_b, turn, x, gap, guest, host, list, &
+      touches)
+    logical, intent(in) :: guest_is_a
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: turn_host(3, 3)   !! host axes to space
+    real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! guest to host axes: turn.p + x [-], [m]
+    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    type(surface_t), intent(in) :: guest, host
+    type(probes_near_t), intent(in) :: list
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: place(3), distance, depth, outward(3), arm(3)
+    integer :: m, i
+
+    do m = 1, list%n
+      i = list%probe(m)
+      place = x + turn(:, 1)*guest%probe(1, i) + turn(:, 2)*guest%probe(2, i) &
+        + turn(:, 3)*guest%probe(3, i)
+      call nearest_on_surface(host, place, list%facet(list%facet_first(m): &
+        list%facet_first(m + 1) - 1), list%edge(list%edge_first(m):list%edge_first(m + 1) - 1), &
+        distance, outward)
+      depth = guest%ball - distance
+      if (depth <= -gap) cycle
+      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*depth)*outward)
+      outward = matmul(turn_host, outward)
+      if (guest_is_a) then
+        call add_touch(a, b, i, arm + to_b, arm, -outward, depth, guest%weight(i), &
+          min(guest%length, host%length), touches)
+      else
+        call add_touch(a, b, i - size(guest%weight) - 1, arm, arm - to_b, outward, depth, &
+          guest%weight(i), min(guest%length, host%length), touches)
+      end if
+    end do
+  end subroutine touch_probes
+
+  !> Touches of the listed pairs of edges that cross.
+  !!
+  !! Two edges touch along n, the normal of both lines, if n lies in the fan of outward normals of
+  !! each (the normals between those of its two facets) and if the deepest place of each in the
+  !! other lies between its ends.
+  subroutine touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
+    real(wp), intent(in) :: turn_b(3, 3)      !! axes of b to space
+    real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
+    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(pair_t), intent(in) :: pair
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: p(3), u(3), d(3), n(3), sine2, sine, s, t, depth, weight, length, arm(3)
+    real(wp) :: peak_a, peak_b
+    integer :: m, i, j, last
+
+    length = min(surface_a%length, surface_b%length)
+    last = 0
+    p = 0.0_wp
+    u = 0.0_wp
+    do m = 1, pair%n_crossings
+      i = pair%edge_a(m)
+      j = pair%edge_b(m)
+      if (i /= last) then
+        p = x + matmul(turn, surface_a%start(:, i))
+        u = matmul(turn, surface_a%along(:, i))
+        last = i
+      end if
+      associate (w => surface_b%along(:, j))
+        d = surface_b%start(:, j) - p
+        n = cross(u, w)
+        sine2 = dot_product(n, n)
+        if (sine2 < least_sine2) cycle
+        sine = sqrt(sine2)
+        s = dot_product(cross(d, w), n)/sine2
+        t = dot_product(cross(d, u), n)/sine2
+        n = n/sign(sine, -dot_product(n, surface_b%outward(:, 2, j)))
+        depth = -dot_product(d, n)
+        if (depth <= -gap .or. depth >= length) cycle
+        weight = fade_beside(matmul(n, turn), surface_a%into(:, :, i)) &
+          *fade_beside(-n, surface_b%into(:, :, j))
+        if (weight <= 0.0_wp) cycle
+        peak_a = s + depth*lean(n, u, surface_b%into(:, :, j))
+        peak_b = t + depth*lean(matmul(-n, turn), matmul(w, turn), surface_a%into(:, :, i))
+        weight = weight*fade_at_ends(peak_a, surface_a%extent(i), depth) &
+          *fade_at_ends(peak_b, surface_b%extent(j), depth)
+        if (weight <= 0.0_wp) cycle
+        arm = p + s*u - 0.5_wp*depth*n
+        arm = matmul(turn_b, arm)
+        n = matmul(turn_b, n)
+        call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, n, depth, &
+          weight, length, touches)
+      end associate
+    end do
+  end subroutine touch_edges
+
+  !> From the place of an edge nearest to a crossing edge of the host to the place where it is
+  !! deepest between the two facets there, over the depth [-].
+  !!
+  !! Below facet i, whose outward normal is n_i, lies the place s at depth*(n.n_i) + s (u.n_i); the
+  !! two are equal at the deepest place.
+  pure function lean(n, u, into) result(way)
+    real(wp), intent(in) :: n(3)         !! out of the guest, into the host; normal to both edges
+    real(wp), intent(in) :: u(3)         !! along the edge of the guest
+    real(wp), intent(in) :: into(3, 2)   !! across the edge of the host, into its facets
+    real(wp) :: way
+    real(wp) :: facing(2), slope(2), square
+
+    ! the normal of facet 1 is in the plane of the two directions `into`, at right angles to its own
+    square = dot_product(into(:, 1), into(:, 2))
+    facing(1) = square*dot_product(n, into(:, 1)) - dot_product(n, into(:, 2))
+    facing(2) = square*dot_product(n, into(:, 2)) - dot_product(n, into(:, 1))
+    slope(1) = square*dot_product(u, into(:, 1)) - dot_product(u, into(:, 2))
+    slope(2) = square*dot_product(u, into(:, 2)) - dot_product(u, into(:, 1))
+    way = 0.0_wp
+    if (abs(slope(1) - slope(2)) > 0.0_wp) way = -(facing(1) - facing(2))/(slope(1) - slope(2))
+  end function lean
+
+  !> One along an edge, falling to zero where its deepest place comes to an end: there the corner
+  !! touches instead.
+  pure function fade_at_ends(place, extent, depth) result(part)
+    real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
+    real(wp), intent(in) :: depth           !! [m]
+    real(wp) :: part
+    real(wp), parameter :: of_depth = 0.25_wp, of_extent = 0.01_wp
+
+    part = min(place, extent - place)/max(of_depth*depth, of_extent*extent)
+    part = max(0.0_wp, min(1.0_wp, part))
+  end function fade_at_ends
+
+  !> One where a normal is in the fan of an edge, falling to zero beside it.
+  pure function fade_beside(normal, into) result(part)
+    real(wp), intent(in) :: normal(3), into(3, 2)   !! body axes
+    real(wp) :: part
+
+    part = min(1.0_wp, 1.0_wp - max(dot_product(normal, into(:, 1)), &
+      dot_product(normal, into(:, 2)))/beside)
+    part = max(0.0_wp, part)
+  end function fade_beside
+
+  !> List what may touch of a pair before the bodies have moved by the skin.
+  subroutine list_features(blocks, turns, surface, search, pair)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: turns(:, :, :)       !! (3, 3, bodies) body to space
+    type(surface_t), intent(in) :: surface(:)    !! (shapes)
+    type(search_t), intent(inout) :: search
+    type(pair_t), intent(inout) :: pair
+    real(wp) :: turn(3, 3), x_a(3), x_b(3), to_b(3), apart
+
+    pair%x_a = blocks%x(:, pair%a)
+    pair%x_b = blocks%x(:, pair%b)
+    pair%q_a = blocks%q(:, pair%a)
+    pair%q_b = blocks%q(:, pair%b)
+    pair%of_a%n = 0
+    pair%of_b%n = 0
+    pair%n_crossings = 0
+    to_b = pair%x_b + pair%shift - pair%x_a
+    associate (a => surface(blocks%shape(pair%a)), b => surface(blocks%shape(pair%b)))
+      apart = norm(to_b) - a%reach - b%reach - search%ahead
+      pair%valid = max(apart, search%skin)
+      if (apart > search%skin) return
+      if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
+        pair%n_crossings = 1   ! the two spheres
+        return
+      end if
+      turn = matmul(transpose(turns(:, :, pair%b)), turns(:, :, pair%a))
+      x_b = matmul(-to_b, turns(:, :, pair%b))
+      x_a = matmul(to_b, turns(:, :, pair%a))
+      call list_probes(transpose(turn), x_a, b, a, search, pair%of_b)
+      call list_probes(turn, x_b, a, b, search, pair%of_a)
+      call list_crossings(turn, x_b, a, b, search, pair)
+    end associate
+  end subroutine list_features
+
+  !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
+  !! may be nearest to it before the bodies have moved by the skin.
+  subroutine list_probes(turn, x, guest, host, search, list)
+    real(wp), intent(in) :: turn(3, 3), x(3)   !! guest to host axes: turn.p + x [-], [m]
+    type(surface_t), intent(in) :: guest, host
+    type(search_t), intent(inout) :: search
+    type(probes_near_t), intent(inout) :: list
+    real(wp) :: margin, place(3), distance, outward(3), low(3), high(3), reach
+    integer :: m
+
+    list%n_facets = 0
+    list%n_edges = 0
+    if (host%ball > 0.0_wp) return   ! its own centre is the probe
+    margin = search%skin + search%ahead + guest%ball
+    call box_in_axes(transpose(turn), -matmul(x, turn), host%low - margin, host%high + margin, &
+      low, high)
+    call gather_probes(guest, low, high, search%guests)
+    do m = 1, search%guests%n
+      place = x + matmul(turn, guest%probe(:, search%guests%item(m)))
+      if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
+      call search_surface(host, place, margin, search, distance, outward)
+      if (distance > margin) cycle
+      reach = abs(distance) + 2*(search%skin + search%ahead)
+      call gather_facets(host, place - reach, place + reach, search%facets)
+      call gather_edges(host, place - reach, place + reach, search%edges)
+      call append(place, reach, search%guests%item(m), host, search, list)
+    end do
+    call reserve(list%n + 1, list%facet_first)
+    call reserve(list%n + 1, list%edge_first)
+    list%facet_first(list%n + 1) = list%n_facets + 1
+    list%edge_first(list%n + 1) = list%n_edges + 1
+  end subroutine list_probes
+
+  !> Box around a box given in other axes.
+  pure subroutine box_in_axes(turn, x, low, high, new_low, new_high)
+    real(wp), intent(in) :: turn(3, 3), x(3)          !! the other axes to these: turn.p + x
+    real(wp), intent(in) :: low(3), high(3)           !! [m]
+    real(wp), intent(out) :: new_low(3), new_high(3)  !! [m]
+    real(wp) :: middle(3), half(3)
+
+    middle = x + matmul(turn, 0.5_wp*(low + high))
+    half = matmul(abs(turn), 0.5_wp*(high - low))
+    new_low = middle - half
+    new_high = middle + half
+  end subroutine box_in_axes
+
+  !> Signed distance of a point from the surface of the host, searched in a growing box: exact.
+  subroutine search_surface(host, place, begin, search, distance, outward)
+    type(surface_t), intent(in) :: host
+    real(wp), intent(in) :: place(3), begin   !! host axes; half the first box [m]
+    type(search_t), intent(inout) :: search
+    real(wp), intent(out) :: distance, outward(3)
+    real(wp) :: reach
+
+    reach = begin
+    do
+      call gather_facets(host, place - reach, place + reach, search%facets)
+      call gather_edges(host, place - reach, place + reach, search%edges)
+      call nearest_on_surface(host, place, search%facets%item(:search%facets%n), &
+        search%edges%item(:search%edges%n), distance, outward)
+      if (abs(distance) <= reach .or. reach > 2*host%reach) return
+      reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
+    end do
+  end subroutine search_surface
+
+  !> Append a probe with those of the gathered facets and edges that are within reach.
+  subroutine append(place, reach, probe, host, search, list)
+    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    integer, intent(in) :: probe
+    type(surface_t), intent(in) :: host
+    type(search_t), intent(in) :: search
+    type(probes_near_t), intent(inout) :: list
+    real(wp) :: d(3)
+    integer :: m, c
+
+    list%n = list%n + 1
+    call reserve(list%n, list%probe)
+    call reserve(list%n, list%facet_first)
+    call reserve(list%n, list%edge_first)
+    list%probe(list%n) = probe
+    list%facet_first(list%n) = list%n_facets + 1
+    list%edge_first(list%n) = list%n_edges + 1
+    facets: do m = 1, search%facets%n
+      associate (f => search%facets%item(m))
+        if (abs(dot_product(host%normal(:, f), place) - host%offset(f)) > reach) cycle
+        do c = host%side(f), host%side(f + 1) - 1
+          if (dot_product(host%side_normal(:, c), place) < host%side_offset(c) - reach) cycle facets
+        end do
+        list%n_facets = list%n_facets + 1
+        call reserve(list%n_facets, list%facet)
+        list%facet(list%n_facets) = f
+      end associate
+    end do facets
+    do m = 1, search%edges%n
+      associate (e => search%edges%item(m))
+        d = place - host%start(:, e)
+        d = d - min(max(dot_product(d, host%along(:, e)), 0.0_wp), host%extent(e))*host%along(:, e)
+        if (dot_product(d, d) > reach**2) cycle
+        list%n_edges = list%n_edges + 1
+        call reserve(list%n_edges, list%edge)
+        list%edge(list%n_edges) = e
+      end associate
+    end do
+  end subroutine append
+
+  !> Pairs of convex edges that may cross before the bodies have moved by the skin.
+  subroutine list_crossings(turn, x, surface_a, surface_b, search, pair)
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(search_t), intent(inout) :: search
+    type(pair_t), intent(inout) :: pair
+    real(wp) :: reach, low(3), high(3), p(3), u(3)
+    integer :: m, k, i, j
+
+    if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
+    reach = search%skin + search%ahead + min(surface_a%length, surface_b%length)
+    call box_in_axes(transpose(turn), -matmul(x, turn), surface_b%low - reach, &
+      surface_b%high + reach, low, high)
+    call gather_edges(surface_a, low, high, search%guests)
+    do m = 1, search%guests%n
+      i = search%guests%item(m)
+      if (i > surface_a%n_convex) exit
+      p = x + matmul(turn, surface_a%start(:, i))
+      u = matmul(turn, surface_a%along(:, i))
+      low = min(p, p + surface_a%extent(i)*u) - reach
+      high = max(p, p + surface_a%extent(i)*u) + reach
+      if (any(low > surface_b%high) .or. any(high < surface_b%low)) cycle
+      call gather_edges(surface_b, low, high, search%hosts)
+      do k = 1, search%hosts%n
+        j = search%hosts%item(k)
+        if (j > surface_b%n_convex) exit
+        if (segment_distance2(p, u, surface_a%extent(i), surface_b%start(:, j), &
+                              surface_b%along(:, j), surface_b%extent(j)) > reach**2) cycle
+        pair%n_crossings = pair%n_crossings + 1
+        call reserve(pair%n_crossings, pair%edge_a)
+        call reserve(pair%n_crossings, pair%edge_b)
+        pair%edge_a(pair%n_crossings) = i
+        pair%edge_b(pair%n_crossings) = j
+      end do
+    end do
+  end subroutine list_crossings
+
+end module contact_surface_m

@@ -1,0 +1,501 @@
+!> The exact surface of a shape, made ready for contact: what can touch, and what can be touched.
+!!
+!! What can touch are probes (corners, and points inside large flat faces) and sharp convex edges.
+!! What is touched is the surface itself: flat convex facets and the edges between them, from which
+!! the signed distance of a point follows exactly. Body axes, origin at the centre of mass.
+module surface_features_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross, norm
+  use tet_mesh_m, only: shape_t
+  use neighbours_m, only: bins_t, bins_build, reserve
+  implicit none
+  private
+  public :: surface_t, surface_init, near_list_t, gather_probes, gather_edges, gather_facets, &
+    nearest_on_surface, segment_distance2, nowhere
+
+  type :: surface_t
+    real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
+    real(wp) :: reach = 0.0_wp                   !! of the sphere about the origin around it [m]
+    real(wp) :: length = 0.0_wp                  !! d_s of the contact Courant number, eq. (6) [m]
+    real(wp) :: low(3) = 0.0_wp, high(3) = 0.0_wp    !! bounding box [m]
+    real(wp), allocatable :: probe(:, :)         !! (3, n) points that touch; sphere: its centre [m]
+    real(wp), allocatable :: weight(:)           !! (n) share of the stiffness [-]
+    integer :: n_corners = 0                     !! the first probes are corners
+    !> Facets: normal.x = offset; inside where side_normal.x >= side_offset for all of its sides.
+    real(wp), allocatable :: normal(:, :), offset(:)              !! (3, n) outward, (n) [m]
+    integer, allocatable :: side(:)              !! (n + 1) first side of each facet
+    real(wp), allocatable :: side_normal(:, :), side_offset(:)    !! (3, :), (:) [m]
+    !> Edges that are not flat, convex ones first; from `start` along the unit vector `along`.
+    integer :: n_convex = 0
+    real(wp), allocatable :: start(:, :), along(:, :), extent(:)  !! (3, n), (3, n), (n) [m]
+    real(wp), allocatable :: into(:, :, :)       !! (3, 2, n) in each facet, across, into it [-]
+    !> (3, 3, n) sign of a distance: vectors that point outward at the start, between, at the end.
+    real(wp), allocatable :: outward(:, :, :)
+    logical, allocatable :: juts(:, :)           !! (2, n) start, end: the corner there touches
+    type(bins_t) :: probes, facets, edges
+  end type surface_t
+
+  !> Numbers found by a search, each once, ascending.
+  type :: near_list_t
+    integer :: n = 0
+    integer, allocatable :: item(:)
+    integer, allocatable, private :: mark(:)     !! search in which each item was seen last
+    integer, private :: search = 0
+  end type near_list_t
+
+  real(wp), parameter :: nowhere = 1.0e30_wp   !! distance from nothing [m]
+  real(wp), parameter :: sharp = 0.02_wp       !! sine by which facets differ at a sharp edge
+  real(wp), parameter :: flat_sum = 4.0_wp     !! weight of all corners of a flat face together
+  real(wp), parameter :: face_sum = 1.0_wp     !! weight of all points inside a flat face
+  real(wp), parameter :: inset = 0.36_wp       !! way of these points from the corner to the middle
+  real(wp), parameter :: large = 0.01_wp       !! share of the surface of a face that has them
+
+contains
+
+  !> Features of a shape.
+  subroutine surface_init(shape, surface)
+    type(shape_t), intent(in) :: shape
+    type(surface_t), intent(out) :: surface
+    integer, allocatable :: edge(:, :)
+    real(wp), allocatable :: point_normal(:, :)
+    logical, allocatable :: juts(:)
+
+    if (shape%kind == 'sphere') then
+      surface%ball = shape%sphere_radius(1)
+      surface%reach = surface%ball
+      surface%length = 2*surface%ball
+      allocate (surface%probe(3, 1), source=0.0_wp)
+      allocate (surface%weight(1), source=1.0_wp)
+      return
+    end if
+    surface%length = 0.25_wp*shape%smallest_edge
+    call make_facets(shape, surface)
+    call pair_edges(shape, edge)
+    call outward_at_points(shape, surface%normal, point_normal)
+    call find_corners(shape, edge, point_normal, juts)
+    call make_edges(shape, edge, point_normal, juts, surface)
+    call make_probes(shape, juts, surface)
+    call sort_into_bins(shape, surface)
+  end subroutine surface_init
+
+  !> Planes and sides of the facets.
+  pure subroutine make_facets(shape, surface)
+    type(shape_t), intent(in) :: shape
+    type(surface_t), intent(inout) :: surface
+    real(wp) :: p(3), next(3), middle(3)
+    integer :: f, c, n, m
+
+    n = size(shape%facet) - 1
+    surface%side = shape%facet
+    allocate (surface%normal(3, n), surface%offset(n))
+    allocate (surface%side_normal(3, size(shape%facet_point)))
+    allocate (surface%side_offset(size(shape%facet_point)))
+    do f = 1, n
+      surface%normal(:, f) = facet_normal(shape, f)
+      m = shape%facet(f + 1) - shape%facet(f)
+      middle = sum(shape%point(:, corners(shape, f)), 2)/real(m, wp)
+      surface%offset(f) = dot_product(surface%normal(:, f), middle)
+      do c = shape%facet(f), shape%facet(f + 1) - 1
+        p = shape%point(:, shape%facet_point(c))
+        next = shape%point(:, next_corner(shape, f, c))
+        surface%side_normal(:, c) = cross(surface%normal(:, f), (next - p)/norm(next - p))
+        surface%side_offset(c) = dot_product(surface%side_normal(:, c), p)
+      end do
+    end do
+  end subroutine make_facets
+
+  !> Numbers of the corners of facet f.
+  pure function corners(shape, f) result(p)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: f
+    integer :: p(shape%facet(f + 1) - shape%facet(f))
+
+    p = shape%facet_point(shape%facet(f):shape%facet(f + 1) - 1)
+  end function corners
+
+  !> The corner of facet f after place c of `facet_point`.
+  pure function next_corner(shape, f, c) result(p)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: f, c
+    integer :: p
+
+    p = shape%facet_point(merge(c + 1, shape%facet(f), c + 1 < shape%facet(f + 1)))
+  end function next_corner
+
+  !> Twice the area of facet f times its outward unit normal, without the length: the unit normal.
+  pure function facet_normal(shape, f) result(normal)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: f
+    real(wp) :: normal(3)
+
+    normal = area_vector(shape, f)
+    normal = normal/norm(normal)
+  end function facet_normal
+
+  !> Area of facet f times its outward unit normal [m2].
+  pure function area_vector(shape, f) result(area)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: f
+    real(wp) :: area(3)
+    real(wp) :: p(3)
+    integer :: c
+
+    p = shape%point(:, shape%facet_point(shape%facet(f)))
+    area = 0.0_wp
+    do c = shape%facet(f) + 1, shape%facet(f + 1) - 2
+      area = area + 0.5_wp*cross(shape%point(:, shape%facet_point(c)) - p, &
+        shape%point(:, shape%facet_point(c + 1)) - p)
+    end do
+  end function area_vector
+
+  !> Edges of the net of facets, each once: start, end, the facet that runs it that way, the other.
+  pure subroutine pair_edges(shape, edge)
+    type(shape_t), intent(in) :: shape
+    integer, allocatable, intent(out) :: edge(:, :)   !! (4, edges)
+    integer, allocatable :: head(:), chain(:), found(:, :)
+    integer :: f, c, a, b, e, n
+
+    allocate (found(4, size(shape%facet_point)), chain(size(shape%facet_point)))
+    allocate (head(size(shape%point, 2)), source=0)   ! edges by their lower corner
+    n = 0
+    do f = 1, size(shape%facet) - 1
+      do c = shape%facet(f), shape%facet(f + 1) - 1
+        a = shape%facet_point(c)
+        b = next_corner(shape, f, c)
+        e = head(min(a, b))
+        do while (e > 0)
+          if (found(1, e) == b .and. found(2, e) == a .and. found(4, e) == 0) exit
+          e = chain(e)
+        end do
+        if (e > 0) then
+          found(4, e) = f
+        else
+          n = n + 1
+          found(:, n) = [a, b, f, 0]
+          chain(n) = head(min(a, b))
+          head(min(a, b)) = n
+        end if
+      end do
+    end do
+    edge = found(:, :n)
+  end subroutine pair_edges
+
+  !> Sum of the normals of the facets at each point, weighted by their angle there: it points
+  !! outward as seen from any place nearest to that point (Baerentzen and Aanaes, 2005).
+  pure subroutine outward_at_points(shape, normal, point_normal)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: normal(:, :)                       !! (3, facets)
+    real(wp), allocatable, intent(out) :: point_normal(:, :)   !! (3, points)
+    real(wp) :: p(3), u(3), w(3)
+    integer :: f, c, before
+
+    allocate (point_normal(3, size(shape%point, 2)), source=0.0_wp)
+    do f = 1, size(normal, 2)
+      before = shape%facet(f + 1) - 1
+      do c = shape%facet(f), shape%facet(f + 1) - 1
+        p = shape%point(:, shape%facet_point(c))
+        u = shape%point(:, next_corner(shape, f, c)) - p
+        w = shape%point(:, shape%facet_point(before)) - p
+        associate (sum_here => point_normal(:, shape%facet_point(c)))
+          sum_here = sum_here + atan2(norm(cross(u, w)), dot_product(u, w))*normal(:, f)
+        end associate
+        before = c
+      end do
+    end do
+  end subroutine outward_at_points
+
+  !> Corners that stick out: all edges fall away from them.
+  pure subroutine find_corners(shape, edge, point_normal, juts)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: edge(:, :)             !! (4, edges)
+    real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
+    logical, allocatable, intent(out) :: juts(:)  !! (points)
+    real(wp), parameter :: jut = 0.01_wp          !! sine by which edges fall away from a corner
+    real(wp) :: along(3)
+    integer :: e, c
+
+    allocate (juts(size(shape%point, 2)))
+    juts = norm2(point_normal, 1) > 0.0_wp
+    do e = 1, size(edge, 2)
+      along = shape%point(:, edge(2, e)) - shape%point(:, edge(1, e))
+      along = along/norm(along)
+      do c = 1, 2
+        associate (outward => point_normal(:, edge(c, e)))
+          if (dot_product(along, outward) > -jut*norm(outward)) juts(edge(c, e)) = .false.
+        end associate
+        along = -along
+      end do
+    end do
+  end subroutine find_corners
+
+  !> The edges that are not flat.
+  pure subroutine make_edges(shape, edge, point_normal, juts, surface)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: edge(:, :)             !! (4, edges)
+    real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
+    logical, intent(in) :: juts(:)                !! (points)
+    type(surface_t), intent(inout) :: surface
+    integer :: bend(size(edge, 2))
+    integer :: e, m, wanted
+
+    do e = 1, size(edge, 2)
+      bend(e) = bend_of(shape, edge(:, e), surface%normal)
+    end do
+    m = count(bend /= 0)
+    allocate (surface%start(3, m), surface%along(3, m), surface%extent(m))
+    allocate (surface%into(3, 2, m), surface%outward(3, 3, m), surface%juts(2, m))
+    surface%n_convex = count(bend > 0)
+    m = 0
+    do wanted = 1, -1, -2   ! convex, then reentrant
+      do e = 1, size(edge, 2)
+        if (bend(e) /= wanted) cycle
+        m = m + 1
+        surface%start(:, m) = shape%point(:, edge(1, e))
+        surface%along(:, m) = shape%point(:, edge(2, e)) - surface%start(:, m)
+        surface%extent(m) = norm(surface%along(:, m))
+        surface%along(:, m) = surface%along(:, m)/surface%extent(m)
+        surface%into(:, 1, m) = cross(surface%normal(:, edge(3, e)), surface%along(:, m))
+        surface%into(:, 2, m) = -cross(surface%normal(:, edge(4, e)), surface%along(:, m))
+        surface%juts(:, m) = juts(edge(1:2, e))
+        surface%outward(:, 1, m) = point_normal(:, edge(1, e))
+        surface%outward(:, 2, m) = surface%normal(:, edge(3, e)) + surface%normal(:, edge(4, e))
+        surface%outward(:, 3, m) = point_normal(:, edge(2, e))
+      end do
+    end do
+  end subroutine make_edges
+
+  !> 1: the edge is convex and sharp, -1: reentrant or convex but not sharp, 0: flat or open.
+  pure function bend_of(shape, edge, normal) result(bend)
+    type(shape_t), intent(in) :: shape
+    integer, intent(in) :: edge(4)
+    real(wp), intent(in) :: normal(:, :)          !! (3, facets)
+    integer :: bend
+    real(wp), parameter :: flat = 1.0e-9_wp
+    real(wp) :: along(3), fall
+
+    bend = 0
+    if (edge(4) == 0) return
+    along = shape%point(:, edge(2)) - shape%point(:, edge(1))
+    along = along/norm(along)
+    fall = dot_product(normal(:, edge(3)), cross(normal(:, edge(4)), along))
+    if (abs(fall) < flat .and. dot_product(normal(:, edge(3)), normal(:, edge(4))) > 0.0_wp) return
+    bend = merge(1, -1, fall > sharp)
+  end function bend_of
+
+  !> Corners that stick out, and points inside large faces.
+  !!
+  !! The corners of one flat face weigh `flat_sum` together, or one each where they are fewer: a
+  !! many-cornered face is no stiffer than a square one. The points inside carry equal faces that
+  !! lie exactly on one another, where no corner is inside the other body.
+  pure subroutine make_probes(shape, juts, surface)
+    type(shape_t), intent(in) :: shape
+    logical, intent(in) :: juts(:)                !! (points) corners that stick out
+    type(surface_t), intent(inout) :: surface
+    real(wp) :: weight(size(juts)), middle(3), whole
+    integer :: f, c, n, m
+
+    weight = 1.0_wp
+    do f = 1, size(shape%facet) - 1
+      n = shape%facet(f + 1) - shape%facet(f)
+      weight(corners(shape, f)) = min(weight(corners(shape, f)), flat_sum/real(n, wp))
+    end do
+    whole = sum([(norm(area_vector(shape, f)), f=1, size(shape%facet) - 1)])
+    n = count(juts)
+    surface%n_corners = n
+    do f = 1, size(shape%facet) - 1
+      if (norm(area_vector(shape, f)) > large*whole) n = n + size(corners(shape, f))
+    end do
+    allocate (surface%probe(3, n), surface%weight(n))
+    n = 0
+    do c = 1, size(juts)
+      if (.not. juts(c)) cycle
+      n = n + 1
+      surface%probe(:, n) = shape%point(:, c)
+      surface%weight(n) = weight(c)
+    end do
+    do f = 1, size(shape%facet) - 1
+      if (norm(area_vector(shape, f)) <= large*whole) cycle
+      m = size(corners(shape, f))
+      middle = sum(shape%point(:, corners(shape, f)), 2)/real(m, wp)
+      do c = shape%facet(f), shape%facet(f + 1) - 1
+        n = n + 1
+        surface%probe(:, n) = (1.0_wp - inset)*shape%point(:, shape%facet_point(c)) + inset*middle
+        surface%weight(n) = face_sum/real(m, wp)
+      end do
+    end do
+  end subroutine make_probes
+
+  !> Bounding box, reach and bins.
+  subroutine sort_into_bins(shape, surface)
+    type(shape_t), intent(in) :: shape
+    type(surface_t), intent(inout) :: surface
+    real(wp), allocatable :: low(:, :), high(:, :)
+    integer :: f, n
+
+    n = size(surface%offset)
+    allocate (low(3, n), high(3, n))
+    do f = 1, n
+      low(:, f) = minval(shape%point(:, corners(shape, f)), 2)
+      high(:, f) = maxval(shape%point(:, corners(shape, f)), 2)
+    end do
+    surface%low = minval(low, 2)
+    surface%high = maxval(high, 2)
+    surface%reach = maxval(norm2(shape%point(:, shape%facet_point), 1))
+    call bins_build(low, high, 2*surface%length, surface%facets)
+    call bins_build(surface%probe, surface%probe, 2*surface%length, surface%probes)
+    low = min(surface%start, surface%start + spread(surface%extent, 1, 3)*surface%along)
+    high = max(surface%start, surface%start + spread(surface%extent, 1, 3)*surface%along)
+    call bins_build(low, high, 2*surface%length, surface%edges)
+  end subroutine sort_into_bins
+
+  !> Probes inside a box.
+  subroutine gather_probes(surface, low, high, list)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    type(near_list_t), intent(inout) :: list
+
+    call gather(surface%probes, size(surface%weight), low, high, list)
+  end subroutine gather_probes
+
+  !> Edges whose bins meet a box; the box should not be much smaller than a bin.
+  subroutine gather_edges(surface, low, high, list)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    type(near_list_t), intent(inout) :: list
+
+    call gather(surface%edges, size(surface%extent), low, high, list)
+  end subroutine gather_edges
+
+  !> Facets whose bins meet a box.
+  subroutine gather_facets(surface, low, high, list)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    type(near_list_t), intent(inout) :: list
+
+    call gather(surface%facets, size(surface%offset), low, high, list)
+  end subroutine gather_facets
+
+  !> Items of the bins that meet a box, each once, ascending.
+  subroutine gather(bins, n_items, low, high, list)
+    type(bins_t), intent(in) :: bins
+    integer, intent(in) :: n_items
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    type(near_list_t), intent(inout) :: list
+    integer :: a(3), b(3), i, j, k, m, bin, item
+
+    list%n = 0
+    call reserve(1, list%item)
+    if (any(low > bins%high) .or. any(high < bins%low)) return
+    if (.not. allocated(list%mark)) allocate (list%mark(n_items), source=0)
+    if (size(list%mark) < n_items) then
+      deallocate (list%mark)
+      allocate (list%mark(n_items), source=0)
+    end if
+    list%search = list%search + 1
+    a = bins%place(low)
+    b = bins%place(high)
+    do k = a(3), b(3)
+      do j = a(2), b(2)
+        do i = a(1), b(1)
+          bin = bins%number([i, j, k])
+          do m = bins%first(bin), bins%first(bin + 1) - 1
+            item = bins%item(m)
+            if (list%mark(item) == list%search) cycle
+            list%mark(item) = list%search
+            list%n = list%n + 1
+            call reserve(list%n, list%item)
+            list%item(list%n) = item
+          end do
+        end do
+      end do
+    end do
+    call sort_items(list%item(:list%n))
+  end subroutine gather
+
+  !> Ascending order; the lists are short.
+  pure subroutine sort_items(item)
+    integer, intent(inout) :: item(:)
+    integer :: i, j, here
+
+    do i = 2, size(item)
+      here = item(i)
+      j = i - 1
+      do while (j >= 1)
+        if (item(j) < here) exit
+        item(j + 1) = item(j)
+        j = j - 1
+      end do
+      item(j + 1) = here
+    end do
+  end subroutine sort_items
+
+  !> Signed distance of a point from the listed facets and edges, and the unit vector along which
+  !! it grows; `nowhere` where none of them is nearest. Positive outside.
+  pure subroutine nearest_on_surface(surface, x, facet, edge, distance, outward)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: x(3)                !! body axes [m]
+    integer, intent(in) :: facet(:), edge(:)    !! numbers of facets and edges
+    real(wp), intent(out) :: distance           !! [m]
+    real(wp), intent(out) :: outward(3)         !! [-]
+    real(wp) :: best, s, d(3), square
+    integer :: m, f, e, c, place
+    logical :: above
+
+    best = nowhere
+    distance = nowhere
+    outward = 0.0_wp
+    do m = 1, size(facet)
+      f = facet(m)
+      s = dot_product(surface%normal(:, f), x) - surface%offset(f)
+      if (abs(s) >= best) cycle
+      above = .true.
+      do c = surface%side(f), surface%side(f + 1) - 1
+        above = dot_product(surface%side_normal(:, c), x) >= surface%side_offset(c)
+        if (.not. above) exit
+      end do
+      if (.not. above) cycle
+      best = abs(s)
+      distance = s
+      outward = surface%normal(:, f)
+    end do
+    do m = 1, size(edge)
+      e = edge(m)
+      d = x - surface%start(:, e)
+      s = dot_product(d, surface%along(:, e))
+      place = 2
+      if (s < 0.0_wp) place = 1
+      if (s > surface%extent(e)) place = 3
+      s = min(max(s, 0.0_wp), surface%extent(e))
+      d = d - s*surface%along(:, e)
+      square = dot_product(d, d)
+      if (square >= best**2) cycle
+      best = sqrt(square)
+      distance = sign(best, dot_product(d, surface%outward(:, place, e)))
+      if (best > 0.0_wp) then
+        outward = d/distance
+      else
+        outward = surface%outward(:, place, e)/norm(surface%outward(:, place, e))
+      end if
+    end do
+  end subroutine nearest_on_surface
+
+  !> Square of the distance of two segments from p along u (unit) for a, from q along w for b [m2].
+  pure function segment_distance2(p, u, a, q, w, b) result(square)
+    real(wp), intent(in) :: p(3), u(3), a, q(3), w(3), b   !! [m]
+    real(wp) :: square
+    real(wp) :: d(3), uw, ud, wd, s, t, det
+
+    d = q - p
+    uw = dot_product(u, w)
+    ud = dot_product(u, d)
+    wd = dot_product(w, d)
+    det = 1.0_wp - uw**2
+    s = 0.0_wp
+    if (det > epsilon(det)) s = min(max((ud - uw*wd)/det, 0.0_wp), a)
+    t = min(max(uw*s - wd, 0.0_wp), b)
+    s = min(max(ud + uw*t, 0.0_wp), a)
+    d = d + t*w - s*u
+    square = dot_product(d, d)
+  end function segment_distance2
+
+end module surface_features_m
