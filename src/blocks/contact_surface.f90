@@ -390,8 +390,8 @@ contains
   !> Touches of the listed pairs of edges that cross.
   !!
   !! Two edges touch along n, the normal of both lines, if n lies in the fan of outward normals of
-  !! each (the normals between those of its two facets) and if the deepest place of each in the
-  !! other lies between its ends.
+  !! each (the normals between those of its two facets) and if the deepest place of one of them
+  !! below the facets of the other lies between its ends, and beside the other edge.
   subroutine touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
     real(wp), intent(in) :: turn_b(3, 3)      !! axes of b to space
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
@@ -401,7 +401,7 @@ contains
     type(pair_t), intent(in) :: pair
     type(touch_t), intent(inout) :: touches
     real(wp) :: p(3), u(3), d(3), n(3), sine2, sine, s, t, depth, weight, length, arm(3)
-    real(wp) :: peak_a, peak_b
+    real(wp) :: peak_a, peak_b, cosine
     integer :: m, i, j, last
 
     length = min(surface_a%length, surface_b%length)
@@ -432,8 +432,13 @@ contains
         if (weight <= 0.0_wp) cycle
         peak_a = s + depth*lean(n, u, surface_b%into(:, :, j))
         peak_b = t + depth*lean(matmul(-n, turn), matmul(w, turn), surface_a%into(:, :, i))
-        weight = weight*fade_at_ends(peak_a, surface_a%extent(i), depth) &
-          *fade_at_ends(peak_b, surface_b%extent(j), depth)
+        cosine = dot_product(u, w)
+        weight = weight*max(fade_at_ends(peak_a, surface_a%extent(i), 0.0_wp, depth) &
+                            *fade_at_ends(t + cosine*(peak_a - s), surface_b%extent(j), depth, &
+                                          depth), &
+                            fade_at_ends(peak_b, surface_b%extent(j), 0.0_wp, depth) &
+                            *fade_at_ends(s + cosine*(peak_b - t), surface_a%extent(i), depth, &
+                                          depth))
         if (weight <= 0.0_wp) cycle
         arm = p + s*u - 0.5_wp*depth*n
         arm = matmul(turn_b, arm)
@@ -466,15 +471,20 @@ contains
     if (abs(slope(1) - slope(2)) > 0.0_wp) way = -(facing(1) - facing(2))/(slope(1) - slope(2))
   end function lean
 
-  !> One along an edge, falling to zero where its deepest place comes to an end: there the corner
-  !! touches instead.
-  pure function fade_at_ends(place, extent, depth) result(part)
+  !> One along an edge, falling to zero towards its ends.
+  !!
+  !! For the deepest place of the edge itself at its end: beyond, the corner touches instead. For
+  !! the place beside the deepest one of the other edge a part of the depth from the end: nearer,
+  !! the other body is inside past the end of the edge, not past the edge.
+  pure function fade_at_ends(place, extent, from, depth) result(part)
     real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
-    real(wp), intent(in) :: depth           !! [m]
+    real(wp), intent(in) :: from            !! zero up to a quarter of this from the end [m]
+    real(wp), intent(in) :: depth           !! one from a quarter of this on [m]
     real(wp) :: part
-    real(wp), parameter :: of_depth = 0.25_wp, of_extent = 0.01_wp
+    real(wp), parameter :: share = 0.25_wp, of_extent = 0.01_wp
 
-    part = min(place, extent - place)/max(of_depth*depth, of_extent*extent)
+    part = (min(place, extent - place) - share*max(from, 0.0_wp)) &
+      /max(share*depth, of_extent*extent)
     part = max(0.0_wp, min(1.0_wp, part))
   end function fade_at_ends
 
