@@ -351,6 +351,8 @@ contains
       touches%depth(t) = depth
       touches%weight(t) = 1.0_wp
       touches%length(t) = 2*self%radius(s)
+      touches%weight_shift(:, t) = 0.0_wp
+      touches%weight_turn(:, t) = 0.0_wp
     end do
   end subroutine touch_wall
 
@@ -396,6 +398,8 @@ contains
       touches%arm_b(:, t) = d - (blocks%x(:, self%pair_b(p)) + shift)
       touches%weight(t) = 1.0_wp
       touches%length(t) = 2*min(self%radius(i), self%radius(j))
+      touches%weight_shift(:, t) = 0.0_wp
+      touches%weight_turn(:, t) = 0.0_wp
     end do
   end subroutine touch_body
 

@@ -10,13 +10,14 @@
 !! another by a skin. What comes out, and its order, do not depend on when the list was made.
 module contact_surface_m
   use kinds_m, only: wp
-  use vectors_m, only: cross, norm, rotation_matrix
+  use vectors_m, only: norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use neighbours_m, only: pair_list_t, near_pairs, reserve
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
     gather_facets, nearest_on_surface, segment_distance2
+  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
   implicit none
   private
   public :: contact_surface_t, contact_surface_init, find_surface_touches
@@ -68,9 +69,6 @@ module contact_surface_m
 
   real(wp), parameter :: skin_share = 0.2_wp     !! skin over the smallest d_s
   real(wp), parameter :: wide_share = 0.15_wp    !! skin of the pairs over the largest reach
-  real(wp), parameter :: beside = 0.15_wp        !! sine of the angle by which a normal may leave the
-                                                 !! fan of an edge; its touch fades out on the way
-  real(wp), parameter :: least_sine2 = 1.0e-4_wp !! square of the sine of the angle of two edges
 
 contains
 
@@ -243,6 +241,7 @@ contains
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
       if (above > self%reach(a) + gap) return
       n = matmul(walls%normal(:, w), turn)
+      call reserve_touches(touches%n + max(1, surface%n_corners), touches)
       if (surface%ball > 0.0_wp) then
         arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
         call add_touch(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], walls%normal(:, w), &
@@ -259,7 +258,7 @@ contains
     end associate
   end subroutine touch_wall
 
-  !> Append a touch.
+  !> Append a touch; there is room.
   subroutine add_touch(a, b, key, arm_a, arm_b, normal, depth, weight, length, touches)
     integer, intent(in) :: a, b, key
     real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres [m]
@@ -269,7 +268,6 @@ contains
     integer :: t
 
     t = touches%n + 1
-    call reserve_touches(t, touches)
     touches%n = t
     touches%a(t) = a
     touches%b(t) = b
@@ -280,6 +278,8 @@ contains
     touches%depth(t) = depth
     touches%weight(t) = weight
     touches%length(t) = length
+    touches%weight_shift(:, t) = 0.0_wp
+    touches%weight_turn(:, t) = 0.0_wp
   end subroutine add_touch
 
   !> Touches of a pair of bodies: probes of b, probes of a, crossing edges.
@@ -300,6 +300,7 @@ contains
     if (way_since(blocks, reach, pair) > pair%valid) call list_features(blocks, turns, &
       surface, search, pair)
     if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
+    call reserve_touches(touches%n + pair%of_a%n + pair%of_b%n + pair%n_crossings, touches)
     to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
     gap = ahead*(norm(blocks%v(:, a) - blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b))
@@ -388,10 +389,6 @@ contains
   end subroutine touch_probes
 
   !> Touches of the listed pairs of edges that cross.
-  !!
-  !! Two edges touch along n, the normal of both lines, if n lies in the fan of outward normals of
-  !! each (the normals between those of its two facets) and if the deepest place of one of them
-  !! below the facets of the other lies between its ends, and beside the other edge.
   subroutine touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
     real(wp), intent(in) :: turn_b(3, 3)      !! axes of b to space
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
@@ -400,103 +397,41 @@ contains
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
     type(touch_t), intent(inout) :: touches
-    real(wp) :: p(3), u(3), d(3), n(3), sine2, sine, s, t, depth, weight, length, arm(3)
-    real(wp) :: peak_a, peak_b, cosine
-    integer :: m, i, j, last
+    type(edge_t) :: guest
+    type(crossing_t) :: crossing
+    real(wp) :: length, arm(3), with_shift(3), with_turn(3)
+    integer :: m, i, last
 
     length = min(surface_a%length, surface_b%length)
     last = 0
-    p = 0.0_wp
-    u = 0.0_wp
     do m = 1, pair%n_crossings
       i = pair%edge_a(m)
-      j = pair%edge_b(m)
-      if (i /= last) then
-        p = x + matmul(turn, surface_a%start(:, i))
-        u = matmul(turn, surface_a%along(:, i))
-        last = i
-      end if
-      associate (w => surface_b%along(:, j))
-        d = surface_b%start(:, j) - p
-        n = cross(u, w)
-        sine2 = dot_product(n, n)
-        if (sine2 < least_sine2) cycle
-        sine = sqrt(sine2)
-        s = dot_product(cross(d, w), n)/sine2
-        t = dot_product(cross(d, u), n)/sine2
-        n = n/sign(sine, -dot_product(n, surface_b%outward(:, 2, j)))
-        depth = -dot_product(d, n)
-        if (depth <= -gap .or. depth >= length) cycle
-        weight = fade_beside(matmul(n, turn), surface_a%into(:, :, i)) &
-          *fade_beside(-n, surface_b%into(:, :, j))
-        if (weight <= 0.0_wp) cycle
-        peak_a = s + depth*lean(n, u, surface_b%into(:, :, j))
-        peak_b = t + depth*lean(matmul(-n, turn), matmul(w, turn), surface_a%into(:, :, i))
-        cosine = dot_product(u, w)
-        weight = weight*max(fade_at_ends(peak_a, surface_a%extent(i), 0.0_wp, depth) &
-                            *fade_at_ends(t + cosine*(peak_a - s), surface_b%extent(j), depth, &
-                                          depth), &
-                            fade_at_ends(peak_b, surface_b%extent(j), 0.0_wp, depth) &
-                            *fade_at_ends(s + cosine*(peak_b - t), surface_a%extent(i), depth, &
-                                          depth))
-        if (weight <= 0.0_wp) cycle
-        arm = p + s*u - 0.5_wp*depth*n
-        arm = matmul(turn_b, arm)
-        n = matmul(turn_b, n)
-        call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, n, depth, &
-          weight, length, touches)
-      end associate
+      if (i /= last) guest = edge_in_axes(surface_a%edge(i), turn, x)
+      last = i
+      call cross_edges(guest, surface_b%edge(pair%edge_b(m)), -gap, length, crossing)
+      if (crossing%weight <= 0.0_wp) cycle
+      arm = matmul(turn_b, crossing%place)
+      call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, &
+        matmul(turn_b, crossing%normal), crossing%depth, crossing%weight, length, touches)
+      if (crossing%weight >= 1.0_wp .or. crossing%depth <= 0.0_wp) cycle
+      call weight_slope(guest, surface_b%edge(pair%edge_b(m)), -gap, length, crossing, &
+        with_shift, with_turn)
+      touches%weight_shift(:, touches%n) = matmul(turn_b, with_shift)
+      touches%weight_turn(:, touches%n) = matmul(turn_b, with_turn)
     end do
   end subroutine touch_edges
 
-  !> From the place of an edge nearest to a crossing edge of the host to the place where it is
-  !! deepest between the two facets there, over the depth [-].
-  !!
-  !! Below facet i, whose outward normal is n_i, lies the place s at depth*(n.n_i) + s (u.n_i); the
-  !! two are equal at the deepest place.
-  pure function lean(n, u, into) result(way)
-    real(wp), intent(in) :: n(3)         !! out of the guest, into the host; normal to both edges
-    real(wp), intent(in) :: u(3)         !! along the edge of the guest
-    real(wp), intent(in) :: into(3, 2)   !! across the edge of the host, into its facets
-    real(wp) :: way
-    real(wp) :: facing(2), slope(2), square
+  !> An edge seen from other axes.
+  pure function edge_in_axes(edge, turn, x) result(seen)
+    type(edge_t), intent(in) :: edge
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! the other axes: turn.p + x [-], [m]
+    type(edge_t) :: seen
 
-    ! the normal of facet 1 is in the plane of the two directions `into`, at right angles to its own
-    square = dot_product(into(:, 1), into(:, 2))
-    facing(1) = square*dot_product(n, into(:, 1)) - dot_product(n, into(:, 2))
-    facing(2) = square*dot_product(n, into(:, 2)) - dot_product(n, into(:, 1))
-    slope(1) = square*dot_product(u, into(:, 1)) - dot_product(u, into(:, 2))
-    slope(2) = square*dot_product(u, into(:, 2)) - dot_product(u, into(:, 1))
-    way = 0.0_wp
-    if (abs(slope(1) - slope(2)) > 0.0_wp) way = -(facing(1) - facing(2))/(slope(1) - slope(2))
-  end function lean
-
-  !> One along an edge, falling to zero towards its ends.
-  !!
-  !! For the deepest place of the edge itself at its end: beyond, the corner touches instead. For
-  !! the place beside the deepest one of the other edge a part of the depth from the end: nearer,
-  !! the other body is inside past the end of the edge, not past the edge.
-  pure function fade_at_ends(place, extent, from, depth) result(part)
-    real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
-    real(wp), intent(in) :: from            !! zero up to a quarter of this from the end [m]
-    real(wp), intent(in) :: depth           !! one from a quarter of this on [m]
-    real(wp) :: part
-    real(wp), parameter :: share = 0.25_wp, of_extent = 0.01_wp
-
-    part = (min(place, extent - place) - share*max(from, 0.0_wp)) &
-      /max(share*depth, of_extent*extent)
-    part = max(0.0_wp, min(1.0_wp, part))
-  end function fade_at_ends
-
-  !> One where a normal is in the fan of an edge, falling to zero beside it.
-  pure function fade_beside(normal, into) result(part)
-    real(wp), intent(in) :: normal(3), into(3, 2)   !! body axes
-    real(wp) :: part
-
-    part = min(1.0_wp, 1.0_wp - max(dot_product(normal, into(:, 1)), &
-      dot_product(normal, into(:, 2)))/beside)
-    part = max(0.0_wp, part)
-  end function fade_beside
+    seen%start = x + matmul(turn, edge%start)
+    seen%along = matmul(turn, edge%along)
+    seen%extent = edge%extent
+    seen%into = matmul(turn, edge%into)
+  end function edge_in_axes
 
   !> List what may touch of a pair before the bodies have moved by the skin.
   subroutine list_features(blocks, turns, surface, search, pair)
@@ -627,8 +562,9 @@ contains
     end do facets
     do m = 1, search%edges%n
       associate (e => search%edges%item(m))
-        d = place - host%start(:, e)
-        d = d - min(max(dot_product(d, host%along(:, e)), 0.0_wp), host%extent(e))*host%along(:, e)
+        d = place - host%edge(e)%start
+        d = d - min(max(dot_product(d, host%edge(e)%along), 0.0_wp), host%edge(e)%extent) &
+          *host%edge(e)%along
         if (dot_product(d, d) > reach**2) cycle
         list%n_edges = list%n_edges + 1
         call reserve(list%n_edges, list%edge)
@@ -643,7 +579,8 @@ contains
     type(surface_t), intent(in) :: surface_a, surface_b
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    real(wp) :: reach, low(3), high(3), p(3), u(3)
+    type(edge_t) :: guest
+    real(wp) :: reach, low(3), high(3)
     integer :: m, k, i, j
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
@@ -654,17 +591,18 @@ contains
     do m = 1, search%guests%n
       i = search%guests%item(m)
       if (i > surface_a%n_convex) exit
-      p = x + matmul(turn, surface_a%start(:, i))
-      u = matmul(turn, surface_a%along(:, i))
-      low = min(p, p + surface_a%extent(i)*u) - reach
-      high = max(p, p + surface_a%extent(i)*u) + reach
+      guest = edge_in_axes(surface_a%edge(i), turn, x)
+      low = min(guest%start, guest%start + guest%extent*guest%along) - reach
+      high = max(guest%start, guest%start + guest%extent*guest%along) + reach
       if (any(low > surface_b%high) .or. any(high < surface_b%low)) cycle
       call gather_edges(surface_b, low, high, search%hosts)
       do k = 1, search%hosts%n
         j = search%hosts%item(k)
         if (j > surface_b%n_convex) exit
-        if (segment_distance2(p, u, surface_a%extent(i), surface_b%start(:, j), &
-                              surface_b%along(:, j), surface_b%extent(j)) > reach**2) cycle
+        associate (host => surface_b%edge(j))
+          if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
+                                host%extent) > reach**2) cycle
+        end associate
         pair%n_crossings = pair%n_crossings + 1
         call reserve(pair%n_crossings, pair%edge_a)
         call reserve(pair%n_crossings, pair%edge_b)

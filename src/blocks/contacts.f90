@@ -113,7 +113,7 @@ contains
     else
       call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
       contacts%reach = contacts%spheres%reach
-      contacts%smallest = contacts%smallest
+      contacts%smallest = contacts%spheres%smallest
     end if
     n = blocks%n
     call partners_init(n, contacts%partners)
@@ -246,7 +246,8 @@ contains
 
   !> Longest substep the present touches allow [s].
   !!
-  !! A sixth of the bound of stability, which also keeps the restitution within 0.02.
+  !! For one pair of bodies a sixth of the bound of stability, which also keeps the restitution
+  !! within 0.02; for all pairs together, see `highest_frequency2`, less than half of that bound.
   pure function stiffness_limit(contacts) result(limit)
     type(contacts_t), intent(in) :: contacts
     real(wp) :: limit
@@ -320,21 +321,25 @@ contains
       highest_frequency2(contacts%soon, contacts%response_soon))
   end subroutine find_touches
 
-  !> Square of the highest frequency of the touching bodies, or a little above [1/s2].
+  !> Square of the highest frequency of a pair of touching bodies, or of all pairs of two touching
+  !! bodies together with a share; a little above [1/s2].
   !!
-  !! It is no higher than that of all the pairs of two touching bodies taken together.
+  !! A pile swings no faster than all the pairs of two touching bodies taken together. It only has
+  !! to be stable, so it may turn further in a substep than a single pair.
   pure function highest_frequency2(touches, response) result(highest)
     type(touch_t), intent(in) :: touches
     type(response_t), intent(in) :: response
     real(wp) :: highest
+    real(wp), parameter :: share = (0.35_wp/0.8_wp)**2
     real(wp) :: pair
     integer :: t
 
     highest = 0.0_wp
     do t = 1, touches%n
       pair = response%pair_frequency2(t)
-      highest = max(highest, pair + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
-        + max(0.0_wp, response%frequency2(touches%b(t)) - pair))
+      highest = max(highest, pair, share*(pair &
+        + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
+        + max(0.0_wp, response%frequency2(touches%b(t)) - pair)))
     end do
   end function highest_frequency2
 
@@ -607,6 +612,7 @@ contains
           force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n) &
             /(1.0_wp + part*r%decay(t)*dt)
           call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
+          if (touches%weight(t) < 1.0_wp) call push_to_weight(t, contacts)
           sum_n = sum_n + force_n
           decay = max(decay, r%decay(t))
           eta = max(eta, r%eta(t))
@@ -617,6 +623,25 @@ contains
       end do
     end associate
   end subroutine sum_forces
+
+  !> The part of the force of touch t by which its weight changes with position: the energy of the
+  !! spring is k(position) d^(gamma+1)/(gamma+1).
+  pure subroutine push_to_weight(t, contacts)
+    integer, intent(in) :: t
+    type(contacts_t), intent(inout) :: contacts
+    real(wp) :: energy
+    integer :: a, b
+
+    associate (touches => contacts%touches)
+      a = touches%a(t)
+      b = touches%b(t)
+      energy = stored_energy(contacts%response%k(t), contacts%law%gamma_n, touches%depth(t))
+      call act(a, b, -energy*touches%weight_shift(:, t), touches%arm_a(:, t), &
+        touches%arm_b(:, t), contacts)
+      contacts%torque(:, a) = contacts%torque(:, a) - energy*touches%weight_turn(:, t)
+      contacts%torque(:, b) = contacts%torque(:, b) + energy*touches%weight_turn(:, t)
+    end associate
+  end subroutine push_to_weight
 
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
   !!

@@ -8,6 +8,7 @@ module surface_features_m
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_t, bins_build, reserve
+  use edge_crossing_m, only: edge_t
   implicit none
   private
   public :: surface_t, surface_init, near_list_t, gather_probes, gather_edges, gather_facets, &
@@ -25,13 +26,9 @@ module surface_features_m
     real(wp), allocatable :: normal(:, :), offset(:)              !! (3, n) outward, (n) [m]
     integer, allocatable :: side(:)              !! (n + 1) first side of each facet
     real(wp), allocatable :: side_normal(:, :), side_offset(:)    !! (3, :), (:) [m]
-    !> Edges that are not flat, convex ones first; from `start` along the unit vector `along`.
+    type(edge_t), allocatable :: edge(:)         !! those that are not flat, convex ones first
     integer :: n_convex = 0
-    real(wp), allocatable :: start(:, :), along(:, :), extent(:)  !! (3, n), (3, n), (n) [m]
-    real(wp), allocatable :: into(:, :, :)       !! (3, 2, n) in each facet, across, into it [-]
-    !> (3, 3, n) sign of a distance: vectors that point outward at the start, between, at the end.
-    real(wp), allocatable :: outward(:, :, :)
-    logical, allocatable :: juts(:, :)           !! (2, n) start, end: the corner there touches
+    real(wp), allocatable :: end_outward(:, :, :)   !! (3, 2, n) outward at the start, at the end
     type(bins_t) :: probes, facets, edges
   end type surface_t
 
@@ -66,6 +63,7 @@ contains
       surface%length = 2*surface%ball
       allocate (surface%probe(3, 1), source=0.0_wp)
       allocate (surface%weight(1), source=1.0_wp)
+      call bins_build(surface%probe, surface%probe, surface%ball, surface%probes)
       return
     end if
     surface%length = 0.25_wp*shape%smallest_edge
@@ -73,7 +71,7 @@ contains
     call pair_edges(shape, edge)
     call outward_at_points(shape, surface%normal, point_normal)
     call find_corners(shape, edge, point_normal, juts)
-    call make_edges(shape, edge, point_normal, juts, surface)
+    call make_edges(shape, edge, point_normal, surface)
     call make_probes(shape, juts, surface)
     call sort_into_bins(shape, surface)
   end subroutine surface_init
@@ -229,11 +227,10 @@ contains
   end subroutine find_corners
 
   !> The edges that are not flat.
-  pure subroutine make_edges(shape, edge, point_normal, juts, surface)
+  pure subroutine make_edges(shape, edge, point_normal, surface)
     type(shape_t), intent(in) :: shape
     integer, intent(in) :: edge(:, :)             !! (4, edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
-    logical, intent(in) :: juts(:)                !! (points)
     type(surface_t), intent(inout) :: surface
     integer :: bend(size(edge, 2))
     integer :: e, m, wanted
@@ -242,24 +239,23 @@ contains
       bend(e) = bend_of(shape, edge(:, e), surface%normal)
     end do
     m = count(bend /= 0)
-    allocate (surface%start(3, m), surface%along(3, m), surface%extent(m))
-    allocate (surface%into(3, 2, m), surface%outward(3, 3, m), surface%juts(2, m))
+    allocate (surface%edge(m), surface%end_outward(3, 2, m))
     surface%n_convex = count(bend > 0)
     m = 0
     do wanted = 1, -1, -2   ! convex, then reentrant
       do e = 1, size(edge, 2)
         if (bend(e) /= wanted) cycle
         m = m + 1
-        surface%start(:, m) = shape%point(:, edge(1, e))
-        surface%along(:, m) = shape%point(:, edge(2, e)) - surface%start(:, m)
-        surface%extent(m) = norm(surface%along(:, m))
-        surface%along(:, m) = surface%along(:, m)/surface%extent(m)
-        surface%into(:, 1, m) = cross(surface%normal(:, edge(3, e)), surface%along(:, m))
-        surface%into(:, 2, m) = -cross(surface%normal(:, edge(4, e)), surface%along(:, m))
-        surface%juts(:, m) = juts(edge(1:2, e))
-        surface%outward(:, 1, m) = point_normal(:, edge(1, e))
-        surface%outward(:, 2, m) = surface%normal(:, edge(3, e)) + surface%normal(:, edge(4, e))
-        surface%outward(:, 3, m) = point_normal(:, edge(2, e))
+        surface%end_outward(:, :, m) = point_normal(:, edge(1:2, e))
+        associate (new => surface%edge(m))
+          new%start = shape%point(:, edge(1, e))
+          new%along = shape%point(:, edge(2, e)) - new%start
+          new%extent = norm(new%along)
+          new%along = new%along/new%extent
+          new%into(:, 1) = cross(surface%normal(:, edge(3, e)), new%along)
+          new%into(:, 2) = -cross(surface%normal(:, edge(4, e)), new%along)
+          new%outward = surface%normal(:, edge(3, e)) + surface%normal(:, edge(4, e))
+        end associate
       end do
     end do
   end subroutine make_edges
@@ -343,8 +339,15 @@ contains
     surface%reach = maxval(norm2(shape%point(:, shape%facet_point), 1))
     call bins_build(low, high, 2*surface%length, surface%facets)
     call bins_build(surface%probe, surface%probe, 2*surface%length, surface%probes)
-    low = min(surface%start, surface%start + spread(surface%extent, 1, 3)*surface%along)
-    high = max(surface%start, surface%start + spread(surface%extent, 1, 3)*surface%along)
+    n = size(surface%edge)
+    deallocate (low, high)
+    allocate (low(3, n), high(3, n))
+    do f = 1, n
+      associate (edge => surface%edge(f))
+        low(:, f) = min(edge%start, edge%start + edge%extent*edge%along)
+        high(:, f) = max(edge%start, edge%start + edge%extent*edge%along)
+      end associate
+    end do
     call bins_build(low, high, 2*surface%length, surface%edges)
   end subroutine sort_into_bins
 
@@ -363,7 +366,7 @@ contains
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
 
-    call gather(surface%edges, size(surface%extent), low, high, list)
+    call gather(surface%edges, size(surface%edge), low, high, list)
   end subroutine gather_edges
 
   !> Facets whose bins meet a box.
@@ -437,8 +440,8 @@ contains
     integer, intent(in) :: facet(:), edge(:)    !! numbers of facets and edges
     real(wp), intent(out) :: distance           !! [m]
     real(wp), intent(out) :: outward(3)         !! [-]
-    real(wp) :: best, s, d(3), square
-    integer :: m, f, e, c, place
+    real(wp) :: best, s, d(3), square, above_edge(3)
+    integer :: m, f, c
     logical :: above
 
     best = nowhere
@@ -459,23 +462,23 @@ contains
       outward = surface%normal(:, f)
     end do
     do m = 1, size(edge)
-      e = edge(m)
-      d = x - surface%start(:, e)
-      s = dot_product(d, surface%along(:, e))
-      place = 2
-      if (s < 0.0_wp) place = 1
-      if (s > surface%extent(e)) place = 3
-      s = min(max(s, 0.0_wp), surface%extent(e))
-      d = d - s*surface%along(:, e)
-      square = dot_product(d, d)
-      if (square >= best**2) cycle
-      best = sqrt(square)
-      distance = sign(best, dot_product(d, surface%outward(:, place, e)))
-      if (best > 0.0_wp) then
-        outward = d/distance
-      else
-        outward = surface%outward(:, place, e)/norm(surface%outward(:, place, e))
-      end if
+      associate (e => surface%edge(edge(m)))
+        d = x - e%start
+        s = dot_product(d, e%along)
+        above_edge = e%outward
+        if (s < 0.0_wp) above_edge = surface%end_outward(:, 1, edge(m))
+        if (s > e%extent) above_edge = surface%end_outward(:, 2, edge(m))
+        d = d - min(max(s, 0.0_wp), e%extent)*e%along
+        square = dot_product(d, d)
+        if (square >= best**2) cycle
+        best = sqrt(square)
+        distance = sign(best, dot_product(d, above_edge))
+        if (best > 0.0_wp) then
+          outward = d/distance
+        else
+          outward = above_edge/norm(above_edge)
+        end if
+      end associate
     end do
   end subroutine nearest_on_surface
 

@@ -19,6 +19,8 @@ module touches_m
     real(wp), allocatable :: depth(:)      !! (n) overlap d_n, > 0 where bodies touch [m]
     real(wp), allocatable :: weight(:)     !! (n) share of the stiffness of the law [-]
     real(wp), allocatable :: length(:)     !! (n) d_s of the contact Courant number, eq. (6) [m]
+    !> (3, n) relative change of the weight with a shift of a, and with a turn about the contact.
+    real(wp), allocatable :: weight_shift(:, :), weight_turn(:, :)   !! [1/m], [1/rad]
   end type touch_t
 
 contains
@@ -37,6 +39,8 @@ contains
     call reserve(n, touches%depth)
     call reserve(n, touches%weight)
     call reserve(n, touches%length)
+    call reserve(n, touches%weight_shift)
+    call reserve(n, touches%weight_turn)
   end subroutine reserve_touches
 
   !> Those entries of a list in which the bodies touch.
@@ -59,6 +63,8 @@ contains
       touching%depth(m) = all%depth(t)
       touching%weight(m) = all%weight(t)
       touching%length(m) = all%length(t)
+      touching%weight_shift(:, m) = all%weight_shift(:, t)
+      touching%weight_turn(:, m) = all%weight_turn(:, t)
     end do
     touching%n = m
   end subroutine select_touching

@@ -75,7 +75,7 @@ module case_types_m
   end type numerics_t
 
   type :: contact_input_t
-    character(name_length) :: model = 'spheres'
+    character(name_length) :: model = 'surface'
     character(name_length) :: law = 'restitution'
     real(wp) :: restitution = 0.3_wp
     real(wp) :: contact_time = 2.0e-3_wp            !! [s]

@@ -26,28 +26,38 @@ program test_contacts
   real(wp), parameter :: g = 9.81_wp         !! [m/s2]
   real(wp), parameter :: dt = 2.0e-3_wp   !! twenty substeps of a twentieth of the contact time [s]
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  character(*), parameter :: models(2) = [character(7) :: 'spheres', 'surface']
   type(shape_t), allocatable :: shapes(:)
+  integer :: model
 
   call make_shapes()
-  call check_bouncing_ball()
-  call check_colliding_balls()
-  call check_landing_cube()
-  call check_landing_slab()
-  call check_swinging_ball()
-  call check_slip_to_roll()
-  call check_incline()
-  call check_incline_on_body()
-  call check_stack()
-  call check_momentum()
-  call check_energy()
-  call check_constants()
-  call check_moving_partners()
-  call check_periodic_image()
-  call check_bookkeeping()
-  call check_runaway()
+  do model = 1, 2
+    call check_model()
+  end do
   call finish_checks()
 
 contains
+
+  !> Everything, for one of the two models.
+  subroutine check_model()
+    print '(a)', 'model '''//trim(models(model))//''''
+    call check_bouncing_ball()
+    call check_colliding_balls()
+    call check_landing_cube()
+    call check_landing_slab()
+    call check_swinging_ball()
+    call check_slip_to_roll()
+    call check_incline()
+    call check_incline_on_body()
+    call check_stack()
+    call check_momentum()
+    call check_energy()
+    call check_constants()
+    call check_moving_partners()
+    call check_periodic_image()
+    call check_bookkeeping()
+    call check_runaway()
+  end subroutine check_model
 
   subroutine make_shapes()
     character(:), allocatable :: message
@@ -74,6 +84,7 @@ contains
 
     allocate (world%case%body(n), world%case%drop(0))
     world%case%grid%length = 1.0_wp
+    world%case%contact%model = models(model)
     world%case%contact%friction = 0.0_wp
     world%case%contact%wall_friction = 0.0_wp
     do b = 1, n
@@ -232,8 +243,9 @@ contains
       0.05_wp)
   end subroutine check_landing_slab
 
-  !> Height of the centre at which the lowest contact sphere of a shape stands on the floor [m].
-  pure function lowest(shape, q) result(height)
+  !> Height of the centre at which the lowest contact sphere or corner of a shape stands on the
+  !! floor [m].
+  function lowest(shape, q) result(height)
     use vectors_m, only: rotate
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: q(4)
@@ -242,6 +254,13 @@ contains
     integer :: i
 
     height = 0.0_wp
+    if (models(model) == 'surface') then
+      do i = 1, size(shape%point, 2)
+        c = rotate(q, shape%point(:, i))
+        height = max(height, -c(3))
+      end do
+      return
+    end if
     do i = 1, size(shape%sphere_radius)
       c = rotate(q, shape%sphere_centre(:, i))
       height = max(height, shape%sphere_radius(i) - c(3))
@@ -437,9 +456,9 @@ contains
         world%case%contact%restitution = 1.0_wp
         world%case%contact%wall_friction = mu(m)
         world%case%contact%friction = mu(m)
-        world%case%contact%substep_ratio = 0.01_wp
+        world%case%contact%substep_ratio = merge(0.001_wp, 0.01_wp, models(model) == 'surface')
         world%case%body(1)%position(3) = 0.03_wp
-        world%case%body(2)%position(2:3) = [0.49_wp, 0.06_wp]
+        world%case%body(2)%position(2:3) = [0.49_wp, 0.066_wp]
         world%case%body(1)%quaternion = random_rotation(2, i)
         world%case%body(2)%quaternion = random_rotation(3, i)
         world%case%body(1)%velocity(3) = -0.5_wp

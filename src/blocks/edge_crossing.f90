@@ -1,0 +1,164 @@
+!> Two sharp edges of two bodies that cross: how deep, along which normal, and whether it counts.
+!!
+!! Each edge is the border of a wedge. They touch along n, the normal of both lines, if n lies in
+!! the fan of outward normals of each wedge (between those of its two facets), and if the deepest
+!! place of one of them in the wedge of the other lies between its ends and beside the other edge:
+!! past its ends its corners touch instead. These conditions fade in and out, and the energy
+!! depth^2 weight is a smooth function of position: `weight_slope` gives the other part of the
+!! force.
+module edge_crossing_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross
+  implicit none
+  private
+  public :: edge_t, crossing_t, cross_edges, weight_slope
+
+  !> A convex edge, in any axes.
+  type :: edge_t
+    real(wp) :: start(3) = 0.0_wp, along(3) = 0.0_wp   !! one end [m], unit vector to the other
+    real(wp) :: extent = 0.0_wp                        !! length [m]
+    real(wp) :: into(3, 2) = 0.0_wp      !! unit vectors across the edge, into its two facets
+    real(wp) :: outward(3) = 0.0_wp      !! between the normals of the two facets
+  end type edge_t
+
+  type :: crossing_t
+    real(wp) :: depth = 0.0_wp           !! of one line behind the other; < 0: apart [m]
+    real(wp) :: weight = 0.0_wp          !! 0: does not count, 1: counts [-]
+    real(wp) :: normal(3) = 0.0_wp       !! unit vector from the guest into the host
+    real(wp) :: place(3) = 0.0_wp        !! half way between the lines [m]
+  end type crossing_t
+
+  real(wp), parameter :: least_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
+  real(wp), parameter :: beside = 0.15_wp   !! sine of the angle by which n may leave a fan
+  real(wp), parameter :: share = 0.25_wp    !! of the depth: width in which an end fades
+  real(wp), parameter :: least_share = 0.01_wp   !! of the edge: the least such width
+
+contains
+
+  !> Crossing of an edge of the guest and one of the host; weight 0 where there is none with a depth
+  !! between `least` and `most`.
+  pure subroutine cross_edges(guest, host, least, most, crossing)
+    type(edge_t), intent(in) :: guest, host   !! in the same axes
+    real(wp), intent(in) :: least             !! <= 0 [m]
+    real(wp), intent(in) :: most              !! > 0 [m]
+    type(crossing_t), intent(out) :: crossing
+    real(wp) :: d(3), n(3), sine2, depth, s, t, cosine, peak_s, peak_t
+
+    associate (u => guest%along, w => host%along)
+      d = host%start - guest%start
+      n(1) = u(2)*w(3) - u(3)*w(2)   ! written out: most calls end here
+      n(2) = u(3)*w(1) - u(1)*w(3)
+      n(3) = u(1)*w(2) - u(2)*w(1)
+      sine2 = n(1)*n(1) + n(2)*n(2) + n(3)*n(3)
+      if (sine2 < least_sine2) return
+      depth = d(1)*n(1) + d(2)*n(2) + d(3)*n(3)
+      if (dot_product(n, host%outward) < 0.0_wp) depth = -depth
+      if (depth <= 0.0_wp .and. depth**2 >= least**2*sine2) return
+      if (depth > 0.0_wp .and. depth**2 >= most**2*sine2) return
+      s = dot_product(cross(d, w), n)/sine2   ! nearest places of the two lines
+      t = dot_product(cross(d, u), n)/sine2
+      depth = depth/sqrt(sine2)
+      n = n/sign(sqrt(sine2), -dot_product(n, host%outward))
+      crossing%weight = in_fan(n, guest%into)*in_fan(-n, host%into)
+      if (crossing%weight <= 0.0_wp) return
+      cosine = dot_product(u, w)
+      peak_s = s + depth*lean(n, u, host%into)
+      peak_t = t + depth*lean(-n, w, guest%into)
+      crossing%weight = crossing%weight*max( &
+        between_ends(peak_s, guest%extent, 0.0_wp, depth) &
+        *between_ends(t + cosine*(peak_s - s), host%extent, depth, depth), &
+        between_ends(peak_t, host%extent, 0.0_wp, depth) &
+        *between_ends(s + cosine*(peak_t - t), guest%extent, depth, depth))
+      crossing%depth = depth
+      crossing%normal = n
+      crossing%place = guest%start + s*u - 0.5_wp*depth*n
+    end associate
+  end subroutine cross_edges
+
+  !> One where a normal is in the fan of an edge, falling to zero beside it.
+  pure function in_fan(normal, into) result(part)
+    real(wp), intent(in) :: normal(3), into(3, 2)
+    real(wp) :: part
+
+    part = 1.0_wp - max(dot_product(normal, into(:, 1)), dot_product(normal, into(:, 2)))/beside
+    part = max(0.0_wp, min(1.0_wp, part))
+  end function in_fan
+
+  !> From the place of an edge nearest to another to the place where it is deepest between the two
+  !! facets of the other, over the depth [-].
+  !!
+  !! At s from the nearest place the edge is depth*(n.n_i) + s (u.n_i) above facet i, whose outward
+  !! normal is n_i; where it is deepest the two are equal.
+  pure function lean(n, u, into) result(way)
+    real(wp), intent(in) :: n(3)         !! into the other body; normal to both edges
+    real(wp), intent(in) :: u(3)         !! along the edge
+    real(wp), intent(in) :: into(3, 2)   !! across the other edge, into its facets
+    real(wp) :: way
+    real(wp) :: slope
+
+    ! n_1 ~ c into_1 - into_2 and n_2 ~ c into_2 - into_1 with the cosine c of the two directions
+    slope = dot_product(u, into(:, 1) - into(:, 2))
+    way = 0.0_wp
+    if (abs(slope) > 0.0_wp) way = -dot_product(n, into(:, 1) - into(:, 2))/slope
+  end function lean
+
+  !> One along an edge, falling to zero towards its ends, from a share of `from` before them.
+  pure function between_ends(place, extent, from, depth) result(part)
+    real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
+    real(wp), intent(in) :: from, depth     !! [m]
+    real(wp) :: part
+
+    part = (min(place, extent - place) - share*max(from, 0.0_wp)) &
+      /max(share*depth, least_share*extent)
+    part = max(0.0_wp, min(1.0_wp, part))
+  end function between_ends
+
+  !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
+  !! about the place of the crossing [1/rad], by central differences.
+  pure subroutine weight_slope(guest, host, least, most, crossing, with_shift, with_turn)
+    type(edge_t), intent(in) :: guest, host
+    real(wp), intent(in) :: least, most             !! [m]
+    type(crossing_t), intent(in) :: crossing
+    real(wp), intent(out) :: with_shift(3), with_turn(3)
+    real(wp), parameter :: turn = 1.0e-6_wp         !! [rad]
+    real(wp) :: change(2), axis(3), shift
+    type(crossing_t) :: there
+    type(edge_t) :: moved
+    integer :: k, side
+
+    shift = turn*guest%extent
+    do k = 1, 3
+      axis = 0.0_wp
+      axis(k) = 1.0_wp
+      do side = 1, 2
+        moved = guest
+        moved%start = guest%start + real(2*side - 3, wp)*shift*axis
+        call cross_edges(moved, host, least, most, there)
+        change(side) = there%weight
+      end do
+      with_shift(k) = (change(2) - change(1))/(2*shift*crossing%weight)
+      do side = 1, 2
+        moved = turned(guest, crossing%place, real(2*side - 3, wp)*turn*axis)
+        call cross_edges(moved, host, least, most, there)
+        change(side) = there%weight
+      end do
+      with_turn(k) = (change(2) - change(1))/(2*turn*crossing%weight)
+    end do
+  end subroutine weight_slope
+
+  !> An edge turned about a place by a small angle.
+  pure function turned(edge, place, angle) result(moved)
+    type(edge_t), intent(in) :: edge
+    real(wp), intent(in) :: place(3), angle(3)   !! [m], [rad]
+    type(edge_t) :: moved
+    integer :: i
+
+    moved = edge
+    moved%start = edge%start + cross(angle, edge%start - place)
+    moved%along = edge%along + cross(angle, edge%along)
+    do i = 1, 2
+      moved%into(:, i) = edge%into(:, i) + cross(angle, edge%into(:, i))
+    end do
+  end function turned
+
+end module edge_crossing_m
