@@ -470,15 +470,8 @@ contains
       //'advection=''upwind''/', '')
     call expect(base//'&boundary z_max_velocity=0,0,0/', '')
     call expect(base//'&fluid surface_tension=0.0/', '')
-<<<<<<< HEAD
     call expect(base//'&fluid surface_tension=0.072/', '')
-    call expect(base//'&contact model=''surface''/', &
-      '&contact model = ''surface'': not available yet, so far: ''spheres'' (line 3)')
-=======
-    call expect(base//'&fluid surface_tension=0.072/', &
-      '&fluid surface_tension = 0.072: not available yet (line 3)')
     call expect(base//'&contact model=''surface''/', '')
->>>>>>> 3d228e9 (Let exact surfaces touch by default)
     call expect(base//'&bed file=''a.stl''/', '&bed: this group is not available yet (line 3)')
   end subroutine test_not_yet
 
