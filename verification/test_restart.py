@@ -11,10 +11,10 @@ from same_bits import contents, differences
 RESULTS = ("run.h5", "fields.vtkhdf", "blocks.vtkhdf")
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_restart_equals_uninterrupted_run(ranks: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "ranks"), [("coupled", 1), ("coupled", 2), ("paper", 1)])
+def test_restart_equals_uninterrupted_run(name: str, ranks: int, tmp_path: Path) -> None:
     """Go on from the first restart file of a finished run, in a copy, and compare."""
-    case = CASES / "ranks" / "coupled.nml"
+    case = CASES / "ranks" / f"{name}.nml"
     machine = Machine(ROOT / "mics") if ranks == 1 else Machine(ROOT / "mics_mpi", ranks)
     whole, again = tmp_path / "whole", tmp_path / "again"
     run(case, whole, machine)

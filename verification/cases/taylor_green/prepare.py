@@ -50,5 +50,5 @@ for n, cost in COSTS.items():
         write(f"courant_{n}", n, 0.5, cost, "the longest step that the Courant number allows")
         short = "C-ISMAC, time step as the square of the spacing"
         write(f"ismac_{n}", n, 0.1 * (16 / n) ** 2, cost, short, "c_ismac")
-        # The speeds |u| + |w| add up to one at most: a step of two cells is a Courant number of two.
+        # |u| + |w| is one at most, so a step of two cells is a Courant number of two.
         write(f"long_{n}", n, 2 * SIDE / n, cost, "C-ISMAC, Courant number 2", "c_ismac", 0.0)
