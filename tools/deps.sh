@@ -26,7 +26,11 @@ missing() {
     Linux)
       library libEGL.so.1 || echo libegl1
       library libGL.so.1 || echo libgl1
-      library libXcursor.so.1 || echo libxcursor1 ;;
+      library libXcursor.so.1 || echo libxcursor1
+      library libGLU.so.1 || echo libglu1-mesa   # this and the next three for Gmsh
+      library libXrender.so.1 || echo libxrender1
+      library libXft.so.2 || echo libxft2
+      library libXinerama.so.1 || echo libxinerama1 ;;
   esac
 }
 

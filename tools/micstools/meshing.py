@@ -1,0 +1,227 @@
+"""From a surface (STL, OBJ, STEP) to tetrahedra for a block of kind 'file'.
+
+trimesh reads, checks and repairs the surface; Gmsh fills it with tetrahedra and keeps its facets. A
+remeshed surface would change volume and weight of curved blocks by several per cent. Both packages
+are imported when they are needed; Gmsh (GPL) runs as a tool of its own, the program does not
+contain it.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools.geometry import Array, IntArray, tet_volumes
+from micstools.shapes import Shape, from_tets
+
+LARGEST_CHANGE = 0.01
+"""Change of volume by repairs or by meshing that is refused."""
+LONGEST = 20.0
+"""Length of a block above which its file is taken to be in mm [m]."""
+
+
+class BadSurface(Exception):
+    """The surface cannot become a block; the text says why and what to do."""
+
+
+@dataclass
+class Surface:
+    """Triangles of a file, in its units, and what was found out and done about them."""
+
+    points: Array  # (n, 3)
+    triangles: IntArray  # (m, 3) seen from outside
+    volume: float
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def length(self) -> float:
+        """Largest extent."""
+        return float(np.ptp(self.points, axis=0).max())
+
+
+def load(path: Path, element: float = 0.0) -> Surface:
+    """The closed surface of a file, repaired where it needs that; `element` [its units] is the edge
+    length with which the curved faces of a STEP file are cut, 0 = a tenth of its length."""
+    if not path.is_file():
+        raise BadSurface(f"{path}: there is no such file")
+    if path.suffix.lower() in (".step", ".stp"):
+        points, triangles, volume = _step_surface(path, element)
+        return closed(points, triangles, volume)
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(path)
+        return closed(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
+    except (ValueError, NotImplementedError, AttributeError, IndexError) as error:
+        raise BadSurface(f"{path}: cannot be read as a surface ({error})") from error
+
+
+def closed(points: Array, triangles: IntArray, volume: float | None = None) -> Surface:
+    """A closed surface seen from outside; warnings tell what was repaired.
+
+    `volume` is that of the true form, if it is known.
+    """
+    import trimesh
+
+    mesh = trimesh.Trimesh(points, triangles, process=True)  # joins equal points
+    mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces(height=0.0))
+    mesh.remove_unreferenced_vertices()
+    if len(mesh.faces) < 4:
+        raise BadSurface("the file holds no closed surface")
+    warnings = []
+    flipped = not mesh.is_winding_consistent or (mesh.is_watertight and mesh.volume < 0)
+    if not mesh.is_watertight:
+        open_edges = _open_edges(mesh)
+        trimesh.repair.fill_holes(mesh)
+        if not mesh.is_watertight:
+            raise BadSurface(
+                f"the surface is open: {open_edges} edges have not just two triangles, and the "
+                "holes could not be filled; repair it where it was drawn"
+            )
+        warnings.append(f"the surface was open at {open_edges} edges; the holes were filled")
+    if flipped:
+        trimesh.repair.fix_normals(mesh, multibody=False)  # type: ignore[no-untyped-call]
+        warnings.append("some or all triangles were seen from inside; they were turned")
+        if not mesh.is_winding_consistent:
+            raise BadSurface("the triangles cannot be turned to one side: no closed body")
+    true = float(mesh.volume) if volume is None else volume
+    if mesh.volume <= 0:
+        raise BadSurface("the surface encloses no volume")
+    if abs(mesh.volume / true - 1) > LARGEST_CHANGE:
+        raise BadSurface(
+            f"the triangles enclose {mesh.volume / true - 1:+.1%} of the volume of the form; "
+            "give a smaller --element"
+        )
+    return Surface(
+        np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64), true, warnings
+    )
+
+
+def _open_edges(mesh: Any) -> int:
+    _, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+    return int((count != 2).sum())
+
+
+def scale_of(surface: Surface, size: float | None, scale: float | None) -> float:
+    """Factor from the file's units to m: from the wanted length, as given, or 1."""
+    if size is not None:
+        return size / surface.length
+    if scale is None and surface.length > LONGEST:
+        raise BadSurface(
+            f"read as m the block is {surface.length:g} m long; if the file is in mm give "
+            "--scale 0.001, or give the length in m with --size"
+        )
+    return 1.0 if scale is None else scale
+
+
+def fill(surface: Surface, element: float = 0.0) -> Array:
+    """Corners (k, 4, 3) of tetrahedra that fill a surface and keep its triangles; `element` > 0 is
+    the largest edge wanted inside. Refuses a surface that meets itself."""
+    with _gmsh() as gmsh:
+        gmsh.option.setNumber("Mesh.MeshSizeMax", element if element > 0 else 1e22)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0 if element > 0 else 1)
+        surface_tag = gmsh.model.addDiscreteEntity(2)
+        tags = np.arange(1, len(surface.points) + 1)
+        gmsh.model.mesh.addNodes(2, surface_tag, tags, surface.points.ravel())
+        gmsh.model.mesh.addElementsByType(
+            surface_tag, 2, [], (np.asarray(surface.triangles) + 1).ravel()
+        )
+        gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop([surface_tag])])
+        gmsh.model.geo.synchronize()
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception as error:  # gmsh raises plain exceptions
+            raise BadSurface(
+                f"no tetrahedra fit the surface, it probably meets itself ({error})"
+            ) from error
+        node, x, _ = gmsh.model.mesh.getNodes()
+        place = np.zeros(int(node.max()) + 1, np.int64)
+        place[node.astype(np.int64)] = np.arange(len(node))
+        _, corners = gmsh.model.mesh.getElementsByType(4)
+    if len(corners) == 0:
+        raise BadSurface("no tetrahedra fit the surface, it probably meets itself")
+    nodes = np.asarray(x, float).reshape(-1, 3)
+    tets: Array = nodes[place[corners.astype(np.int64)]].reshape(-1, 4, 3)
+    total = float(np.abs(tet_volumes(tets)).sum())
+    if abs(total / surface.volume - 1) > LARGEST_CHANGE:
+        raise BadSurface(
+            f"the tetrahedra hold {total:.4g}, the surface {surface.volume:.4g}: it meets itself "
+            "or parts of it overlap; unite them where they were drawn"
+        )
+    return tets
+
+
+def _step_surface(path: Path, element: float) -> tuple[Array, IntArray, float]:
+    """Triangles of a STEP file and the exact volume of its solids."""
+    with _gmsh() as gmsh:
+        try:
+            gmsh.model.occ.importShapes(str(path))
+            gmsh.model.occ.synchronize()
+        except Exception as error:  # gmsh raises plain exceptions
+            raise BadSurface(f"{path}: cannot be read as STEP ({error})") from error
+        solids = gmsh.model.getEntities(3)
+        if len(solids) != 1:
+            raise BadSurface(f"{path}: holds {len(solids)} solids, a block is one")
+        volume = gmsh.model.occ.getMass(*solids[0])
+        low, high = np.split(np.array(gmsh.model.getBoundingBox(*solids[0])), 2)
+        edge = element if element > 0 else float((high - low).max()) / 10
+        gmsh.option.setNumber("Mesh.MeshSizeMax", edge)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 12)
+        gmsh.model.mesh.generate(2)
+        node, x, _ = gmsh.model.mesh.getNodes()
+        place = np.zeros(int(node.max()) + 1, np.int64)
+        place[node.astype(np.int64)] = np.arange(len(node))
+        _, corners = gmsh.model.mesh.getElementsByType(2)
+    triangles = place[corners.astype(np.int64)].reshape(-1, 3)
+    return np.asarray(x).reshape(-1, 3), triangles, float(volume)
+
+
+class _gmsh:
+    """Gmsh with its messages off, for a while."""
+
+    def __enter__(self) -> Any:
+        import gmsh
+
+        gmsh.initialize(interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        self.gmsh = gmsh
+        return gmsh
+
+    def __exit__(self, *_: object) -> None:
+        self.gmsh.finalize()
+
+
+def block(name: str, tets: Array, density: float) -> tuple[Shape, Array]:
+    """A block from loose tetrahedra [m], and its centroid in their axes."""
+    volume = np.abs(tet_volumes(tets))
+    centroid = (volume[:, None] * tets.mean(axis=1)).sum(axis=0) / volume.sum()
+    return from_tets(name, tets, density), centroid
+
+
+def write_shape(path: Path, shape: Shape) -> None:
+    """The program's own shape file, with all digits."""
+    lines = ["mics-shape 1", f"points {len(shape.points)}"]
+    lines += [" ".join(repr(float(x)) for x in point) for point in shape.points]
+    lines += [f"tets {len(shape.tets)}"]
+    lines += [" ".join(str(int(corner) + 1) for corner in tet) for tet in shape.tets]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def report(shape: Shape, shift: Array) -> str:
+    """Mass properties in lines to read; `shift` is the centroid in the file's coordinates [m]."""
+    mass = shape.density * shape.volume
+    rows = [
+        ("extent", " x ".join(f"{x:.4g}" for x in np.ptp(shape.points, axis=0)) + " m"),
+        ("volume", f"{shape.volume:.6g} m3"),
+        ("mass", f"{mass:.6g} kg at {shape.density:g} kg/m3"),
+        ("weight", f"{9.81 * mass:.6g} N"),
+        ("centroid", ", ".join(f"{x:.6g}" for x in shift) + " m in the file's axes"),
+        *[
+            (f"inertia {axis}", "  ".join(f"{x:12.5e}" for x in row) + " kg m2")
+            for axis, row in zip("xyz", shape.inertia, strict=True)
+        ],
+        ("tetrahedra", f"{len(shape.tets)}, {len(shape.triangles)} triangles at the surface"),
+        ("contact spheres", f"{len(shape.sphere_radius)} of spheres = 'centroid'"),
+    ]
+    return "\n".join(f"{name:16}{text}" for name, text in rows)
