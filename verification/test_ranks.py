@@ -16,7 +16,7 @@ MACHINES = {
 }
 
 
-@pytest.fixture(scope="module", params=["coupled", "paper", "stream", "dry"])
+@pytest.fixture(scope="module", params=["coupled", "paper", "stream", "current", "dry"])
 def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The result of one thread of the serial program."""
     output = tmp_path_factory.mktemp("ranks") / request.param

@@ -11,7 +11,10 @@ from same_bits import contents, differences
 RESULTS = ("run.h5", "fields.vtkhdf", "blocks.vtkhdf")
 
 
-@pytest.mark.parametrize(("name", "ranks"), [("coupled", 1), ("coupled", 2), ("paper", 1)])
+RUNS = [("coupled", 1), ("coupled", 2), ("paper", 1), ("current", 1), ("current", 2)]
+
+
+@pytest.mark.parametrize(("name", "ranks"), RUNS)
 def test_restart_equals_uninterrupted_run(name: str, ranks: int, tmp_path: Path) -> None:
     """Go on from the first restart file of a finished run, in a copy, and compare."""
     case = CASES / "ranks" / f"{name}.nml"

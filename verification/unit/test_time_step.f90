@@ -1,7 +1,7 @@
 !> Whole steps: still water, length of the step, a release, a fall without fluid.
 program test_time_step
   use kinds_m, only: wp
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, water_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use liquid_fill_m, only: liquid_volume
@@ -14,6 +14,8 @@ program test_time_step
   call still_water()
   call water_beside_outflow()
   call uniform_current()
+  call moved_block()
+  call slice_with_odd_cells()
   call length_of_steps()
   call spinning_ball()
   call release_into_water()
@@ -127,6 +129,70 @@ contains
     call check('current: what enters', -sum(sim%transport%g(13, 1:8, 1:12, 1)), &
                speed*sim%clock%dt*0.08_wp*0.0613_wp, 1.0e-15_wp)
   end subroutine uniform_current
+
+  !> A block that is moved at a constant rate does so whatever pushes, feels the water, and the
+  !! water is kept.
+  subroutine moved_block()
+    type(case_t) :: case
+    type(simulation_t) :: sim
+    type(step_report_t) :: report
+    real(wp), parameter :: rate(3) = [0.2_wp, -0.1_wp, 0.15_wp], spin(3) = [0.0_wp, 0.0_wp, 5.0_wp]
+    real(wp), parameter :: place(3) = [0.0613_wp, 0.0389_wp, 0.0571_wp]
+    real(wp) :: before
+    integer :: step
+
+    call tank(1, case)
+    case%body(1)%position = place
+    case%body(1)%fixed = .true.
+    case%body(1)%velocity = rate
+    case%body(1)%angular_velocity = spin
+    call start(case, sim)
+    before = liquid_volume(sim%grid, sim%flow%liquid)
+    do step = 1, 5
+      call take_step(sim, report)
+    end do
+    call check('moved block: place', maxval(abs(sim%blocks%x(:, 1) - place - rate*sim%clock%t)), &
+               0.0_wp, 1.0e-14_wp)
+    call check('moved block: speed', maxval(abs(sim%blocks%v(:, 1) - rate)), 0.0_wp, 0.0_wp)
+    call check('moved block: turned', sim%blocks%q(4, 1), sin(0.5_wp*spin(3)*sim%clock%t), &
+               1.0e-14_wp)
+    call check('moved block: water', liquid_volume(sim%grid, sim%flow%liquid), before, &
+               1.0e-13_wp*before)
+    call check('moved block: divergence', report%divergence_max <= 1.0e-8_wp)
+    call check('moved block: feels the water', norm2(sim%blocks%fluid_force(:, 1)) > 0.1_wp)
+  end subroutine moved_block
+
+  !> Odd numbers of cells, one of them across: a slice between slip walls is the same as one between
+  !! periodic sides, and nothing moves across it.
+  subroutine slice_with_odd_cells()
+    type(case_t) :: case
+    type(simulation_t) :: sim(2)
+    type(step_report_t) :: report
+    integer :: step, n
+    character(8), parameter :: kind(2) = [character(8) :: 'slip', 'periodic']
+
+    do n = 1, 2
+      call tank(0, case)
+      case%grid%cells = [13, 1, 11]
+      case%grid%length(2) = 0.01_wp
+      case%boundary%kind(:, 2) = kind(n)
+      case%fluid%water_level = -1.0_wp
+      case%water = [water_t(min=[0.0_wp, -1.0_wp, 0.0_wp], max=[0.051_wp, 1.0_wp, 0.083_wp])]
+      call start(case, sim(n))
+      do step = 1, 10
+        call take_step(sim(n), report)
+      end do
+      call check('slice: converged', report%pressure_converged .and. report%viscous_converged)
+      call check('slice: water falls', minval(sim(n)%flow%u(1:13, 1, 1:11, 3)) < -0.02_wp)
+      call check('slice: nothing across', maxval(abs(sim(n)%flow%u(1:13, 1, 1:11, 2))), 0.0_wp, &
+                 1.0e-15_wp)
+      call check('slice: volume', liquid_volume(sim(n)%grid, sim(n)%flow%liquid), &
+                 0.051_wp*0.01_wp*0.083_wp, 1.0e-17_wp)
+    end do
+    call check('slice: slip or periodic', maxval(abs(sim(1)%flow%u(1:13, 1, 1:11, :) &
+                                                     - sim(2)%flow%u(1:13, 1, 1:11, :))), 0.0_wp, &
+               1.0e-9_wp)
+  end subroutine slice_with_odd_cells
 
   !> Steps obey the Courant number of fluid and blocks, and land on a release.
   subroutine length_of_steps()
