@@ -17,7 +17,7 @@ module contact_surface_m
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
     gather_facets, nearest_on_surface, segment_distance2
-  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
+  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, may_cross, weight_slope
   implicit none
   private
   public :: contact_surface_t, contact_surface_init, find_surface_touches
@@ -602,6 +602,7 @@ contains
         associate (host => surface_b%edge(j))
           if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
                                 host%extent) > reach**2) cycle
+          if (.not. may_cross(guest, host, pair%valid/min(surface_a%reach, surface_b%reach))) cycle
         end associate
         pair%n_crossings = pair%n_crossings + 1
         call reserve(pair%n_crossings, pair%edge_a)

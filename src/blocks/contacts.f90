@@ -247,7 +247,7 @@ contains
   !> Longest substep the present touches allow [s].
   !!
   !! For one pair of bodies a sixth of the bound of stability, which also keeps the restitution
-  !! within 0.02; for all pairs together, see `highest_frequency2`, less than half of that bound.
+  !! within 0.02; for all pairs together, see `highest_frequency2`, little more than half of that bound.
   pure function stiffness_limit(contacts) result(limit)
     type(contacts_t), intent(in) :: contacts
     real(wp) :: limit
@@ -330,7 +330,7 @@ contains
     type(touch_t), intent(in) :: touches
     type(response_t), intent(in) :: response
     real(wp) :: highest
-    real(wp), parameter :: share = (0.35_wp/0.8_wp)**2
+    real(wp), parameter :: share = (0.35_wp/1.2_wp)**2
     real(wp) :: pair
     integer :: t
 

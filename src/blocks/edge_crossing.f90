@@ -11,7 +11,7 @@ module edge_crossing_m
   use vectors_m, only: cross
   implicit none
   private
-  public :: edge_t, crossing_t, cross_edges, weight_slope
+  public :: edge_t, crossing_t, cross_edges, may_cross, weight_slope
 
   !> A convex edge, in any axes.
   type :: edge_t
@@ -74,6 +74,23 @@ contains
       crossing%place = guest%start + s*u - 0.5_wp*depth*n
     end associate
   end subroutine cross_edges
+
+  !> Whether two edges may come to count before one has turned by an angle.
+  pure function may_cross(guest, host, angle) result(yes)
+    type(edge_t), intent(in) :: guest, host   !! in the same axes
+    real(wp), intent(in) :: angle             !! [rad]
+    logical :: yes
+    real(wp), parameter :: safety = 1.5_wp
+    real(wp) :: n(3), sine, most
+
+    n = cross(guest%along, host%along)
+    sine = norm2(n)
+    yes = sine < 5*angle
+    if (yes) return
+    n = n/sign(sine, -dot_product(n, host%outward))
+    most = beside + safety*angle*(1.0_wp + 1.0_wp/sine)   ! n turns by angle/sine, the fans by angle
+    yes = all(matmul(n, guest%into) < most) .and. all(matmul(-n, host%into) < most)
+  end function may_cross
 
   !> One where a normal is in the fan of an edge, falling to zero beside it.
   pure function in_fan(normal, into) result(part)
