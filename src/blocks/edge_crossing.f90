@@ -131,35 +131,29 @@ contains
   end function between_ends
 
   !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
-  !! about the place of the crossing [1/rad], by central differences.
+  !! about the place of the crossing [1/rad], by small differences.
   pure subroutine weight_slope(guest, host, least, most, crossing, with_shift, with_turn)
     type(edge_t), intent(in) :: guest, host
     real(wp), intent(in) :: least, most             !! [m]
     type(crossing_t), intent(in) :: crossing
     real(wp), intent(out) :: with_shift(3), with_turn(3)
     real(wp), parameter :: turn = 1.0e-6_wp         !! [rad]
-    real(wp) :: change(2), axis(3), shift
+    real(wp) :: axis(3), shift
     type(crossing_t) :: there
     type(edge_t) :: moved
-    integer :: k, side
+    integer :: k
 
     shift = turn*guest%extent
     do k = 1, 3
       axis = 0.0_wp
       axis(k) = 1.0_wp
-      do side = 1, 2
-        moved = guest
-        moved%start = guest%start + real(2*side - 3, wp)*shift*axis
-        call cross_edges(moved, host, least, most, there)
-        change(side) = there%weight
-      end do
-      with_shift(k) = (change(2) - change(1))/(2*shift*crossing%weight)
-      do side = 1, 2
-        moved = turned(guest, crossing%place, real(2*side - 3, wp)*turn*axis)
-        call cross_edges(moved, host, least, most, there)
-        change(side) = there%weight
-      end do
-      with_turn(k) = (change(2) - change(1))/(2*turn*crossing%weight)
+      moved = guest
+      moved%start = guest%start + shift*axis
+      call cross_edges(moved, host, least, most, there)
+      with_shift(k) = (there%weight - crossing%weight)/(shift*crossing%weight)
+      moved = turned(guest, crossing%place, turn*axis)
+      call cross_edges(moved, host, least, most, there)
+      with_turn(k) = (there%weight - crossing%weight)/(turn*crossing%weight)
     end do
   end subroutine weight_slope
 
