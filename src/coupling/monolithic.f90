@@ -20,6 +20,7 @@ module monolithic_m
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
   use buoyancy_m, only: hydrostatic_correction
+  use momentum_return_m, only: return_momentum
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
     predict_velocity, renew_acceleration
@@ -44,6 +45,7 @@ contains
     real(wp), parameter :: weightless(3) = 0.0_wp
 
     associate (p => self%pressure, bodies => self%bodies)
+      self%u_before = flow%u
       call set_pressure_system(grid, case%numerics, solid%open, flow%rho, p, flow%sides)
       call build_rigid_flux(grid, solid, bodies, p%active, p%operator%flux)
 
@@ -82,6 +84,10 @@ contains
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
+      if (case%numerics%momentum == 'conservative') then
+        call return_momentum(grid, case%fluid, solid, self%at_start, bodies, self%u_before, flow, &
+                             self%viscous%z, self%viscous%r)
+      end if
       call fill_velocity_halo(grid, flow%u)
       call extend_pressure(grid, case%fluid%gravity, flow%rho, p%active, p%known, flow%p)
       call force_from_faces(grid, solid, bodies, p%operator%flux, p%phi_total, self%total)

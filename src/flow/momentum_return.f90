@@ -1,0 +1,154 @@
+!> Momentum that the velocity stage gives to cut cells, handed over to the mass that is there.
+!!
+!! The transport carries the momentum of all fluid in a cell, m = rho V (1 - alpha). Viscosity,
+!! pressure and the forces on bodies move the mean open share of two faces instead, m_d = rho V w_d
+!! (`open_share`), in which a uniform force accelerates all cells alike. So a change of velocity
+!! du relative to that of the wall leaves (m_d - m) du of the momentum that a body has felt without
+!! an owner. It goes to those of the 26 cells around that no body cuts, where the two masses
+!! are the same, so that nothing comes back. Fluid and bodies together keep their momentum.
+module momentum_return_m
+  use kinds_m, only: wp
+  use case_types_m, only: fluid_t
+  use grid_m, only: grid_t, n_halo, unit_step
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm
+  use momentum_conservative_m, only: mass_through
+  use viscous_m, only: open_share
+  use parallel_m, only: halo_exchange
+  implicit none
+  private
+  public :: return_momentum
+
+  real(wp), parameter :: heavy = 0.5_wp           !! mass of a full taker over that of a full giver
+  real(wp), parameter :: least_sum = 14.0_wp
+    !! full cells among which a giver without whole neighbours spreads at least: of what the cells
+    !! give to each other less comes back than was given
+
+contains
+
+  !> Complete the velocity stage: `flow%u` on entry is its result in all cells.
+  subroutine return_momentum(grid, fluid, solid, before, bodies, u_before, flow, whole, cut)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: before, bodies   !! at the start and at the end of the step
+    real(wp), intent(in), contiguous :: u_before(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                 grid%lo(3) - n_halo:, :)
+                                                   !! velocity before the stage [m/s]
+    type(flow_t), intent(inout) :: flow
+    real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                       grid%lo(3) - n_halo:, :), &
+      contiguous :: whole, cut
+        !! work arrays: what a cell owes to its whole neighbours, or to all, cut ones too [m/s]
+    integer :: b, m, c(3), low(3), high(3)
+
+    if (bodies%n == 0) return
+    whole = 0.0_wp
+    cut = 0.0_wp
+    low = grid%hi
+    high = grid%lo
+    do b = 1, bodies%n
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        c = solid%face(1:3, m)
+        call owe(b, c)
+        call owe(b, c - unit_step(:, solid%face(4, m)))
+      end do
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        call owe(b, solid%cell(:, m))
+      end do
+    end do
+    call halo_exchange(whole, n_halo)
+    call halo_exchange(cut, n_halo)
+    call take(max(low, grid%lo), min(high, grid%hi))
+  contains
+    !> What cell c at body b owes, per share of the takers.
+    subroutine owe(b, c)
+      integer, intent(in) :: b, c(3)
+      real(wp) :: arm(3), wall(3), mass, mass_whole, mass_cut, full, owed, m
+      integer :: i, j, k, d, u(3)
+
+      low = min(low, c - 1)
+      high = max(high, c + 1)
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], &
+                        bodies%x(:, b))
+      wall = wall_velocity(bodies%motion(:, b) - before%motion(:, b), arm)
+      full = flow%rho(c(1), c(2), c(3))*grid%volume
+      mass = mass_of(c(1), c(2), c(3))
+      mass_whole = 0.0_wp
+      mass_cut = 0.0_wp
+      do k = c(3) - 1, c(3) + 1
+        do j = c(2) - 1, c(2) + 1
+          do i = c(1) - 1, c(1) + 1
+            m = mass_of(i, j, k)
+            if (is_whole(i, j, k) .and. m > heavy*full) mass_whole = mass_whole + m
+            mass_cut = mass_cut + m**2/full
+          end do
+        end do
+      end do
+      do d = 1, 3
+        u = c + unit_step(:, d)
+        owed = (full*open_share(solid%open(c(1), c(2), c(3), d), solid%open(u(1), u(2), u(3), d)) &
+                - mass)*(flow%u(c(1), c(2), c(3), d) - u_before(c(1), c(2), c(3), d) - wall(d))
+        if (mass_whole > 0.0_wp) then
+          whole(c(1), c(2), c(3), d) = owed/mass_whole
+        else
+          cut(c(1), c(2), c(3), d) = owed/max(mass_cut, least_sum*full)
+        end if
+      end do
+    end subroutine owe
+
+    !> The own cells between two corners take what their neighbours and they themselves owe.
+    subroutine take(first, last)
+      integer, intent(in) :: first(3), last(3)
+      integer :: i, j, k, p, q, r
+      real(wp) :: mass, full, total(3)
+      logical :: here_whole
+
+      !$omp parallel do private(i, j, p, q, r, mass, full, total, here_whole) schedule(static)
+      do k = first(3), last(3)
+        do j = first(2), last(2)
+          do i = first(1), last(1)
+            mass = mass_of(i, j, k)
+            here_whole = is_whole(i, j, k)
+            total = 0.0_wp
+            do r = k - 1, k + 1
+              do q = j - 1, j + 1
+                do p = i - 1, i + 1
+                  full = flow%rho(p, q, r)*grid%volume
+                  if (here_whole .and. mass > heavy*full) then
+                    total = total + whole(p, q, r, :)
+                  else
+                    total = total + cut(p, q, r, :)*mass/full
+                  end if
+                end do
+              end do
+            end do
+            flow%u(i, j, k, :) = flow%u(i, j, k, :) + total
+          end do
+        end do
+      end do
+    end subroutine take
+
+    !> Mass of the fluid in a cell [kg].
+    pure function mass_of(i, j, k) result(mass)
+      integer, intent(in) :: i, j, k
+      real(wp) :: mass
+
+      mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
+    end function mass_of
+
+    !> No body touches the cell or one of its faces.
+    pure function is_whole(i, j, k) result(answer)
+      integer, intent(in) :: i, j, k
+      logical :: answer
+
+      answer = solid%alpha(i, j, k) <= 0.0_wp &
+        .and. all(solid%open(i, j, k, :) >= 1.0_wp) .and. solid%open(i + 1, j, k, 1) >= 1.0_wp &
+        .and. solid%open(i, j + 1, k, 2) >= 1.0_wp .and. solid%open(i, j, k + 1, 3) >= 1.0_wp
+    end function is_whole
+  end subroutine return_momentum
+
+end module momentum_return_m
