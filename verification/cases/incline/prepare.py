@@ -1,0 +1,40 @@
+"""One case file for each row of D5.csv: a flat box and a sphere on a floor under tilted gravity.
+Below the friction angle also without sleep."""
+
+from pathlib import Path
+
+import numpy as np
+
+ROWS = np.loadtxt(Path(__file__).with_name("D5.csv"), delimiter=",", skiprows=2)
+TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu:g}.
+! cost: 1 s
+&run
+  title = 'incline'
+  physics = 'dry'
+  t_end = {end}
+  dt = 1.0e-2
+  field_interval = 0.0
+  restart_interval = 0.0
+/
+&grid  cells = 100, 20, 10  length = 16.0, 0.3, 0.1 /
+&fluid gravity = {along:.15g}, 0.0, {down:.15g} /
+&contact friction = {mu:g}  wall_friction = {mu:g}  sleep = {sleep} /
+&shape name = 'box'  kind = 'box'  size = 0.04, 0.04, 0.02 /
+&shape name = 'sphere'  kind = 'sphere'  size = 0.04 /
+&body  shape = 'box'  position = 0.1, 0.1, 0.01 /
+&body  shape = 'sphere'  position = 0.1, 0.2, 0.02 /
+"""
+
+for theta, mu, a_block, _ in ROWS:
+    slope = np.radians(theta)
+    for sleep in ("T",) if a_block > 0.0 else ("T", "F"):
+        text = TEXT.format(
+            theta=theta,
+            mu=mu,
+            end=0.6 if a_block > 0.0 else 2.0,
+            along=9.81 * np.sin(slope),
+            down=-9.81 * np.cos(slope),
+            sleep=sleep,
+        )
+        name = f"deg{theta:.0f}_mu{100 * mu:03.0f}{'' if sleep == 'T' else '_awake'}.nml"
+        Path(name).write_text(text)
