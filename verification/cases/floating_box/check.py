@@ -1,0 +1,80 @@
+"""Draft, heave period and stability of floating boxes."""
+
+import numpy as np
+
+from micstools.checks import Checks, sound
+from micstools.reader import Run
+
+DRAFT_BAND = 0.01
+G = 9.81
+
+
+def tilt_deg(run: Run) -> np.ndarray:
+    """Angle of the upright axis of the box to the vertical at every row."""
+    x, y = run.bodies.quaternion[:, 0, 1], run.bodies.quaternion[:, 0, 2]
+    return np.degrees(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
+
+
+def draft_of_weight(run: Run) -> float:
+    """Draft of the upright box at rest by Archimedes, water below and air above [m]."""
+    liquid = float(run.value("fluid", "liquid_density", 998.2))
+    gas = float(run.value("fluid", "gas_density", 1.204))
+    sides = np.array(run.value("shape", "size", [0.0] * 3), float)
+    immersed = (float(run.bodies.mass[0]) - gas * sides.prod()) / (liquid - gas)
+    return float(immersed / (sides[0] * sides[1]))
+
+
+def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
+    """Mean draft over whole periods [m], the heave period [s] and the draft at every row, against
+    the level that the liquid would have at rest."""
+    b, high = run.bodies, run.grid.high - run.grid.low
+    sides = np.array(run.value("shape", "size", [0.0] * 3), float)
+    level = (run.series.liquid_volume + sides[0] * sides[1] * draft_of_weight(run)) / (
+        high[0] * high[1]
+    )
+    draft = level - (b.position[:, 0, 2] - sides[2] / 2)
+    even = np.arange(0.0, b.time[-1], 1e-3)
+    d = np.interp(even, b.time, draft)
+    rising = np.flatnonzero((d[:-1] < d.mean()) & (d[1:] >= d.mean()))
+    period = float(np.diff(even[rising]).mean()) if len(rising) > 1 else float("nan")
+    whole = slice(rising[0], rising[-1]) if len(rising) > 1 else slice(None)
+    return float(d[whole].mean()), period, draft
+
+
+def check(runs: list[Run]) -> Checks:
+    """Each upright box: draft and period; each tilted one: whether it comes back."""
+    checks, study, curves = Checks("floating box"), {}, {}
+    for run in runs:
+        name, b = run.folder.name, run.bodies
+        if name.endswith("tilted"):
+            tilt = tilt_deg(run)
+            last = tilt[b.time > 0.75 * b.time[-1]].max()
+            figures = f"{tilt[0]:.1f} at first, {last:.1f} deg at most in the last quarter"
+            if name.startswith("flat"):
+                checks.true("a flat box comes back", tilt.max() < 1.05 * tilt[0], figures)
+            else:
+                checks.true("a tall box capsizes", last > 45, figures)
+            sound(run, checks)
+            continue
+        expected = draft_of_weight(run)
+        found, period, draft = mean_draft(run)
+        cells = 0.06 / float(run.grid.spacing[2])
+        name = f"{cells:.0f} cells per height"
+        checks.close(f"{name}: mean draft [m]", found, expected, DRAFT_BAND)
+        low, high = (2 * np.pi * np.sqrt((1 + ca) * expected / G) for ca in (0.3, 1.0))
+        checks.within(f"{name}: heave period [s]", period, low, high)
+        study[cells] = found
+        curves[name] = (b.time, 1e3 * draft)
+        reference = expected
+        sound(run, checks)
+    if curves:
+        checks.figure(
+            "draft",
+            "t [s]",
+            "mm",
+            curves,
+            {"Archimedes": ([0.0, 3.0], [1e3 * reference] * 2)},
+            smooth=True,
+        )
+        checks.study("mean draft [m]", study, reference, "cells per height")
+    return checks
