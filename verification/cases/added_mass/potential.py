@@ -33,6 +33,35 @@ def sphere_in_cube(diameter: float, edge: float, degree: int = 25) -> float:
     return float(0.5 - 1.5 * free[0] / half)
 
 
+def circle_in_square(diameter: float, edge: float, degree: int = 41) -> float:
+    """The same for a circle that moves in the middle of a square, in two dimensions."""
+    a, half = diameter / 2, edge / 2
+    points, weights = leggauss(48)
+    root = np.sqrt(weights)
+    sides = [(np.array([np.full(48, half), points * half]), 0)]
+    sides += [(np.array([points * half, np.full(48, half)]), 1)]
+
+    def part(n: int, x: np.ndarray) -> np.ndarray:
+        power = (x[0] / half + 1j * x[1] / half) ** n
+        r2 = (x**2).sum(axis=0)
+        return power.imag * (1 + (a * a / r2) ** n)
+
+    def slopes(function) -> np.ndarray:
+        step, found = 1e-6 * half, []
+        for x, d in sides:
+            ahead, behind = x.copy(), x.copy()
+            ahead[d] += step
+            behind[d] -= step
+            found.append((function(ahead) - function(behind)) / (2 * step) * root)
+        return np.concatenate(found)
+
+    columns = np.array([slopes(lambda x, n=n: part(n, x)) for n in range(1, degree + 1, 2)])
+    scale = np.abs(columns).max(axis=1)
+    target = -slopes(lambda x: -a * a * x[1] / (x**2).sum(axis=0))
+    free = np.linalg.lstsq((columns / scale[:, None]).T, target, rcond=None)[0] / scale
+    return float(1 - 2 * free[0] / half)
+
+
 def _norm(x: np.ndarray) -> np.ndarray:
     return np.sqrt((x**2).sum(axis=0))
 
