@@ -27,7 +27,7 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units deps run test verify mutate lint clean help FORCE
+.PHONY: all units deps run test verify mutate bench-contact lint clean help FORCE
 
 all: $(binary)
 
@@ -39,6 +39,7 @@ help:
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
+	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make lint     style of the Fortran and Python sources'
 	@echo 'make clean    remove what make has built'
 	@echo 'Variables: OPT="-O2" for a portable binary, FC_SERIAL, FC_MPI, CASE'
@@ -80,7 +81,7 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
 	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
 
-ifneq ($(filter-out deps lint clean help run test verify mutate,$(or $(MAKECMDGOALS),all)),)
+ifneq ($(filter-out deps lint clean help run test verify mutate bench-contact,$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 endif
 
@@ -102,6 +103,12 @@ verify: deps
 
 mutate: deps
 	@$(PYTHON) verification/mutate.py
+
+N := 64
+THREADS := 1
+bench-contact: deps
+	@$(MAKE) --no-print-directory
+	@$(PYTHON) tools/bench_contact.py --n $(N) --threads $(THREADS)
 
 lint: deps
 	@tools/lint.sh

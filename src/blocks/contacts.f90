@@ -247,7 +247,8 @@ contains
   !> Longest substep the present touches allow [s].
   !!
   !! For one pair of bodies a sixth of the bound of stability, which also keeps the restitution
-  !! within 0.02; for all pairs together, see `highest_frequency2`, little more than half of that bound.
+  !! within 0.02; for all pairs together, see `highest_frequency2`, little more than half of that
+  !! bound.
   pure function stiffness_limit(contacts) result(limit)
     type(contacts_t), intent(in) :: contacts
     real(wp) :: limit
@@ -656,13 +657,16 @@ contains
   end function damped_part
 
   !> Tangential force of one group, no larger than friction allows.
+  !!
+  !! The force of the spring alone is limited too: while it slips, the spring holds what friction
+  !! lets it hold, and the dashpot puts no energy into it.
   pure subroutine rub(g, force_n, eta_n, implicit, contacts)
     integer, intent(in) :: g
     real(wp), intent(in) :: force_n    !! sum of the normal forces [N]
     real(wp), intent(in) :: eta_n      !! normal damping of the group [N s/m]
     real(wp), intent(in) :: implicit   !! 1 + eta dt/(2 m): damping acts in mid-substep
     type(contacts_t), intent(inout) :: contacts
-    real(wp) :: v(3), f(3), k, k_n, eta, bound, size_f
+    real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
     integer :: t, a, b
 
     associate (groups => contacts%groups, springs => contacts%springs, law => contacts%law)
@@ -681,7 +685,10 @@ contains
       size_f = norm2(f)
       if (size_f > bound) then
         f = f*(bound/size_f)
-        springs%xi(:, g) = tangential_slip(k, law%gamma_t, eta, f*implicit, v)
+        f_spring = tangential_force(k, law%gamma_t, 0.0_wp, springs%xi(:, g), v)
+        size_f = norm2(f_spring)
+        if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
+          f_spring*(bound/size_f), v)
       end if
       call act(a, b, f, groups%arm_a(:, g), groups%arm_b(:, g), contacts)
     end associate

@@ -1,0 +1,46 @@
+"""Stacked cubes stand and a hooked hexapod hangs.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+WAY = 0.5  # [mm]
+TILT = 0.5  # [degrees]
+CREEP = 1e-6  # [m/s]
+PARTS = {"aligned cubes": slice(0, 10), "cubes with offsets": slice(10, 20), "hook": slice(21, 22)}
+VARIES = ("contact sleep",)
+
+
+def check(runs: list[Run]) -> Checks:
+    """How far each part has moved and turned at the end, and its creep."""
+    checks = Checks("stacks and hooks")
+    for run in runs:
+        b = run.bodies
+        half = b.row(0.5 * b.time[-1])
+        moved = np.linalg.norm(b.position[-1] - b.position[0], axis=1)
+        same = np.abs((b.quaternion[-1] * b.quaternion[0]).sum(axis=1)).clip(0.0, 1.0)
+        turned = 2.0 * np.degrees(np.arccos(same))
+        creep = np.linalg.norm(b.position[-1] - b.position[half], axis=1)
+        creep /= b.time[-1] - b.time[half]
+        for what, part in PARTS.items():
+            name = f"{run.folder.name}, {what}:"
+            checks.below(f"{name} way [mm]", 1e3 * float(moved[part].max()), WAY)
+            checks.below(f"{name} tilt [deg]", float(turned[part].max()), TILT)
+            checks.below(f"{name} creep [m/s]", float(creep[part].max()), CREEP)
+        held = int(b.contacts[-1, 21])
+        checks.true("the hooked hexapod touches one body", held == 1, f"{held}")
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
