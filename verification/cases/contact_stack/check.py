@@ -21,16 +21,17 @@ VARIES = ("contact sleep",)
 
 
 def check(runs: list[Run]) -> Checks:
-    """How far each part has moved and turned at the end, and its creep."""
+    """How far each part has moved and turned at the end, and its creep, free of any sway."""
     checks = Checks("stacks and hooks")
     for run in runs:
         b = run.bodies
-        half = b.row(0.5 * b.time[-1])
         moved = np.linalg.norm(b.position[-1] - b.position[0], axis=1)
         same = np.abs((b.quaternion[-1] * b.quaternion[0]).sum(axis=1)).clip(0.0, 1.0)
         turned = 2.0 * np.degrees(np.arccos(same))
-        creep = np.linalg.norm(b.position[-1] - b.position[half], axis=1)
-        creep /= b.time[-1] - b.time[half]
+        end = b.time[-1]
+        third, last = (b.time > 0.5 * end) & (b.time <= 0.75 * end), b.time > 0.75 * end
+        creep = b.position[last].mean(axis=0) - b.position[third].mean(axis=0)
+        creep = np.linalg.norm(creep, axis=1) / (0.25 * end)
         for what, part in PARTS.items():
             name = f"{run.folder.name}, {what}:"
             checks.below(f"{name} way [mm]", 1e3 * float(moved[part].max()), WAY)
