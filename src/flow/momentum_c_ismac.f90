@@ -43,6 +43,7 @@ module momentum_c_ismac_m
   real(wp), parameter :: implicit_share = 0.75_wp   !! a, weight of the first-order operator
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
   integer, parameter :: max_iterations = 500
+  integer, parameter :: worth_threads = 8192        !! fewer numbers are the work of one thread
 
   !> The left side over its diagonal, for the three components one above the other along z.
   type, extends(linear_operator_t) :: predictor_operator_t
@@ -429,7 +430,7 @@ contains
     real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
     integer :: i, j, k, m
 
-    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    !$omp parallel do collapse(2) private(i, j) schedule(static) if (size(x) > worth_threads)
     do m = 1, 3
       do k = lo(3), hi(3)
         do j = lo(2), hi(2)
@@ -469,7 +470,7 @@ contains
     integer :: m, k, n(3)
 
     n = op%hi - op%lo + 1
-    !$omp parallel do collapse(2) schedule(static)
+    !$omp parallel do collapse(2) schedule(static) if (size(stacked) > worth_threads)
     do m = 1, 3
       do k = 1, n(3)
         op%x(op%lo(1):op%hi(1), op%lo(2):op%hi(2), op%lo(3) + k - 1, m) = &
@@ -485,7 +486,7 @@ contains
     integer :: m, k, n(3)
 
     n = op%hi - op%lo + 1
-    !$omp parallel do collapse(2) schedule(static)
+    !$omp parallel do collapse(2) schedule(static) if (size(stacked) > worth_threads)
     do m = 1, 3
       do k = 1, n(3)
         stacked(2:n(1) + 1, 2:n(2) + 1, 1 + (m - 1)*n(3) + k) = &
