@@ -326,9 +326,10 @@ contains
 
   !> What is found does not depend on when the lists were made: a body carried past another.
   subroutine check_lists()
-    type(world_t) :: world, fresh
+    type(world_t), allocatable :: world, fresh
     integer :: step, differ, touched
 
+    allocate (world)
     call new_world(world, ['hexapod', 'hexapod'])
     world%blocks%q(:, 2) = random_rotation(7, 1)
     differ = 0
@@ -337,6 +338,8 @@ contains
       world%blocks%x(:, 2) = 0.5_wp + [0.08_wp - 4.0e-4_wp*step, 0.03_wp, 0.035_wp]
       call move(world, [0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.002_wp, 0.001_wp])
       call find(world)
+      if (allocated(fresh)) deallocate (fresh)
+      allocate (fresh)
       call new_world(fresh, ['hexapod', 'hexapod'])
       fresh%blocks%x = world%blocks%x
       fresh%blocks%q = world%blocks%q
