@@ -21,6 +21,7 @@ module mass_average_m
   use pressure_m, only: pressure_report_t, set_pressure_system, solve_pressure, face_acceleration, &
                         cell_mean_of_faces, predict_face_velocity, divergence
   use buoyancy_m, only: displaced_force
+  use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
     predict_velocity, renew_acceleration
@@ -64,7 +65,7 @@ contains
       do pass = 1, case%numerics%coupling_passes
         call average_cells(grid, solid, bodies, flow, stage%rho_mixture)
         stage%u_before = flow%u
-        call predict_mixture(case, grid, dt, pass == 1, flow, stage, report)
+        call predict_mixture(case, grid, solid, dt, pass == 1, flow, stage, report)
         call project_mixture(case, grid, dt, flow, stage, projection)
         report%pressure%passes = report%pressure%passes + projection%passes
         report%pressure%iterations = report%pressure%iterations + projection%iterations
@@ -139,9 +140,10 @@ contains
   end subroutine average_cells
 
   !> Predictor of the mixture: old pressure and gravity of the fluid, then viscosity (first pass).
-  subroutine predict_mixture(case, grid, dt, first, flow, stage, report)
+  subroutine predict_mixture(case, grid, solid, dt, first, flow, stage, report)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     logical, intent(in) :: first
     type(flow_t), intent(inout) :: flow
@@ -157,7 +159,10 @@ contains
         call add_tension(grid, stage%rho_mixture, stage%tension, p%a_face)
         call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
         if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
+        call surface_stress(grid, solid%alpha, stage%rho_mixture, flow%mu, flow%u, &
+                            stage%a_stress)
         call accelerate_cells(grid, dt, flow, stage)
+        flow%u = flow%u + dt*stage%a_stress
         call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, &
                            stage%viscous)
         call predict_velocity(grid, stage%rho_mixture, dt, flow, stage, report)

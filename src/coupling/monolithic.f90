@@ -21,6 +21,7 @@ module monolithic_m
                         extend_pressure
   use buoyancy_m, only: hydrostatic_correction
   use momentum_return_m, only: return_momentum
+  use surface_stress_m, only: surface_stress
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
     predict_velocity, renew_acceleration
@@ -53,7 +54,9 @@ contains
                              flow%sides)
       call add_tension(grid, flow%rho, self%tension, p%a_face)
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
+      call surface_stress(grid, solid%alpha, flow%rho, flow%mu, flow%u, self%a_stress)
       call accelerate_cells(grid, dt, flow, self)
+      flow%u = flow%u + dt*self%a_stress
       call force_from_faces(grid, solid, bodies, p%operator%flux, flow%p, self%from_pressure, &
                             flow%sides)
       call force_from_tension(grid, solid, bodies, p%operator%flux, self%tension, self%terms, &

@@ -183,14 +183,20 @@ contains
     pure subroutine one_column(c, p)
       real(wp), intent(in) :: c(:)    !! along the vertical axis [-]
       real(wp), intent(out) :: p(:)   !! [Pa]
-      real(wp) :: weight, above, head, rise
+      real(wp) :: weight, above, head, rise, lean, lean_above, half_jump
       integer :: axis, k, l
 
       axis = side%along(side%up)
       above = 0.0_wp
       head = 0.0_wp
+      lean_above = 0.0_wp
+      half_jump = 0.5_wp*(fluid%liquid_density - fluid%gas_density)*abs(fluid%gravity(axis)) &
+                  *grid%h(axis)
       do l = 1, size(c)
         k = merge(size(c) + 1 - l, l, side%upward)   ! from the top down
+        lean = uneven(c, k, merge(1, -1, side%upward))
+        if (l > 1) head = head + half_jump*(lean_above - lean)   ! as `weight_at_faces`
+        lean_above = lean
         weight = abs(fluid%gravity(axis))*grid%h(axis) &
                  *(fluid%gas_density + (fluid%liquid_density - fluid%gas_density)*c(k))
         head = head + 0.5_wp*(above + weight)
@@ -201,6 +207,17 @@ contains
       rise = grid%h(axis)*sum(c) - max(side%depth, 0.0_wp)
       p = p - c*fluid%liquid_density*abs(fluid%gravity(axis))*rise
     end subroutine one_column
+
+    !> How much more of the liquid of a cell lies in its lower half than in its upper one [-].
+    pure real(wp) function uneven(c, k, up)
+      real(wp), intent(in) :: c(:)
+      integer, intent(in) :: k, up   !! cell; step upwards
+      integer :: below, above
+
+      below = min(max(k - up, 1), size(c))
+      above = min(max(k + up, 1), size(c))
+      uneven = max(-1.0_wp, min(1.0_wp, c(below) - c(above)))*c(k)*(1.0_wp - c(k))
+    end function uneven
   end subroutine set_pressure
 
   !> Length over which the pressure difference to the outside acts: half a cell, and as much water

@@ -1,4 +1,5 @@
-!> Surface tension as a force at the faces, in balance with the pressure gradient.
+!> Forces of the surface at the faces, in balance with the pressure gradient: surface tension, and
+!! what the weight gains where the liquid of a cell lies (`weight_at_faces`).
 !!
 !! $$ f_f = \sigma \kappa_f \frac{C_{high} - C_{low}}{h} $$
 !! It joins gravity and the pressure gradient at the same faces, so a pressure that jumps by
@@ -81,9 +82,12 @@ contains
     type(surface_tension_t), intent(inout) :: self
     integer(i8) :: cells(1)
 
-    self%acts = fluid%surface_tension > 0.0_wp .and. .not. fluid%single_phase
+    self%acts = .not. fluid%single_phase
     if (.not. self%acts) return
-    if (.not. allocated(self%force)) call allocate_tension(grid, self)
+    if (.not. allocated(self%force)) call allocate_tension(grid, fluid%surface_tension, self)
+    self%force = 0.0_wp
+    call weight_at_faces(grid, fluid, c, self%force)
+    if (fluid%surface_tension <= 0.0_wp) return
     call find_places(grid, c, self)
     call curvature_from_heights(grid, solid, c, self)
     call list_wanted(grid, self)
@@ -95,17 +99,19 @@ contains
   end subroutine find_tension
 
   !> Room for the fields, at the start of a run.
-  subroutine allocate_tension(grid, self)
+  subroutine allocate_tension(grid, sigma, self)
     type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: sigma   !! [N/m]
     type(surface_tension_t), intent(inout) :: self
     integer, parameter :: first_size = 1024
     integer :: a(3), b(3)
 
     a = grid%lo - n_halo
     b = grid%hi + n_halo
+    allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    if (sigma <= 0.0_wp) return
     allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
-    allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%place(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=no_height)
     allocate (self%cell(3, first_size), self%value(first_size))
   end subroutine allocate_tension
@@ -532,7 +538,6 @@ contains
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
-            self%force(i, j, k, d) = 0.0_wp
             f = [i, j, k]
             if (.not. grid%periodic(d) .and. (f(d) == 1 .or. f(d) == grid%n(d) + 1)) cycle
             associate (low => self%state(i - e(1), j - e(2), k - e(3)), &
@@ -540,14 +545,62 @@ contains
               known = count([low, high] /= no_surface)
             end associate
             if (known == 0) cycle
-            self%force(i, j, k, d) = sigma*(self%curvature(i - e(1), j - e(2), k - e(3)) &
-              + self%curvature(i, j, k))/real(known, wp) &
+            self%force(i, j, k, d) = self%force(i, j, k, d) &
+              + sigma*(self%curvature(i - e(1), j - e(2), k - e(3)) &
+                       + self%curvature(i, j, k))/real(known, wp) &
               *(c(i, j, k) - c(i - e(1), j - e(2), k - e(3)))/grid%h(d)
           end do
         end do
       end do
     end do
   end subroutine force_at_faces
+
+  !> What the weight at the faces gains where the liquid of a cell does not fill it evenly:
+  !! $$ f_f = \frac{1}{2}(\rho_l - \rho_g) g_d (s_{high} q_{high} - s_{low} q_{low}), \quad
+  !! q = C (1 - C), \; s = C_{below} - C_{above} $$
+  !!
+  !! With level liquid at the bottom of a cell (s = 1) the pressure of the cell is then the mean of
+  !! the true one, rho g C^2/2, whatever C; with half of C on either face, as the mean density has
+  !! it, the layer of the surface moves as if it were half a cell deep, which makes the period of
+  !! a wave wrong by up to k h/4, to either side, as the surface lies in its cell (measured: -1.3 %
+  !! to 2.5 % at 32 cells per wavelength).
+  subroutine weight_at_faces(grid, fluid, c, force)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: force(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                                 grid%lo(3) - n_halo:, :)   !! [N/m3]
+    integer :: i, j, k, d, e(3), f(3)
+    real(wp) :: weight
+
+    do d = 1, 3
+      weight = 0.5_wp*(fluid%liquid_density - fluid%gas_density)*fluid%gravity(d)
+      if (.not. abs(weight) > 0.0_wp) cycle
+      e = unit_step(:, d)
+      !$omp parallel do private(i, j, f) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            f = [i, j, k]
+            if (.not. grid%periodic(d) .and. (f(d) == 1 .or. f(d) == grid%n(d) + 1)) cycle
+            force(i, j, k, d) = weight*(uneven(f) - uneven(f - e))
+          end do
+        end do
+      end do
+    end do
+  contains
+    !> How much more of the liquid of a cell lies in its lower half than in its upper one [-].
+    pure real(wp) function uneven(at)
+      integer, intent(in) :: at(3)
+      real(wp) :: here, below, above
+
+      here = c(at(1), at(2), at(3))
+      below = c(at(1) - e(1), at(2) - e(2), at(3) - e(3))
+      above = c(at(1) + e(1), at(2) + e(2), at(3) + e(3))
+      uneven = max(-1.0_wp, min(1.0_wp, below - above))*here*(1.0_wp - here)
+    end function uneven
+  end subroutine weight_at_faces
 
   !> Add the acceleration by surface tension to that of the faces: a_f += f_f/rho_f [m/s2].
   subroutine add_tension(grid, rho, self, a)

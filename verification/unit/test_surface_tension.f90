@@ -24,6 +24,7 @@ program test_surface_tension
 
   call parallel_init()
   fluid%surface_tension = 0.07_wp
+  fluid%gravity = 0.0_wp
   call known_curvature(3, 1)
   call known_curvature(3, -1)
   call known_curvature(1, 1)
@@ -32,6 +33,7 @@ program test_surface_tension
   call curvature_beyond_heights()
   call two_basins()
   call balance_at_faces()
+  call weight_of_level_liquid()
   call longest_step()
   call pull_on_a_body()
   call finish_checks()
@@ -253,6 +255,48 @@ contains
     face_curvature = (tension%curvature(low(1), low(2), low(3)) &
                       + tension%curvature(high(1), high(2), high(3)))/real(max(n, 1), wp)
   end function face_curvature
+
+  !> Level liquid to a share of a layer: with its weight on the two faces of the layer the pressure
+  !! of the layer is the mean of the true one, rho g h C^2/2, on either side of the tank.
+  subroutine weight_of_level_liquid()
+    real(wp), parameter :: share = 0.3_wp
+    type(surface_tension_t) :: tension
+    type(fluid_t) :: heavy
+    real(wp), allocatable :: a(:, :, :, :), one(:, :, :)
+    real(wp) :: found(2), jump
+    integer :: k, way
+
+    do way = 1, 2   ! the liquid below, then above: gravity turned over with it
+      call start(cells)
+      do k = grid%lo(3), grid%hi(3)
+        if ((k < 9 .and. way == 1) .or. (k > 9 .and. way == 2)) c(:, :, k) = 1.0_wp
+        if (k == 9) c(:, :, k) = share
+      end do
+      call fill_scalar_halo(grid, c)
+      heavy = fluid_t()
+      heavy%gravity = [0.0_wp, 0.0_wp, merge(-9.81_wp, 9.81_wp, way == 1)]
+      call find_tension(grid, heavy, solid, c, tension)
+      allocate (a, source=solid%open)
+      allocate (one, source=c)
+      a = 0.0_wp
+      one = 1.0_wp
+      call add_tension(grid, one, tension, a)
+      jump = heavy%liquid_density - heavy%gas_density
+      found = -huge(1.0_wp)
+      associate (i => grid%lo(1), j => grid%lo(2), g => heavy%gravity(3))
+        do k = grid%lo(3), grid%hi(3)
+          if (k == 9) found(way) = a(i, j, 9, 3)/g + jump*0.5_wp*(c(i, j, 8) + share)
+          if (k == 10) found(3 - way) = a(i, j, 10, 3)/g + jump*0.5_wp*(c(i, j, 10) + share)
+        end do
+      end associate
+      call global_max(found)
+      call check('weight of the face in the liquid [kg/m3]', found(1), &
+                 jump*(0.5_wp + share - 0.5_wp*share**2), 1.0e-10_wp)
+      call check('weight of the face in the gas [kg/m3]', found(2), jump*0.5_wp*share**2, &
+                 1.0e-10_wp)
+      deallocate (a, one)
+    end do
+  end subroutine weight_of_level_liquid
 
   !> Brackbill's limit for water and air on 1 mm: sqrt(999.404e-9/(4 pi 0.07)) s.
   subroutine longest_step()

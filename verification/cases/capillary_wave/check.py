@@ -1,0 +1,46 @@
+"""A small capillary wave against the exact solution.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+from micstools.waves import prosperetti_two_fluids, standing_amplitude  # noqa: E402
+
+RMS_BAND = 0.02  # of the initial amplitude
+COUNTS_FROM = 32  # cells per wavelength
+WAVENUMBER, AMPLITUDE = 2 * np.pi, 0.01
+
+
+def check(runs: list[Run]) -> Checks:
+    """Root mean square of the difference in amplitude."""
+    checks, errors, ours, exact = Checks("capillary wave"), {}, {}, {}
+    for run in runs:
+        name, cells = run.folder.name, round(1.0 / run.grid.spacing[0])
+        rho = tuple(float(run.value("fluid", f"{of}_density", 0.0)) for of in ("liquid", "gas"))
+        mu = float(run.value("fluid", "liquid_viscosity", 0.0))
+        sigma = float(run.value("fluid", "surface_tension", 0.0))
+        omega = (sigma * WAVENUMBER**3 / sum(rho)) ** 0.5
+        time, amplitude = standing_amplitude(run)
+        reference = prosperetti_two_fluids(time, WAVENUMBER, omega, mu / rho[0], (rho[0], rho[1]))
+        error = float(np.sqrt(np.mean((amplitude / AMPLITUDE - reference) ** 2)))
+        label = f"{name}: rms difference, {cells} cells per wavelength"
+        checks.below(label, error, RMS_BAND, counts=cells >= COUNTS_FROM)
+        if name.startswith("cells"):
+            errors[cells] = error
+        ours[name], exact[name] = (time, amplitude / AMPLITUDE), (time, reference)
+        sound(run, checks)
+    checks.study("rms difference in amplitude", errors, 0.0, "cells per wavelength")
+    checks.figure("amplitude", "t [s]", "a/a0", ours, exact, smooth=True)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)

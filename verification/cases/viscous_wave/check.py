@@ -1,0 +1,44 @@
+"""A small gravity wave on a viscous liquid against the exact solution.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+from micstools.waves import standing_amplitude  # noqa: E402
+
+RMS_BAND = 0.02  # of the initial amplitude
+COUNTS_FROM = 32  # cells per wavelength
+AMPLITUDE = 0.01  # [m]
+TABLE = Path(__file__).with_name("B2_prosperetti_single_fluid.csv")
+
+
+def check(runs: list[Run]) -> Checks:
+    """Root mean square of the difference in amplitude at the times of the table."""
+    checks, errors, ours = Checks("viscous wave"), {}, {}
+    rows = [line for line in TABLE.read_text().splitlines() if line[0] not in "#t"]
+    table = np.array([[float(part) for part in row.split(",")] for row in rows])
+    for run in runs:
+        name, cells = run.folder.name, round(1.0 / run.grid.spacing[0])
+        time, amplitude = standing_amplitude(run)
+        exact = table[table[:, 0] <= time[-1]]
+        found = np.interp(exact[:, 0], time, amplitude / AMPLITUDE)
+        errors[cells] = float(np.sqrt(np.mean((found - exact[:, 1]) ** 2)))
+        label = f"{name}: rms difference, {cells} cells per wavelength"
+        checks.below(label, errors[cells], RMS_BAND, counts=cells >= COUNTS_FROM)
+        ours[name] = (time, amplitude / AMPLITUDE)
+        sound(run, checks)
+    checks.study("rms difference in amplitude", errors, 0.0, "cells per wavelength")
+    checks.figure("amplitude", "t [s]", "a/a0", ours, {"exact": (table[:, 0], table[:, 1])})
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
