@@ -551,7 +551,7 @@ contains
     list%edge_first(list%n) = list%n_edges + 1
     facets: do m = 1, search%facets%n
       associate (f => search%facets%item(m))
-        if (abs(dot_product(host%normal(:, f), place) - host%offset(f)) > reach) cycle
+        if (abs(dot_product(host%normal(:, f), place) - host%offset(f)) > reach) cycle facets
         do c = host%side(f), host%side(f + 1) - 1
           if (dot_product(host%side_normal(:, c), place) < host%side_offset(c) - reach) cycle facets
         end do
