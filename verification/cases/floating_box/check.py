@@ -5,7 +5,7 @@ import numpy as np
 from micstools.checks import Checks, sound
 from micstools.reader import Run
 
-DRAFT_BAND = 0.01
+DRAFT_BAND, ARM_BAND = 0.01, 1e-6
 G = 9.81
 
 
@@ -22,6 +22,39 @@ def draft_of_weight(run: Run) -> float:
     sides = np.array(run.value("shape", "size", [0.0] * 3), float)
     immersed = (float(run.bodies.mass[0]) - gas * sides.prod()) / (liquid - gas)
     return float(immersed / (sides[0] * sides[1]))
+
+
+def metacentric_height(run: Run) -> float:
+    """Height of the metacentre above the centre of mass of the floating upright box [m]."""
+    width, _, height = np.array(run.value("shape", "size", [0.0] * 3), float)
+    draft = draft_of_weight(run)
+    return float(width**2 / (12 * draft) + draft / 2 - height / 2)
+
+
+def righting_arm(run: Run) -> tuple[float, float]:
+    """Righting arm over the sine of the tilt [m] of a box of square section that is held in still
+    water: ours, from the torque, and that of theory.
+
+    The water's plane cuts the four sides only, at the height d + s x above the base, x along the
+    tilt. So the immersed part has the volume B^2 d and its centroid x = B^2 s/(12 d) aside and
+    (d^2 + s^2 B^2/12)/(2 d) above the base; both turn with the box.
+    """
+    b = run.bodies
+    liquid = float(run.value("fluid", "liquid_density", 998.2))
+    gas = float(run.value("fluid", "gas_density", 1.204))
+    level = float(run.value("fluid", "water_level", 0.0))
+    width, _, height = np.array(run.value("shape", "size", [0.0] * 3), float)
+    tilt = np.radians(tilt_deg(run)[0])
+    draft = (level - b.position[0, 0, 2]) / np.cos(tilt) + height / 2
+    slope = np.tan(tilt)
+    aside = width**2 * slope / (12 * draft)
+    above = (draft**2 + slope**2 * width**2 / 12) / (2 * draft) - height / 2
+    arm = aside * np.cos(tilt) + above * np.sin(tilt)
+    lift = (liquid - gas) * G * width**2 * draft
+    # a torque along the axis of the tilt would tilt it further
+    axis = b.quaternion[0, 0, 1:] / np.linalg.norm(b.quaternion[0, 0, 1:])
+    ours = -float(b.fluid_torque[-1, 0] @ axis) / lift
+    return ours / float(np.sin(tilt)), float(arm / np.sin(tilt))
 
 
 def mean_draft(run: Run) -> tuple[float, float, np.ndarray]:
@@ -46,14 +79,21 @@ def check(runs: list[Run]) -> Checks:
     checks, study, curves = Checks("floating box"), {}, {}
     for run in runs:
         name, b = run.folder.name, run.bodies
+        if name.endswith("held"):
+            ours, arm = righting_arm(run)
+            said = f"{name.split('_')[0]} box held at {tilt_deg(run)[0]:.0f} deg"
+            checks.close(f"{said}: righting arm / sine [mm]", 1e3 * ours, 1e3 * arm, ARM_BAND)
+            sound(run, checks)
+            continue
         if name.endswith("tilted"):
-            tilt = tilt_deg(run)
+            tilt, metacentre = tilt_deg(run), 1e3 * metacentric_height(run)
             last = tilt[b.time > 0.75 * b.time[-1]].max()
             figures = f"{tilt[0]:.1f} at first, {last:.1f} deg at most in the last quarter"
-            if name.startswith("flat"):
-                checks.true("a flat box comes back", tilt.max() < 1.05 * tilt[0], figures)
+            said = f"GM = {metacentre:+.1f} mm: a {name.split('_')[0]} box"
+            if metacentre > 0:
+                checks.true(f"{said} comes back", tilt.max() < 1.05 * tilt[0], figures)
             else:
-                checks.true("a tall box capsizes", last > 45, figures)
+                checks.true(f"{said} capsizes", last > 45, figures)
             sound(run, checks)
             continue
         expected = draft_of_weight(run)

@@ -5,7 +5,7 @@ import numpy as np
 from micstools.checks import Checks, sound
 from micstools.reader import Run
 
-BAND = 1e-3
+BAND, DRAG_BAND = 1e-3, 0.01
 WALLS = ("no_slip", "slip")
 
 
@@ -34,6 +34,10 @@ class Budget:
         held = (b.fluid_force * b.fixed[:, None]).sum(axis=1)
         weights = (np.array(weight) - (b.mass * b.fixed).sum())[:, None] * self.g
         force = np.array(walls) + weights + b.contact_force.sum(axis=1) - held
+        self.fluid_impulse = self.momentum - self.momentum[0]
+        self.fluid_impulse[1:] -= np.cumsum(
+            (force + held)[1:] * np.diff(self.time)[:, None], axis=0
+        )
         self.impulse = np.zeros_like(self.momentum)
         self.impulse[1:] = np.cumsum(force[1:] * np.diff(self.time)[:, None], axis=0)
         self.potential = -self.g[2] * np.array(height) + run.series.potential_energy_bodies
@@ -65,6 +69,15 @@ def check(runs: list[Run]) -> Checks:
         if b.fixed.all():
             impulse = np.abs((b.fluid_force[1:, 0, 0] * np.diff(b.time)).sum())
             scale, said = float(impulse), "impulse on the sphere"
+            drag = float(impulse / b.time[-1])
+            along = np.abs(budget.fluid_impulse[-1, 0]) / b.time[-1]
+            state = "held in a stream" if np.all(b.velocity == 0) else "moved through still water"
+            checks.close(
+                f"{name}: drag on the sphere {state}, against the control volume [N]",
+                drag,
+                float(along),
+                DRAG_BAND,
+            )
         else:
             shape = run.shapes[b.shape[0]]
             density = float(run.value("fluid", "liquid_density", 998.2))
