@@ -21,8 +21,9 @@ flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
-unit_sources := $(wildcard verification/unit/*.f90)
+unit_sources := $(wildcard verification/unit/*.f90 verification/drivers/*.f90)
 units := $(patsubst verification/unit/%.f90,$(B)/%,$(wildcard verification/unit/test_*.f90))
+units += $(patsubst verification/drivers/%.f90,$(B)/%,$(wildcard verification/drivers/*.f90))
 vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
 
 .DELETE_ON_ERROR:

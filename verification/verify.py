@@ -166,7 +166,8 @@ def main() -> int:
         case = Case(name, getattr(module, "VARIES", ()), mine, left_out)
         good = [Run(run.folder) for run in sorted(mine, key=lambda r: r.name) if run.good]
         try:
-            case.checks = module.check(good) if good else None
+            alone = not every[name] and getattr(module, "COST", 0.0) <= wanted.cost
+            case.checks = module.check(good) if good or alone else None
         except Exception as problem:  # a check must not take the report with it
             case.problem = f"check.py: {type(problem).__name__}: {problem}"
         note_options(case, plain)
