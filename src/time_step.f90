@@ -26,6 +26,7 @@ module time_step_m
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
   use release_m, only: release_due_blocks, next_release
   use diagnostics_m, only: step_report_t
@@ -92,6 +93,8 @@ contains
     allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return
+    if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
+      minval(sim%grid%h), sim%blocks, sim%contacts%lubrication)
     call flow_init(sim%grid, sim%flow)
     call solid_geometry_init(sim%grid, sim%solid, sim%blocks%n)
     call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)

@@ -12,6 +12,7 @@ module contacts_m
   use touches_m, only: touch_t, select_touching
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
+  use lubrication_m, only: lubrication_t, lubricate
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
     stored_energy, normal_force, tangential_force, tangential_slip
   implicit none
@@ -67,6 +68,7 @@ module contacts_m
     logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
+    type(lubrication_t) :: lubrication
     real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     type(touch_t) :: touches
@@ -152,7 +154,7 @@ contains
         return
       end if
       call go_half_way(walls, left, limit, contacts, blocks, dt_b)
-      call finish_substep(gravity, dt_b, contacts, blocks, report)
+      call finish_substep(walls, gravity, dt_b, contacts, blocks, report)
       left = merge(left - dt_b, 0.0_wp, dt_b < left)
       report%substeps = report%substeps + 1
     end do
@@ -196,7 +198,8 @@ contains
   end subroutine go_half_way
 
   !> The rest of a substep: contact and the other half of the drift.
-  subroutine finish_substep(gravity, dt_b, contacts, blocks, report)
+  subroutine finish_substep(walls, gravity, dt_b, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3), dt_b   !! [m/s2, s]
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
@@ -209,6 +212,8 @@ contains
     call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
     call know_motion(blocks, contacts%partners)
     call sum_forces(dt_b, contacts, report)
+    if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
+                                                    contacts%force)
     contacts%impulse = contacts%impulse + dt_b*contacts%force
     contacts%twist = contacts%twist + dt_b*contacts%torque
     call kick([0.0_wp, 0.0_wp, 0.0_wp], dt_b, contacts%force(:, 1:), contacts%torque(:, 1:), blocks)

@@ -17,6 +17,7 @@ module walls_m
     real(wp) :: normal(3, 6) = 0.0_wp       !! unit vector out of the tank [-]
     real(wp) :: offset(6) = 0.0_wp          !! normal.x of the points of the wall [m]
     real(wp) :: velocity(3, 6) = 0.0_wp     !! of the wall in its own plane [m/s]
+    logical :: slip(6) = .false.            !! no friction with the fluid
     real(wp) :: period(3) = 0.0_wp          !! length of the tank where it is periodic, else 0 [m]
   end type walls_t
 
@@ -42,6 +43,7 @@ contains
         walls%offset(m) = sense*(grid%origin(d) + real(s - 1, wp)*grid%length(d))
         walls%velocity(:, m) = boundary%velocity(:, s, d)
         walls%velocity(d, m) = 0.0_wp
+        walls%slip(m) = boundary%kind(s, d) == 'slip'
       end do
     end do
   end subroutine walls_init

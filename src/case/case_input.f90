@@ -422,6 +422,7 @@ contains
     call v%item('substep_ratio', contact%substep_ratio)
     call v%item('courant_max', contact%courant_max)
     call v%item('sleep', contact%sleep)
+    call v%item('lubrication', contact%lubrication)
 
     call require_share(v, 'restitution', contact%restitution)
     call v%require('contact_time', contact%contact_time > 0.0_wp, 'must be positive [s]')

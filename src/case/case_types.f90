@@ -85,6 +85,7 @@ module case_types_m
     real(wp) :: substep_ratio = 0.05_wp
     real(wp) :: courant_max = 0.1_wp                !! C_s of eq. (6)
     logical :: sleep = .true.
+    logical :: lubrication = .false.
   end type contact_input_t
 
   type :: shape_input_t
