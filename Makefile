@@ -5,6 +5,7 @@ VERSION := 0.1.0
 FC_SERIAL := h5fc
 FC_MPI := h5pfc
 OPT := -O3 -march=native
+LTO := -flto=auto -ffat-lto-objects
 OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \
   -ffpe-trap=invalid,zero,overflow
 FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
@@ -17,7 +18,7 @@ variant := $(parallel)$(if $(DEBUG),-debug)
 B := build/$(variant)
 binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)
 compiler := $(if $(MPI),$(FC_MPI),$(FC_SERIAL))
-flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT))
+flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT) $(LTO))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
@@ -43,7 +44,7 @@ help:
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make lint     style of the Fortran and Python sources'
 	@echo 'make clean    remove what make has built'
-	@echo 'Variables: OPT="-O2" for a portable binary, FC_SERIAL, FC_MPI, CASE'
+	@echo 'Variables: OPT="-O2" for a portable binary, LTO= for a quick build, FC_SERIAL, FC_MPI, CASE'
 
 # `make V=1` shows whole commands.
 say = $(if $(V),,@echo '  $(1)';)
@@ -55,7 +56,7 @@ $(binary): $$(OBJECTS_mics)
 units: $(units)
 
 $(units): $(B)/%: $$(OBJECTS_$$*)
-	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
+	$(call say,LD $@)$(compiler) $(flags) -fno-lto -o $@ $^
 
 $(B)/%.o: %.f90 $(B)/settings
 	$(call say,FC $@)$(compiler) $(flags) -J$(B) -c -o $@ $<

@@ -9,7 +9,7 @@ module contact_law_m
   private
   public :: contact_law_t, contact_law_init
   public :: restitution_of, impact_duration, damping_ratio_of
-  public :: normal_constant, tangential_constant, stored_energy
+  public :: normal_constant, tangential_constant, normal_stiffness, stored_energy
   public :: normal_force, tangential_force, tangential_slip
 
   type :: contact_law_t
@@ -127,12 +127,21 @@ contains
     if (law%constants) k = weight*law%k_t
   end function tangential_constant
 
+  !> Stiffness dF/dd of a spring k d^gamma; not touching yet: as where it begins [N/m].
+  elemental function normal_stiffness(k, gamma, d) result(stiffness)
+    real(wp), intent(in) :: k, gamma, d   !! [N/m^gamma, -, m]
+    real(wp) :: stiffness
+
+    stiffness = k
+    if (abs(gamma - 1.0_wp) > 0.0_wp) stiffness = k*gamma*max(0.0_wp, d)**(gamma - 1.0_wp)
+  end function normal_stiffness
+
   !> Energy stored in a spring k d^gamma [J].
   elemental function stored_energy(k, gamma, d) result(energy)
     real(wp), intent(in) :: k, gamma, d   !! [N/m^gamma, -, m]
     real(wp) :: energy
 
-    energy = k*d**(gamma + 1.0_wp)/(gamma + 1.0_wp)
+    energy = k*d*power(d, gamma)/(gamma + 1.0_wp)
   end function stored_energy
 
   !> Size of the normal force between two bodies, eq. (1), never pulling [N].
@@ -147,7 +156,7 @@ contains
     real(wp), intent(in) :: v_n             !! v_r.n: > 0 while opening [m/s]
     real(wp) :: f
 
-    f = max(0.0_wp, k*d_n**gamma - eta*v_n)
+    f = max(0.0_wp, k*power(d_n, gamma) - eta*v_n)
   end function normal_force
 
   !> Tangential force on a body before slip, eq. (2) [N].
@@ -181,5 +190,14 @@ contains
     length = norm2(spring)
     if (length > 0.0_wp) xi = spring*length**(1.0_wp/gamma - 1.0_wp)
   end function tangential_slip
+
+  !> d^gamma, quick for the linear spring.
+  elemental function power(d, gamma) result(p)
+    real(wp), intent(in) :: d, gamma   !! [m, -]
+    real(wp) :: p
+
+    p = d
+    if (abs(gamma - 1.0_wp) > 0.0_wp) p = d**gamma
+  end function power
 
 end module contact_law_m

@@ -17,7 +17,8 @@ module contact_surface_m
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
     gather_facets, nearest_on_surface, segment_distance2
-  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, may_cross, weight_slope
+  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, may_cross, way_apart, &
+    weight_slope
   implicit none
   private
   public :: contact_surface_t, contact_surface_init, find_surface_touches
@@ -26,6 +27,7 @@ module contact_surface_m
   type :: probes_near_t
     integer :: n = 0
     integer, allocatable :: probe(:)
+    real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
     integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
     integer :: n_facets = 0, n_edges = 0
     integer, allocatable :: facet(:), edge(:)
@@ -36,15 +38,18 @@ module contact_surface_m
     integer :: a = 0, b = 0
     real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
     real(wp) :: valid = -1.0_wp                  !! way the bodies may move meanwhile [m]
+    integer :: uses = 0                          !! of the list
     real(wp) :: x_a(3) = 0.0_wp, x_b(3) = 0.0_wp, q_a(4) = 0.0_wp, q_b(4) = 0.0_wp
     type(probes_near_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
+    real(wp), allocatable :: away(:)             !! way before the two may cross [m]
   end type pair_t
 
   !> How far to look for features, and the lists of the search.
   type :: search_t
-    real(wp) :: skin = 0.0_wp                    !! way bodies may move before lists are renewed [m]
+    real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
+    real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
     real(wp) :: ahead = 0.0_wp                   !! longest way of a touch that comes soon [m]
     type(near_list_t) :: guests, hosts, facets, edges
   end type search_t
@@ -67,14 +72,17 @@ module contact_surface_m
     integer, allocatable :: old_slot(:), old_a(:), old_b(:)   !! work
   end type contact_surface_t
 
-  real(wp), parameter :: skin_share = 0.2_wp     !! skin over the smallest d_s
+  real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
+  real(wp), parameter :: most_skin = 4.0_wp      !! largest skin over the least
+  integer, parameter :: lasting_substeps = 10    !! that lists of fast bodies last
   real(wp), parameter :: wide_share = 0.15_wp    !! skin of the pairs over the largest reach
 
 contains
 
   !> Make the features of all shapes and size the lists.
-  subroutine contact_surface_init(courant_max, blocks, self)
+  subroutine contact_surface_init(courant_max, longest_substep, blocks, self)
     real(wp), intent(in) :: courant_max   !! C_s of eq. (6): bodies move less in a substep, over d_s
+    real(wp), intent(in) :: longest_substep   !! [s]
     type(blocks_t), intent(in) :: blocks
     type(contact_surface_t), intent(out) :: self
     integer :: s, b
@@ -93,6 +101,7 @@ contains
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest
+    self%search%lasting = real(lasting_substeps, wp)*longest_substep
     self%search%ahead = courant_max*self%smallest
     self%wide_skin = wide_share*maxval(self%reach)
   end subroutine contact_surface_init
@@ -292,18 +301,25 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(touch_t), intent(inout) :: touches
-    real(wp) :: to_b(3), gap, turn(3, 3), x(3)
+    integer, parameter :: worn = 50               !! uses after which a list is renewed early,
+    real(wp), parameter :: fresh = 0.05_wp        !! unless the way is below this share of a skin
+    real(wp) :: to_b(3), speed, gap, way, turn(3, 3), x(3)
     integer :: a, b
 
     a = pair%a
     b = pair%b
-    if (way_since(blocks, reach, pair) > pair%valid) call list_features(blocks, turns, &
-      surface, search, pair)
+    speed = norm(blocks%v(:, a) - blocks%v(:, b)) &
+      + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b)
+    way = way_since(blocks, reach, pair)
+    if (way > pair%valid .or. (pair%uses > worn .and. way > fresh*search%skin)) then
+      call list_features(blocks, turns, surface, speed, search, pair)
+      way = 0.0_wp
+    end if
+    pair%uses = pair%uses + 1
     if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
     call reserve_touches(touches%n + pair%of_a%n + pair%of_b%n + pair%n_crossings, touches)
     to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
-    gap = ahead*(norm(blocks%v(:, a) - blocks%v(:, b)) &
-      + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b))
+    gap = ahead*speed
     associate (surface_a => surface(blocks%shape(a)), &
       surface_b => surface(blocks%shape(b)), turn_a => turns(:, :, a), &
       turn_b => turns(:, :, b))
@@ -314,10 +330,10 @@ contains
       turn = matmul(transpose(turn_b), turn_a)
       x = matmul(-to_b, turn_b)
       call touch_probes(.false., a, b, turn_a, to_b, transpose(turn), matmul(to_b, turn_a), gap, &
-        surface_b, surface_a, pair%of_b, touches)
-      call touch_probes(.true., a, b, turn_b, to_b, turn, x, gap, surface_a, surface_b, pair%of_a, &
-        touches)
-      call touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
+        way, surface_b, surface_a, pair%of_b, touches)
+      call touch_probes(.true., a, b, turn_b, to_b, turn, x, gap, way, surface_a, surface_b, &
+        pair%of_a, touches)
+      call touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
     end associate
   end subroutine touch_pair
 
@@ -353,7 +369,7 @@ contains
   end subroutine touch_balls
 
   !> Touches of the listed probes of one body (the guest) with the surface of the other (the host).
-  subroutine touch_probes(guest_is_a, a, b, turn_host, to_b, turn, x, gap, guest, host, list, &
+  subroutine touch_probes(guest_is_a, a, b, turn_host, to_b, turn, x, gap, way, guest, host, list, &
       touches)
     logical, intent(in) :: guest_is_a
     integer, intent(in) :: a, b
@@ -361,6 +377,7 @@ contains
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
     real(wp), intent(in) :: turn(3, 3), x(3)  !! guest to host axes: turn.p + x [-], [m]
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    real(wp), intent(in) :: way               !! of the bodies since the list was made [m]
     type(surface_t), intent(in) :: guest, host
     type(probes_near_t), intent(in) :: list
     type(touch_t), intent(inout) :: touches
@@ -368,6 +385,7 @@ contains
     integer :: m, i
 
     do m = 1, list%n
+      if (list%away(m) > way + gap) cycle
       i = list%probe(m)
       place = x + turn(:, 1)*guest%probe(1, i) + turn(:, 2)*guest%probe(2, i) &
         + turn(:, 3)*guest%probe(3, i)
@@ -389,11 +407,12 @@ contains
   end subroutine touch_probes
 
   !> Touches of the listed pairs of edges that cross.
-  subroutine touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
+  subroutine touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
     real(wp), intent(in) :: turn_b(3, 3)      !! axes of b to space
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
     real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    real(wp), intent(in) :: way               !! of the bodies since the list was made [m]
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
     type(touch_t), intent(inout) :: touches
@@ -405,6 +424,7 @@ contains
     length = min(surface_a%length, surface_b%length)
     last = 0
     do m = 1, pair%n_crossings
+      if (pair%away(m) > way + gap) cycle
       i = pair%edge_a(m)
       if (i /= last) guest = edge_in_axes(surface_a%edge(i), turn, x)
       last = i
@@ -433,27 +453,30 @@ contains
     seen%into = matmul(turn, edge%into)
   end function edge_in_axes
 
-  !> List what may touch of a pair before the bodies have moved by the skin.
-  subroutine list_features(blocks, turns, surface, search, pair)
+  !> List what may touch of a pair before the bodies have moved by a skin: wider for fast bodies.
+  subroutine list_features(blocks, turns, surface, speed, search, pair)
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: turns(:, :, :)       !! (3, 3, bodies) body to space
     type(surface_t), intent(in) :: surface(:)    !! (shapes)
+    real(wp), intent(in) :: speed                !! of any two points, at most [m/s]
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    real(wp) :: turn(3, 3), x_a(3), x_b(3), to_b(3), apart
+    real(wp) :: turn(3, 3), x_a(3), x_b(3), to_b(3), apart, skin
 
     pair%x_a = blocks%x(:, pair%a)
     pair%x_b = blocks%x(:, pair%b)
     pair%q_a = blocks%q(:, pair%a)
     pair%q_b = blocks%q(:, pair%b)
+    pair%uses = 0
     pair%of_a%n = 0
     pair%of_b%n = 0
     pair%n_crossings = 0
     to_b = pair%x_b + pair%shift - pair%x_a
     associate (a => surface(blocks%shape(pair%a)), b => surface(blocks%shape(pair%b)))
       apart = norm(to_b) - a%reach - b%reach - search%ahead
-      pair%valid = max(apart, search%skin)
-      if (apart > search%skin) return
+      skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
+      pair%valid = max(apart, skin)
+      if (apart > skin) return
       if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
         pair%n_crossings = 1   ! the two spheres
         return
@@ -461,16 +484,17 @@ contains
       turn = matmul(transpose(turns(:, :, pair%b)), turns(:, :, pair%a))
       x_b = matmul(-to_b, turns(:, :, pair%b))
       x_a = matmul(to_b, turns(:, :, pair%a))
-      call list_probes(transpose(turn), x_a, b, a, search, pair%of_b)
-      call list_probes(turn, x_b, a, b, search, pair%of_a)
+      call list_probes(transpose(turn), x_a, skin, b, a, search, pair%of_b)
+      call list_probes(turn, x_b, skin, a, b, search, pair%of_a)
       call list_crossings(turn, x_b, a, b, search, pair)
     end associate
   end subroutine list_features
 
   !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
   !! may be nearest to it before the bodies have moved by the skin.
-  subroutine list_probes(turn, x, guest, host, search, list)
+  subroutine list_probes(turn, x, skin, guest, host, search, list)
     real(wp), intent(in) :: turn(3, 3), x(3)   !! guest to host axes: turn.p + x [-], [m]
+    real(wp), intent(in) :: skin               !! [m]
     type(surface_t), intent(in) :: guest, host
     type(search_t), intent(inout) :: search
     type(probes_near_t), intent(inout) :: list
@@ -480,7 +504,7 @@ contains
     list%n_facets = 0
     list%n_edges = 0
     if (host%ball > 0.0_wp) return   ! its own centre is the probe
-    margin = search%skin + search%ahead + guest%ball
+    margin = skin + search%ahead + guest%ball
     call box_in_axes(transpose(turn), -matmul(x, turn), host%low - margin, host%high + margin, &
       low, high)
     call gather_probes(guest, low, high, search%guests)
@@ -489,10 +513,11 @@ contains
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
       call search_surface(host, place, margin, search, distance, outward)
       if (distance > margin) cycle
-      reach = abs(distance) + 2*(search%skin + search%ahead)
+      reach = abs(distance) + 2*(skin + search%ahead)
       call gather_facets(host, place - reach, place + reach, search%facets)
       call gather_edges(host, place - reach, place + reach, search%edges)
       call append(place, reach, search%guests%item(m), host, search, list)
+      list%away(list%n) = distance - guest%ball
     end do
     call reserve(list%n + 1, list%facet_first)
     call reserve(list%n + 1, list%edge_first)
@@ -544,6 +569,7 @@ contains
 
     list%n = list%n + 1
     call reserve(list%n, list%probe)
+    call reserve(list%n, list%away)
     call reserve(list%n, list%facet_first)
     call reserve(list%n, list%edge_first)
     list%probe(list%n) = probe
@@ -580,13 +606,14 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(edge_t) :: guest
-    real(wp) :: reach, low(3), high(3)
+    real(wp) :: reach, angle, low(3), high(3)
     integer :: m, k, i, j
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
-    reach = search%skin + search%ahead + min(surface_a%length, surface_b%length)
+    reach = pair%valid + search%ahead + min(surface_a%length, surface_b%length)
     call box_in_axes(transpose(turn), -matmul(x, turn), surface_b%low - reach, &
       surface_b%high + reach, low, high)
+    angle = pair%valid/min(surface_a%reach, surface_b%reach)
     call gather_edges(surface_a, low, high, search%guests)
     do m = 1, search%guests%n
       i = search%guests%item(m)
@@ -602,13 +629,15 @@ contains
         associate (host => surface_b%edge(j))
           if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
                                 host%extent) > reach**2) cycle
-          if (.not. may_cross(guest, host, pair%valid/min(surface_a%reach, surface_b%reach))) cycle
+          if (.not. may_cross(guest, host, angle)) cycle
         end associate
         pair%n_crossings = pair%n_crossings + 1
         call reserve(pair%n_crossings, pair%edge_a)
         call reserve(pair%n_crossings, pair%edge_b)
         pair%edge_a(pair%n_crossings) = i
+        call reserve(pair%n_crossings, pair%away)
         pair%edge_b(pair%n_crossings) = j
+        pair%away(pair%n_crossings) = way_apart(guest, surface_b%edge(j), angle)
       end do
     end do
   end subroutine list_crossings

@@ -5,21 +5,24 @@
 module contacts_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use vectors_m, only: cross
+  use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
   use walls_m, only: walls_t, floor_wall
   use neighbours_m, only: reserve
-  use touches_m, only: touch_t, select_touching
+  use touches_m, only: touch_t, set_apart
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use lubrication_m, only: lubrication_t, lubricate
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
-    stored_energy, normal_force, tangential_force, tangential_slip
+    normal_stiffness, stored_energy, normal_force, tangential_force, tangential_slip
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
   public :: springs_t, reserve_springs
 
+  !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
+  !! pair too slow for one, and of a pile.
+  real(wp), parameter :: impact_turn = 0.35_wp, slow_turn = 0.7_wp, pile_turn = 1.2_wp
   integer, parameter :: most_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
   !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches.
@@ -53,6 +56,7 @@ module contacts_m
 
   !> What may touch: walls (-6..-1) and bodies (1..n) alike.
   type :: partners_t
+    real(wp) :: gravity = 0.0_wp                         !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n) [m/s], [rad/s]
     real(wp), allocatable :: inverse_mass(:)             !! (-6:n) 0 for walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) likewise [1/(kg m2)]
@@ -72,7 +76,7 @@ module contacts_m
     real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     type(touch_t) :: touches
-    type(touch_t) :: soon                        !! with those that may come before the substep ends
+    type(touch_t) :: soon                        !! those that may come before the substep ends
     type(groups_t) :: groups
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
@@ -109,7 +113,8 @@ contains
     contacts%courant_max = input%courant_max
     contacts%exact = input%model == 'surface'
     if (contacts%exact) then
-      call contact_surface_init(input%courant_max, blocks, contacts%surface)
+      call contact_surface_init(input%courant_max, contacts%longest_substep, blocks, &
+        contacts%surface)
       contacts%reach = contacts%surface%reach
       contacts%smallest = contacts%surface%smallest
     else
@@ -144,7 +149,7 @@ contains
     contacts%impulse = 0.0_wp
     contacts%twist = 0.0_wp
     contacts%n_met = 0
-    call know_partners(walls, blocks, contacts%partners)
+    call know_partners(walls, gravity, blocks, contacts%partners)
     call find_touches(walls, blocks, 0.0_wp, contacts)
     left = dt
     do while (left > 0.0_wp)
@@ -207,7 +212,6 @@ contains
 
     call note_partners(contacts)
     call match_springs(contacts)
-    call know_motion(blocks, contacts%partners)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
     call know_motion(blocks, contacts%partners)
@@ -251,16 +255,14 @@ contains
 
   !> Longest substep the present touches allow [s].
   !!
-  !! For one pair of bodies a sixth of the bound of stability, which also keeps the restitution
-  !! within 0.02; for all pairs together, see `highest_frequency2`, little more than half of that
-  !! bound.
+  !! For one pair of bodies a sixth of the bound of stability, which keeps the restitution within
+  !! 0.01, or a third where they are slow; for all pairs together little more than half of it.
   pure function stiffness_limit(contacts) result(limit)
     type(contacts_t), intent(in) :: contacts
     real(wp) :: limit
-    real(wp), parameter :: turn = 0.35_wp   !! frequency times substep; 2 is the bound of stability
 
     limit = huge(1.0_wp)
-    if (contacts%frequency2 > 0.0_wp) limit = turn/sqrt(contacts%frequency2)
+    if (contacts%frequency2 > 0.0_wp) limit = impact_turn/sqrt(contacts%frequency2)
   end function stiffness_limit
 
   !> Room for the walls and n bodies.
@@ -272,13 +274,15 @@ contains
     allocate (partners%inverse_mass(-6:n), partners%inverse_inertia(3, 3, -6:n), source=0.0_wp)
   end subroutine partners_init
 
-  !> Masses of all partners and the velocity of the walls.
-  pure subroutine know_partners(walls, blocks, partners)
+  !> Masses of all partners, their gravity and the velocity of the walls.
+  pure subroutine know_partners(walls, gravity, blocks, partners)
     type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(inout) :: partners
     integer :: w, b
 
+    partners%gravity = norm(gravity)
     do w = 1, walls%n
       partners%v(:, walls%number(w)) = walls%velocity(:, w)
     end do
@@ -306,26 +310,59 @@ contains
     integer :: b
 
     if (contacts%exact) then
-      call find_surface_touches(walls, blocks, ahead, contacts%surface, contacts%soon)
+      call find_surface_touches(walls, blocks, ahead, contacts%surface, contacts%touches)
     else
-      call find_sphere_touches(walls, blocks, ahead, contacts%spheres, contacts%soon)
+      call find_sphere_touches(walls, blocks, ahead, contacts%spheres, contacts%touches)
     end if
-    call select_touching(contacts%soon, contacts%touches)
+    call set_apart(contacts%touches, contacts%soon)
     call form_groups(contacts%touches, contacts%groups)
     contacts%frequency2 = 0.0_wp
-    if (contacts%soon%n == 0) return
+    call know_motion(blocks, contacts%partners)
+    if (contacts%touches%n + contacts%soon%n == 0) return
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       contacts%partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
         blocks%inverse_inertia(:, :, blocks%shape(b)))
     end do
-    call respond(contacts%touches, contacts%law, contacts%partners, contacts%response)
-    contacts%frequency2 = highest_frequency2(contacts%touches, contacts%response)
-    if (contacts%soon%n == contacts%touches%n) return
-    call respond(contacts%soon, contacts%law, contacts%partners, contacts%response_soon)
-    contacts%frequency2 = max(contacts%frequency2, &
-      highest_frequency2(contacts%soon, contacts%response_soon))
+    associate (response => contacts%response, soon => contacts%response_soon)
+      call respond(contacts%touches, contacts%law, contacts%partners, response)
+      if (contacts%soon%n > 0) then
+        call respond(contacts%soon, contacts%law, contacts%partners, soon)
+        call add_frequencies(contacts%touches, contacts%soon, response, soon)
+        contacts%frequency2 = highest_frequency2(contacts%soon, soon)
+      end if
+      contacts%frequency2 = max(contacts%frequency2, highest_frequency2(contacts%touches, response))
+    end associate
   end subroutine find_touches
+
+  !> Add the frequencies of what may touch soon to those of what touches, of each pair and of each
+  !! body: springs together swing no faster than the squares of both frequencies together.
+  pure subroutine add_frequencies(touches, soon, response, response_soon)
+    type(touch_t), intent(in) :: touches, soon
+    type(response_t), intent(inout) :: response, response_soon
+    real(wp) :: both
+    integer :: first, last, m, m_last
+
+    response%frequency2 = response%frequency2 + response_soon%frequency2
+    response_soon%frequency2 = response%frequency2
+    m = 1
+    first = 1
+    do while (first <= soon%n)
+      last = last_of_pair(soon, first)
+      do while (m <= touches%n)
+        if (.not. comes_before(touches%a(m), touches%b(m), 0, soon%a(first), soon%b(first), 0)) exit
+        m = m + 1
+      end do
+      if (m > touches%n) return
+      if (touches%a(m) == soon%a(first) .and. touches%b(m) == soon%b(first)) then
+        m_last = last_of_pair(touches, m)
+        both = response%pair_frequency2(m) + response_soon%pair_frequency2(first)
+        response%pair_frequency2(m:m_last) = both
+        response_soon%pair_frequency2(first:last) = both
+      end if
+      first = last + 1
+    end do
+  end subroutine add_frequencies
 
   !> Square of the highest frequency of a pair of touching bodies, or of all pairs of two touching
   !! bodies together with a share; a little above [1/s2].
@@ -336,7 +373,7 @@ contains
     type(touch_t), intent(in) :: touches
     type(response_t), intent(in) :: response
     real(wp) :: highest
-    real(wp), parameter :: share = (0.35_wp/1.2_wp)**2
+    real(wp), parameter :: share = (impact_turn/pile_turn)**2
     real(wp) :: pair
     integer :: t
 
@@ -396,8 +433,8 @@ contains
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
     real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
-    real(wp) :: total, inverse, k, omega2, highest, stiffness
-    integer :: a, b, t
+    real(wp) :: total, inverse, k, omega2, highest, stiffness, speed
+    integer :: a, b, t, i
 
     a = touches%a(first)
     b = touches%b(first)
@@ -406,7 +443,9 @@ contains
     do t = first, last
       nn = touches%weight(t)*square(touches%normal(:, t))
       weights = weights + nn
-      points = points + spread(touches%arm_a(:, t), 2, 6)*spread(nn, 1, 3)
+      do i = 1, 6
+        points(:, i) = points(:, i) + nn(i)*touches%arm_a(:, t)
+      end do
     end do
     highest = 0.0_wp
     k = normal_constant(law, 1.0_wp/(partners%inverse_mass(a) + partners%inverse_mass(b)))
@@ -417,7 +456,7 @@ contains
       inverse = inverse_effective_mass(partners, a, arm, touches%normal(:, t))
       arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
       inverse = inverse + inverse_effective_mass(partners, b, arm, touches%normal(:, t))
-      stiffness = k*law%gamma_n*max(0.0_wp, touches%depth(t))**(law%gamma_n - 1.0_wp)
+      stiffness = normal_stiffness(k, law%gamma_n, touches%depth(t))
       omega2 = stiffness*total*inverse
       response%k(t) = touches%weight(t)*k
       if (law%constants) then
@@ -429,6 +468,11 @@ contains
       end if
       highest = max(highest, omega2)
     end do
+    ! no impact: slower than its weight makes a body within a swing
+    speed = norm(partners%v(:, b) - partners%v(:, a)) &
+      + norm(partners%omega(:, a))*norm(touches%arm_a(:, first)) &
+      + norm(partners%omega(:, b))*norm(touches%arm_b(:, first))
+    if (speed**2*highest < partners%gravity**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
     if (partners%inverse_mass(a) > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
     if (partners%inverse_mass(b) > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
@@ -453,7 +497,10 @@ contains
     inverse = partners%inverse_mass(b)
     if (inverse <= 0.0_wp) return
     lever = cross(arm, n)
-    inverse = inverse + dot_product(lever, matmul(partners%inverse_inertia(:, :, b), lever))
+    associate (inverse_inertia => partners%inverse_inertia(:, :, b))
+      inverse = inverse + dot_product(lever, inverse_inertia(:, 1)*lever(1) &
+        + inverse_inertia(:, 2)*lever(2) + inverse_inertia(:, 3)*lever(3))
+    end associate
   end function inverse_effective_mass
 
   !> Gather the touches of each key and partner; mean normal and point weighted by overlap.

@@ -11,7 +11,7 @@ module edge_crossing_m
   use vectors_m, only: cross
   implicit none
   private
-  public :: edge_t, crossing_t, cross_edges, may_cross, weight_slope
+  public :: edge_t, crossing_t, cross_edges, may_cross, way_apart, weight_slope
 
   !> A convex edge, in any axes.
   type :: edge_t
@@ -91,6 +91,34 @@ contains
     most = beside + safety*angle*(1.0_wp + 1.0_wp/sine)   ! n turns by angle/sine, the fans by angle
     yes = all(matmul(n, guest%into) < most) .and. all(matmul(-n, host%into) < most)
   end function may_cross
+
+  !> Way that two bodies may move before two edges of theirs that are apart can cross; zero where
+  !! that is hard to say [m].
+  !!
+  !! The distance of two lines changes by the way of their nearest places along the normal. As long
+  !! as the lines are far from parallel these places, and so their way, stay within bounds.
+  pure function way_apart(guest, host, angle) result(way)
+    type(edge_t), intent(in) :: guest, host   !! in the same axes
+    real(wp), intent(in) :: angle             !! by which the edges may turn [rad]
+    real(wp) :: way
+    real(wp), parameter :: least_sine = 0.3_wp, most_angle = 0.1_wp, least_cosine = 0.5_wp
+    real(wp), parameter :: lever = 3.0_wp     !! way of the nearest places over that of the bodies
+    real(wp) :: n(3), d(3), sine, s, t
+
+    way = 0.0_wp
+    if (angle > most_angle) return
+    n = cross(guest%along, host%along)
+    sine = norm2(n)
+    if (sine < least_sine) return
+    n = n/sign(sine, -dot_product(n, host%outward))
+    if (-dot_product(n, host%outward) < least_cosine*norm2(host%outward)) return
+    d = host%start - guest%start
+    s = dot_product(cross(d, host%along), cross(guest%along, host%along))/sine**2
+    t = dot_product(cross(d, guest%along), cross(guest%along, host%along))/sine**2
+    if (abs(s - 0.5_wp*guest%extent) > guest%extent) return
+    if (abs(t - 0.5_wp*host%extent) > host%extent) return
+    way = max(0.0_wp, dot_product(d, n)/lever)
+  end function way_apart
 
   !> One where a normal is in the fan of an edge, falling to zero beside it.
   pure function in_fan(normal, into) result(part)

@@ -4,7 +4,7 @@ module touches_m
   use neighbours_m, only: reserve
   implicit none
   private
-  public :: touch_t, reserve_touches, select_touching
+  public :: touch_t, reserve_touches, set_apart
 
   !> Touches of one moment, sorted by a, then b, then key.
   !!
@@ -43,30 +43,62 @@ contains
     call reserve(n, touches%weight_turn)
   end subroutine reserve_touches
 
-  !> Those entries of a list in which the bodies touch.
-  subroutine select_touching(all, touching)
-    type(touch_t), intent(in) :: all
-    type(touch_t), intent(inout) :: touching
-    integer :: t, m
+  !> Keep in a list the entries in which the bodies touch, and move the others to a list of their
+  !! own; both stay sorted.
+  subroutine set_apart(touches, soon)
+    type(touch_t), intent(inout) :: touches, soon
+    integer :: t, kept
 
-    call reserve_touches(all%n, touching)
-    m = 0
-    do t = 1, all%n
-      if (all%depth(t) <= 0.0_wp) cycle
-      m = m + 1
-      touching%a(m) = all%a(t)
-      touching%b(m) = all%b(t)
-      touching%key(m) = all%key(t)
-      touching%arm_a(:, m) = all%arm_a(:, t)
-      touching%arm_b(:, m) = all%arm_b(:, t)
-      touching%normal(:, m) = all%normal(:, t)
-      touching%depth(m) = all%depth(t)
-      touching%weight(m) = all%weight(t)
-      touching%length(m) = all%length(t)
-      touching%weight_shift(:, m) = all%weight_shift(:, t)
-      touching%weight_turn(:, m) = all%weight_turn(:, t)
+    soon%n = 0
+    kept = 0
+    do t = 1, touches%n
+      if (touches%depth(t) <= 0.0_wp) then
+        soon%n = soon%n + 1
+        call reserve_touches(soon%n, soon)
+        call copy_entry(touches, t, soon, soon%n)
+      else
+        kept = kept + 1
+        if (kept < t) call move_entry(t, kept, touches)
+      end if
     end do
-    touching%n = m
-  end subroutine select_touching
+    touches%n = kept
+  end subroutine set_apart
+
+  !> Copy an entry from one list to another, where there is room.
+  pure subroutine copy_entry(from, t, to, m)
+    type(touch_t), intent(in) :: from
+    integer, intent(in) :: t, m
+    type(touch_t), intent(inout) :: to
+
+    to%a(m) = from%a(t)
+    to%b(m) = from%b(t)
+    to%key(m) = from%key(t)
+    to%arm_a(:, m) = from%arm_a(:, t)
+    to%arm_b(:, m) = from%arm_b(:, t)
+    to%normal(:, m) = from%normal(:, t)
+    to%depth(m) = from%depth(t)
+    to%weight(m) = from%weight(t)
+    to%length(m) = from%length(t)
+    to%weight_shift(:, m) = from%weight_shift(:, t)
+    to%weight_turn(:, m) = from%weight_turn(:, t)
+  end subroutine copy_entry
+
+  !> Move an entry within a list.
+  pure subroutine move_entry(t, m, touches)
+    integer, intent(in) :: t, m
+    type(touch_t), intent(inout) :: touches
+
+    touches%a(m) = touches%a(t)
+    touches%b(m) = touches%b(t)
+    touches%key(m) = touches%key(t)
+    touches%arm_a(:, m) = touches%arm_a(:, t)
+    touches%arm_b(:, m) = touches%arm_b(:, t)
+    touches%normal(:, m) = touches%normal(:, t)
+    touches%depth(m) = touches%depth(t)
+    touches%weight(m) = touches%weight(t)
+    touches%length(m) = touches%length(t)
+    touches%weight_shift(:, m) = touches%weight_shift(:, t)
+    touches%weight_turn(:, m) = touches%weight_turn(:, t)
+  end subroutine move_entry
 
 end module touches_m

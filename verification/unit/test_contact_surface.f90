@@ -67,7 +67,7 @@ contains
     end do
     call blocks_init(world%case, shapes, world%blocks)
     call walls_init(world%case%grid, world%case%boundary, world%walls)
-    call contact_surface_init(0.1_wp, world%blocks, world%surface)
+    call contact_surface_init(0.1_wp, 1.0e-4_wp, world%blocks, world%surface)
   end subroutine new_world
 
   subroutine find(world)
