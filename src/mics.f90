@@ -18,6 +18,7 @@ program mics
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
   use output_m, only: output_t, open_output, write_due_output, close_output
   use restart_m, only: read_restart
@@ -28,6 +29,7 @@ program mics
   type(options_t) :: options
   type(case_t) :: case
   type(shape_t), allocatable :: shapes(:)
+  type(bed_t) :: bed
   type(simulation_t) :: sim
   type(output_t) :: output
   type(step_report_t) :: report
@@ -39,11 +41,11 @@ program mics
   call read_options()
   call read_and_check()
   call catch_signals()
-  call simulation_init(case, shapes, sim)
+  call simulation_init(case, shapes, bed, sim)
   if (len(options%restart) > 0) call go_on()
 
-  call open_output(case, parameters_text(case), options, sim%wet, sim%grid, sim%clock, &
-                   sim%blocks, output)
+  call open_output(case, parameters(), options, sim%wet, sim%grid, sim%clock, &
+                   sim%blocks, bed, output)
   call stop_on_trouble()
   call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
                         report, output)
@@ -68,6 +70,14 @@ program mics
   call parallel_final()
 
 contains
+
+  !> All values of the case as text, and what the file of the bed held.
+  function parameters() result(text)
+    character(:), allocatable :: text
+
+    text = parameters_text(case)
+    if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
+  end function parameters
 
   !> Number of the signal that any process has caught, 0 for none.
   function any_signal() result(number)
@@ -103,11 +113,12 @@ contains
     if (problems%n > 0) call refuse(problems)
     call read_case(text, case, problems)
     call make_shapes(case, shapes, problems)
-    call check_case(case, shapes, problems)
+    call make_bed(case, bed, problems)
+    call check_case(case, shapes, bed, problems)
     call check_initial_state(case, problems)
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) return
-    if (is_root()) call print_plan(output_unit, case, shapes)
+    if (is_root()) call print_plan(output_unit, case, shapes, bed)
     call finish()
   end subroutine read_and_check
 
@@ -116,7 +127,7 @@ contains
     character(:), allocatable :: message
     integer :: info
 
-    call read_restart(options%restart, parameters_text(case), sim%grid, sim%clock, sim%flow, &
+    call read_restart(options%restart, parameters(), sim%grid, sim%clock, sim%flow, &
                       sim%solid, &
                       sim%blocks, sim%contacts, info, message)
     if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)

@@ -25,6 +25,7 @@ module time_step_m
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
+  use bed_m, only: bed_t
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
@@ -71,12 +72,13 @@ module time_step_m
 contains
 
   !> State at t = 0: bodies in place, liquid filled in, everything at rest or at its given velocity.
-  subroutine simulation_init(case, shapes, sim)
+  subroutine simulation_init(case, shapes, bed, sim)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
     type(simulation_t), intent(inout) :: sim
     type(stage_report_t) :: report
-    integer :: d
+    integer :: d, n_solids
 
     sim%case = case
     sim%wet = case%run%physics /= 'dry'
@@ -87,6 +89,7 @@ contains
     call clock_init(case%run, sim%clock)
     call grid_init(case%grid, case%boundary, sim%grid)
     call walls_init(case%grid, case%boundary, sim%walls)
+    sim%walls%bed = bed
     call blocks_init(case, shapes, sim%blocks)
     call contacts_init(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
@@ -96,11 +99,13 @@ contains
     if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
       minval(sim%grid%h), sim%blocks, sim%contacts%lubrication)
     call flow_init(sim%grid, sim%flow)
-    call solid_geometry_init(sim%grid, sim%solid, sim%blocks%n)
-    call solid_geometry_init(sim%grid, sim%before, sim%blocks%n)
+    n_solids = sim%blocks%n
+    if (bed%there) n_solids = n_solids + 1
+    call solid_geometry_init(sim%grid, sim%solid, n_solids)
+    call solid_geometry_init(sim%grid, sim%before, n_solids)
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, &
                              merge(case%numerics%subcells, 0, &
-                                   case%numerics%solid_fraction == 'subcell'))
+                                   case%numerics%solid_fraction == 'subcell'), bed)
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
     if (case%fluid%single_phase) then
       sim%transport%incoming = 1.0_wp
@@ -108,7 +113,7 @@ contains
       sim%transport%level = case%fluid%water_level
     end if
     call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
-    call stage_init(sim%grid, sim%blocks%n, case%numerics, sim%stage)
+    call stage_init(sim%grid, n_solids, case%numerics, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
     call read_initial_liquid(case%fluid, sim%grid, sim%flow)

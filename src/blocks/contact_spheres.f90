@@ -1,4 +1,4 @@
-!> Touches of the contact spheres of the T-type model with one another and with the plane walls.
+!> Touches of the contact spheres of the T-type model with one another, the plane walls and the bed.
 !!
 !! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved so far
 !! that others may touch. What comes out, and its order, do not depend on when the list was made.
@@ -8,6 +8,8 @@ module contact_spheres_m
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
+  use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
+  use surface_features_m, only: near_list_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, reserve
   use touches_m, only: touch_t, reserve_touches
   implicit none
@@ -36,7 +38,7 @@ module contact_spheres_m
     real(wp), allocatable :: radius(:)         !! (slots) [m]
     !> Candidates: entries first(p) : first(p+1)-1 belong to body pair p.
     integer :: n_pairs = 0
-    integer, allocatable :: pair_a(:), pair_b(:), first(:)   !! pair_b < 0: a wall
+    integer, allocatable :: pair_a(:), pair_b(:), first(:)   !! pair_b < 0: wall, bed
     real(wp), allocatable :: shift(:, :)       !! (3, pairs) to the image of b near a [m]
     integer :: n_candidates = 0
     integer, allocatable :: i(:), j(:)         !! slots of the sphere of a and of b
@@ -46,6 +48,7 @@ module contact_spheres_m
     real(wp), allocatable :: x(:, :), q(:, :)
     real(wp), allocatable :: turn(:, :, :)     !! (3, 3, bodies) body to space
     type(pair_list_t) :: near
+    type(near_list_t) :: facets, edges         !! of the bed
   end type contact_spheres_t
 
 contains
@@ -106,7 +109,9 @@ contains
     touches%n = 0
     call reserve_touches(self%n_candidates, touches)
     do p = 1, self%n_pairs
-      if (self%pair_b(p) < 0) then
+      if (self%pair_b(p) == bed_partner) then
+        call touch_bed(walls%bed, blocks, self, p, way(self, blocks, p, ahead), touches)
+      else if (self%pair_b(p) < 0) then
         call touch_wall(walls, blocks, self, p, way(self, blocks, p, ahead), touches)
       else
         call touch_body(blocks, self, p, way(self, blocks, p, ahead), touches)
@@ -174,6 +179,7 @@ contains
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. blocks%fixed(a)) then
+        if (walls%bed%there) call list_bed(walls%bed, blocks, a, self)
         do w = 1, walls%n
           call list_wall(walls, blocks, a, w, self)
         end do
@@ -267,6 +273,32 @@ contains
     end associate
   end subroutine list_wall
 
+  !> Spheres of body a near the bed.
+  subroutine list_bed(bed, blocks, a, self)
+    type(bed_t), intent(in) :: bed
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a
+    type(contact_spheres_t), intent(inout) :: self
+    real(wp) :: x(3), c(3), reach, distance, outward(3)
+    integer :: i, slot
+
+    x = bed_place(bed, blocks%x(:, a))
+    reach = self%reach(a) + self%skin
+    if (.not. bed_is_near(bed, x - reach, x + reach)) return
+    call add_pair(a, bed_partner, [0.0_wp, 0.0_wp, 0.0_wp], self)
+    associate (shape => blocks%shapes(blocks%shape(a)))
+      do i = 1, size(shape%sphere_radius)
+        c = x + matmul(self%turn(:, :, a), shape%sphere_centre(:, i))
+        reach = shape%sphere_radius(i) + self%skin
+        call bed_distance(bed, c, reach, reach + self%reach(a), self%facets, self%edges, distance, &
+          outward)
+        if (distance > reach) cycle
+        call take_slot(blocks, a, i, self, slot)
+        call add_candidate(slot, 0, self)
+      end do
+    end associate
+  end subroutine list_bed
+
   !> Sphere pairs of near pair p of bodies, in the order of the spheres of a, then of the bins of b.
   subroutine list_body(blocks, p, self)
     type(blocks_t), intent(in) :: blocks
@@ -355,6 +387,38 @@ contains
       touches%weight_turn(:, t) = 0.0_wp
     end do
   end subroutine touch_wall
+
+  !> Touches of pair p, a body and the bed, each sphere at the nearest place of the bed.
+  subroutine touch_bed(bed, blocks, self, p, gap, touches)
+    type(bed_t), intent(in) :: bed
+    type(blocks_t), intent(in) :: blocks
+    type(contact_spheres_t), intent(inout) :: self
+    integer, intent(in) :: p
+    real(wp), intent(in) :: gap   !! still taken as a touch [m]
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: distance, outward(3)
+    integer :: c, s, t
+
+    do c = self%first(p), self%first(p + 1) - 1
+      s = self%i(c)
+      call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
+        2*self%radius(s) + gap, self%facets, self%edges, distance, outward)
+      if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
+      t = touches%n + 1
+      touches%n = t
+      touches%a(t) = self%pair_a(p)
+      touches%b(t) = bed_partner
+      touches%key(t) = self%sphere(s)
+      touches%normal(:, t) = -outward
+      touches%arm_a(:, t) = self%centre(:, s) - blocks%x(:, self%pair_a(p)) - distance*outward
+      touches%arm_b(:, t) = 0.0_wp
+      touches%depth(t) = self%radius(s) - distance
+      touches%weight(t) = 1.0_wp
+      touches%length(t) = 2*self%radius(s)
+      touches%weight_shift(:, t) = 0.0_wp
+      touches%weight_turn(:, t) = 0.0_wp
+    end do
+  end subroutine touch_bed
 
   !> Place of a wall in the list of walls.
   pure function findloc_wall(walls, number) result(w)

@@ -1,4 +1,4 @@
-!> Touches of the exact surfaces of the blocks with one another and with the plane walls.
+!> Touches of the exact surfaces of the blocks with one another, the plane walls and the bed.
 !!
 !! A probe of one body (see `surface_features_m`) touches where it is inside the other; its depth is
 !! its distance from the surface of the other. A sharp edge touches an edge of the other where the
@@ -13,6 +13,7 @@ module contact_surface_m
   use vectors_m, only: norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
+  use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
   use neighbours_m, only: pair_list_t, near_pairs, reserve
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
@@ -64,6 +65,7 @@ module contact_surface_m
     integer, allocatable :: slot(:)              !! (near%n) place of each in `pairs`
     type(pair_t), allocatable :: pairs(:)
     logical, allocatable :: taken(:)             !! (size of pairs)
+    type(pair_t), allocatable :: with_bed(:)     !! (bodies) each with the bed
     !> Bodies and poses of the list of pairs.
     logical :: listed = .false.
     logical, allocatable :: present(:)
@@ -93,7 +95,7 @@ contains
     end do
     allocate (self%reach(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
-    allocate (self%pairs(0), self%taken(0))
+    allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
       self%reach(b) = self%surface(blocks%shape(b))%reach
@@ -124,6 +126,7 @@ contains
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. blocks%fixed(a)) then
+        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, ahead, self, touches)
         do w = 1, walls%n
           call touch_wall(walls, blocks, a, w, ahead, self, touches)
         end do
@@ -267,6 +270,80 @@ contains
     end associate
   end subroutine touch_wall
 
+  !> Touches of body a and the bed: corners of the bed, corners of the body, crossing edges. The
+  !! points inside the faces of a body do not touch it: as on a wall, some corner always does.
+  subroutine touch_bed(bed, blocks, a, ahead, self, touches)
+    type(bed_t), intent(in) :: bed
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a
+    real(wp), intent(in) :: ahead   !! [s]
+    type(contact_surface_t), intent(inout) :: self
+    type(touch_t), intent(inout) :: touches
+    real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
+      0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+    real(wp) :: x(3), speed, gap, way
+
+    x = bed_place(bed, blocks%x(:, a))
+    speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
+    gap = ahead*speed
+    associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a), &
+      pair => self%with_bed(a))
+      way = norm(x - pair%x_a) + 2*self%reach(a)*norm2(blocks%q(:, a) - pair%q_a)
+      if (is_worn(pair, way, self%search)) then
+        pair%a = a
+        pair%b = bed_partner
+        pair%x_a = x
+        pair%q_a = blocks%q(:, a)
+        call list_bed(bed, turn, surface, speed, self%search, pair)
+        way = 0.0_wp
+      end if
+      pair%uses = pair%uses + 1
+      if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
+      call reserve_touches(touches%n + pair%of_a%n + pair%of_b%n + pair%n_crossings, touches)
+      call touch_probes(.false., a, bed_partner, turn, -x, transpose(turn), -matmul(x, turn), gap, &
+        way, bed%surface, surface, pair%of_b, touches)
+      call touch_probes(.true., a, bed_partner, no_turn, -x, turn, x, gap, way, surface, &
+        bed%surface, pair%of_a, touches)
+      call touch_edges(no_turn, -x, turn, x, gap, way, surface, bed%surface, pair, touches)
+    end associate
+  end subroutine touch_bed
+
+  !> List what may touch of a body and the bed before the body has moved by a skin.
+  subroutine list_bed(bed, turn, surface, speed, search, pair)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: turn(3, 3)           !! body to space
+    type(surface_t), intent(in) :: surface       !! of the body
+    real(wp), intent(in) :: speed                !! of any point of the body, at most [m/s]
+    type(search_t), intent(inout) :: search
+    type(pair_t), intent(inout) :: pair
+    real(wp) :: margin, place(3), distance, outward(3)
+    integer :: i
+
+    pair%uses = 0
+    pair%of_a%n = 0
+    pair%of_b%n = 0
+    pair%n_crossings = 0
+    pair%valid = skin_for(speed, search)
+    margin = pair%valid + search%ahead
+    associate (x => pair%x_a, reach => surface%reach + margin)
+      if (.not. bed_is_near(bed, x - reach, x + reach)) return
+      call list_probes(transpose(turn), -matmul(x, turn), pair%valid, bed%surface, surface, &
+        search, pair%of_b)
+      call list_crossings(turn, x, surface, bed%surface, search, pair)
+    end associate
+    pair%of_a%n_facets = 0
+    pair%of_a%n_edges = 0
+    margin = margin + surface%ball
+    do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
+      place = pair%x_a + matmul(turn, surface%probe(:, i))
+      call bed_distance(bed, place, margin, max(margin, surface%reach), search%facets, &
+        search%edges, distance, outward)
+      if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
+      call append_near(bed%surface, pair%valid, surface%ball, i, place, distance, search, pair%of_a)
+    end do
+    call end_lists(pair%of_a)
+  end subroutine list_bed
+
   !> Append a touch; there is room.
   subroutine add_touch(a, b, key, arm_a, arm_b, normal, depth, weight, length, touches)
     integer, intent(in) :: a, b, key
@@ -301,8 +378,6 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(touch_t), intent(inout) :: touches
-    integer, parameter :: worn = 50               !! uses after which a list is renewed early,
-    real(wp), parameter :: fresh = 0.05_wp        !! unless the way is below this share of a skin
     real(wp) :: to_b(3), speed, gap, way, turn(3, 3), x(3)
     integer :: a, b
 
@@ -311,7 +386,7 @@ contains
     speed = norm(blocks%v(:, a) - blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b)
     way = way_since(blocks, reach, pair)
-    if (way > pair%valid .or. (pair%uses > worn .and. way > fresh*search%skin)) then
+    if (is_worn(pair, way, search)) then
       call list_features(blocks, turns, surface, speed, search, pair)
       way = 0.0_wp
     end if
@@ -336,6 +411,27 @@ contains
       call touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
     end associate
   end subroutine touch_pair
+
+  !> Whether the lists of a pair have to be made anew.
+  pure function is_worn(pair, way, search) result(yes)
+    type(pair_t), intent(in) :: pair
+    real(wp), intent(in) :: way                   !! of the bodies since the list was made [m]
+    type(search_t), intent(in) :: search
+    integer, parameter :: worn = 50               !! uses after which a list is renewed early,
+    real(wp), parameter :: fresh = 0.05_wp        !! unless the way is below this share of a skin
+    logical :: yes
+
+    yes = way > pair%valid .or. (pair%uses > worn .and. way > fresh*search%skin)
+  end function is_worn
+
+  !> Way by which bodies may move before their lists are renewed: wider for fast bodies [m].
+  pure function skin_for(speed, search) result(skin)
+    real(wp), intent(in) :: speed                 !! of any two points, at most [m/s]
+    type(search_t), intent(in) :: search
+    real(wp) :: skin
+
+    skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
+  end function skin_for
 
   !> Largest way that points of the two bodies have moved since their features were listed [m].
   pure function way_since(blocks, reach, pair) result(way)
@@ -474,7 +570,7 @@ contains
     to_b = pair%x_b + pair%shift - pair%x_a
     associate (a => surface(blocks%shape(pair%a)), b => surface(blocks%shape(pair%b)))
       apart = norm(to_b) - a%reach - b%reach - search%ahead
-      skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
+      skin = skin_for(speed, search)
       pair%valid = max(apart, skin)
       if (apart > skin) return
       if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
@@ -498,7 +594,7 @@ contains
     type(surface_t), intent(in) :: guest, host
     type(search_t), intent(inout) :: search
     type(probes_near_t), intent(inout) :: list
-    real(wp) :: margin, place(3), distance, outward(3), low(3), high(3), reach
+    real(wp) :: margin, place(3), distance, outward(3), low(3), high(3)
     integer :: m
 
     list%n_facets = 0
@@ -513,17 +609,38 @@ contains
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
       call search_surface(host, place, margin, search, distance, outward)
       if (distance > margin) cycle
-      reach = abs(distance) + 2*(skin + search%ahead)
-      call gather_facets(host, place - reach, place + reach, search%facets)
-      call gather_edges(host, place - reach, place + reach, search%edges)
-      call append(place, reach, search%guests%item(m), host, search, list)
-      list%away(list%n) = distance - guest%ball
+      call append_near(host, skin, guest%ball, search%guests%item(m), place, distance, search, list)
     end do
+    call end_lists(list)
+  end subroutine list_probes
+
+  !> Append a probe with the facets and edges that may be nearest to it before the bodies have moved
+  !! by the skin.
+  subroutine append_near(host, skin, ball, probe, place, distance, search, list)
+    type(surface_t), intent(in) :: host
+    real(wp), intent(in) :: skin, ball           !! radius if the guest is a sphere, else 0 [m]
+    integer, intent(in) :: probe
+    real(wp), intent(in) :: place(3), distance   !! of the probe, host axes; from the surface [m]
+    type(search_t), intent(inout) :: search
+    type(probes_near_t), intent(inout) :: list
+    real(wp) :: reach
+
+    reach = abs(distance) + 2*(skin + search%ahead)
+    call gather_facets(host, place - reach, place + reach, search%facets)
+    call gather_edges(host, place - reach, place + reach, search%edges)
+    call append(place, reach, probe, host, search, list)
+    list%away(list%n) = distance - ball
+  end subroutine append_near
+
+  !> Close the lists of facets and edges of the last probe.
+  subroutine end_lists(list)
+    type(probes_near_t), intent(inout) :: list
+
     call reserve(list%n + 1, list%facet_first)
     call reserve(list%n + 1, list%edge_first)
     list%facet_first(list%n + 1) = list%n_facets + 1
     list%edge_first(list%n + 1) = list%n_edges + 1
-  end subroutine list_probes
+  end subroutine end_lists
 
   !> Box around a box given in other axes.
   pure subroutine box_in_axes(turn, x, low, high, new_low, new_high)

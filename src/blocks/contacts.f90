@@ -8,6 +8,7 @@ module contacts_m
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
   use walls_m, only: walls_t, floor_wall
+  use bed_m, only: bed_partner
   use neighbours_m, only: reserve
   use touches_m, only: touch_t, set_apart
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
@@ -51,15 +52,15 @@ module contacts_m
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (-6:n) sum over the pairs of a free body [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (-7:n) sum over the pairs of a free body [1/s2]
   end type response_t
 
-  !> What may touch: walls (-6..-1) and bodies (1..n) alike.
+  !> What may touch: bed (-7), walls (-6..-1) and bodies (1..n) alike.
   type :: partners_t
     real(wp) :: gravity = 0.0_wp                         !! [m/s2]
-    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -6:n) [m/s], [rad/s]
-    real(wp), allocatable :: inverse_mass(:)             !! (-6:n) 0 for walls, fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -6:n) likewise [1/(kg m2)]
+    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -7:n) [m/s], [rad/s]
+    real(wp), allocatable :: inverse_mass(:)             !! (-7:n) 0 for walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
   end type partners_t
 
   type :: contacts_t
@@ -81,8 +82,8 @@ module contacts_m
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
     type(partners_t) :: partners
-    real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -6:n) of this substep [N], [N m]
-    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -6:n) of the step [N s], [N m s]
+    real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -7:n) of this substep [N], [N m]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -7:n) of the step [N s], [N m s]
     !> The place to go back to: (3, n), (4, n), (3, n), (3, n).
     real(wp), allocatable :: x(:, :), q(:, :), l(:, :), spin(:, :)
     integer :: n_met = 0
@@ -124,9 +125,9 @@ contains
     end if
     n = blocks%n
     call partners_init(n, contacts%partners)
-    allocate (contacts%force(3, -6:n), contacts%torque(3, -6:n), source=0.0_wp)
-    allocate (contacts%impulse(3, -6:n), contacts%twist(3, -6:n), source=0.0_wp)
-    allocate (contacts%response%frequency2(-6:n), contacts%response_soon%frequency2(-6:n))
+    allocate (contacts%force(3, -7:n), contacts%torque(3, -7:n), source=0.0_wp)
+    allocate (contacts%impulse(3, -7:n), contacts%twist(3, -7:n), source=0.0_wp)
+    allocate (contacts%response%frequency2(-7:n), contacts%response_soon%frequency2(-7:n))
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
@@ -270,8 +271,8 @@ contains
     integer, intent(in) :: n
     type(partners_t), intent(out) :: partners
 
-    allocate (partners%v(3, -6:n), partners%omega(3, -6:n), source=0.0_wp)
-    allocate (partners%inverse_mass(-6:n), partners%inverse_inertia(3, 3, -6:n), source=0.0_wp)
+    allocate (partners%v(3, -7:n), partners%omega(3, -7:n), source=0.0_wp)
+    allocate (partners%inverse_mass(-7:n), partners%inverse_inertia(3, 3, -7:n), source=0.0_wp)
   end subroutine partners_init
 
   !> Masses of all partners, their gravity and the velocity of the walls.
@@ -828,7 +829,7 @@ contains
       b = contacts%met_b(m)
       blocks%contacts(a) = blocks%contacts(a) + 1
       if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
-      if (b == floor_wall) blocks%on_floor(a) = 1
+      if (b == floor_wall .or. b == bed_partner) blocks%on_floor(a) = 1
     end do
   end subroutine count_partners
 

@@ -46,6 +46,12 @@ contains
     real(wp) :: extent(3), edge
     integer, allocatable :: next(:)
 
+    if (size(low, 2) == 0) then
+      bins%n = 1
+      allocate (bins%first(2), source=1)
+      allocate (bins%item(0))
+      return
+    end if
     bins%low = minval(low, 2)
     bins%high = maxval(high, 2)
     extent = bins%high - bins%low

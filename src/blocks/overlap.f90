@@ -1,4 +1,4 @@
-!> How deep the true shapes of the blocks reach into one another and into the walls.
+!> How deep the true shapes of the blocks reach into one another, into the walls and the bed.
 !!
 !! The measure is independent of the contact model: the depth of two blocks is the largest distance
 !! below the surface of one of a surface point of the other, points taken at the corners, along the
@@ -10,10 +10,14 @@ module overlap_m
   use tet_mesh_m, only: shape_t, surface_of_tets
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
+  use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
+  use surface_features_m, only: near_list_t, gather_edges
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
   implicit none
   private
   public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for
+
+  real(wp), parameter :: per_edge_sharp = 16.0_wp   !! points on a sharp edge per smallest edge
 
   !> What is worked out once per shape; body axes.
   type :: solid_t
@@ -29,6 +33,7 @@ module overlap_m
     real(wp), allocatable :: tet_origin(:, :)    !! (3, tets) corner 1 [m]
     real(wp), allocatable :: face(:, :, :)       !! (3, 3, triangles) corners of the surface [m]
     type(bins_t) :: tets, faces                  !! the same in bins
+    real(wp) :: spacing = 0.0_wp                 !! of points along sharp edges [m]
   end type solid_t
 
   !> The shapes of a run made ready, and the lists of the search.
@@ -37,6 +42,7 @@ module overlap_m
     type(pair_list_t) :: pairs
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: radius(:)           !! (bodies) [m]
+    type(near_list_t) :: facets, edges           !! of the bed
   end type overlap_t
 
 contains
@@ -66,6 +72,7 @@ contains
 
     if (shape%kind == 'sphere') solid%ball = shape%sphere_radius(1)
     solid%radius = max(shape%radius, solid%ball)
+    solid%spacing = shape%smallest_edge/per_edge_sharp
     n = size(shape%flow_tet, 2)
     allocate (solid%to_tet(3, 3, n), solid%tet_origin(3, n), low(3, n), high(3, n))
     do t = 1, n
@@ -102,7 +109,7 @@ contains
     type(shape_t), intent(in) :: shape
     integer, intent(in) :: triangle(:, :)        !! (3, n) surface of the shape
     type(solid_t), intent(inout) :: solid
-    real(wp), parameter :: per_edge_sharp = 16.0_wp, per_edge_flat = 4.0_wp
+    real(wp), parameter :: per_edge_flat = 4.0_wp
     real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between coplanar triangles
     real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
     integer, allocatable :: edge(:, :)
@@ -130,7 +137,7 @@ contains
       end if
       do e = 1, n_edges
         p(:, 1:2) = shape%point(:, edge(1:2, e))
-        spacing = shape%smallest_edge/per_edge_sharp
+        spacing = solid%spacing
         if (edge(4, e) > 0) then
           if (dot_product(normal(:, edge(3, e)), normal(:, edge(4, e))) > 1.0_wp - flat) then
             spacing = shape%smallest_edge/per_edge_flat
@@ -271,13 +278,14 @@ contains
       <= share*blocks%shapes(blocks%shape(c))%smallest_edge
   end function room_for
 
-  !> Largest depth of body c in the other present bodies and the walls [m].
+  !> Largest depth of body c in the other present bodies, the walls and the bed [m].
   function body_overlap(overlap, walls, blocks, c) result(depth)
     type(overlap_t), intent(in) :: overlap
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: c
     real(wp) :: depth
+    type(near_list_t) :: facets, edges
     real(wp) :: turn(3, 3), d(3)
     integer :: b
 
@@ -285,6 +293,8 @@ contains
     turn = rotation_matrix(blocks%q(:, c))
     associate (own => overlap%solid(blocks%shape(c)))
       call deepen_wall(own%corner, own%ball, own%radius, blocks%x(:, c), turn, walls, depth)
+      if (walls%bed%there) call deepen_bed(own, blocks%x(:, c), turn, walls%bed, facets, edges, &
+        depth)
       do b = 1, blocks%n
         if (b == c .or. .not. blocks%present(b)) cycle
         d = blocks%x(:, c) - blocks%x(:, b)
@@ -296,7 +306,7 @@ contains
     end associate
   end function body_overlap
 
-  !> Largest depth of the present bodies in one another and in the walls [m].
+  !> Largest depth of the present bodies in one another, in the walls and in the bed [m].
   !!
   !! Pairs of bodies that are both held or moved are left out.
   subroutine max_overlap(walls, blocks, overlap, depth)
@@ -314,6 +324,8 @@ contains
         if (.not. blocks%present(a) .or. blocks%fixed(a)) cycle
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           overlap%turn(:, :, a), walls, depth)
+        if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), overlap%turn(:, :, a), &
+          walls%bed, overlap%facets, overlap%edges, depth)
       end associate
     end do
     call near_pairs(blocks%x, overlap%radius, blocks%present, walls%period, 0.0_wp, overlap%pairs)
@@ -370,6 +382,55 @@ contains
       end if
     end do
   end subroutine deepen_wall
+
+  !> Raise `depth` to the depth of a body in the bed, if that is larger: of its sample points below
+  !! the surface of the bed, and of the sharp edges and corners of the bed below its own.
+  subroutine deepen_bed(body, position, turn, bed, facets, edges, depth)
+    type(solid_t), intent(in) :: body
+    real(wp), intent(in) :: position(3)  !! centre of mass [m]
+    real(wp), intent(in) :: turn(3, 3)   !! body to space
+    type(bed_t), intent(in) :: bed
+    type(near_list_t), intent(inout) :: facets, edges   !! work
+    real(wp), intent(inout) :: depth
+    real(wp) :: x(3), p(3), distance, outward(3)
+    integer :: c, i, m
+
+    x = bed_place(bed, position)
+    if (.not. bed_is_near(bed, x - body%radius, x + body%radius)) then
+      if (bed_covers(bed, x)) depth = max(depth, body%radius)
+      return
+    end if
+    if (body%ball > 0.0_wp) then
+      call bed_distance(bed, x, body%ball, 2*body%ball, facets, edges, distance, outward)
+      depth = max(depth, body%ball - distance)
+      return
+    end if
+    do c = 1, size(body%reach)
+      p = x + matmul(turn, body%middle(:, c))
+      if (.not. bed_is_near(bed, p - body%reach(c), p + body%reach(c))) then
+        if (.not. bed_covers(bed, p)) cycle
+      end if
+      do i = body%cluster(c), body%cluster(c + 1) - 1
+        p = x + matmul(turn, body%sample(:, i))
+        if (.not. bed_covers(bed, p)) cycle
+        call bed_distance(bed, p, body%reach(c), 2*body%radius, facets, edges, distance, outward)
+        depth = max(depth, -distance)
+      end do
+    end do
+    call gather_edges(bed%surface, x - body%radius, x + body%radius, edges)
+    do m = 1, edges%n
+      if (edges%item(m) > bed%surface%n_convex) exit
+      associate (edge => bed%surface%edge(edges%item(m)))
+        do i = 0, ceiling(edge%extent/body%spacing)
+          p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x
+          if (dot_product(p, p) > body%radius**2) cycle
+          p = matmul(p, turn)
+          if (any(p < body%tets%low) .or. any(p > body%tets%high)) cycle
+          if (inside(body, p)) call deepen_point(body, p, depth)
+        end do
+      end associate
+    end do
+  end subroutine deepen_bed
 
   !> Raise `depth` to the largest depth of the sample points of a below the surface of b.
   pure subroutine deepen_samples(a, turn, d, b, depth)

@@ -12,7 +12,7 @@ module surface_features_m
   implicit none
   private
   public :: surface_t, surface_init, near_list_t, gather_probes, gather_edges, gather_facets, &
-    nearest_on_surface, segment_distance2, nowhere
+    nearest_on_surface, segment_distance2, nowhere, pair_edges
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]

@@ -1,7 +1,8 @@
-!> The plane walls of the tank as partners of the blocks.
+!> The plane walls of the tank, and its bed, as partners of the blocks.
 module walls_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
+  use bed_m, only: bed_t
   implicit none
   private
   public :: walls_t, walls_init, floor_wall
@@ -10,7 +11,8 @@ module walls_m
 
   !> Sides that blocks can touch (`no_slip` and `slip`), and the periods of the others.
   !!
-  !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max.
+  !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max; the bed
+  !! is -7 (see `bed_m`).
   type :: walls_t
     integer :: n = 0
     integer :: number(6) = 0                !! -6..-1, ascending
@@ -18,12 +20,13 @@ module walls_m
     real(wp) :: offset(6) = 0.0_wp          !! normal.x of the points of the wall [m]
     real(wp) :: velocity(3, 6) = 0.0_wp     !! of the wall in its own plane [m/s]
     logical :: slip(6) = .false.            !! no friction with the fluid
+    type(bed_t) :: bed
     real(wp) :: period(3) = 0.0_wp          !! length of the tank where it is periodic, else 0 [m]
   end type walls_t
 
 contains
 
-  !> The contact walls of a case.
+  !> The contact walls of a case, without a bed.
   pure subroutine walls_init(grid, boundary, walls)
     type(grid_input_t), intent(in) :: grid
     type(boundary_input_t), intent(in) :: boundary

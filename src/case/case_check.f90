@@ -16,6 +16,7 @@ module case_check_m
   use drops_m, only: draw_drop
   use surface_tension_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
+  use bed_m, only: bed_t
   use neighbours_m, only: nearest_shift
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
   implicit none
@@ -27,7 +28,7 @@ module case_check_m
   !> The bodies of a case in their starting places, and one place more to try drops in.
   type :: scene_t
     type(blocks_t) :: blocks            !! bodies 1..n of the case, and n+1
-    type(walls_t) :: walls, no_walls    !! the latter with the periods only
+    type(walls_t) :: walls, no_walls    !! the latter with the periods only, no bed either
     type(overlap_t) :: overlap
     integer :: n = 0
     integer, allocatable :: line(:)     !! (n) lines of the bodies in the case file
@@ -54,9 +55,10 @@ contains
   end subroutine make_shapes
 
   !> Everything about a case that needs the shapes of its bodies.
-  subroutine check_case(case, shapes, problems)
+  subroutine check_case(case, shapes, bed, problems)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! from `make_shapes`, one for each `&shape`
+    type(bed_t), intent(in) :: bed           !! from `make_bed`
     type(problems_t), intent(inout) :: problems
     type(scene_t) :: scene
     integer :: i
@@ -66,7 +68,7 @@ contains
     call check_capillary_step(case, problems)
     if (case%run%physics == 'fluid') return
     call check_lengths(case, shapes, problems)
-    call set_scene(case, shapes, scene)
+    call set_scene(case, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
     call check_places(case, scene, problems)
     call check_pairs(scene, problems)
@@ -155,9 +157,10 @@ contains
   end function longest_line
 
   !> Put the good bodies of a case into a scene; without good shapes it stays empty.
-  subroutine set_scene(case, shapes, scene)
+  subroutine set_scene(case, shapes, bed, scene)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
     type(scene_t), intent(out) :: scene
     type(case_t) :: good          ! the good bodies and one more, no drops
     type(shape_t), allocatable :: made(:)
@@ -184,6 +187,7 @@ contains
     call blocks_init(good, made, scene%blocks)
     call overlap_init(made, scene%n + 1, scene%overlap)
     call walls_init(case%grid, case%boundary, scene%walls)
+    scene%walls%bed = bed
     scene%no_walls%period = scene%walls%period
     allocate (scene%line(scene%n), scene%held(scene%n), scene%outside(scene%n))
     scene%line = good%body(:scene%n)%line
@@ -239,6 +243,8 @@ contains
         d = (1 - scene%walls%number(w))/2
         text = 'reaches '//brief(depth)//' m through the wall '//side_name(s, d)
       end do
+      if (len(text) > 0) return
+      text = 'lies in the bed, or reaches more than 1 % of its size into it'
       return
     end if
     do d = 1, 3

@@ -11,7 +11,6 @@ module case_input_m
     is_given
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use group_visitor_m, only: group_visitor_t
-  use not_yet_m, only: is_not_yet, not_yet_message
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text
   implicit none
   private
@@ -95,9 +94,6 @@ contains
       call v%note(': unknown group, nearest known: &' &
                   //nearest_name(printable(list%group(i)%name), groups))
       return
-    else if (is_not_yet(list%group(i)%name, '', '')) then
-      call v%note(': this group is '//not_yet_message)
-      return
     else if (n(g) > 0 .and. g < first_repeated) then
       call v%note(': the group is given twice, first on line ' &
                   //to_text(first_line(list, list%group(i)%name)))
@@ -153,6 +149,8 @@ contains
       input%body(n)%faulty = .true.
     case ('drop')
       input%drop(n)%faulty = .true.
+    case ('bed')
+      input%bed%faulty = .true.
     case default   ! nobody asks about the others
     end select
   end subroutine mark_faulty
@@ -562,10 +560,10 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(bed_input_t), intent(inout) :: bed
 
-    call v%needed('file', 'the form of the bed')
+    bed%line = v%group%line
     call v%item('file', bed%file)
     call v%option('kind', bed%kind, 'heightmap stl')
-    call v%require('file', len_trim(bed%file) > 0, 'must name a file')
+    call v%require('file', len_trim(bed%file) > 0, 'must name a file with the form of the bed')
   end subroutine visit_bed
 
   !> The shape of a body or drop: one that exists.

@@ -5,6 +5,7 @@ module case_plan_m
   use case_types_m, only: case_t, is_given
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
   use surface_tension_m, only: capillary_step
   use contact_sphere_placement_m, only: height_errors
   implicit none
@@ -23,16 +24,18 @@ module case_plan_m
 contains
 
   !> Print the plan of a checked case.
-  subroutine print_plan(unit, case, shapes)
+  subroutine print_plan(unit, case, shapes, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
     logical :: wet, blocks
 
     wet = case%run%physics /= 'dry'
     blocks = case%run%physics /= 'fluid'
     call print_run(unit, case)
     call print_grid(unit, case, wet)
+    if (bed%there) call print_bed(unit, case, bed)
     if (wet) call print_liquid(unit, case)
     if (blocks) call print_shapes(unit, case, wet, shapes)
     if (blocks) call print_bodies(unit, case, shapes)
@@ -81,6 +84,18 @@ contains
     end associate
     call entry(unit, 'spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
   end subroutine print_grid
+
+  subroutine print_bed(unit, case, bed)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(in) :: bed
+    real(wp) :: low(3), high(3)
+
+    low = minval(bed%point, 2)
+    high = maxval(bed%point, 2)
+    call entry(unit, 'bed from', trim(case%bed%file)//', '//to_text(bed%n_given)//' facets, ' &
+               //'heights from '//brief(low(3))//' to '//brief(high(3))//' m')
+  end subroutine print_bed
 
   subroutine print_liquid(unit, case)
     integer, intent(in) :: unit

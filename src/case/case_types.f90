@@ -132,6 +132,8 @@ module case_types_m
   type :: bed_input_t
     character(:), allocatable :: file
     character(name_length) :: kind = 'heightmap'
+    integer :: line = 0                             !! of the case file, where the group begins
+    logical :: faulty = .false.                     !! something is wrong with the group
   end type bed_input_t
 
   type :: case_t

@@ -9,7 +9,6 @@ module group_visitor_m
   use errors_m, only: problems_t, to_text
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
-  use not_yet_m, only: is_not_yet, not_yet_message
   use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
     quoted_text, printable, value_ok, value_not_finite, value_too_large, value_not_whole
   implicit none
@@ -33,8 +32,8 @@ module group_visitor_m
     procedure, private :: item_real, item_reals, item_integer, item_integers
     procedure, private :: item_logical, item_text
     generic :: item => item_real, item_reals, item_integer, item_integers, item_logical, item_text
-    procedure, private :: lookup, fault, choices, count_is, read_real, read_integer, read_text
-    procedure, private :: write_line, refuse_not_yet
+    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text
+    procedure, private :: write_line
   end type group_visitor_t
 
 contains
@@ -200,7 +199,6 @@ contains
       call self%read_real(i, j, values(j))
     end do
     if (.not. self%good(variable)) return
-    call self%refuse_not_yet(i, '*', any(abs(values - x) > 0.0_wp))
     x = values
   end subroutine list
 
@@ -241,7 +239,6 @@ contains
       call self%read_integer(i, j, values(j))
     end do
     if (.not. self%good(variable)) return
-    call self%refuse_not_yet(i, '*', any(values /= n))
     n = values
   end subroutine item_integers
 
@@ -251,7 +248,6 @@ contains
     character(*), intent(in) :: variable
     logical, intent(inout) :: flag
     integer :: i, info
-    logical :: before
 
     if (self%writing) then
       call self%write_line(variable, to_text(flag))
@@ -260,13 +256,11 @@ contains
     i = self%lookup(variable)
     if (i == 0) return
     if (.not. self%count_is(i, 1, 1)) return
-    before = flag
     associate (value => self%group%assignment(i)%value(1))
       call parse_logical(value%text, flag, info)
       if (value%quoted) info = value_not_whole
     end associate
     if (info /= value_ok) call self%fault(i, 'must be .true. or .false.')
-    if (info == value_ok) call self%refuse_not_yet(i, '*', flag .neqv. before)
   end subroutine item_logical
 
   !> Text of any length.
@@ -285,7 +279,6 @@ contains
     if (i == 0) return
     call self%read_text(i, ok)
     if (.not. ok) return
-    call self%refuse_not_yet(i, '*', self%group%assignment(i)%value(1)%text /= text)
     text = self%group%assignment(i)%value(1)%text
   end subroutine item_text
 
@@ -338,19 +331,15 @@ contains
     associate (text => self%group%assignment(i)%value(1)%text)
       if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. scan(text//' ', ' ') <= len(text) &
           .or. len(text) == 0) then
-        call self%fault(i, 'unknown, must be one of '//self%choices(variable, allowed))
-      else if (is_not_yet(self%group%name, variable, text)) then
-        call self%fault(i, not_yet_message//', so far: '//self%choices(variable, allowed))
+        call self%fault(i, 'unknown, must be one of '//choices(allowed))
       else
         word = text
       end if
     end associate
   end subroutine option
 
-  !> The words of a list that are available, as a message shows them.
-  pure function choices(self, variable, allowed) result(text)
-    class(group_visitor_t), intent(in) :: self
-    character(*), intent(in) :: variable
+  !> The words of a list, as a message shows them.
+  pure function choices(allowed) result(text)
     character(*), intent(in) :: allowed
     character(:), allocatable :: text
     integer :: first, last
@@ -359,10 +348,8 @@ contains
     first = 1
     do while (first <= len(allowed))
       last = first + scan(allowed(first:)//' ', ' ') - 2
-      if (.not. is_not_yet(self%group%name, variable, allowed(first:last))) then
-        if (len(text) > 0) text = text//', '
-        text = text//quoted_text(allowed(first:last))
-      end if
+      if (len(text) > 0) text = text//', '
+      text = text//quoted_text(allowed(first:last))
       first = last + 2
     end do
   end function choices
@@ -481,18 +468,6 @@ contains
       end if
     end associate
   end subroutine read_text
-
-  !> Refuse assignment i if its variable is in the table of what is not available yet.
-  subroutine refuse_not_yet(self, i, value, changed)
-    class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i
-    character(*), intent(in) :: value
-    logical, intent(in) :: changed   !! the value is not the default
-
-    if (.not. changed) return
-    if (.not. is_not_yet(self%group%name, self%group%assignment(i)%name, value)) return
-    call self%fault(i, not_yet_message)
-  end subroutine refuse_not_yet
 
   !> Write one variable.
   subroutine write_line(self, variable, value)

@@ -24,6 +24,7 @@ module body_shares_m
   use vectors_m, only: cross, rotation_matrix
   use grid_m, only: grid_t, unit_step
   use tet_mesh_m, only: shape_t, most_facet_corners
+  use polyhedron_m, only: tet_volume
   implicit none
   private
   public :: body_shares_t, share_work_t, find_body_shares, list_cut_tets, full_cell, full_face
@@ -836,15 +837,18 @@ contains
     end do
   end subroutine pair_tets
 
-  !> Outward normals and plane constants of a tetrahedron of positive volume: n.x <= d inside.
+  !> Outward normals and plane constants of a tetrahedron: n.x <= d inside. One of negative volume,
+  !! a part to be taken away again (see `bed_solid_m`), is turned inside out.
   pure subroutine faces_of_tet(corner, n, d)
     real(wp), intent(in) :: corner(3, 4)   !! [cells]
     real(wp), intent(out) :: n(3, 4), d(4)
+    real(wp) :: sense
     integer :: f
 
+    sense = sign(1.0_wp, tet_volume(corner))
     do f = 1, 4
       associate (a => corner(:, opposite(1, f)))
-        n(:, f) = cross(corner(:, opposite(2, f)) - a, corner(:, opposite(3, f)) - a)
+        n(:, f) = sense*cross(corner(:, opposite(2, f)) - a, corner(:, opposite(3, f)) - a)
         d(f) = dot_product(n(:, f), a) + near_face*sum(abs(n(:, f)))
       end associate
     end do

@@ -71,8 +71,8 @@ contains
   contains
     !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.
     subroutine set_velocity()
-      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :), stage%total(4:6, &
-          :), blocks)
+      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :blocks%n), &
+                                    stage%total(4:6, :blocks%n), blocks)
       call copy_motion(blocks, stage%bodies)
     end subroutine set_velocity
   end subroutine advance_velocity

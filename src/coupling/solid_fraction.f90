@@ -1,13 +1,17 @@
-!> The bodies in the grid: solid shares, wall distances, cut cells, sealed pockets.
+!> The bodies and the bed in the grid: solid shares, wall distances, cut cells, sealed pockets.
 !!
 !! Every process fills its own cells and halo, images in other periods included, from the poses of
-!! the bodies alone; nothing is exchanged but the flags of pockets, where there are any.
+!! the bodies alone; nothing is exchanged but the flags of pockets, where there are any. The bed is
+!! one more fixed body, the last; its shares are found once.
 module solid_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
   use solid_geometry_m, only: solid_geometry_t, no_hit
+  use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_t
+  use bed_solid_m, only: make_bed_solid
   use body_shares_m, only: body_shares_t, share_work_t, find_body_shares, list_cut_tets, &
     full_cell, full_face
   use subcell_shares_m, only: subcell_work_t, count_subcells
@@ -19,7 +23,10 @@ module solid_fraction_m
   real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
 
   type :: solid_fraction_t
-    type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body
+    type(body_shares_t), allocatable :: body(:)   !! (n) what is known of each body, and of the bed
+    logical :: has_bed = .false.
+    type(shape_t) :: bed                          !! the part of it in the grid, about its centre
+    real(wp) :: bed_centre(3) = 0.0_wp            !! [m]
     type(share_work_t), allocatable :: work(:)    !! (threads)
     integer :: subcells = 0                       !! per direction, 0: exact shares
     type(subcell_work_t), allocatable :: count(:) !! (threads)
@@ -37,22 +44,27 @@ module solid_fraction_m
 contains
 
   !> Allocate the caches and work arrays.
-  subroutine solid_fraction_init(grid, blocks, self, subcells)
+  subroutine solid_fraction_init(grid, blocks, self, subcells, bed)
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(out) :: self
     integer, intent(in), optional :: subcells   !! counted per direction, else exact shares
-    integer :: a(3), b(3)
+    type(bed_t), intent(in), optional :: bed
+    integer :: a(3), b(3), n
 
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     self%low = merge(a, max(a, 1), grid%periodic)
     self%high = merge(b, min(b, grid%n), grid%periodic)
     if (present(subcells)) self%subcells = subcells
-    allocate (self%body(blocks%n), self%work(0:omp_get_max_threads() - 1))
+    if (present(bed)) self%has_bed = bed%there
+    if (self%has_bed) call make_bed_solid(grid, bed, self%bed_centre, self%bed)
+    n = blocks%n
+    if (self%has_bed) n = n + 1
+    allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
     allocate (self%count(0:omp_get_max_threads() - 1))
-    allocate (self%near(blocks%n), source=.false.)
-    allocate (self%first(3, blocks%n), self%last(3, blocks%n), source=0)
+    allocate (self%near(n), source=.false.)
+    allocate (self%first(3, n), self%last(3, n), source=0)
     allocate (self%source(2, 0), self%reached(0), self%stack(0))
     allocate (self%flag(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
   end subroutine solid_fraction_init
@@ -67,9 +79,9 @@ contains
 
     call clear(grid, solid)
     call find_shares(grid, blocks, self)
-    call reserve(self, blocks, solid)
+    call reserve(self, solid)
     call place_bodies(grid, self, solid)
-    do b = 1, blocks%n
+    do b = 1, size(self%body)
       call paint_body(self, grid, b, solid)
     end do
     call finish_faces(solid)
@@ -133,6 +145,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(inout) :: self
+    real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     integer :: b, t
     logical :: changed
 
@@ -156,6 +169,12 @@ contains
       if (self%subcells > 0) call count_subcells(self%subcells, self%count(t), self%body(b))
       call list_cut_tets(self%work(t), self%body(b))
     end do
+    if (.not. self%has_bed) return
+    b = size(self%body)
+    self%near(b) = .true.   ! and it has no images
+    call find_body_shares(grid, self%bed, self%bed_centre, upright, self%work(0), self%body(b), &
+                          changed)
+    if (changed) call list_cut_tets(self%work(0), self%body(b))
   end subroutine find_shares
 
   !> Images of body b, a ball at most, that touch the cells kept here.
@@ -198,16 +217,15 @@ contains
   end function floor_ratio
 
   !> Lists long enough for all bodies in all their images; they grow by doubling.
-  subroutine reserve(self, blocks, solid)
+  subroutine reserve(self, solid)
     type(solid_fraction_t), intent(inout) :: self
-    type(blocks_t), intent(in) :: blocks
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b, copies, cells, faces, legs, tets
+    integer :: b, copies, cells, faces, legs, tets, n
 
-    if (size(solid%body_cell) /= blocks%n + 1) then
+    n = size(self%body) + 1
+    if (size(solid%body_cell) /= n) then
       deallocate (solid%body_cell, solid%body_face, solid%body_tet)
-      allocate (solid%body_cell(blocks%n + 1), solid%body_face(blocks%n + 1), &
-                solid%body_tet(blocks%n + 1))
+      allocate (solid%body_cell(n), solid%body_face(n), solid%body_tet(n))
     end if
     solid%body_cell(1) = 1
     solid%body_face(1) = 1
@@ -215,7 +233,7 @@ contains
     faces = 0
     legs = 0
     tets = 0
-    do b = 1, blocks%n
+    do b = 1, n - 1
       if (.not. self%near(b)) cycle
       copies = product(self%last(:, b) - self%first(:, b) + 1)
       cells = cells + copies*self%body(b)%n_cell

@@ -21,7 +21,7 @@ module cut_cell_m
     integer :: n = 0                            !! pieces
     real(wp) :: open = 1.0_wp                   !! open share of the box
     real(wp), allocatable :: corner(:, :, :)    !! (3, 4, *) corners of the pieces, 0..1
-    real(wp), allocatable :: share(:)           !! (*) their volumes [share of the box]
+    real(wp), allocatable :: share(:)   !! (*) their volumes, < 0: taken away [share of the box]
     real(wp), allocatable :: height(:, :)       !! (4, *) rising m.x of the corners for one m
   end type cut_cell_t
 
@@ -52,15 +52,20 @@ contains
         x(:, v) = (solid%corner(:, v, solid%tet(t)) - low)/h
       end do
       if (any(minval(x, 2) >= 1.0_wp) .or. any(maxval(x, 2) <= 0.0_wp)) cycle
-      call add_tetrahedron(x, self)
+      if (tet_volume(x) >= 0.0_wp) then
+        call add_tetrahedron(x, 1.0_wp, self)
+      else
+        call add_tetrahedron(x(:, [2, 1, 3, 4]), -1.0_wp, self)
+      end if
     end do
     self%open = max(1.0_wp - sum(self%share(1:self%n)), 0.0_wp)
   end subroutine load_cut_cell
 
   !> Clip a tetrahedron to the unit cube and add the pieces: tetrahedra from one corner of the rest
   !! over the triangles of its faces.
-  subroutine add_tetrahedron(x, self)
-    real(wp), intent(in) :: x(3, 4)
+  subroutine add_tetrahedron(x, sense, self)
+    real(wp), intent(in) :: x(3, 4)   !! of positive volume
+    real(wp), intent(in) :: sense     !! 1: solid, -1: a part that is taken away again
     type(cut_cell_t), intent(inout) :: self
     type(polyhedron_t) :: p
     logical :: done(3, max_corners)
@@ -79,7 +84,7 @@ contains
           done(at, here) = .true.
           to = p%link(at, here)
           if (to == v) exit
-          call add_piece(p%x(:, 1), p%x(:, v), p%x(:, here), p%x(:, to), self)
+          call add_piece(p%x(:, 1), p%x(:, v), p%x(:, here), p%x(:, to), sense, self)
           from = here
           here = to
         end do
@@ -98,8 +103,8 @@ contains
   end function slot_before
 
   !> Add one tetrahedron inside the unit cube.
-  subroutine add_piece(apex, p, q, r, self)
-    real(wp), intent(in) :: apex(3), p(3), q(3), r(3)
+  subroutine add_piece(apex, p, q, r, sense, self)
+    real(wp), intent(in) :: apex(3), p(3), q(3), r(3), sense
     type(cut_cell_t), intent(inout) :: self
     real(wp) :: corner(3, 4), share
 
@@ -111,7 +116,7 @@ contains
     if (share < least_piece) return
     if (self%n == size(self%share)) call grow(self)
     self%n = self%n + 1
-    self%share(self%n) = share
+    self%share(self%n) = sense*share
     self%corner(:, :, self%n) = corner
   end subroutine add_piece
 

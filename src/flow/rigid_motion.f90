@@ -9,7 +9,7 @@ module rigid_motion_m
   public :: rigid_motion_t, rigid_motion_init, wall_velocity
 
   type :: rigid_motion_t
-    integer :: n = 0
+    integer :: n = 0   !! bodies, and the bed if there is one: at rest, not free, not `present`
     logical, allocatable :: present(:)         !! (n) in the fluid
     logical, allocatable :: free(:)            !! (n) moved by the fluid
     real(wp), allocatable :: x(:, :)           !! (3, n) centre of mass [m]
@@ -33,6 +33,10 @@ contains
     allocate (bodies%inertia(3, 3, n), bodies%inverse_inertia(3, 3, n))
     bodies%x = 0.0_wp
     bodies%motion = 0.0_wp
+    bodies%mass = 1.0_wp   ! of the bed, which never moves
+    bodies%volume = 1.0_wp
+    bodies%inertia = 0.0_wp
+    bodies%inverse_inertia = 0.0_wp
   end subroutine rigid_motion_init
 
   !> Velocity of a point at `arm` from the centre of mass [m/s].

@@ -21,7 +21,8 @@ module solid_geometry_m
     real(wp), allocatable :: leg_low(:, :, :, :), leg_high(:, :, :, :)
     integer, allocatable :: leg_body_low(:, :, :, :), leg_body_high(:, :, :, :)
 
-    !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m].
+    !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m]. Of the bed some may have
+    !! negative volume: what they hold is taken away again (see `bed_solid_m`).
     integer :: n_tet = 0
     real(wp), allocatable :: corner(:, :, :)
     integer, allocatable :: body_tet(:)         !! (n_bodies + 1) of b: body_tet(b):body_tet(b+1)-1

@@ -13,6 +13,7 @@ module output_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_t
   use contacts_m, only: contacts_t
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t
@@ -53,7 +54,7 @@ module output_m
 contains
 
   !> Make the folder fit and create its files, or open those of the run that goes on from `clock`.
-  subroutine open_output(case, parameters, options, fluid, grid, clock, blocks, output)
+  subroutine open_output(case, parameters, options, fluid, grid, clock, blocks, bed, output)
     type(case_t), intent(in) :: case
     character(*), intent(in) :: parameters   !! all values of the case as text
     type(options_t), intent(in) :: options
@@ -61,6 +62,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(clock_t), intent(in) :: clock
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     type(output_t), intent(out) :: output
 
     output%message = ''
@@ -80,20 +82,21 @@ contains
       output%folder = case%run%output
       if (len(options%output) > 0) output%folder = options%output
       call prepare_folder(output%folder, output%code, output%message)
-      if (output%code == exit_ok) call create_files(grid, blocks, output)
+      if (output%code == exit_ok) call create_files(grid, blocks, bed, output)
     end if
     call look_for_trouble(output)
     call progress_start(options%quiet, fluid, clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
 
-  subroutine create_files(grid, blocks, output)
+  subroutine create_files(grid, blocks, bed, output)
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     type(output_t), intent(inout) :: output
 
     call create_run_file(output%folder//run_name, output%text, output%parameters, grid, blocks, &
-      output%run_file)
+      bed, output%run_file)
     if (output%fields) call create_field_file(output%folder//field_name, grid, output%field_file)
     if (output%surfaces) call create_block_file(output%folder//block_name, blocks, &
       output%block_file)

@@ -10,6 +10,7 @@ module write_run_m
   use grid_m, only: grid_t
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_t
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_integer32
   use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
@@ -40,11 +41,12 @@ module write_run_m
 contains
 
   !> Create the file with everything but rows.
-  subroutine create_run_file(path, text, parameters, grid, blocks, self)
+  subroutine create_run_file(path, text, parameters, grid, blocks, bed, self)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
+    type(bed_t), intent(in) :: bed
     type(run_file_t), intent(out) :: self
     integer :: c
 
@@ -55,6 +57,7 @@ contains
       call file%attribute('/', 'format_version', 1)
       call write_provenance(text, parameters, file)
       call write_grid(grid, file)
+      if (bed%there) call write_bed(bed, file)
       call write_shapes(blocks, file)
       call write_bodies(blocks, file)
       call file%new_column('/bodies/time', 's', file_real64, [integer ::], chunk_rows(1), self%time)
@@ -143,6 +146,16 @@ contains
       call file%store('/grid/'//axis(d:d), 'm', grid%face([(i, i=1, grid%n(d) + 1)], d))
     end do
   end subroutine write_grid
+
+  !> The surface of the bed, repeated between periodic sides; corners are counted from 0.
+  subroutine write_bed(bed, file)
+    type(bed_t), intent(in) :: bed
+    type(h5_file_t), intent(inout) :: file
+
+    call file%group('/bed')
+    call file%store('/bed/points', 'm', bed%point)
+    call file%store('/bed/triangles', '1', bed%triangle - 1)
+  end subroutine write_bed
 
   !> The shapes; corners are counted from 0, as h5py and VTK do.
   subroutine write_shapes(blocks, file)

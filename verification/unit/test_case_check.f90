@@ -8,6 +8,7 @@ program test_case_check
   use case_input_m, only: read_case
   use case_check_m, only: make_shapes, check_case
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t, make_bed
   implicit none
 
   character(*), parameter :: lf = new_line('a')
@@ -165,6 +166,7 @@ contains
     real(wp), parameter :: d = 0.02_wp
     type(case_t) :: case
     type(shape_t), allocatable :: shapes(:)
+    type(bed_t) :: bed
     type(problems_t) :: problems
     real(wp) :: corner(3), feet(3, 3)
     integer :: i, n
@@ -173,7 +175,8 @@ contains
       //'0.0288675134594813 quaternion = 0.540625096237162, 0.455768038939282, ' &
       //'-0.060003000646866, -0.704556342610988/', case, problems)
     call make_shapes(case, shapes, problems)
-    call check_case(case, shapes, problems)
+    call make_bed(case, bed, problems)
+    call check_case(case, shapes, bed, problems)
     call check('fixed block is a good case', problems%n, 0)
     n = 0
     do i = 1, size(shapes(2)%point, 2)
@@ -198,12 +201,14 @@ contains
     character(:), allocatable :: found
     type(case_t) :: case
     type(shape_t), allocatable :: shapes(:)
+    type(bed_t) :: bed
     type(problems_t) :: problems
     integer :: i
 
     call read_case(text, case, problems)
     call make_shapes(case, shapes, problems)
-    call check_case(case, shapes, problems)
+    call make_bed(case, bed, problems)
+    call check_case(case, shapes, bed, problems)
     found = ''
     do i = 1, problems%n
       if (i > 1) found = found//'|'

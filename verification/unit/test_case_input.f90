@@ -26,7 +26,7 @@ program test_case_input
   call test_contact()
   call test_shapes()
   call test_bodies()
-  call test_not_yet()
+  call test_options()
   call test_all_at_once()
   call finish_checks()
 
@@ -464,16 +464,20 @@ contains
       '&body colour = ''red'': unknown variable, nearest known: shape (line 4)')
   end subroutine test_bodies
 
-  !> What the contract promises for later is refused as such.
-  subroutine test_not_yet()
+  !> Options that came late.
+  subroutine test_options()
     call expect(base//'&numerics momentum=''c_ismac'' solid_fraction=''subcell'' ' &
       //'advection=''upwind''/', '')
     call expect(base//'&boundary z_max_velocity=0,0,0/', '')
     call expect(base//'&fluid surface_tension=0.0/', '')
     call expect(base//'&fluid surface_tension=0.072/', '')
     call expect(base//'&contact model=''surface''/', '')
-    call expect(base//'&bed file=''a.stl''/', '&bed: this group is not available yet (line 3)')
-  end subroutine test_not_yet
+    call expect(base//'&bed file=''a.stl'' kind = ''stl''/', '')
+    call expect(base//'&bed file=''a.stl'' kind = ''map''/', '&bed kind = ''map'': unknown, ' &
+      //'must be one of ''heightmap'', ''stl'' (line 3)')
+    call expect(base//'&bed kind = ''stl''/', '&bed file (by default): must name a file ' &
+      //'with the form of the bed (line 3)')
+  end subroutine test_options
 
   !> Faults of form, of type, of range and between groups come out together.
   subroutine test_all_at_once()

@@ -42,6 +42,7 @@ contains
         x(path(v, t)) = b(path(v, t))
         solid%corner(:, v + 1, t) = low + h*x
       end do
+      if (t > 3) solid%corner(:, [1, 2], t) = solid%corner(:, [2, 1], t)   ! positive volume
     end do
   end subroutine set_box
 

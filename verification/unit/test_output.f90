@@ -12,8 +12,10 @@ program test_output
   use restart_m, only: read_restart
   use hdf5_file_m, only: h5_file_t
   use sample_state_m, only: sample_t, make_sample, fill_cells
+  use bed_m, only: bed_t
   use check_m, only: check, finish_checks
   implicit none
+  type(bed_t) :: no_bed
   character(*), parameter :: here = 'test-output'
 
   call parallel_init()
@@ -84,7 +86,8 @@ contains
     else
       call move(s)
     end if
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, output)
+    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+      output)
     call check('the output is opened', output%code, exit_ok)
     call write_due_output(s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, output)
     do while (.not. s%clock%finished())
@@ -228,13 +231,16 @@ contains
     call shell('mkdir '//here//'/other && touch '//here//'/other/thesis.tex')
     options%output = here//'/other'
     call make_sample(0.0_wp, .false., s)
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, output)
+    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+      output)
     call check('a folder with other things is refused', output%code, exit_input)
     options%output = here//'/other/thesis.tex'
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, output)
+    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+      output)
     call check('a file is no folder', output%code, exit_input)
     options%output = here//'/other/thesis.tex/below'
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, output)
+    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+      output)
     call check('a folder that cannot be made is trouble', output%code, exit_files)
     options%output = here//'/empty'
     call shell('mkdir '//here//'/empty')

@@ -3,6 +3,7 @@ program test_time_step
   use kinds_m, only: wp
   use case_types_m, only: case_t, water_t
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
   use shapes_builtin_m, only: make_shape
   use liquid_fill_m, only: liquid_volume
   use diagnostics_m, only: step_report_t
@@ -47,10 +48,11 @@ contains
     type(case_t), intent(in) :: case
     type(simulation_t), intent(inout) :: sim
     type(shape_t) :: shapes(1)
+    type(bed_t) :: no_bed
     character(:), allocatable :: message
 
     call make_shape(case%shape(1), shapes(1), message)
-    call simulation_init(case, shapes, sim)
+    call simulation_init(case, shapes, no_bed, sim)
   end subroutine start
 
   !> A held block through the level: nothing moves, no liquid is lost, and it is carried.

@@ -1,0 +1,154 @@
+!> Text files that are read word by word: words between blanks and line ends, `#` begins a remark.
+module file_words_m
+  use kinds_m, only: wp
+  use errors_m, only: to_text
+  use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, quoted_text
+  implicit none
+  private
+  public :: words_t, read_whole, next_word, get_integer, get_real, get_count, expected, complain
+  public :: place_of
+
+  integer, parameter :: longest_text = 500000000   !! bytes
+
+  !> A text that is read word by word; after a problem nothing more is read.
+  type :: words_t
+    character(:), allocatable :: text
+    integer :: at = 1, line = 1
+    character(:), allocatable :: problem   !! empty, or the first one
+  end type words_t
+
+contains
+
+  !> The bytes of a file, line ends as line feeds.
+  subroutine read_whole(file, words)
+    character(*), intent(in) :: file
+    type(words_t), intent(out) :: words
+    integer :: unit, length, status
+    logical :: there
+
+    words%problem = ''
+    words%text = ''
+    words%line = 0
+    inquire (file=file, exist=there, size=length)
+    open (newunit=unit, file=file, access='stream', form='unformatted', action='read', &
+          status='old', iostat=status)
+    if (status /= 0 .or. .not. there) then
+      words%problem = 'there is no such file, or it may not be read'
+      return
+    end if
+    if (length > longest_text .or. length < 0) then
+      words%problem = 'longer than 500 MB'
+    else
+      words%text = repeat(' ', length)
+      read (unit, iostat=status) words%text
+      if (status /= 0) words%problem = 'could not be read'
+    end if
+    close (unit)
+    words%line = 1
+  end subroutine read_whole
+
+  !> Note a problem; only the first counts.
+  subroutine complain(words, text)
+    type(words_t), intent(inout) :: words
+    character(*), intent(in) :: text
+
+    if (len(words%problem) == 0) words%problem = text
+  end subroutine complain
+
+  !> The next word; empty at the end of the text or after a problem.
+  function next_word(words) result(word)
+    type(words_t), intent(inout) :: words
+    character(:), allocatable :: word
+    integer :: first
+
+    word = ''
+    if (len(words%problem) > 0) return
+    do while (words%at <= len(words%text))
+      select case (words%text(words%at:words%at))
+      case (' ', achar(9), achar(13))
+        words%at = words%at + 1
+      case (achar(10))
+        words%at = words%at + 1
+        words%line = words%line + 1
+      case ('#')
+        do while (words%at <= len(words%text))
+          if (words%text(words%at:words%at) == achar(10)) exit
+          words%at = words%at + 1
+        end do
+      case default
+        exit
+      end select
+    end do
+    first = words%at
+    do while (words%at <= len(words%text))
+      select case (words%text(words%at:words%at))
+      case (' ', achar(9), achar(10), achar(13)); exit
+      case default; words%at = words%at + 1
+      end select
+    end do
+    word = words%text(first:words%at - 1)
+  end function next_word
+
+  subroutine get_integer(words, n)
+    type(words_t), intent(inout) :: words
+    integer, intent(out) :: n
+    character(:), allocatable :: word
+    integer :: info
+
+    n = 0
+    word = next_word(words)
+    if (len(words%problem) > 0) return
+    call parse_integer(word, n, info)
+    if (info /= value_ok) call expected(words, 'a whole number', word)
+  end subroutine get_integer
+
+  subroutine get_real(words, x)
+    type(words_t), intent(inout) :: words
+    real(wp), intent(out) :: x
+    character(:), allocatable :: word
+    integer :: info
+
+    x = 0.0_wp
+    word = next_word(words)
+    if (len(words%problem) > 0) return
+    call parse_real(word, x, info)
+    if (info == value_too_large .and. scan(word, 'eEdD') > 0) then
+      if (index(word, '-', back=.true.) > scan(word, 'eEdD')) info = value_ok   ! as good as zero
+    end if
+    if (info /= value_ok) call expected(words, 'a number', word)
+  end subroutine get_real
+
+  subroutine expected(words, what, word)
+    type(words_t), intent(inout) :: words
+    character(*), intent(in) :: what, word
+
+    if (len(word) == 0) then
+      call complain(words, 'the file ends where '//what//' should stand')
+    else
+      call complain(words, quoted_text(word)//' stands where '//what//' should')
+    end if
+  end subroutine expected
+
+  !> A count that the rest of the text has room for.
+  subroutine get_count(words, what, n)
+    type(words_t), intent(inout) :: words
+    character(*), intent(in) :: what
+    integer, intent(out) :: n
+
+    call get_integer(words, n)
+    if (n < 0 .or. n > len(words%text) - words%at) then
+      call complain(words, 'the file does not hold '//to_text(n)//' '//what)
+      n = 0
+    end if
+  end subroutine get_count
+
+  !> The line of the problem, to stand before it; empty where there is none.
+  pure function place_of(words) result(text)
+    type(words_t), intent(in) :: words
+    character(:), allocatable :: text
+
+    text = ''
+    if (len(words%problem) > 0 .and. words%line > 0) text = 'line '//to_text(words%line)//': '
+  end function place_of
+
+end module file_words_m

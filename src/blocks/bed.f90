@@ -1,0 +1,571 @@
+!> The bed: a fixed floor of any form in the tank, for contact and flow.
+!!
+!! It is a surface of triangles, with solid below the facets that look up and none below those that
+!! look down. So it may be open (a map of heights, whose border lies at the sides of the tank or
+!! outside) or closed (stones, a terrain with sides and bottom). Space axes; between periodic sides
+!! the form is repeated.
+module bed_m
+  use kinds_m, only: wp
+  use errors_m, only: problems_t, to_text
+  use case_types_m, only: case_t
+  use value_text_m, only: quoted_text
+  use vectors_m, only: cross, norm
+  use tet_mesh_m, only: shape_t
+  use neighbours_m, only: bins_t, bins_build, reserve
+  use surface_features_m, only: surface_t, surface_init, near_list_t, gather_edges, gather_facets, &
+    nearest_on_surface, pair_edges, nowhere
+  use bed_file_m, only: bed_form_t, read_bed_file
+  implicit none
+  private
+  public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
+  public :: clip_polygon
+
+  integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
+
+  type :: bed_t
+    logical :: there = .false.
+    real(wp), allocatable :: point(:, :)       !! (3, n) with the repetitions [m]
+    integer, allocatable :: triangle(:, :)     !! (3, m) counter-clockwise from outside
+    real(wp) :: origin(3) = 0.0_wp             !! lower corner of the tank [m]
+    real(wp) :: period(3) = 0.0_wp             !! length of the tank where it is periodic, else 0
+    type(surface_t) :: surface                 !! what touches and is touched
+    type(bins_t) :: columns                    !! the facets seen from above
+    integer :: n_given = 0                     !! triangles of the file, without the repetitions
+    character(:), allocatable :: checksum      !! of the file
+  end type bed_t
+
+  !> The surface above and below a place: heights, and 1 for facets that look up, -1 for others.
+  type :: layers_t
+    integer :: n = 0
+    real(wp), allocatable :: height(:)   !! falling [m]
+    integer, allocatable :: way(:)
+  end type layers_t
+
+  real(wp), parameter :: round_off = 1.0e-6_wp   !! of coordinates in files, over the tank [-]
+  real(wp), parameter :: no_gap = 1.0e-13_wp     !! by which facets overlap, over the bed [-]
+  real(wp), parameter :: same_place = 1.0e-7_wp  !! points nearer are one, over the bed [-]
+
+contains
+
+  !> Read the bed of a case and look for everything that may be wrong with it.
+  subroutine make_bed(case, bed, problems)
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(out) :: bed
+    type(problems_t), intent(inout) :: problems
+    type(bed_form_t) :: form
+    character(:), allocatable :: message
+    integer :: n_before
+
+    if (len_trim(case%bed%file) == 0 .or. case%bed%faulty) return
+    call read_bed_file(trim(case%bed%file), case%bed%kind, form, message)
+    if (len(message) > 0) then
+      call note(message)
+      return
+    end if
+    if (case%grid%faulty .or. case%boundary%faulty) return
+    n_before = problems%n
+    call check_extent()
+    if (problems%n > n_before) return
+    call set_bed(case, form, bed, message)
+    if (len(message) > 0) then
+      call note(message)
+      return
+    end if
+    call check_border(case, bed, message)
+    if (len(message) > 0) call note(message)
+    if (len(message) > 0) return
+    call check_layers(case, bed, message)
+    if (len(message) > 0) call note(message)
+  contains
+    subroutine note(what)
+      character(*), intent(in) :: what
+
+      call problems%add_message('&bed file = '//quoted_text(trim(case%bed%file))//': '//what, &
+                                case%bed%line)
+    end subroutine note
+
+    !> The size of the form beside that of the tank.
+    subroutine check_extent()
+      character(1), parameter :: axis(3) = ['x', 'y', 'z']
+      real(wp), parameter :: far_too_large = 100.0_wp
+      real(wp) :: low(3), high(3), from(3), to(3), slack(3)
+      integer :: d
+
+      low = minval(form%point, 2)
+      high = maxval(form%point, 2)
+      from = case%grid%origin
+      to = from + case%grid%length
+      slack = round_off*case%grid%length
+      if (any(high(1:2) - low(1:2) > far_too_large*maxval(case%grid%length(1:2)))) then
+        call note('it is '//to_text(maxval(high(1:2) - low(1:2)))//' m long, more than ' &
+          //to_text(nint(far_too_large))//' times the tank; are its coordinates in mm? ' &
+          //'They must be in m')
+        return
+      end if
+      do d = 1, 2
+        if (case%bed%kind == 'heightmap') then
+          if (low(d) > from(d) + slack(d) .or. high(d) < to(d) - slack(d)) then
+            call note('the map does not cover the tank, which reaches from '//to_text(from(d)) &
+              //' to '//to_text(to(d))//' m in '//axis(d)//'; the map reaches from ' &
+              //to_text(low(d))//' to '//to_text(high(d))//' m')
+          else if (case%boundary%kind(1, d) == 'periodic' .and. high(d) - low(d) &
+                   > case%grid%length(d) + 2*slack(d)) then
+            call note('the map must be as long as the period '//to_text(case%grid%length(d)) &
+              //' m in '//axis(d))
+          end if
+        else if (high(d) < from(d) .or. low(d) > to(d)) then
+          call note('the bed lies outside the tank in '//axis(d))
+        end if
+      end do
+      if (high(3) <= from(3)) call note('the bed lies below the tank')
+      if (case%boundary%kind(1, 3) == 'periodic') call note('a bed needs sides in z that are ' &
+        //'not periodic')
+    end subroutine check_extent
+  end subroutine make_bed
+
+  !> Make a form ready: repeat it between periodic sides, join equal points, sort it.
+  subroutine set_bed(case, form, bed, message)
+    type(case_t), intent(in) :: case
+    type(bed_form_t), intent(in) :: form
+    type(bed_t), intent(out) :: bed
+    character(:), allocatable, intent(out) :: message   !! empty, or what is wrong
+    type(shape_t) :: net
+    real(wp), allocatable :: low(:, :), high(:, :)
+    real(wp) :: area, spacing
+    integer :: m, n
+
+    message = ''
+    bed%origin = case%grid%origin
+    bed%period = merge(case%grid%length, 0.0_wp, case%boundary%kind(1, :) == 'periodic')
+    bed%checksum = form%checksum
+    call repeat_form(case, form, bed)
+    call join_points(bed)
+    area = 0.0_wp
+    n = size(bed%triangle, 2)
+    allocate (low(3, n), high(3, n))
+    do m = 1, n
+      associate (p => bed%point(:, bed%triangle(:, m)))
+        low(:, m) = minval(p, 2)
+        high(:, m) = maxval(p, 2)
+        spacing = norm(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1)))
+        if (.not. spacing > (same_place*maxval(high(:, m) - low(:, m)))*maxval(high(:, m) &
+                            - low(:, m))) then
+          message = 'the facet at '//place_text(p(:, 1))//' has no area'
+          return
+        end if
+        area = area + 0.5_wp*spacing
+      end associate
+    end do
+    spacing = sqrt(area/real(n, wp))
+    net%point = bed%point
+    net%facet = [(3*m - 2, m=1, n + 1)]
+    net%facet_point = reshape(bed%triangle, [3*n])
+    net%smallest_edge = 2*spacing   ! sets the bins only
+    call surface_init(net, bed%surface)
+    ! a place on the edge between two flat facets must not slip between them
+    bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
+    bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
+    bed%surface%probe = bed%surface%probe(:, :bed%surface%n_corners)
+    bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
+    call bins_build(bed%surface%probe, bed%surface%probe, spacing, bed%surface%probes)
+    low(3, :) = 0.0_wp
+    high(3, :) = 0.0_wp
+    call bins_build(low, high, spacing, bed%columns)
+    bed%there = .true.
+  end subroutine set_bed
+
+  !> Copies of the form on both sides of the tank where it is periodic: one period to each side,
+  !! or as many as the cells that are kept beyond a side reach.
+  subroutine repeat_form(case, form, bed)
+    type(case_t), intent(in) :: case
+    type(bed_form_t), intent(in) :: form
+    type(bed_t), intent(inout) :: bed
+    integer, parameter :: cells_beyond = 4
+    integer :: times(3), i, j, copy, n, m
+
+    times = 0
+    where (bed%period > 0.0_wp) times = max(1, (cells_beyond + case%grid%cells - 1) &
+                                            /case%grid%cells)
+    n = size(form%point, 2)
+    m = size(form%triangle, 2)
+    bed%n_given = m
+    copy = product(2*times + 1)
+    allocate (bed%point(3, n*copy), bed%triangle(3, m*copy))
+    copy = 0
+    do j = -times(2), times(2)
+      do i = -times(1), times(1)
+        bed%point(:, copy*n + 1:(copy + 1)*n) = form%point &
+          + spread(bed%period*real([i, j, 0], wp), 2, n)
+        bed%triangle(:, copy*m + 1:(copy + 1)*m) = form%triangle + copy*n
+        copy = copy + 1
+      end do
+    end do
+  end subroutine repeat_form
+
+  !> Let corners at one place be one point; facets that shrink to a line are dropped.
+  subroutine join_points(bed)
+    type(bed_t), intent(inout) :: bed
+    type(bins_t) :: bins
+    integer, allocatable :: number(:)
+    real(wp) :: near
+    integer :: i, m, n, bin, p
+
+    near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
+    call bins_build(bed%point - near, bed%point + near, mean_spacing(bed), bins)
+    allocate (number(size(bed%point, 2)), source=0)
+    n = 0
+    do i = 1, size(number)
+      bin = bins%number(bins%place(bed%point(:, i)))
+      do m = bins%first(bin), bins%first(bin + 1) - 1
+        p = bins%item(m)
+        if (p >= i) exit
+        if (any(abs(bed%point(:, p) - bed%point(:, i)) > near)) cycle
+        number(i) = number(p)
+        exit
+      end do
+      if (number(i) > 0) cycle
+      n = n + 1
+      number(i) = n
+    end do
+    call renumber(number, n, bed)
+  end subroutine join_points
+
+  !> Take new numbers of the points.
+  subroutine renumber(number, n, bed)
+    integer, intent(in) :: number(:), n
+    type(bed_t), intent(inout) :: bed
+    real(wp) :: point(3, n)
+    integer :: i, m, c(3)
+
+    do i = size(number), 1, -1   ! of equal points the first one stays
+      point(:, number(i)) = bed%point(:, i)
+    end do
+    m = 0
+    do i = 1, size(bed%triangle, 2)
+      c = number(bed%triangle(:, i))
+      if (c(1) == c(2) .or. c(2) == c(3) .or. c(3) == c(1)) cycle
+      m = m + 1
+      bed%triangle(:, m) = c
+    end do
+    bed%point = point
+    bed%triangle = bed%triangle(:, :m)
+  end subroutine renumber
+
+  !> Side of a square that has the mean area of a facet seen from the largest side [m].
+  pure function mean_spacing(bed) result(spacing)
+    type(bed_t), intent(in) :: bed
+    real(wp) :: spacing
+    real(wp) :: extent(3)
+
+    extent = maxval(bed%point, 2) - minval(bed%point, 2)
+    spacing = sqrt(max(extent(1)*extent(2), extent(2)*extent(3), extent(3)*extent(1)) &
+                   /real(max(1, size(bed%triangle, 2)), wp))
+  end function mean_spacing
+
+  !> An open edge of the surface inside the tank: the solid would end there without a surface.
+  subroutine check_border(case, bed, message)
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(in) :: bed
+    character(:), allocatable, intent(out) :: message
+    type(shape_t) :: net
+    integer, allocatable :: edge(:, :)
+    real(wp) :: p(3, 2), low(3), high(3), from, to, at(2)
+    integer :: e, d, n, m
+
+    message = ''
+    net%point = bed%point
+    net%facet = [(3*m - 2, m=1, size(bed%triangle, 2) + 1)]
+    net%facet_point = reshape(bed%triangle, [size(bed%triangle)])
+    call pair_edges(net, edge)
+    low = case%grid%origin + round_off*case%grid%length
+    high = case%grid%origin + (1.0_wp - round_off)*case%grid%length
+    n = 0
+    do e = 1, size(edge, 2)
+      if (edge(4, e) /= 0) cycle
+      p = bed%point(:, edge(1:2, e))
+      if (maxval(p(3, :)) <= low(3)) cycle
+      from = 0.0_wp   ! the part of the edge inside the tank, seen from above
+      to = 1.0_wp
+      do d = 1, 2
+        at = [low(d), high(d)]
+        if (abs(p(d, 2) - p(d, 1)) <= 0.0_wp) then
+          if (p(d, 1) <= at(1) .or. p(d, 1) >= at(2)) to = -1.0_wp
+        else
+          at = (at - p(d, 1))/(p(d, 2) - p(d, 1))
+          from = max(from, minval(at))
+          to = min(to, maxval(at))
+        end if
+      end do
+      if (from >= to) cycle
+      n = n + 1
+      if (n > 1) cycle
+      message = place_text(p(:, 1) + 0.5_wp*(from + to)*(p(:, 2) - p(:, 1)))
+    end do
+    if (n == 0) return
+    message = 'the surface has '//to_text(n)//' open edges inside the tank, one at '//message &
+      //'; it must be closed, or reach the sides of the tank, and its facets must all run ' &
+      //'counter-clockwise seen from outside'
+  end subroutine check_border
+
+  !> From above every place of the tank must show the surface in order: into the solid, out of it.
+  subroutine check_layers(case, bed, message)
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(in) :: bed
+    character(:), allocatable, intent(out) :: message
+    type(layers_t) :: layers
+    real(wp) :: p(3, 12), low(3), high(3), at(3), top
+    integer :: f, n, k, d, depth
+
+    message = ''
+    low = case%grid%origin
+    high = case%grid%origin + case%grid%length
+    top = -huge(top)
+    do f = 1, size(bed%triangle, 2)
+      p(:, :3) = bed%point(:, bed%triangle(:, f))
+      n = 3
+      do d = 1, 2
+        call clip_polygon(d, low(d), 1.0_wp, n, p)
+        call clip_polygon(d, high(d), -1.0_wp, n, p)
+      end do
+      if (n < 3) cycle
+      top = max(top, maxval(p(3, :n)))
+      at = sum(p(:, :n), 2)/real(n, wp)
+      call find_layers(bed, at, round_off*case%grid%length(3), layers)
+      depth = 0
+      do k = 1, layers%n
+        depth = depth + layers%way(k)
+        if (depth == 0 .or. depth == 1) cycle
+        at(3) = layers%height(k)
+        if (depth < 0) then
+          message = 'the facet at '//place_text(at)//' looks down with no solid above it: its ' &
+            //'corners must run counter-clockwise seen from outside'
+        else
+          message = 'at '//place_text(at)//' solid lies in solid: parts of the bed must not ' &
+            //'overlap, and facets must run counter-clockwise seen from outside'
+        end if
+        return
+      end do
+    end do
+    if (top > high(3)) then
+      message = 'the bed reaches up to '//to_text(top)//' m, out of the tank, which ends at ' &
+        //to_text(high(3))//' m; coordinates must be in m'
+    else if (top <= low(3)) then
+      message = 'the bed lies below the tank'
+    end if
+  end subroutine check_layers
+
+  !> All facets above and below a place, from the top; equal heights: those that look down first.
+  subroutine find_layers(bed, at, same, layers)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: at(3)
+    real(wp), intent(in) :: same   !! heights nearer than this are equal [m]
+    type(layers_t), intent(inout) :: layers
+    real(wp) :: height
+    integer :: bin, m, f, way, k
+
+    layers%n = 0
+    bin = column_of(bed, at)
+    if (bin == 0) return
+    do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
+      f = bed%columns%item(m)
+      way = way_of(bed, f, at)
+      if (way == 0) cycle
+      height = height_of(bed, f, at)
+      layers%n = layers%n + 1
+      call reserve(layers%n, layers%height)
+      call reserve(layers%n, layers%way)
+      k = layers%n
+      do while (k > 1)
+        if (layers%height(k - 1) > height + same .or. (layers%height(k - 1) > height - same .and. &
+            layers%way(k - 1) <= way)) exit
+        layers%height(k) = layers%height(k - 1)
+        layers%way(k) = layers%way(k - 1)
+        k = k - 1
+      end do
+      layers%height(k) = height
+      layers%way(k) = way
+    end do
+  end subroutine find_layers
+
+  !> Bin of the facets above and below a place, 0 if there are none.
+  pure function column_of(bed, at) result(bin)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: at(3)
+    integer :: bin
+
+    bin = 0
+    associate (columns => bed%columns)
+      if (any(at(1:2) < columns%low(1:2)) .or. any(at(1:2) > columns%high(1:2))) return
+      bin = columns%number(columns%place([at(1:2), 0.0_wp]))
+    end associate
+  end function column_of
+
+  !> How facet f lies over or under a place: 1 it looks up, -1 down, 0 not at all.
+  !!
+  !! The winding number of its outline seen from above. Of two facets with a common edge only one
+  !! covers a place on the edge: both see the same bits.
+  pure function way_of(bed, f, at) result(way)
+    type(bed_t), intent(in) :: bed
+    integer, intent(in) :: f
+    real(wp), intent(in) :: at(3)
+    integer :: way
+    real(wp) :: p(2), q(2), side
+    integer :: c, rise
+
+    way = 0
+    do c = 1, 3
+      p = bed%point(1:2, bed%triangle(c, f))
+      q = bed%point(1:2, bed%triangle(1 + mod(c, 3), f))
+      rise = 0
+      if (p(2) <= at(2) .and. q(2) > at(2)) then
+        rise = 1
+        side = (q(1) - p(1))*(at(2) - p(2)) - (at(1) - p(1))*(q(2) - p(2))
+      else if (q(2) <= at(2) .and. p(2) > at(2)) then
+        rise = -1
+        side = (p(1) - q(1))*(at(2) - q(2)) - (at(1) - q(1))*(p(2) - q(2))
+      else
+        cycle
+      end if
+      if (side > 0.0_wp) way = way + rise   ! the edge passes on the side of larger x
+    end do
+  end function way_of
+
+  !> Height of the plane of facet f at a place [m].
+  pure function height_of(bed, f, at) result(height)
+    type(bed_t), intent(in) :: bed
+    integer, intent(in) :: f
+    real(wp), intent(in) :: at(3)
+    real(wp) :: height
+
+    associate (n => bed%surface%normal(:, f))
+      height = (bed%surface%offset(f) - n(1)*at(1) - n(2)*at(2))/n(3)
+    end associate
+  end function height_of
+
+  !> Does the solid of the bed hold a point?
+  pure function bed_covers(bed, x) result(yes)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: x(3)   !! [m]
+    logical :: yes
+    integer :: bin, m, f, way, above
+
+    above = 0
+    bin = column_of(bed, x)
+    if (bin > 0) then
+      do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
+        f = bed%columns%item(m)
+        way = way_of(bed, f, x)
+        if (way == 0) cycle
+        if (height_of(bed, f, x) > x(3)) above = above + way
+      end do
+    end if
+    yes = above > 0
+  end function bed_covers
+
+  !> Where a point is seen from the bed: shifted into the tank by whole periods.
+  pure function bed_place(bed, x) result(place)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: x(3)   !! never wrapped [m]
+    real(wp) :: place(3)
+
+    place = x
+    where (bed%period > 0.0_wp) place = x - bed%period &
+                                        *floor((x - bed%origin)/max(bed%period, tiny(x)))
+  end function bed_place
+
+  !> May the surface of the bed meet a box? By its bins.
+  pure function bed_is_near(bed, low, high) result(yes)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: low(3), high(3)   !! [m]
+    logical :: yes
+    integer :: a(3), b(3), i, j, k, bin
+
+    yes = .false.
+    associate (bins => bed%surface%facets)
+      if (any(low > bins%high) .or. any(high < bins%low)) return
+      a = bins%place(low)
+      b = bins%place(high)
+      yes = .true.
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            bin = bins%number([i, j, k])
+            if (bins%first(bin + 1) > bins%first(bin)) return
+          end do
+        end do
+      end do
+      yes = .false.
+    end associate
+  end function bed_is_near
+
+  !> Signed distance of a point from the bed (positive outside), and the unit vector along which it
+  !! grows: exact up to `near` outside and up to `far` inside; beyond that `nowhere` or -`far`.
+  subroutine bed_distance(bed, x, near, far, facets, edges, distance, outward)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: x(3)          !! [m]
+    real(wp), intent(in) :: near, far     !! near <= far [m]
+    type(near_list_t), intent(inout) :: facets, edges   !! work
+    real(wp), intent(out) :: distance     !! [m]
+    real(wp), intent(out) :: outward(3)   !! 0 where the distance is not exact
+    real(wp) :: reach
+
+    reach = near
+    do
+      call gather_facets(bed%surface, x - reach, x + reach, facets)
+      call gather_edges(bed%surface, x - reach, x + reach, edges)
+      call nearest_on_surface(bed%surface, x, facets%item(:facets%n), edges%item(:edges%n), &
+        distance, outward)
+      if (abs(distance) <= reach) return
+      outward = 0.0_wp
+      if (reach <= near) then
+        distance = nowhere
+        if (.not. bed_covers(bed, x)) return
+      end if
+      distance = -far
+      if (reach >= far) return
+      reach = min(2*reach, far)
+    end do
+  end subroutine bed_distance
+
+  !> Keep the part of a convex polygon where side*(x(d) - plane) >= 0; it has one corner more at
+  !! most.
+  pure subroutine clip_polygon(d, plane, side, n, p)
+    integer, intent(in) :: d
+    real(wp), intent(in) :: plane, side
+    integer, intent(inout) :: n
+    real(wp), intent(inout) :: p(:, :)   !! (3, at least n + 1)
+    real(wp) :: old(3, n), here, before
+    integer :: v, w
+
+    if (n == 0) return
+    old = p(:, :n)
+    w = n
+    n = 0
+    before = side*(old(d, w) - plane)
+    do v = 1, size(old, 2)
+      here = side*(old(d, v) - plane)
+      if (here*before < 0.0_wp) then
+        n = n + 1
+        p(:, n) = old(:, w) + before/(before - here)*(old(:, v) - old(:, w))
+        p(d, n) = plane
+      end if
+      if (here >= 0.0_wp) then
+        n = n + 1
+        p(:, n) = old(:, v)
+      end if
+      w = v
+      before = here
+    end do
+  end subroutine clip_polygon
+
+  !> Three coordinates.
+  pure function place_text(x) result(text)
+    real(wp), intent(in) :: x(3)   !! [m]
+    character(:), allocatable :: text
+    character(48) :: buffer
+
+    write (buffer, '(g0.4, ", ", g0.4, ", ", g0.4)') x
+    text = 'x, y, z = '//trim(buffer)//' m'
+  end function place_text
+
+end module bed_m

@@ -1,0 +1,184 @@
+!> The form of a bed from a file: a map of heights, or triangles in the STL form.
+!!
+!! A map of heights is plain text, words between blanks and line ends, `#` begins a remark:
+!!
+!!     nx ny x0 y0 dx dy      points in x and y, the first of them, their spacing [m]
+!!     z z z ...              nx*ny heights [m], x fastest, then y
+!!
+!! Between four points the bed is two triangles, parted along the diagonal from (i, j) to
+!! (i+1, j+1). STL files may be ASCII or binary, in metres; their normals are not looked at, the
+!! corners of a facet run counter-clockwise seen from outside.
+module bed_file_m
+  use, intrinsic :: iso_fortran_env, only: real32
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+  use kinds_m, only: wp
+  use errors_m, only: to_text
+  use checksum_m, only: checksum_t
+  use file_words_m, only: words_t, read_whole, next_word, get_integer, get_real, expected, &
+    complain, place_of
+  implicit none
+  private
+  public :: bed_form_t, read_bed_file
+
+  integer, parameter :: most_points = 20000000
+  integer, parameter :: stl_head = 84, stl_facet = 50   !! bytes of a binary STL file
+
+  !> Triangles as the file gives them, counter-clockwise from outside.
+  type :: bed_form_t
+    real(wp), allocatable :: point(:, :)       !! (3, n) [m]
+    integer, allocatable :: triangle(:, :)     !! (3, m)
+    character(:), allocatable :: checksum      !! of the file
+  end type bed_form_t
+
+contains
+
+  !> Read a file of a kind ('heightmap' or 'stl'); `message` is empty, or says what is wrong.
+  subroutine read_bed_file(file, kind, form, message)
+    character(*), intent(in) :: file, kind
+    type(bed_form_t), intent(out) :: form
+    character(:), allocatable, intent(out) :: message
+    type(words_t) :: words
+    type(checksum_t) :: checksum
+
+    allocate (form%point(3, 0), form%triangle(3, 0))
+    form%checksum = ''
+    call read_whole(file, words)
+    if (len(words%problem) == 0 .and. len(words%text) == 0) then
+      words%line = 0
+      call complain(words, 'the file is empty')
+    end if
+    if (len(words%problem) == 0) then
+      call checksum%add_text(words%text)
+      form%checksum = checksum%text()
+      if (kind == 'heightmap') then
+        call read_heights(words, form)
+      else if (is_binary_stl(words%text)) then
+        call read_binary_stl(words, form)
+      else
+        call read_ascii_stl(words, form)
+      end if
+    end if
+    message = place_of(words)//words%problem
+    if (len(message) > 0) return
+    if (.not. all(ieee_is_finite(form%point))) message = 'a coordinate is not a finite number'
+  end subroutine read_bed_file
+
+  !> A map of heights.
+  subroutine read_heights(words, form)
+    type(words_t), intent(inout) :: words
+    type(bed_form_t), intent(inout) :: form
+    character(:), allocatable :: word
+    real(wp) :: first(2), spacing(2)
+    integer :: n(2), i, j, k
+
+    do k = 1, 2
+      call get_integer(words, n(k))
+    end do
+    do k = 1, 2
+      call get_real(words, first(k))
+    end do
+    do k = 1, 2
+      call get_real(words, spacing(k))
+    end do
+    if (any(n < 2)) call complain(words, 'a map of heights needs two points at least in x and y')
+    if (.not. all(spacing > 0.0_wp)) call complain(words, 'the spacing must be positive')
+    if (real(n(1), wp)*real(n(2), wp) > real(most_points, wp)) then
+      call complain(words, 'more than '//to_text(most_points)//' points')
+    end if
+    if (len(words%problem) > 0) return
+    deallocate (form%point, form%triangle)
+    allocate (form%point(3, n(1)*n(2)), form%triangle(3, 2*(n(1) - 1)*(n(2) - 1)))
+    do j = 1, n(2)
+      do i = 1, n(1)
+        k = i + (j - 1)*n(1)
+        form%point(1:2, k) = first + real([i, j] - 1, wp)*spacing
+        call get_real(words, form%point(3, k))
+        if (len(words%problem) > 0) return
+      end do
+    end do
+    word = next_word(words)
+    if (len(word) > 0) call expected(words, 'the end of '//to_text(n(1)*n(2))//' heights', word)
+    do j = 1, n(2) - 1
+      do i = 1, n(1) - 1
+        k = i + (j - 1)*n(1)
+        form%triangle(:, 2*(i + (j - 1)*(n(1) - 1)) - 1) = [k, k + 1, k + 1 + n(1)]
+        form%triangle(:, 2*(i + (j - 1)*(n(1) - 1))) = [k, k + 1 + n(1), k + n(1)]
+      end do
+    end do
+  end subroutine read_heights
+
+  !> Triangles between `facet` and `endfacet`.
+  subroutine read_ascii_stl(words, form)
+    type(words_t), intent(inout) :: words
+    type(bed_form_t), intent(inout) :: form
+    character(:), allocatable :: word
+    real(wp), allocatable :: longer(:, :)
+    integer :: n, c, k
+
+    word = next_word(words)
+    if (word /= 'solid') call expected(words, '''solid'', the start of an STL file,', word)
+    n = 0
+    do
+      word = next_word(words)
+      if (len(word) == 0) exit
+      if (word /= 'vertex') cycle
+      if (n + 1 > size(form%point, 2)) then
+        allocate (longer(3, max(3000, 2*n)))
+        longer(:, :n) = form%point(:, :n)
+        call move_alloc(longer, form%point)
+      end if
+      n = n + 1
+      do c = 1, 3
+        call get_real(words, form%point(c, n))
+      end do
+    end do
+    if (len(words%problem) > 0) return
+    words%line = 0
+    if (n == 0) call complain(words, 'the file holds no facets')
+    if (mod(n, 3) /= 0) call complain(words, 'a facet of the file does not have three corners')
+    form%point = form%point(:, :n)
+    form%triangle = reshape([(k, k=1, n)], [3, n/3])
+  end subroutine read_ascii_stl
+
+  !> Has a text the length of a binary STL file? Some of those begin with `solid` too.
+  pure function is_binary_stl(text) result(yes)
+    character(*), intent(in) :: text
+    logical :: yes
+
+    yes = len(text) >= stl_head
+    if (yes) yes = abs(real(len(text) - stl_head, wp) - stl_facet*facets_announced(text)) < 0.5_wp
+  end function is_binary_stl
+
+  !> Number of facets in the head of a binary STL file, lowest byte first.
+  pure function facets_announced(text) result(n)
+    character(*), intent(in) :: text
+    real(wp) :: n
+    integer :: c
+
+    n = 0.0_wp
+    do c = stl_head, stl_head - 3, -1
+      n = 256.0_wp*n + real(ichar(text(c:c)), wp)
+    end do
+  end function facets_announced
+
+  !> Head, number of facets, then normal, three corners and two bytes for each.
+  subroutine read_binary_stl(words, form)
+    type(words_t), intent(inout) :: words
+    type(bed_form_t), intent(inout) :: form
+    integer :: n, f, c, at, k
+
+    n = (len(words%text) - stl_head)/stl_facet
+    words%line = 0
+    if (n == 0) call complain(words, 'the file holds no facets')
+    deallocate (form%point)
+    allocate (form%point(3, 3*n))
+    do f = 1, n
+      do c = 1, 3
+        at = stl_head + stl_facet*(f - 1) + 12*c
+        form%point(:, 3*(f - 1) + c) = real(transfer(words%text(at + 1:at + 12), [0.0_real32]), wp)
+      end do
+    end do
+    form%triangle = reshape([(k, k=1, 3*n)], [3, n])
+  end subroutine read_binary_stl
+
+end module bed_file_m
