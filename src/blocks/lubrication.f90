@@ -7,9 +7,10 @@ module lubrication_m
   use neighbours_m, only: nearest_shift
   implicit none
   private
-  public :: lubrication_t, lubrication_init, lubricate, film_impulse
+  public :: lubrication_t, lubrication_init, lubricate, film_impulse, film_pull
 
   real(wp), parameter :: roughness = 1.0e-3_wp   !! thinnest film over the radius of the sphere [-]
+  real(wp), parameter :: atmosphere = 101325.0_wp   !! [Pa]
 
   type :: lubrication_t
     logical :: active = .false.
@@ -99,6 +100,8 @@ contains
     half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*thinnest)
     resistance = (film_impulse(lubrication, radius, gap + half) &
       - film_impulse(lubrication, radius, gap - half))/(2*half)
+    if (opening > 0.0_wp) resistance = min(resistance, &
+                                           film_pull(lubrication, radius, gap, opening)/opening)
     f = -resistance*opening/(1.0_wp + 0.5_wp*resistance*inverse*dt)
   end function push
 
@@ -121,6 +124,26 @@ contains
     if (h > thinnest) impulse = impulse + log(h/thinnest) - (h - thinnest)/lubrication%resolved
     impulse = 6*pi*lubrication%viscosity*radius**2*impulse
   end function film_impulse
+
+  !> Largest force with which a film that opens can pull [N].
+  !!
+  !! The liquid bears no tension: where the suction \( 3\mu R v/s^2 \) in a film as thick as s
+  !! passes the pressure of the atmosphere, it cavitates. With s_0 the thickness where it just does,
+  !! \( F = 2\pi R [p (s_0 - h) + 3\mu R v/s_0] \) for h < s_0, the integral over the film; less
+  !! what the grid resolves.
+  pure function film_pull(lubrication, radius, gap, opening) result(force)
+    type(lubrication_t), intent(in) :: lubrication
+    real(wp), intent(in) :: radius, gap   !! [m]
+    real(wp), intent(in) :: opening       !! rate at which the gap opens, > 0 [m/s]
+    real(wp) :: force
+    real(wp) :: h, s
+
+    h = min(max(gap, roughness*radius), lubrication%resolved)
+    s = max(h, sqrt(3*lubrication%viscosity*radius*opening/atmosphere))
+    force = 2*pi*radius*(atmosphere*(s - h) &
+      + 3*lubrication%viscosity*radius*opening*(1/s - 1/lubrication%resolved))
+    force = max(0.0_wp, force)
+  end function film_pull
 
   !> One over the mass of a body, 0 if it is held [1/kg].
   pure function inverse_mass(blocks, b) result(inverse)

@@ -7,7 +7,7 @@ program test_lubrication
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use lubrication_m, only: lubrication_t, lubrication_init, film_impulse
+  use lubrication_m, only: lubrication_t, lubrication_init, film_impulse, film_pull
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -22,6 +22,7 @@ program test_lubrication
   call check_fall('no_slip', 1.0_wp)
   call check_fall('slip', 0.25_wp)
   call check_pair()
+  call check_cavitation()
   call finish_checks()
 
 contains
@@ -136,5 +137,31 @@ contains
     call check('contact force tells it', blocks%contact_force(:, 2)*dt/blocks%mass(2), &
                blocks%v(:, 2) - 0.1_wp*n, 1.0e-12_wp)
   end subroutine check_pair
+
+  !> A film that opens pulls with its own resistance, or with the atmosphere where it is too thin:
+  !! the suction, capped, summed over the film.
+  subroutine check_cavitation()
+    real(wp), parameter :: v = 0.25_wp, p = 101325.0_wp
+    integer, parameter :: n = 200000
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contacts_t) :: contacts
+    real(wp) :: h, s, ds, force
+    integer :: i
+
+    call start('no_slip', reshape([0.5_wp, 0.5_wp, 0.5_wp], [3, 1]), &
+               reshape([0.0_wp, 0.0_wp, 0.0_wp], [3, 1]), blocks, walls, contacts)
+    h = 0.4_wp*thick
+    call check('thick film', film_pull(contacts%lubrication, d/2, h, v), &
+               6*pi*mu*(d/2)**2*v*(1/h - 1/thick), 1.0e-12_wp)
+    h = 1.0e-2_wp*thick
+    ds = (thick - h)/real(n, wp)
+    force = 0.0_wp
+    do i = 1, n
+      s = h + (real(i, wp) - 0.5_wp)*ds
+      force = force + 2*pi*(d/2)*ds*min(p, 3*mu*(d/2)*v/s**2)
+    end do
+    call check('thin film', film_pull(contacts%lubrication, d/2, h, v), force, 1.0e-4_wp*force)
+  end subroutine check_cavitation
 
 end program test_lubrication
