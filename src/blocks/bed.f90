@@ -507,6 +507,7 @@ contains
     type(near_list_t), intent(inout) :: facets, edges   !! work
     real(wp), intent(out) :: distance     !! [m]
     real(wp), intent(out) :: outward(3)   !! 0 where the distance is not exact
+    real(wp), parameter :: least = 0.02_wp   !! share of `far` to begin with
     real(wp) :: reach
 
     reach = near
@@ -523,7 +524,7 @@ contains
       end if
       distance = -far
       if (reach >= far) return
-      reach = min(2*reach, far)
+      reach = min(max(2*reach, least*far), far)
     end do
   end subroutine bed_distance
 
