@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from run_cases import CASES, ROOT, Machine, run
+from run_cases import CASES, ROOT, Machine, prepare, run
 from same_bits import differences
 
 SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
@@ -29,3 +29,14 @@ def test_same_bits(reference: Path, machine: Machine, tmp_path: Path) -> None:
     """Compare every dataset and attribute of every result file."""
     run(CASES / "ranks" / f"{reference.name}.nml", tmp_path / "run", machine)
     assert differences(reference, tmp_path / "run") == []
+
+
+def test_same_bits_over_a_bed(tmp_path: Path) -> None:
+    """Blocks in water on a rough bed; the map is found beside the case."""
+    prepare("bed", tmp_path)
+    case = tmp_path / "short.nml"
+    text = (tmp_path / "drop.nml").read_text().replace("t_end = 0.4", "t_end = 0.05")
+    case.write_text(text.replace("field_interval = 0.1", "field_interval = 0.02"))
+    run(case, tmp_path / "alone", Machine(SERIAL, threads=1))
+    run(case, tmp_path / "shared", Machine(PARALLEL, ranks=2, threads=2))
+    assert differences(tmp_path / "alone", tmp_path / "shared") == []

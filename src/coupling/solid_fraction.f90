@@ -84,6 +84,7 @@ contains
     do b = 1, size(self%body)
       call paint_body(self, grid, b, solid)
     end do
+    if (self%has_bed) call make_way(size(self%body), solid)
     call finish_faces(solid)
     call finish_cells(grid, solid)
     call guard_legs(self, solid)
@@ -404,6 +405,23 @@ contains
       end if
     end associate
   end subroutine shorten_leg
+
+  !> Where bodies press into the bed, b, its share of a face makes way for theirs: what a moving body
+  !! carries through a face has to fit the change of its volume in the cells.
+  pure subroutine make_way(b, solid)
+    integer, intent(in) :: b
+    type(solid_geometry_t), intent(inout) :: solid
+    real(wp) :: excess
+    integer :: m
+
+    do m = solid%body_face(b), solid%body_face(b + 1) - 1
+      associate (f => solid%face(:, m))
+        excess = min(max(-solid%open(f(1), f(2), f(3), f(4)), 0.0_wp), solid%face_beta(m))
+        solid%face_beta(m) = solid%face_beta(m) - excess
+        solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) + excess
+      end associate
+    end do
+  end subroutine make_way
 
   !> Faces that bodies close: no open share is left, and shares above one are scaled down.
   pure subroutine finish_faces(solid)

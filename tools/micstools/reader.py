@@ -189,6 +189,11 @@ class Run:
         return self._read("run.h5", _read_shapes)
 
     @cached_property
+    def bed(self) -> tuple[Array, IntArray]:
+        """Corners (n, 3) [m] and triangles (m, 3) of the bed; none of them without a bed."""
+        return self._read("run.h5", _read_bed)
+
+    @cached_property
     def bodies(self) -> Bodies:
         """The bodies at every complete row."""
         return self._read("run.h5", _read_bodies)
@@ -280,6 +285,12 @@ def _read_shape(name: str, group: h5py.Group) -> Shape:
         inertia=np.asarray(group.attrs["inertia"]).reshape(3, 3),
         density=float(_plain(group.attrs["density"])),
     )
+
+
+def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
+    if "bed" not in h5:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=int)
+    return h5["bed/points"][:], h5["bed/triangles"][:].astype(int)
 
 
 def _read_bodies(h5: h5py.File) -> Bodies:
