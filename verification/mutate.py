@@ -102,7 +102,7 @@ def build(tests: tuple[str, ...]) -> tuple[bool, str]:
     goals = [f"build/serial/{test}" for test in tests if "/" not in test]
     if any("/" in test for test in tests):
         goals.append("mics")
-    return command(["make", "OPT=-O1 -march=native", *goals])
+    return command(["make", "OPT=-O1 -march=native", "LTO=", *goals])
 
 
 def green(test: str) -> bool:
