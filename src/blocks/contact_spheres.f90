@@ -25,6 +25,7 @@ module contact_spheres_m
 
   type :: contact_spheres_t
     real(wp) :: skin = 0.0_wp                  !! pairs nearer than this are listed [m]
+    real(wp) :: clear = 0.0_wp                   !! way of pairs that are not listed to touch [m]
     real(wp) :: free_way = 0.0_wp              !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
@@ -83,7 +84,8 @@ contains
     allocate (self%slot_of(s), source=0)
     if (blocks%n == 0) return
     self%free_way = share*self%smallest
-    self%skin = 2*self%free_way + courant_max*self%smallest
+    self%clear = courant_max*self%smallest
+    self%skin = 2*self%free_way + self%clear
   end subroutine contact_spheres_init
 
   !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.

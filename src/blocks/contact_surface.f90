@@ -17,8 +17,8 @@ module contact_surface_m
   use neighbours_m, only: pair_list_t, near_pairs, reserve
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
-    gather_facets, nearest_on_surface, segment_distance2
-  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, may_cross, way_apart, &
+    gather_facets, nearest_on_surface, search_surface, least_distance, segment_distance2
+  use edge_crossing_m, only: edge_t, crossing_t, cross_edges, turn_before, way_apart, &
     weight_slope
   implicit none
   private
@@ -61,6 +61,7 @@ module contact_surface_m
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
+    real(wp) :: clear = 0.0_wp                   !! way of pairs that are not in it to touch [m]
     type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
     integer, allocatable :: slot(:)              !! (near%n) place of each in `pairs`
     type(pair_t), allocatable :: pairs(:)
@@ -77,7 +78,7 @@ module contact_surface_m
   real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
   real(wp), parameter :: most_skin = 4.0_wp      !! largest skin over the least
   integer, parameter :: lasting_substeps = 10    !! that lists of fast bodies last
-  real(wp), parameter :: wide_share = 0.15_wp    !! skin of the pairs over the largest reach
+  real(wp), parameter :: wide_share = 0.2_wp     !! skin of the pairs over the largest reach
 
 contains
 
@@ -105,7 +106,8 @@ contains
     self%search%skin = skin_share*self%smallest
     self%search%lasting = real(lasting_substeps, wp)*longest_substep
     self%search%ahead = courant_max*self%smallest
-    self%wide_skin = wide_share*maxval(self%reach)
+    self%wide_skin = max(wide_share*maxval(self%reach), 2*self%search%ahead)
+    self%clear = 0.5_wp*self%wide_skin
   end subroutine contact_surface_init
 
   !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.
@@ -155,7 +157,7 @@ contains
     do b = 1, blocks%n
       if (blocks%present(b) .neqv. self%present(b)) return
       if (.not. blocks%present(b)) cycle
-      if (norm(blocks%x(:, b) - self%x(:, b)) > 0.5_wp*(self%wide_skin - self%search%ahead)) return
+      if (norm(blocks%x(:, b) - self%x(:, b)) > 0.5_wp*(self%wide_skin - self%clear)) return
     end do
     yes = .false.
   end function pairs_may_be_missing
@@ -530,8 +532,7 @@ contains
       call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, &
         matmul(turn_b, crossing%normal), crossing%depth, crossing%weight, length, touches)
       if (crossing%weight >= 1.0_wp .or. crossing%depth <= 0.0_wp) cycle
-      call weight_slope(guest, surface_b%edge(pair%edge_b(m)), -gap, length, crossing, &
-        with_shift, with_turn)
+      call weight_slope(guest, surface_b%edge(pair%edge_b(m)), crossing, with_shift, with_turn)
       touches%weight_shift(:, touches%n) = matmul(turn_b, with_shift)
       touches%weight_turn(:, touches%n) = matmul(turn_b, with_turn)
     end do
@@ -607,7 +608,8 @@ contains
     do m = 1, search%guests%n
       place = x + matmul(turn, guest%probe(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
-      call search_surface(host, place, margin, search, distance, outward)
+      if (least_distance(host, place) > margin) cycle
+      call search_surface(host, place, margin, search%facets, search%edges, distance, outward)
       if (distance > margin) cycle
       call append_near(host, skin, guest%ball, search%guests%item(m), place, distance, search, list)
     end do
@@ -654,25 +656,6 @@ contains
     new_low = middle - half
     new_high = middle + half
   end subroutine box_in_axes
-
-  !> Signed distance of a point from the surface of the host, searched in a growing box: exact.
-  subroutine search_surface(host, place, begin, search, distance, outward)
-    type(surface_t), intent(in) :: host
-    real(wp), intent(in) :: place(3), begin   !! host axes; half the first box [m]
-    type(search_t), intent(inout) :: search
-    real(wp), intent(out) :: distance, outward(3)
-    real(wp) :: reach
-
-    reach = begin
-    do
-      call gather_facets(host, place - reach, place + reach, search%facets)
-      call gather_edges(host, place - reach, place + reach, search%edges)
-      call nearest_on_surface(host, place, search%facets%item(:search%facets%n), &
-        search%edges%item(:search%edges%n), distance, outward)
-      if (abs(distance) <= reach .or. reach > 2*host%reach) return
-      reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
-    end do
-  end subroutine search_surface
 
   !> Append a probe with those of the gathered facets and edges that are within reach.
   subroutine append(place, reach, probe, host, search, list)
@@ -723,14 +706,15 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(edge_t) :: guest
-    real(wp) :: reach, angle, low(3), high(3)
+    real(wp) :: reach, reach_both, angle, turn_away, away, low(3), high(3)
     integer :: m, k, i, j
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
     reach = pair%valid + search%ahead + min(surface_a%length, surface_b%length)
     call box_in_axes(transpose(turn), -matmul(x, turn), surface_b%low - reach, &
       surface_b%high + reach, low, high)
-    angle = pair%valid/min(surface_a%reach, surface_b%reach)
+    reach_both = min(surface_a%reach, surface_b%reach)
+    angle = pair%valid/reach_both
     call gather_edges(surface_a, low, high, search%guests)
     do m = 1, search%guests%n
       i = search%guests%item(m)
@@ -746,7 +730,9 @@ contains
         associate (host => surface_b%edge(j))
           if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
                                 host%extent) > reach**2) cycle
-          if (.not. may_cross(guest, host, angle)) cycle
+          turn_away = turn_before(guest, host)
+          if (turn_away >= angle) cycle
+          away = max(way_apart(guest, host, angle), turn_away*reach_both)
         end associate
         pair%n_crossings = pair%n_crossings + 1
         call reserve(pair%n_crossings, pair%edge_a)
@@ -754,7 +740,7 @@ contains
         pair%edge_a(pair%n_crossings) = i
         call reserve(pair%n_crossings, pair%away)
         pair%edge_b(pair%n_crossings) = j
-        pair%away(pair%n_crossings) = way_apart(guest, surface_b%edge(j), angle)
+        pair%away(pair%n_crossings) = away
       end do
     end do
   end subroutine list_crossings

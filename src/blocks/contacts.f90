@@ -9,7 +9,7 @@ module contacts_m
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_partner
-  use neighbours_m, only: reserve
+  use neighbours_m, only: pair_list_t, reserve
   use touches_m, only: touch_t, set_apart
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
@@ -76,6 +76,7 @@ module contacts_m
     type(lubrication_t) :: lubrication
     real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
+    real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
     type(touch_t) :: touches
     type(touch_t) :: soon                        !! those that may come before the substep ends
     type(groups_t) :: groups
@@ -118,10 +119,12 @@ contains
         contacts%surface)
       contacts%reach = contacts%surface%reach
       contacts%smallest = contacts%surface%smallest
+      contacts%clear = contacts%surface%clear
     else
       call contact_spheres_init(input%courant_max, blocks, contacts%spheres)
       contacts%reach = contacts%spheres%reach
       contacts%smallest = contacts%spheres%smallest
+      contacts%clear = contacts%spheres%clear
     end if
     n = blocks%n
     call partners_init(n, contacts%partners)
@@ -154,7 +157,7 @@ contains
     call find_touches(walls, blocks, 0.0_wp, contacts)
     left = dt
     do while (left > 0.0_wp)
-      limit = substep_limit(contacts, blocks, dt)
+      limit = substep_limit(walls, contacts, blocks, dt)
       if (.not. left < limit*real(most_substeps, wp)) then
         report%info = 1
         return
@@ -230,29 +233,73 @@ contains
 
   !> Longest substep allowed now [s].
   !!
-  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the Courant limit of
-  !! eq. (6) with the highest relative speed any two bodies can have, and the limit of stiffness.
-  pure function substep_limit(contacts, blocks, dt) result(limit)
+  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness, and
+  !! the Courant limit of eq. (6) with the highest relative speed any two points can have of two
+  !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
+  pure function substep_limit(walls, contacts, blocks, dt) result(limit)
+    type(walls_t), intent(in) :: walls
     type(contacts_t), intent(in) :: contacts
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt   !! fluid step [s]
     real(wp) :: limit
-    real(wp) :: speed, fastest(2)
+    real(wp) :: speed, near, fastest(2)
     integer :: b
 
     limit = min(contacts%substep_ratio*dt, contacts%longest_substep, stiffness_limit(contacts))
+    if (contacts%exact) then
+      near = fastest_near(blocks, contacts%reach, contacts%surface%near)
+    else
+      near = fastest_near(blocks, contacts%reach, contacts%spheres%near)
+    end if
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
       speed = norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b))*contacts%reach(b)
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
+      if (.not. speed <= near) then
+        if (near_wall(walls, blocks%x(:, b), contacts%reach(b) + contacts%clear)) near = speed
+      end if
     end do
-    speed = sum(fastest)
-    if (.not. speed*limit <= contacts%courant_max*contacts%smallest) then
-      limit = contacts%courant_max*contacts%smallest/speed
+    if (.not. near*limit <= contacts%courant_max*contacts%smallest) then
+      limit = contacts%courant_max*contacts%smallest/near
     end if
+    speed = sum(fastest)
+    if (.not. speed*limit <= contacts%clear) limit = contacts%clear/speed
   end function substep_limit
+
+  !> Highest relative speed of any two points of listed pairs of bodies [m/s].
+  pure function fastest_near(blocks, reach, near) result(fastest)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: reach(:)         !! (bodies) [m]
+    type(pair_list_t), intent(in) :: near
+    real(wp) :: fastest
+    real(wp) :: speed
+    integer :: p
+
+    fastest = 0.0_wp
+    do p = 1, near%n
+      associate (a => near%a(p), b => near%b(p))
+        speed = norm(blocks%v(:, a) - blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
+          + norm(blocks%omega(:, b))*reach(b)
+      end associate
+      if (.not. speed <= fastest) fastest = speed
+    end do
+  end function fastest_near
+
+  !> Whether a wall is within reach of a place.
+  pure function near_wall(walls, x, reach) result(yes)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: x(3), reach   !! [m]
+    logical :: yes
+    integer :: w
+
+    yes = .true.
+    do w = 1, walls%n
+      if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
+    end do
+    yes = .false.
+  end function near_wall
 
   !> Longest substep the present touches allow [s].
   !!

@@ -11,7 +11,7 @@ module edge_crossing_m
   use vectors_m, only: cross
   implicit none
   private
-  public :: edge_t, crossing_t, cross_edges, may_cross, way_apart, weight_slope
+  public :: edge_t, crossing_t, cross_edges, turn_before, way_apart, weight_slope
 
   !> A convex edge, in any axes.
   type :: edge_t
@@ -30,7 +30,8 @@ module edge_crossing_m
 
   real(wp), parameter :: least_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
   real(wp), parameter :: beside = 0.15_wp   !! sine of the angle by which n may leave a fan
-  real(wp), parameter :: share = 0.25_wp    !! of the depth: width in which an end fades
+  real(wp), parameter :: share = 0.5_wp    !! of the depth: width in which an end fades
+  real(wp), parameter :: least_weight = 1.0e-12_wp   !! what is below is nothing
   real(wp), parameter :: least_share = 0.01_wp   !! of the edge: the least such width
 
 contains
@@ -42,7 +43,7 @@ contains
     real(wp), intent(in) :: least             !! <= 0 [m]
     real(wp), intent(in) :: most              !! > 0 [m]
     type(crossing_t), intent(out) :: crossing
-    real(wp) :: d(3), n(3), sine2, depth, s, t, cosine, peak_s, peak_t
+    real(wp) :: d(3), n(3), sine2, depth, s, t, cosine, peak_s, peak_t, ends(2)
 
     associate (u => guest%along, w => host%along)
       d = host%start - guest%start
@@ -64,33 +65,34 @@ contains
       cosine = dot_product(u, w)
       peak_s = s + depth*lean(n, u, host%into)
       peak_t = t + depth*lean(-n, w, guest%into)
-      crossing%weight = crossing%weight*max( &
-        between_ends(peak_s, guest%extent, 0.0_wp, depth) &
-        *between_ends(t + cosine*(peak_s - s), host%extent, depth, depth), &
-        between_ends(peak_t, host%extent, 0.0_wp, depth) &
-        *between_ends(s + cosine*(peak_t - t), guest%extent, depth, depth))
+      ends = [between_ends(peak_s, guest%extent, depth) &
+        *between_ends(t + cosine*(peak_s - s), host%extent, depth), &
+        between_ends(peak_t, host%extent, depth) &
+        *between_ends(s + cosine*(peak_t - t), guest%extent, depth)]
+      crossing%weight = crossing%weight*either(ends)
+      if (crossing%weight < least_weight) crossing%weight = 0.0_wp
       crossing%depth = depth
       crossing%normal = n
       crossing%place = guest%start + s*u - 0.5_wp*depth*n
     end associate
   end subroutine cross_edges
 
-  !> Whether two edges may come to count before one has turned by an angle.
-  pure function may_cross(guest, host, angle) result(yes)
+  !> Angle by which two edges may turn before they can count; zero where they may at once [rad].
+  pure function turn_before(guest, host) result(angle)
     type(edge_t), intent(in) :: guest, host   !! in the same axes
-    real(wp), intent(in) :: angle             !! [rad]
-    logical :: yes
+    real(wp) :: angle
     real(wp), parameter :: safety = 1.5_wp
-    real(wp) :: n(3), sine, most
+    real(wp) :: n(3), sine, outside
 
     n = cross(guest%along, host%along)
     sine = norm2(n)
-    yes = sine < 5*angle
-    if (yes) return
+    angle = 0.0_wp
+    if (sine <= 0.0_wp) return
     n = n/sign(sine, -dot_product(n, host%outward))
-    most = beside + safety*angle*(1.0_wp + 1.0_wp/sine)   ! n turns by angle/sine, the fans by angle
-    yes = all(matmul(n, guest%into) < most) .and. all(matmul(-n, host%into) < most)
-  end function may_cross
+    outside = max(maxval(matmul(n, guest%into)), maxval(matmul(-n, host%into))) - beside
+    ! n turns by angle/sine, the fans by the angle
+    angle = min(0.2_wp*sine, max(0.0_wp, outside)/(safety*(1.0_wp + 1.0_wp/sine)))
+  end function turn_before
 
   !> Way that two bodies may move before two edges of theirs that are apart can cross; zero where
   !! that is hard to say [m].
@@ -125,9 +127,34 @@ contains
     real(wp), intent(in) :: normal(3), into(3, 2)
     real(wp) :: part
 
-    part = 1.0_wp - max(dot_product(normal, into(:, 1)), dot_product(normal, into(:, 2)))/beside
-    part = max(0.0_wp, min(1.0_wp, part))
+    part = fade(1.0_wp - maxval(matmul(normal, into))/beside)
   end function in_fan
+
+  !> From 0 to 1 as x goes from 0 to 1, without a kink: a block would tremble on one.
+  elemental function fade(x) result(part)
+    real(wp), intent(in) :: x
+    real(wp) :: part
+
+    part = max(0.0_wp, min(1.0_wp, x))
+    part = part**2*(3.0_wp - 2*part)
+  end function fade
+
+  !> Change of log(`fade`) with x; zero where `fade` is zero.
+  elemental function fade_slope(x) result(slope)
+    real(wp), intent(in) :: x
+    real(wp) :: slope
+
+    slope = 0.0_wp
+    if (x > 0.0_wp .and. x < 1.0_wp) slope = 6*(1.0_wp - x)/(x*(3.0_wp - 2*x))
+  end function fade_slope
+
+  !> One where one of two is one, zero where both are zero; smooth.
+  pure function either(parts) result(part)
+    real(wp), intent(in) :: parts(2)
+    real(wp) :: part
+
+    part = parts(1) + parts(2) - parts(1)*parts(2)
+  end function either
 
   !> From the place of an edge nearest to another to the place where it is deepest between the two
   !! facets of the other, over the depth [-].
@@ -147,57 +174,143 @@ contains
     if (abs(slope) > 0.0_wp) way = -dot_product(n, into(:, 1) - into(:, 2))/slope
   end function lean
 
-  !> One along an edge, falling to zero towards its ends, from a share of `from` before them.
-  pure function between_ends(place, extent, from, depth) result(part)
+  !> One along an edge, falling to zero at its ends.
+  pure function between_ends(place, extent, depth) result(part)
     real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
-    real(wp), intent(in) :: from, depth     !! [m]
+    real(wp), intent(in) :: depth           !! [m]
     real(wp) :: part
 
-    part = (min(place, extent - place) - share*max(from, 0.0_wp)) &
-      /max(share*depth, least_share*extent)
-    part = max(0.0_wp, min(1.0_wp, part))
+    part = fade(min(place, extent - place)/fade_width(extent, depth))
   end function between_ends
 
-  !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
-  !! about the place of the crossing [1/rad], by small differences.
-  pure subroutine weight_slope(guest, host, least, most, crossing, with_shift, with_turn)
-    type(edge_t), intent(in) :: guest, host
-    real(wp), intent(in) :: least, most             !! [m]
-    type(crossing_t), intent(in) :: crossing
-    real(wp), intent(out) :: with_shift(3), with_turn(3)
-    real(wp), parameter :: turn = 1.0e-6_wp         !! [rad]
-    real(wp) :: axis(3), shift
-    type(crossing_t) :: there
-    type(edge_t) :: moved
-    integer :: k
+  !> Way in which the weight fades at an end of an edge [m].
+  pure function fade_width(extent, depth) result(width)
+    real(wp), intent(in) :: extent, depth   !! [m]
+    real(wp) :: width
 
-    shift = turn*guest%extent
-    do k = 1, 3
-      axis = 0.0_wp
-      axis(k) = 1.0_wp
-      moved = guest
-      moved%start = guest%start + shift*axis
-      call cross_edges(moved, host, least, most, there)
-      with_shift(k) = (there%weight - crossing%weight)/(shift*crossing%weight)
-      moved = turned(guest, crossing%place, turn*axis)
-      call cross_edges(moved, host, least, most, there)
-      with_turn(k) = (there%weight - crossing%weight)/(turn*crossing%weight)
-    end do
+    width = max(share*depth, least_share*extent)
+  end function fade_width
+
+  !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
+  !! about the place of the crossing [1/rad].
+  !!
+  !! The lines of `cross_edges` backwards: `by_x` is the change of log(weight) with x.
+  pure subroutine weight_slope(guest, host, crossing, with_shift, with_turn)
+    type(edge_t), intent(in) :: guest, host         !! in the same axes
+    type(crossing_t), intent(in) :: crossing        !! of weight > 0 and depth > 0
+    real(wp), intent(out) :: with_shift(3), with_turn(3)
+    real(wp) :: d(3), normal(3), sine2, s, t, cosine, lean_s, lean_t, steep(3), steepness
+    real(wp) :: by_n(3), by_normal(3), by_d(3), by_u(3), by_into(3, 2)
+    real(wp) :: by_s, by_t, by_depth, by_lean, by_cosine, by_peak, by_other, by_depths(2), ends(2, 2)
+
+    associate (u => guest%along, w => host%along, n => crossing%normal, depth => crossing%depth)
+      d = host%start - guest%start
+      normal = cross(u, w)
+      sine2 = dot_product(normal, normal)
+      s = dot_product(cross(d, w), normal)/sine2
+      t = dot_product(cross(d, u), normal)/sine2
+      cosine = dot_product(u, w)
+      lean_s = lean(n, u, host%into)
+      lean_t = lean(-n, w, guest%into)
+      ends(1, 1) = between_ends(s + depth*lean_s, guest%extent, depth)
+      ends(2, 1) = between_ends(t + cosine*depth*lean_s, host%extent, depth)
+      ends(1, 2) = between_ends(t + depth*lean_t, host%extent, depth)
+      ends(2, 2) = between_ends(s + cosine*depth*lean_t, guest%extent, depth)
+
+      by_n = 0.0_wp
+      by_into = 0.0_wp
+      call fan_slope(n, guest%into, by_n, by_into)
+      by_normal = 0.0_wp
+      call fan_slope(-n, host%into, by_normal)
+      by_n = by_n - by_normal
+
+      ! the peak of the guest in the host
+      call end_slope(s + depth*lean_s, guest%extent, depth, by_peak, by_depths(1))
+      call end_slope(t + cosine*depth*lean_s, host%extent, depth, by_other, by_depths(2))
+      call share_of_either(product(ends, 1), 1, by_peak, by_other, by_depths)
+      by_s = by_peak
+      by_t = by_other
+      by_depth = lean_s*(by_peak + cosine*by_other) + sum(by_depths)
+      by_cosine = by_other*depth*lean_s
+      by_lean = depth*(by_peak + cosine*by_other)
+      by_u = 0.0_wp
+      steep = host%into(:, 1) - host%into(:, 2)
+      steepness = dot_product(u, steep)
+      if (abs(steepness) > 0.0_wp) then
+        by_n = by_n - by_lean/steepness*steep
+        by_u = -by_lean*lean_s/steepness*steep
+      end if
+
+      ! the peak of the host in the guest
+      call end_slope(t + depth*lean_t, host%extent, depth, by_peak, by_depths(1))
+      call end_slope(s + cosine*depth*lean_t, guest%extent, depth, by_other, by_depths(2))
+      call share_of_either(product(ends, 1), 2, by_peak, by_other, by_depths)
+      by_t = by_t + by_peak
+      by_s = by_s + by_other
+      by_depth = by_depth + lean_t*(by_peak + cosine*by_other) + sum(by_depths)
+      by_cosine = by_cosine + by_other*depth*lean_t
+      by_lean = depth*(by_peak + cosine*by_other)
+      steep = guest%into(:, 1) - guest%into(:, 2)
+      steepness = dot_product(w, steep)
+      if (abs(steepness) > 0.0_wp) then
+        by_n = by_n + by_lean/steepness*steep
+        steep = by_lean/steepness*(n - lean_t*w)
+        by_into(:, 1) = by_into(:, 1) + steep
+        by_into(:, 2) = by_into(:, 2) - steep
+      end if
+
+      by_n = by_n - by_depth*d
+      by_d = -by_depth*n + (by_s*cross(w, normal) + by_t*cross(u, normal))/sine2
+      by_normal = (by_s*cross(d, w) + by_t*cross(d, u) - 2*(by_s*s + by_t*t)*normal)/sine2 &
+        + (by_n - dot_product(by_n, n)*n)/sign(sqrt(sine2), dot_product(normal, n))
+      by_u = by_u + by_cosine*w + by_t*cross(normal, d)/sine2 + cross(w, by_normal)
+
+      with_shift = -by_d
+      with_turn = cross(guest%start - crossing%place, -by_d) + cross(u, by_u) &
+        + cross(guest%into(:, 1), by_into(:, 1)) + cross(guest%into(:, 2), by_into(:, 2))
+    end associate
   end subroutine weight_slope
 
-  !> An edge turned about a place by a small angle.
-  pure function turned(edge, place, angle) result(moved)
-    type(edge_t), intent(in) :: edge
-    real(wp), intent(in) :: place(3), angle(3)   !! [m], [rad]
-    type(edge_t) :: moved
+  !> Change of log(`in_fan`) with the normal, and with the directions into the facets; added.
+  pure subroutine fan_slope(normal, into, by_normal, by_into)
+    real(wp), intent(in) :: normal(3), into(3, 2)
+    real(wp), intent(inout) :: by_normal(3)
+    real(wp), intent(inout), optional :: by_into(3, 2)
+    real(wp) :: slope
     integer :: i
 
-    moved = edge
-    moved%start = edge%start + cross(angle, edge%start - place)
-    moved%along = edge%along + cross(angle, edge%along)
-    do i = 1, 2
-      moved%into(:, i) = edge%into(:, i) + cross(angle, edge%into(:, i))
-    end do
-  end function turned
+    i = merge(1, 2, dot_product(normal, into(:, 1)) > dot_product(normal, into(:, 2)))
+    slope = -fade_slope(1.0_wp - dot_product(normal, into(:, i))/beside)/beside
+    by_normal = by_normal + slope*into(:, i)
+    if (present(by_into)) by_into(:, i) = by_into(:, i) + slope*normal
+  end subroutine fan_slope
+
+  !> Change of log(`between_ends`) with the place and with the depth [1/m]; zero where it is zero.
+  pure subroutine end_slope(place, extent, depth, by_place, by_depth)
+    real(wp), intent(in) :: place, extent, depth   !! as in `between_ends`
+    real(wp), intent(out) :: by_place, by_depth
+    real(wp) :: x, width, slope
+
+    width = fade_width(extent, depth)
+    x = min(place, extent - place)/width
+    by_place = 0.0_wp
+    by_depth = 0.0_wp
+    slope = fade_slope(x)/width
+    by_place = sign(slope, 0.5_wp*extent - place)
+    if (share*depth > least_share*extent) by_depth = -share*x*slope
+  end subroutine end_slope
+
+  !> From changes of log(parts(which)) to those of log(`either`).
+  pure subroutine share_of_either(parts, which, by_peak, by_other, by_depths)
+    real(wp), intent(in) :: parts(2)
+    integer, intent(in) :: which
+    real(wp), intent(inout) :: by_peak, by_other, by_depths(2)
+    real(wp) :: ratio
+
+    ratio = parts(which)*(1.0_wp - parts(3 - which))/max(either(parts), tiny(1.0_wp))
+    by_peak = ratio*by_peak
+    by_other = ratio*by_other
+    by_depths = ratio*by_depths
+  end subroutine share_of_either
 
 end module edge_crossing_m

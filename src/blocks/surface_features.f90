@@ -12,7 +12,7 @@ module surface_features_m
   implicit none
   private
   public :: surface_t, surface_init, near_list_t, gather_probes, gather_edges, gather_facets, &
-    nearest_on_surface, segment_distance2, nowhere, pair_edges
+    nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere, pair_edges
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
@@ -30,6 +30,8 @@ module surface_features_m
     integer :: n_convex = 0
     real(wp), allocatable :: end_outward(:, :, :)   !! (3, 2, n) outward at the start, at the end
     type(bins_t) :: probes, facets, edges
+    real(wp) :: net_step(3) = 1.0_wp             !! of a net over the bounding box [m]
+    real(wp), allocatable :: net(:, :, :)        !! signed distance at its nodes, from 0 [m]
   end type surface_t
 
   !> Numbers found by a search, each once, ascending.
@@ -74,6 +76,7 @@ contains
     call make_edges(shape, edge, point_normal, surface)
     call make_probes(shape, juts, surface)
     call sort_into_bins(shape, surface)
+    call make_net(surface)
   end subroutine surface_init
 
   !> Planes and sides of the facets.
@@ -481,6 +484,59 @@ contains
       end associate
     end do
   end subroutine nearest_on_surface
+
+  !> Signed distance of a point from the surface, searched in a growing box: exact.
+  subroutine search_surface(surface, x, begin, facets, edges, distance, outward)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: x(3), begin              !! body axes; half the first box [m]
+    type(near_list_t), intent(inout) :: facets, edges    !! work
+    real(wp), intent(out) :: distance, outward(3)    !! [m], see `nearest_on_surface`
+    real(wp) :: reach
+
+    reach = begin
+    do
+      call gather_facets(surface, x - reach, x + reach, facets)
+      call gather_edges(surface, x - reach, x + reach, edges)
+      call nearest_on_surface(surface, x, facets%item(:facets%n), edges%item(:edges%n), distance, &
+        outward)
+      if (abs(distance) <= reach .or. reach > 2*surface%reach) return
+      reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
+    end do
+  end subroutine search_surface
+
+  !> Signed distance at the nodes of a net over the bounding box.
+  subroutine make_net(surface)
+    type(surface_t), intent(inout) :: surface
+    integer, parameter :: most_steps = 24   ! along the longest side
+    type(near_list_t) :: facets, edges
+    real(wp) :: x(3), outward(3), step
+    integer :: n(3), i, j, k
+
+    step = maxval(surface%high - surface%low)/real(most_steps, wp)
+    n = max(1, ceiling((surface%high - surface%low)/step))
+    surface%net_step = max((surface%high - surface%low)/real(n, wp), tiny(1.0_wp))
+    allocate (surface%net(0:n(1), 0:n(2), 0:n(3)))
+    do k = 0, n(3)
+      do j = 0, n(2)
+        do i = 0, n(1)
+          x = surface%low + surface%net_step*real([i, j, k], wp)
+          call search_surface(surface, x, step, facets, edges, surface%net(i, j, k), outward)
+        end do
+      end do
+    end do
+  end subroutine make_net
+
+  !> The signed distance of a point from the surface is not below this [m].
+  pure function least_distance(surface, x) result(least)
+    type(surface_t), intent(in) :: surface
+    real(wp), intent(in) :: x(3)   !! body axes [m]
+    real(wp) :: least
+    integer :: n(3)
+
+    n = nint(min(max((x - surface%low)/surface%net_step, 0.0_wp), real(ubound(surface%net), wp)))
+    ! it changes by no more than the way from the node to the point
+    least = surface%net(n(1), n(2), n(3)) - norm(x - surface%low - surface%net_step*real(n, wp))
+  end function least_distance
 
   !> Square of the distance of two segments from p along u (unit) for a, from q along w for b [m2].
   pure function segment_distance2(p, u, a, q, w, b) result(square)
