@@ -8,7 +8,7 @@ module contacts_m
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
   use walls_m, only: walls_t, floor_wall
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_is_near, bed_partner
   use neighbours_m, only: pair_list_t, reserve
   use touches_m, only: touch_t, set_apart
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
@@ -233,8 +233,8 @@ contains
 
   !> Longest substep allowed now [s].
   !!
-  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness, and
-  !! the Courant limit of eq. (6) with the highest relative speed any two points can have of two
+  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness,
+  !! and the Courant limit of eq. (6) with the highest relative speed any two points can have of two
   !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
   pure function substep_limit(walls, contacts, blocks, dt) result(limit)
     type(walls_t), intent(in) :: walls
@@ -287,7 +287,7 @@ contains
     end do
   end function fastest_near
 
-  !> Whether a wall is within reach of a place.
+  !> Whether a wall or the bed is within reach of a place.
   pure function near_wall(walls, x, reach) result(yes)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: x(3), reach   !! [m]
@@ -298,7 +298,8 @@ contains
     do w = 1, walls%n
       if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
     end do
-    yes = .false.
+    yes = walls%bed%there
+    if (yes) yes = bed_is_near(walls%bed, x - reach, x + reach)
   end function near_wall
 
   !> Longest substep the present touches allow [s].

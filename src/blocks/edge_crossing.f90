@@ -201,7 +201,8 @@ contains
     real(wp), intent(out) :: with_shift(3), with_turn(3)
     real(wp) :: d(3), normal(3), sine2, s, t, cosine, lean_s, lean_t, steep(3), steepness
     real(wp) :: by_n(3), by_normal(3), by_d(3), by_u(3), by_into(3, 2)
-    real(wp) :: by_s, by_t, by_depth, by_lean, by_cosine, by_peak, by_other, by_depths(2), ends(2, 2)
+    real(wp) :: by_s, by_t, by_depth, by_lean, by_cosine, by_peak, by_other, by_depths(2)
+    real(wp) :: ends(2, 2)
 
     associate (u => guest%along, w => host%along, n => crossing%normal, depth => crossing%depth)
       d = host%start - guest%start

@@ -406,8 +406,8 @@ contains
     end associate
   end subroutine shorten_leg
 
-  !> Where bodies press into the bed, b, its share of a face makes way for theirs: what a moving body
-  !! carries through a face has to fit the change of its volume in the cells.
+  !> Where bodies press into the bed, b, its share of a face makes way for theirs: what a moving
+  !! body carries through a face has to fit the change of its volume in the cells.
   pure subroutine make_way(b, solid)
     integer, intent(in) :: b
     type(solid_geometry_t), intent(inout) :: solid

@@ -15,7 +15,8 @@ program advect_surface
   use liquid_fill_m, only: liquid_volume
   use box_solid_m, only: simple_grid
   implicit none
-  integer, parameter :: plane(3) = [50, 100, 200], vortex(3) = [32, 64, 128], space(3) = [32, 48, 64]
+  integer, parameter :: plane(3) = [50, 100, 200]
+  integer, parameter :: vortex(3) = [32, 64, 128], space(3) = [32, 48, 64]
   real(wp), parameter :: courant = 0.25_wp   !! of the sum over the directions
   integer :: m
 
