@@ -1,0 +1,45 @@
+"""Restitution of a ball under water against that asked for, and how it depends on the step."""
+
+import numpy as np
+
+from micstools.checks import Checks, sound
+from micstools.reader import Run
+
+VARIES = ("contact restitution",)
+BAND = 0.05
+LATER = 3.0e-3  # s after the contact
+
+
+def restitution(run: Run) -> float:
+    """Speed shortly after the touch over the speed before."""
+    b = run.bodies
+    speed = b.velocity[:, 0, 2]
+    touching = np.flatnonzero(b.contacts[:, 0] > 0)
+    after = float(np.interp(b.time[touching[-1]] + LATER, b.time, speed))
+    return -after / float(speed[touching[0] - 1])
+
+
+def check(runs: list[Run]) -> Checks:
+    """The short step must give the restitution; the longer ones are shown."""
+    checks, found = Checks("bounce under water"), []
+    wanted = 0.9
+    for run in runs:
+        wanted = float(run.value("contact", "restitution", 0.3))
+        share = float(run.value("run", "dt", 0.0)) / float(
+            run.value("contact", "contact_time", 2e-3)
+        )
+        value = restitution(run)
+        name = f"step {share:g} contact times: restitution"
+        checks.close(name, value, wanted, BAND, counts=share < 0.2)
+        found.append((share, value))
+        sound(run, checks)
+    steps, values = zip(*sorted(found), strict=True)
+    checks.figure(
+        "restitution under water",
+        "step / contact time",
+        "-",
+        {"ours": (steps, values)},
+        {"asked for": ([0.0, max(steps)], [wanted] * 2)},
+        smooth=True,
+    )
+    return checks
