@@ -33,7 +33,7 @@ module time_step_m
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
-  use buoyancy_m, only: displaced_force
+  use buoyancy_m, only: displaced_force, displaced_mass
   use coupling_m, only: advance_velocity, note_start
   use clock_m, only: clock_t, clock_init
   use surface_tension_m, only: capillary_step
@@ -160,6 +160,7 @@ contains
     call choose_step(sim, report)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                dt => sim%clock%dt)
+      if (sim%wet) call know_added_mass(sim)
       if (sim%wet) call note_start(case, grid, sim%solid, flow, blocks, sim%stage)
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
@@ -246,6 +247,33 @@ contains
       sim%felt(b) = .true.
     end do
   end subroutine first_force
+
+  !> Fluid that moves along with each body in an impact: of what it displaces, as much as with a
+  !! sphere that touches a wall and moves normal to it.
+  !!
+  !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
+  !! no part. Too large a mass would swing from step to step, hence the limit.
+  subroutine know_added_mass(sim)
+    type(simulation_t), intent(inout) :: sim
+    real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
+    real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
+    real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
+    real(wp) :: push
+    integer :: b
+
+    call copy_motion(sim%blocks, sim%stage%bodies)
+    associate (blocks => sim%blocks)
+      call displaced_mass(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
+                          sim%stage%buoyancy, blocks%added_mass)
+      do b = 1, blocks%n
+        push = norm2(blocks%contact_force(:, b))
+        blocks%added_mass(b) = min(coefficient*blocks%added_mass(b), largest*blocks%mass(b))
+        if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(sim%case%fluid%gravity)) then
+          blocks%added_mass(b) = 0.0_wp
+        end if
+      end do
+    end associate
+  end subroutine know_added_mass
 
   !> The present solids become those of the start of the step.
   subroutine swap_solids(sim)

@@ -74,6 +74,8 @@ module contacts_m
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
     type(lubrication_t) :: lubrication
+    real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
+    real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
     real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
@@ -131,6 +133,7 @@ contains
     allocate (contacts%force(3, -7:n), contacts%torque(3, -7:n), source=0.0_wp)
     allocate (contacts%impulse(3, -7:n), contacts%twist(3, -7:n), source=0.0_wp)
     allocate (contacts%response%frequency2(-7:n), contacts%response_soon%frequency2(-7:n))
+    allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
@@ -150,6 +153,7 @@ contains
     real(wp) :: left, dt_b, limit
 
     call begin_step(blocks)
+    call share_with_fluid(blocks, contacts%share, contacts%steady)
     contacts%impulse = 0.0_wp
     contacts%twist = 0.0_wp
     contacts%n_met = 0
@@ -213,23 +217,45 @@ contains
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
+    integer :: b
 
     call note_partners(contacts)
     call match_springs(contacts)
     call stretch_springs(0.5_wp*dt_b, contacts)
-    call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
+    call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
     call know_motion(blocks, contacts%partners)
     call sum_forces(dt_b, contacts, report)
     if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
                                                     contacts%force)
     contacts%impulse = contacts%impulse + dt_b*contacts%force
     contacts%twist = contacts%twist + dt_b*contacts%torque
+    do b = 1, blocks%n
+      contacts%force(:, b) = contacts%share(b)*contacts%force(:, b)
+    end do
     call kick([0.0_wp, 0.0_wp, 0.0_wp], dt_b, contacts%force(:, 1:), contacts%torque(:, 1:), blocks)
-    call kick(gravity, 0.5_wp*dt_b, blocks%fluid_force, blocks%fluid_torque, blocks)
+    call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
     call know_motion(blocks, contacts%partners)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call drift(0.5_wp*dt_b, blocks)
   end subroutine finish_substep
+
+  !> The part of a contact force that moves a body, and what else acts on it all through the step.
+  !!
+  !! A body M carries fluid M_a along, so a new contact force F changes its velocity by
+  !! F/(M + M_a); the rest of F reaches the fluid when the step ends. The fluid force of the step
+  !! before holds that part of the contact force of then, which is made good: a force that lasts
+  !! acts in full.
+  pure subroutine share_with_fluid(blocks, share, steady)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(inout) :: share(:)       !! (n) [-]
+    real(wp), intent(inout) :: steady(:, :)   !! (3, n) [N]
+    integer :: b
+
+    do b = 1, blocks%n
+      share(b) = blocks%mass(b)/(blocks%mass(b) + blocks%added_mass(b))
+      steady(:, b) = blocks%fluid_force(:, b) + (1.0_wp - share(b))*blocks%contact_force(:, b)
+    end do
+  end subroutine share_with_fluid
 
   !> Longest substep allowed now [s].
   !!
@@ -336,7 +362,8 @@ contains
       partners%v(:, walls%number(w)) = walls%velocity(:, w)
     end do
     do b = 1, blocks%n
-      partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/blocks%mass(b), blocks%fixed(b))
+      partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/(blocks%mass(b) &
+                                                       + blocks%added_mass(b)), blocks%fixed(b))
     end do
   end subroutine know_partners
 

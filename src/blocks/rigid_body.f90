@@ -26,6 +26,7 @@ module rigid_body_m
     real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, shapes) body axes [1/(kg m2)]
     integer, allocatable :: shape(:)             !! (n) index into shapes
     real(wp), allocatable :: mass(:)             !! (n) [kg]
+    real(wp), allocatable :: added_mass(:)       !! (n) fluid that moves along in an impact [kg]
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
     logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
@@ -100,7 +101,7 @@ contains
     allocate (blocks%inverse_inertia(3, 3, size(blocks%shapes)), source=0.0_wp)
     allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
     allocate (blocks%fixed(n), blocks%present(n), source=.false.)
-    allocate (blocks%mass(n), blocks%release_time(n), source=0.0_wp)
+    allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), source=0.0_wp)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
       source=0.0_wp)
     allocate (blocks%given_v(3, n), blocks%given_omega(3, n), source=0.0_wp)

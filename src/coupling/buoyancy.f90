@@ -26,7 +26,7 @@ module buoyancy_m
   use exact_sum_m, only: exact_sums
   implicit none
   private
-  public :: buoyancy_t, buoyancy_init, displaced_force, hydrostatic_correction
+  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_mass, hydrostatic_correction
 
   real(wp), parameter :: pure_share = 1.0e-12_wp   !! shares this close to 0 or 1 have no surface
 
@@ -63,6 +63,37 @@ contains
       force(:, b) = exact_sums(self%work(1:n, :))
     end do
   end subroutine displaced_force
+
+  !> Mass of the fluid in the place of each body, the surface in a cell not looked at [kg].
+  subroutine displaced_mass(grid, fluid, solid, bodies, c, self, mass)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
+    type(buoyancy_t), intent(inout) :: self
+    real(wp), intent(out) :: mass(:)   !! (bodies)
+    real(wp) :: total(6)
+    integer :: b, m, n, i(3)
+
+    mass = 0.0_wp
+    do b = 1, bodies%n
+      if (.not. bodies%present(b)) cycle
+      call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
+      n = 0
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        i = solid%cell(:, m)
+        if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+        n = n + 1
+        self%work(n, :) = 0.0_wp
+        self%work(n, 1) = solid%cell_alpha(m)*grid%volume*(fluid%gas_density &
+          + (fluid%liquid_density - fluid%gas_density)*c(i(1), i(2), i(3)))
+      end do
+      total = exact_sums(self%work(1:n, :))
+      mass(b) = total(1)
+    end do
+  end subroutine displaced_mass
 
   !> Buoyancy of the true displaced fluid less the hydrostatic part of the face pressures, per body.
   subroutine hydrostatic_correction(grid, fluid, solid, bodies, flux, c, rho, self, force)

@@ -53,6 +53,7 @@ contains
     call check_momentum()
     call check_energy()
     call check_constants()
+    call check_added_mass()
     call check_moving_partners()
     call check_periodic_image()
     call check_bookkeeping()
@@ -151,6 +152,33 @@ contains
     end do
     call check('duration of the impact', duration, world%case%contact%contact_time, 1.0e-4_wp)
   end subroutine check_bouncing_ball
+
+  !> A ball that carries fluid along: restitution and momentum are those of both, and a force that
+  !! lasts acts in full.
+  subroutine check_added_mass()
+    type(world_t) :: world
+    real(wp) :: impulse, weight
+
+    call new_world(world, 1, 'ball')
+    world%case%contact%restitution = 0.9_wp
+    world%case%body(1)%position(3) = 0.5_wp*d + 1.0e-4_wp
+    world%case%body(1)%velocity(3) = -0.8_wp
+    call start(world)
+    world%blocks%added_mass(1) = 0.25_wp*world%blocks%mass(1)
+    call run(world, 1, 4.0e-3_wp)
+    call check('restitution with added mass', world%blocks%v(3, 1)/0.8_wp, 0.9_wp, 0.01_wp)
+    impulse = world%blocks%contact_force(3, 1)*4.0e-3_wp
+    call check('impulse on ball and fluid', impulse, 1.25_wp*world%blocks%mass(1) &
+               *(world%blocks%v(3, 1) + 0.8_wp), 1.0e-12_wp)
+    weight = world%blocks%mass(1)*g
+    world%blocks%x(3, 1) = 0.5_wp
+    world%blocks%v = 0.0_wp
+    world%blocks%contact_force(:, 1) = [0.0_wp, 0.0_wp, weight]
+    world%gravity = [0.0_wp, 0.0_wp, -g]
+    call run(world, 1)
+    call check('what the fluid took of the last force', world%blocks%v(3, 1), -dt*g/1.25_wp, &
+               1.0e-12_wp)
+  end subroutine check_added_mass
 
   !> Two balls, head on; and off centre, where only the normal velocity is reversed.
   subroutine check_colliding_balls()
