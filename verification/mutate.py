@@ -78,7 +78,7 @@ def copy_tree() -> None:
         venv.symlink_to(ROOT / ".venv")
 
 
-def command(arguments: list[str | Path]) -> tuple[bool, str]:
+def command(arguments: list[str | Path], patience: float = PATIENCE) -> tuple[bool, str]:
     """Run in the scratch tree; whether it ended well in time, and its output."""
     try:
         done = subprocess.run(
@@ -89,7 +89,7 @@ def command(arguments: list[str | Path]) -> tuple[bool, str]:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            timeout=PATIENCE,
+            timeout=patience,
             env={**os.environ, "MAKEFLAGS": "", "MAKELEVEL": "0"},
         )
     except subprocess.TimeoutExpired:
@@ -97,12 +97,12 @@ def command(arguments: list[str | Path]) -> tuple[bool, str]:
     return done.returncode == 0, done.stdout
 
 
-def build(tests: tuple[str, ...]) -> tuple[bool, str]:
+def build(tests: tuple[str, ...], patience: float = PATIENCE) -> tuple[bool, str]:
     """Compile what the tests need, with little optimisation to save time."""
     goals = [f"build/serial/{test}" for test in tests if "/" not in test]
     if any("/" in test for test in tests):
         goals.append("mics")
-    return command(["make", "OPT=-O1 -march=native", "LTO=", *goals])
+    return command(["make", "OPT=-O1 -march=native", "LTO=", *goals], patience)
 
 
 def green(test: str) -> bool:
@@ -145,7 +145,7 @@ def main() -> int:
 
     copy_tree()
     tests = tuple(sorted({test for m in chosen for test in m.tests}))
-    built, output = build(tests)
+    built, output = build(tests, 12 * PATIENCE)
     if not built:
         print(f"the unbroken program does not compile\n{output[-3000:]}")
         return 1
