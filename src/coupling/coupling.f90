@@ -6,6 +6,7 @@ module coupling_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use surface_tension_m, only: find_tension
+  use face_memory_m, only: note_deviation
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
@@ -17,7 +18,8 @@ module coupling_m
 
 contains
 
-  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration.
+  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration, else
+  !! how the faces at the surface differ from the cells.
   subroutine note_start(case, grid, solid, flow, blocks, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -26,7 +28,12 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(stage_t), intent(inout) :: stage
 
-    if (.not. stage%implicit_momentum) return
+    if (.not. stage%implicit_momentum) then
+      if (case%numerics%coupling == 'monolithic') then
+        call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
+      end if
+      return
+    end if
     call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
     if (case%numerics%coupling == 'mics') then
       call copy_motion(blocks, stage%bodies)

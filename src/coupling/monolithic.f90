@@ -75,7 +75,7 @@ contains
 
       call fill_velocity_halo(grid, flow%u)
       call halo_exchange(p%a_cell, n_halo)
-      call predict_face_velocity(grid, dt, flow%rho, p%a_face, p%a_cell, flow)
+      call predict_face_velocity(grid, dt, flow%rho, p%a_face, p%a_cell, flow, self%deviation)
       call face_velocity_at_walls(grid, solid, self%at_start, dt, flow%rho, p%a_face, p%a_cell, &
                                   flow)
       call renew_acceleration(dt, flow, self)

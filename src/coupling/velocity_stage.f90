@@ -44,6 +44,7 @@ module velocity_stage_m
     real(wp), allocatable :: u_before(:, :, :, :)
       !! velocity before the predictor of the mixture [m/s]
     real(wp), allocatable :: a_stress(:, :, :, :)   !! acceleration by the surface stress [m/s2]
+    real(wp), allocatable :: deviation(:, :, :, :)  !! of the faces at the start (`face_memory_m`)
   end type stage_t
 
 contains
@@ -71,7 +72,7 @@ contains
     allocate (self%terms(0, 6))
     allocate (self%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%a_stress, source=self%u_before)
+    allocate (self%a_stress, self%deviation, source=self%u_before)
   end subroutine stage_init
 
   !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and

@@ -387,10 +387,13 @@ contains
   !! keeps the
   !! steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
   !!
+  !! `deviation` is what a face at the surface differed from its cells before (`face_memory_m`). It
+  !! fades with viscosity like the rest that the cells do not see.
+  !!
   !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
   !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
   !! that `a_face` does not hold, so half of it goes to the cell, too.
-  subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow)
+  subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow, deviation)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
@@ -400,6 +403,9 @@ contains
       contiguous :: a_face, a_cell
         !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
+    real(wp), intent(in), contiguous, optional :: deviation(grid%lo(1) - n_halo:, grid%lo(2) &
+                                                            - n_halo:, grid%lo(3) - n_halo:, :)
+      !! [m/s]
     integer :: i, j, k, d, e(3)
     real(wp) :: nu
 
@@ -415,6 +421,8 @@ contains
               flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
                 + face_step(grid, dt, nu)*(a_face(i, j, k, d) - face_mean(a_cell(il, jl, kl, d), &
                     a_cell(i, j, k, d)))
+              if (present(deviation)) flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
+                + face_step(grid, dt, nu)/dt*deviation(i, j, k, d)
             end associate
           end do
         end do

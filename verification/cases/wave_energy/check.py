@@ -1,0 +1,49 @@
+"""A wave without viscosity keeps its height, wherever its level lies in a cell.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+from micstools.waves import period, standing_amplitude  # noqa: E402
+
+BAND = 0.05  # of the height, in nine periods
+GRAVITY, WAVENUMBER, SPACING = (9.81, 4.0 * np.pi / 0.3, 0.3 / 32.0)
+HEIGHT, ROWS = (1e-5, 21)
+LIQUID, GAS = (1000.0, 1.2)
+
+
+def exact_period(depth: float) -> float:
+    """Linear theory of two layers between floor and lid [s]."""
+    below = LIQUID / np.tanh(WAVENUMBER * depth)
+    above = GAS / np.tanh(WAVENUMBER * (ROWS * SPACING - depth))
+    squared = GRAVITY * WAVENUMBER * (LIQUID - GAS) / (below + above)
+    return float(2.0 * np.pi / squared**0.5)
+
+
+def check(runs: list[Run]) -> Checks:
+    """Largest height in the last half second over that of the start."""
+    checks, ours = Checks("waves without viscosity"), {}
+    for run in runs:
+        name = run.folder.name
+        time, amplitude = standing_amplitude(run, mode=4)
+        left = float(np.abs(amplitude[time > time[-1] - 0.5]).max()) / HEIGHT
+        checks.close(f"{name}: height after nine periods", left, 1.0, BAND)
+        depth = (16.0 + int(name[-2:]) / 100.0) * SPACING
+        exact = exact_period(depth)
+        checks.close(f"{name}: period [s]", period(time, amplitude), exact, 0.05, counts=False)
+        ours[name] = (time, amplitude / HEIGHT)
+        sound(run, checks)
+    checks.figure("height", "t [s]", "a/a0", ours)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
