@@ -1,4 +1,5 @@
-"""Collapse of a column of water: front and height against experiments.
+"""Collapse of a column of water: front and height against experiments and another program, and
+what must hold whatever an experiment does: the exact force at the start, and energy.
 
 usage: python check.py RUN [RUN ...]
 """
@@ -16,6 +17,10 @@ from micstools.reader import Run  # noqa: E402
 
 BAND = 0.05  # of the position of the front
 HEIGHT_BAND = 0.05  # of the initial height
+PROGRAM_BAND = 0.04  # of the front by interFoam on the same grid
+FORCE_BAND = 0.01  # of the impulse of the first rows of fields over the exact force
+ENERGY_GAIN, ENERGY_LOSS = (0.01, 0.05)  # of the potential energy of the start
+GRAVITY, DENSITY = (9.81, 998.2)
 LARGEST_SHIFT = 0.15  # of the time, in units of T: the gate of the experiment
 SIZES = {  # base [m], height over base
     "martin_moyce_1": (0.05715, 1.0),
@@ -54,6 +59,42 @@ def history(run: Run) -> tuple[Values, Values, Values]:
     return np.array(run.field_times), np.array(front), np.array(height)
 
 
+def starting_force(base: float, height: float) -> float:
+    """Force of the wall on the column at the start over its density and width [m3/s2].
+
+    Exact for a liquid at rest without gas: the pressure is harmonic, zero on top and on the free
+    side: rho g (H - z) less a series in cos(k z) cosh(k x).
+    """
+    n = np.arange(100)
+    k = (n + 0.5) * np.pi / height
+    taken = 2.0 / (height * k**3) * (-1.0) ** n / np.cosh(k * base)
+    return float(GRAVITY * (0.5 * height**2 - taken.sum()))
+
+
+def impulse_over_force(run: Run, base: float, height: float) -> float:
+    """Momentum of the water along x at the first row of fields, over exact force and time."""
+    dx, dz = run.grid.spacing[0], run.grid.spacing[2]
+    time = run.field_times[1]
+    fields = run.fields(time)
+    momentum = fields.liquid[:, 0, :].astype(float) * fields.velocity[:, 0, :, 0].astype(float)
+    return float(momentum.sum() * dx * dz / (starting_force(base, height) * time))
+
+
+def energy(run: Run) -> tuple[Values, Values]:
+    """Times [s], and kinetic and potential energy over that of the start."""
+    h, potential, kinetic = run.grid.spacing, [], []
+    for t in run.field_times:
+        share = run.fields(t).liquid[:, 0, :].astype(float)
+        rows, columns = share.shape
+        below = np.vstack([np.ones((1, columns)), share[:-1]])
+        above = np.vstack([share[1:], np.zeros((1, columns))])
+        middle = (np.arange(rows) + 0.5)[:, None] - 0.5 * (1.0 - share) * np.sign(below - above)
+        weight = DENSITY * GRAVITY * float(np.prod(h))
+        potential.append(weight * h[2] * float((share * middle).sum()))
+        kinetic.append(float(np.interp(t, run.series.time, run.series.kinetic_energy_fluid)))
+    return np.array(run.field_times), (np.array(potential) + np.array(kinetic)) / potential[0]
+
+
 def worst(time: Values, value: Values, reference: Values, scale: Values, shift: float) -> float:
     """Largest difference at the times of the reference, over `scale`."""
     found = np.interp(reference[:, 0] + shift, time, value)
@@ -77,6 +118,22 @@ def check(runs: list[Run]) -> Checks:
         shift = float(shifts[int(np.argmin(errors))])
         checks.below(f"{name}: largest error of the front ({len(rows)} points)", min(errors), BAND)
         checks.within(f"{name}: shift of the time", shift, -LARGEST_SHIFT, LARGEST_SHIFT)
+        other = Path(__file__).with_name(f"interfoam_{name}.csv")
+        if other.exists():
+            rows_other = table(other.name)
+            rows_other = rows_other[rows_other[:, 0] <= time[-1]]
+            error = worst(time, front, rows_other, rows_other[:, 1], 0.0)
+            checks.below(f"{name}: largest difference from interFoam", error, PROGRAM_BAND)
+        ratio_force = impulse_over_force(run, base, ratio * base)
+        checks.close(f"{name}: impulse over exact force at the start", ratio_force, 1.0, FORCE_BAND)
+        instants, total = energy(run)
+        free = total[instants <= seconds[front < length - 0.5].max()]
+        checks.within(
+            f"{name}: energy over that of the start",
+            float(free[np.argmax(np.abs(free - 1.0))]),
+            1.0 - ENERGY_LOSS,
+            1.0 + ENERGY_GAIN,
+        )
         if name == "martin_moyce_1":
             drop = table("B1_martin_moyce_height.csv")
             drop = drop[drop[:, 0] <= time[-1] - LARGEST_SHIFT]
