@@ -4,6 +4,7 @@ module lubrication_m
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
+  use bed_m, only: bed_partner
   use neighbours_m, only: nearest_shift
   implicit none
   private
@@ -49,7 +50,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, -6:)          !! (3, -6:n) [N]
+    real(wp), intent(inout) :: force(:, bed_partner:) !! (3, -7:n) of all partners [N]
     real(wp) :: d(3), n(3), f(3), gap, distance, radius
     integer :: a, b, w
 

@@ -1,0 +1,50 @@
+"""Speed of a sphere that settles with a wake against spectral-element results."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from micstools.checks import Checks, sound
+from micstools.reader import Run
+
+HERE = Path(__file__).resolve().parent
+BAND = 0.06
+
+
+def reference() -> dict[str, float]:
+    """Vertical speed over sqrt((s - 1) g D) by run of the source."""
+    lines = (HERE / "reference.csv").read_text().splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return {row["run"]: float(row["u_vertical_over_uref"]) for row in rows}
+
+
+def check(runs: list[Run]) -> Checks:
+    """Speed against the inflow at the end of each run."""
+    checks, known, speeds = Checks("settling sphere with a wake"), reference(), {}
+    exact, curves = known["spectral_L"], {}
+    for run in runs:
+        b, sphere = run.bodies, run.shapes["sphere"]
+        diameter = float(run.value("shape", "size", 1.0))
+        density = float(run.value("fluid", "liquid_density", 998.2))
+        viscosity = float(run.value("fluid", "liquid_viscosity", 1.0)) / density
+        unit = float(np.sqrt((sphere.density / density - 1) * 9.81 * diameter))
+        stream = float(run.value("boundary", "z_min_velocity", [0.0] * 3)[2])
+        speed = (stream - b.velocity[:, 0, 2]) / unit
+        cells = round(diameter / float(run.grid.spacing[2]), 1)
+        name = f"{cells:g} cells per diameter"
+        checks.close(f"{name}: Galileo number", unit * diameter / viscosity, 144.0, 1e-3)
+        late = b.time > 0.9 * b.time[-1]
+        speeds[cells] = float(speed[late].mean())
+        checks.close(f"{name}: speed / sqrt((s - 1) g D)", speeds[cells], exact, BAND, cells > 14)
+        changed = float(np.ptp(speed[late]) / speeds[cells])
+        checks.below(f"{name}: change of speed in the last tenth", changed, 0.01)
+        tilted = float(np.abs(b.velocity[late, 0, :2]).max() / unit)
+        checks.below(f"{name}: sideways speed", tilted, 0.01)
+        curves[name] = (b.time * unit / diameter, speed)
+        sound(run, checks)
+    checks.study("speed / sqrt((s - 1) g D)", speeds, exact, "cells per diameter")
+    ends = [0.0, max((float(t[-1]) for t, _ in curves.values()), default=1.0)]
+    wanted = {"spectral elements": (ends, [exact] * 2)}
+    checks.figure("speed", "t sqrt((s - 1) g/D)", "-", curves, wanted, smooth=True)
+    return checks
