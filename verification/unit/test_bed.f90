@@ -274,7 +274,7 @@ contains
         form%point(:, 3*t - 3 + c) = x + rotate(q, shape%point(:, shape%triangle(c, t)))
       end do
     end do
-    form%triangle = reshape([(c, c=1, 3*n)], [3, n])
+    allocate (form%triangle, source=reshape([(c, c=1, 3*n)], [3, n]))
     form%checksum = ''
   end function form_of
 
