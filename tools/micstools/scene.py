@@ -19,6 +19,7 @@ from micstools.shapes import Shape
 
 Plotter = Any  # pyvista.Plotter, which is imported late
 WATER = "#7fb8e6"
+BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
 DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
 VIEWS = ("front", "side")
@@ -76,6 +77,7 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     row = run.bodies.row(t)
     _add_blocks(plotter, run, row)
     _add_tank(plotter, low, high)
+    _add_bed(plotter, run)
     label = f"t = {run.bodies.time[row]:.2f} s"
     if fields is not None:
         if style.water:
@@ -151,6 +153,38 @@ def _add_tank(plotter: Plotter, low: Array, high: Array) -> None:
     height = high[2] - low[2]
     floor = pv.Box(bounds=[*bounds[:4], low[2] - 0.012 * height, low[2] - 0.002 * height])
     plotter.add_mesh(floor, color="#e8e4dc", ambient=0.4)
+
+
+def _add_bed(plotter: Plotter, run: Run) -> None:
+    """The surface of the bed in the tank, and below its border the sides of the tank."""
+    import pyvista as pv
+
+    points, triangles = run.bed
+    if not len(triangles):
+        return
+    low, high = run.grid.low, run.grid.high
+    threes = np.full((len(triangles), 1), 3)
+    bed = pv.PolyData(points, faces=np.hstack([threes, triangles]).ravel())
+    for d in range(2):
+        for side, at in ((1, low), (-1, high)):
+            normal = np.zeros(3)
+            normal[d] = side
+            bed = bed.clip(normal=normal, origin=at, invert=False)
+    if not bed.n_cells:
+        return
+    plotter.add_mesh(bed, color=BED, smooth_shading=False, ambient=0.3, diffuse=0.8)
+    edges = bed.extract_feature_edges(
+        boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+    )
+    if not edges.n_cells:
+        return
+    plotter.add_mesh(edges, color="#303030", line_width=1.5)
+    ends = np.asarray(edges.lines).reshape(-1, 3)[:, 1:]
+    below = np.array(edges.points)
+    below[:, 2] = low[2]
+    fours = np.column_stack([np.full(len(ends), 4), ends, ends[:, ::-1] + len(below)])
+    walls = pv.PolyData(np.vstack([edges.points, below]), faces=fours.ravel())
+    plotter.add_mesh(walls, color=BED, ambient=0.5, diffuse=0.5)
 
 
 def _point_grid(run: Run, fields: Fields) -> Any:
