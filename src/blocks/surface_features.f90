@@ -418,22 +418,35 @@ contains
     call sort_items(list%item(:list%n))
   end subroutine gather
 
-  !> Ascending order; the lists are short.
+  !> Ascending order, by Shell's method: lists may be long over a fine bed.
   pure subroutine sort_items(item)
+    integer, intent(inout) :: item(:)
+    integer, parameter :: gap(7) = [701, 301, 132, 57, 23, 10, 4]   !! Ciura (2001), and 1
+    integer :: g
+
+    do g = 1, size(gap)
+      if (gap(g) < size(item)) call sort_by_gap(gap(g), item)
+    end do
+    call sort_by_gap(1, item)
+  end subroutine sort_items
+
+  !> Ascending order of the items at places that differ by a gap.
+  pure subroutine sort_by_gap(gap, item)
+    integer, intent(in) :: gap
     integer, intent(inout) :: item(:)
     integer :: i, j, here
 
-    do i = 2, size(item)
+    do i = 1 + gap, size(item)
       here = item(i)
-      j = i - 1
+      j = i - gap
       do while (j >= 1)
         if (item(j) < here) exit
-        item(j + 1) = item(j)
-        j = j - 1
+        item(j + gap) = item(j)
+        j = j - gap
       end do
-      item(j + 1) = here
+      item(j + gap) = here
     end do
-  end subroutine sort_items
+  end subroutine sort_by_gap
 
   !> Signed distance of a point from the listed facets and edges, and the unit vector along which
   !! it grows; `nowhere` where none of them is nearest. Positive outside.

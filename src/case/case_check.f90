@@ -244,7 +244,7 @@ contains
         text = 'reaches '//brief(depth)//' m through the wall '//side_name(s, d)
       end do
       if (len(text) > 0) return
-      text = 'lies in the bed, or reaches more than 1 % of its size into it'
+      text = 'reaches more than 1 % of its size into the bed'
       return
     end if
     do d = 1, 3
