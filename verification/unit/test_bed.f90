@@ -180,7 +180,34 @@ contains
     call check('of the faces in x', worst(2), 0.0_wp, 1.0e-15_wp)
     call check('of the faces in y', worst(3), 0.0_wp, 1.0e-15_wp)
     call check('centres inside', worst(4), 0.0_wp, 0.0_wp)
+    call check('of the faces in z, by points', worst_level_face(grid, solid), 0.0_wp, 0.03_wp)
   end subroutine volume_of_slope
+
+  !> Shares of the faces in z against the points of them that lie under the slope: largest error.
+  function worst_level_face(grid, solid) result(worst)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, parameter :: n = 40   ! points in each direction
+    real(wp) :: worst, x(3)
+    integer :: i, j, k, a, b, below
+
+    worst = 0.0_wp
+    do k = 1, grid%n(3)
+      do j = 1, grid%n(2)
+        do i = 1, grid%n(1)
+          below = 0
+          do b = 1, n
+            do a = 1, n
+              x(1) = grid%face(i, 1) + (real(a, wp) - 0.5_wp)/real(n, wp)*grid%h(1)
+              x(2) = grid%face(j, 2) + (real(b, wp) - 0.5_wp)/real(n, wp)*grid%h(2)
+              if (dot_product(slope, [x(1), x(2), 1.0_wp]) > grid%face(k, 3)) below = below + 1
+            end do
+          end do
+          worst = max(worst, abs(1.0_wp - solid%open(i, j, k, 3) - real(below, wp)/real(n**2, wp)))
+        end do
+      end do
+    end do
+  end function worst_level_face
 
   !> A hexapod as a bed, closed and overhanging, fills the grid as the same hexapod does as a body:
   !! shares, faces, legs, and the liquid below any plane in its cut cells.
