@@ -127,6 +127,8 @@ contains
           x(path(v, t)) = high(path(v, t), b)
           solid%corner(:, v + 1, m) = x
         end do
+        ! every other way along the edges turns the other way round; volumes are positive
+        if (t > 3) solid%corner(:, 2:3, m) = solid%corner(:, [3, 2], m)
       end do
     end do
   end subroutine set_tetrahedra
