@@ -6,80 +6,23 @@ usage: python check.py RUN [RUN ...]
 import sys
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from micstools.checks import main  # noqa: E402
+from micstools.impact_pressure import Experiment  # noqa: E402
 
-ARRIVAL_BAND, PLATEAU_BAND = (0.04, 0.15)
-COUNTS_FROM = 16  # cells to the height of the column
-HEIGHT, DENSITY, GRAVITY = (0.55, 998.2, 9.81)
-LEVEL = 0.4  # rho g H at which the water has arrived; the table has no points between 0.03 and 0.45
-PLATEAU = (3.0, 5.0)  # t sqrt(g/H), after the impact and before the wave comes back
-SENSORS = {"p1": 0.021, "p3": 0.101}  # height above the floor [m]
 FRONT = 2.42  # of the box [m]
 
-Values = NDArray[np.float64]
-
-
-def table(name: str) -> Values:
-    """Time and pressure of a sensor without units."""
-    lines = Path(__file__).with_name(f"B7_kleefsman_{name}.csv").read_text().splitlines()
-    return np.array([[float(v) for v in line.split(",")] for line in lines if line[0] not in "#t"])
-
-
-def history(run: Run) -> tuple[Values, dict[str, Values]]:
-    """Times and pressures at the sensors without units: of the last cells before the box in the
-    middle of the tank, straight lines between their heights."""
-    dx, _, dz = run.grid.spacing
-    last = int(np.floor(FRONT / dx + 0.5)) - 1
-    found: dict[str, list[float]] = {name: [] for name in SENSORS}
-    for t in run.field_times:
-        column = run.fields(t).pressure[:, 0, last].astype(float) / (DENSITY * GRAVITY * HEIGHT)
-        heights = (np.arange(len(column)) + 0.5) * dz
-        for name, height in SENSORS.items():
-            found[name].append(float(np.interp(height, heights, column)))
-    time = np.array(run.field_times) * (GRAVITY / HEIGHT) ** 0.5
-    return time, {name: np.array(values) for name, values in found.items()}
-
-
-def arrival(time: Values, pressure: Values) -> float:
-    """First time at which the pressure passes LEVEL."""
-    i = int(np.flatnonzero(pressure > LEVEL)[0])
-    return float(np.interp(LEVEL, pressure[i - 1 : i + 1], time[i - 1 : i + 1]))
-
-
-def plateau(time: Values, pressure: Values) -> float:
-    """Mean pressure in PLATEAU."""
-    return float(np.interp(np.linspace(*PLATEAU, 200), time, pressure).mean())
-
-
-def check(runs: list[Run]) -> Checks:
-    """Two sensors of each run."""
-    checks, ours = Checks("dam break against a box"), {}
-    for run in runs:
-        cells = round(HEIGHT / run.grid.spacing[2])
-        time, pressures = history(run)
-        for name, pressure in pressures.items():
-            rows = table(name)
-            counts, label = cells >= COUNTS_FROM, f"{run.folder.name}, {name}"
-            exact = arrival(rows[:, 0], rows[:, 1])
-            checks.close(
-                f"{label}: arrival", arrival(time, pressure), exact, ARRIVAL_BAND, counts=counts
-            )
-            exact = plateau(rows[:, 0], rows[:, 1])
-            checks.close(
-                f"{label}: plateau", plateau(time, pressure), exact, PLATEAU_BAND, counts=counts
-            )
-            ours[f"{name}, {cells} cells"] = (time, pressure)
-        sound(run, checks)
-    measured = {name: (table(name)[:, 0], table(name)[:, 1]) for name in SENSORS}
-    checks.figure("pressure", "t sqrt(g/H)", "p/(rho g H)", ours, measured)
-    return checks
-
+BOX = Experiment(
+    title="dam break against a box",
+    tables=str(Path(__file__).with_name("B7_kleefsman_{}.csv")),
+    height=0.55,
+    sensors={"p1": 0.021, "p3": 0.101},
+    level=0.4,  # the table has no points between 0.03 and 0.45
+    plateau=(3.0, 5.0),
+    column=lambda grid: round(FRONT / grid.spacing[0]) - 1,
+    counts_from=16,
+)
 
 if __name__ == "__main__":
-    main(check)
+    main(BOX.check)

@@ -1,0 +1,84 @@
+"""Pressures of a dam break where the water strikes: arrival and plateau against an experiment.
+
+Pressures are over rho g H and times over sqrt(H/g), H the height of the column of water.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micstools.checks import Checks, sound
+from micstools.reader import Grid, Run
+
+ARRIVAL_BAND, PLATEAU_BAND = (0.04, 0.15)
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A dam break with pressure sensors above one another on a surface that faces the water."""
+
+    title: str
+    tables: str  # path of the tables, with {} for the name of a sensor
+    height: float  # of the column of water [m]
+    sensors: dict[str, float]  # height above the floor [m]
+    level: float  # at which the water has arrived
+    plateau: tuple[float, float]  # after the impact and before the wave comes back
+    column: Callable[[Grid], int]  # number in x of the last cells before the surface, from 0
+    counts_from: int  # cells to the height of the column of the coarsest run that counts
+    density: float = 998.2  # [kg/m3]
+    gravity: float = 9.81  # [m/s2]
+
+    def table(self, sensor: str) -> tuple[Values, Values]:
+        """Times and pressures measured."""
+        lines = Path(self.tables.format(sensor)).read_text().splitlines()
+        rows = np.array([line.split(",") for line in lines if line[0] not in "#t"], float)
+        return rows[:, 0], rows[:, 1]
+
+    def history(self, run: Run) -> tuple[Values, dict[str, Values]]:
+        """Times of a run, and pressures at each sensor: of the cells before the surface in the
+        middle of the tank, straight lines between their heights."""
+        column, scale = self.column(run.grid), self.density * self.gravity * self.height
+        found: dict[str, list[float]] = {name: [] for name in self.sensors}
+        for t in run.field_times:
+            pressure = run.fields(t).pressure[:, 0, column].astype(float) / scale
+            heights = (np.arange(len(pressure)) + 0.5) * run.grid.spacing[2]
+            for name, height in self.sensors.items():
+                found[name].append(float(np.interp(height, heights, pressure)))
+        time = np.array(run.field_times) * (self.gravity / self.height) ** 0.5
+        return time, {name: np.array(values) for name, values in found.items()}
+
+    def arrival(self, time: Values, pressure: Values) -> float:
+        """First time at which the pressure passes the level."""
+        i = int(np.flatnonzero(pressure > self.level)[0])
+        return float(np.interp(self.level, pressure[i - 1 : i + 1], time[i - 1 : i + 1]))
+
+    def mean(self, time: Values, pressure: Values) -> float:
+        """Mean pressure of the plateau."""
+        return float(np.interp(np.linspace(*self.plateau, 200), time, pressure).mean())
+
+    def check(self, runs: list[Run]) -> Checks:
+        """Every sensor of each run."""
+        checks, ours = Checks(self.title), {}
+        measured = {name: self.table(name) for name in self.sensors}
+        for run in runs:
+            cells = round(self.height / run.grid.spacing[2])
+            time, pressures = self.history(run)
+            for name, pressure in pressures.items():
+                counts, label = cells >= self.counts_from, f"{run.folder.name}, {name}"
+                for what, value, band in (
+                    ("arrival", self.arrival, ARRIVAL_BAND),
+                    ("plateau", self.mean, PLATEAU_BAND),
+                ):
+                    exact = value(*measured[name])
+                    checks.close(
+                        f"{label}: {what}", value(time, pressure), exact, band, counts=counts
+                    )
+                ours[f"{name}, {cells} cells"] = (time, pressure)
+            sound(run, checks)
+        checks.figure("pressure", "t sqrt(g/H)", "p/(rho g H)", ours, measured)
+        return checks
