@@ -33,7 +33,7 @@ module time_step_m
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
-  use buoyancy_m, only: displaced_force, displaced_mass
+  use buoyancy_m, only: displaced_force, displaced_fluid
   use coupling_m, only: advance_velocity, note_start
   use clock_m, only: clock_t, clock_init
   use surface_tension_m, only: capillary_step
@@ -230,8 +230,7 @@ contains
   end subroutine release
 
   !> A block that has just appeared feels the buoyancy of its place; after each step the fluid
-  !! force of
-  !! that step takes over.
+  !! force of that step takes over.
   subroutine first_force(sim)
     type(simulation_t), intent(inout) :: sim
     integer :: b
@@ -258,19 +257,19 @@ contains
     real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
-    real(wp) :: push
+    real(wp) :: push, displaced, moment(3)
     integer :: b
 
     call copy_motion(sim%blocks, sim%stage%bodies)
     associate (blocks => sim%blocks)
-      call displaced_mass(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
-                          sim%stage%buoyancy, blocks%added_mass)
+      blocks%added_mass = 0.0_wp
       do b = 1, blocks%n
+        if (.not. blocks%present(b)) cycle
         push = norm2(blocks%contact_force(:, b))
-        blocks%added_mass(b) = min(coefficient*blocks%added_mass(b), largest*blocks%mass(b))
-        if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(sim%case%fluid%gravity)) then
-          blocks%added_mass(b) = 0.0_wp
-        end if
+        if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(sim%case%fluid%gravity)) cycle
+        call displaced_fluid(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, b, &
+                             sim%stage%buoyancy, displaced, moment)
+        blocks%added_mass(b) = min(coefficient*displaced, largest*blocks%mass(b))
       end do
     end associate
   end subroutine know_added_mass

@@ -18,9 +18,10 @@ module bed_m
   implicit none
   private
   public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
-  public :: clip_polygon
+  public :: facet_within, clip_polygon, most_corners
 
   integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
+  integer, parameter :: most_corners = 12  !! of a facet cut at five planes, and more
 
   type :: bed_t
     logical :: there = .false.
@@ -313,20 +314,15 @@ contains
     type(bed_t), intent(in) :: bed
     character(:), allocatable, intent(out) :: message
     type(layers_t) :: layers
-    real(wp) :: p(3, 12), low(3), high(3), at(3), top
-    integer :: f, n, k, d, depth
+    real(wp) :: p(3, most_corners), low(3), high(3), at(3), top
+    integer :: f, n, k, depth
 
     message = ''
     low = case%grid%origin
     high = case%grid%origin + case%grid%length
     top = -huge(top)
     do f = 1, size(bed%triangle, 2)
-      p(:, :3) = bed%point(:, bed%triangle(:, f))
-      n = 3
-      do d = 1, 2
-        call clip_polygon(d, low(d), 1.0_wp, n, p)
-        call clip_polygon(d, high(d), -1.0_wp, n, p)
-      end do
+      call facet_within(bed, f, low, high, n, p)
       if (n < 3) cycle
       top = max(top, maxval(p(3, :n)))
       at = sum(p(:, :n), 2)/real(n, wp)
@@ -527,6 +523,23 @@ contains
       reach = min(max(2*reach, least*far), far)
     end do
   end subroutine bed_distance
+
+  !> The part of facet f over a rectangle of the ground plane.
+  pure subroutine facet_within(bed, f, low, high, n, p)
+    type(bed_t), intent(in) :: bed
+    integer, intent(in) :: f
+    real(wp), intent(in) :: low(:), high(:)       !! in x and y first [m]
+    integer, intent(out) :: n                     !! corners, none where they do not meet
+    real(wp), intent(out) :: p(3, most_corners)   !! [m]
+    integer :: d
+
+    p(:, :3) = bed%point(:, bed%triangle(:, f))
+    n = 3
+    do d = 1, 2
+      call clip_polygon(d, low(d), 1.0_wp, n, p)
+      call clip_polygon(d, high(d), -1.0_wp, n, p)
+    end do
+  end subroutine facet_within
 
   !> Keep the part of a convex polygon where side*(x(d) - plane) >= 0; it has one corner more at
   !! most.

@@ -8,7 +8,7 @@
 module bed_solid_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
-  use bed_m, only: bed_t, clip_polygon
+  use bed_m, only: bed_t, facet_within, clip_polygon, most_corners
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: reserve
@@ -16,8 +16,7 @@ module bed_solid_m
   private
   public :: make_bed_solid
 
-  integer, parameter :: most_corners = 12            !! of a triangle cut at five planes, and more
-  real(wp), parameter :: least_tet = 1.0e-15_wp      !! smaller parts are dropped [cells]
+  real(wp), parameter :: least_tet = 1.0e-15_wp   !! smaller parts are dropped [cells]
 
   !> Polygons of the surface, one after the other, and tetrahedra, four corners each; those of
   !! facets that look down have negative volumes.
@@ -47,12 +46,7 @@ contains
     end do
     low(3) = grid%face(0, 3)
     do f = 1, size(bed%triangle, 2)
-      p(:, :3) = bed%point(:, bed%triangle(:, f))
-      n = 3
-      do d = 1, 2
-        call clip_polygon(d, low(d), 1.0_wp, n, p)
-        call clip_polygon(d, high(d), -1.0_wp, n, p)
-      end do
+      call facet_within(bed, f, low, high, n, p)
       call clip_polygon(3, low(3), 1.0_wp, n, p)
       if (n < 3 .or. lies_in_side(p(:, :n), low, high)) cycle
       call add_facet(p(:, :n), parts)

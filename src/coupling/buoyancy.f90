@@ -1,15 +1,12 @@
 !> Exact weight of the fluid that each body displaces, and what the face pressures miss of it.
 !!
-!! The pressure acts on a body through the solid shares of the grid faces, which measure its
-!! volume by
-!! the trapezoid rule: a submerged block would float by the wrong volume, by some per cent at coarse
-!! grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra, cut
-!! by the
-!! plane of the liquid where the surface crosses a body, and only the rest of the pressure force
-!! comes
-!! from the faces. In still water the force on a body is Archimedes' to round-off. The same term
-!! makes
-!! the weight of the fluid that of its true volume, so it closes the momentum of fluid and bodies.
+!! The pressure acts on a body through the solid shares of the grid faces, which measure its volume
+!! by the trapezoid rule: a submerged block would float by the wrong volume, by some per cent at
+!! coarse grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra,
+!! cut by the plane of the liquid where the surface crosses a body, and only the rest of the
+!! pressure force comes from the faces. In still water the force on a body is Archimedes' to
+!! round-off. The same term makes the weight of the fluid that of its true volume, so it closes the
+!! momentum of fluid and bodies.
 module buoyancy_m
   use kinds_m, only: wp
   use vectors_m, only: cross
@@ -26,7 +23,7 @@ module buoyancy_m
   use exact_sum_m, only: exact_sums
   implicit none
   private
-  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_mass, hydrostatic_correction
+  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_fluid, hydrostatic_correction
 
   real(wp), parameter :: pure_share = 1.0e-12_wp   !! shares this close to 0 or 1 have no surface
 
@@ -53,47 +50,17 @@ contains
                                           grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
-    integer :: b, n
+    real(wp) :: mass, moment(3)
+    integer :: b
 
     force = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
-      n = displaced_weight(grid, fluid, solid, bodies, c, b, self%work)
-      force(:, b) = exact_sums(self%work(1:n, :))
+      call displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
+      force(1:3, b) = -mass*fluid%gravity
+      force(4:6, b) = -cross(moment, fluid%gravity)
     end do
   end subroutine displaced_force
-
-  !> Mass of the fluid in the place of each body, the surface in a cell not looked at [kg].
-  subroutine displaced_mass(grid, fluid, solid, bodies, c, self, mass)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    type(solid_geometry_t), intent(in) :: solid
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
-    type(buoyancy_t), intent(inout) :: self
-    real(wp), intent(out) :: mass(:)   !! (bodies)
-    real(wp) :: total(6)
-    integer :: b, m, n, i(3)
-
-    mass = 0.0_wp
-    do b = 1, bodies%n
-      if (.not. bodies%present(b)) cycle
-      call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
-      n = 0
-      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        i = solid%cell(:, m)
-        if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
-        n = n + 1
-        self%work(n, :) = 0.0_wp
-        self%work(n, 1) = solid%cell_alpha(m)*grid%volume*(fluid%gas_density &
-          + (fluid%liquid_density - fluid%gas_density)*c(i(1), i(2), i(3)))
-      end do
-      total = exact_sums(self%work(1:n, :))
-      mass(b) = total(1)
-    end do
-  end subroutine displaced_mass
 
   !> Buoyancy of the true displaced fluid less the hydrostatic part of the face pressures, per body.
   subroutine hydrostatic_correction(grid, fluid, solid, bodies, flux, c, rho, self, force)
@@ -128,21 +95,21 @@ contains
     allocate (self%work(2*n, 6))
   end subroutine make_room
 
-  !> Minus the weight of the fluid in the place of body b, cell by cell, with its torque.
-  function displaced_weight(grid, fluid, solid, bodies, c, b, term) result(n)
+  !> Fluid in the true place of body b: its mass, and its first moment about the centre of mass.
+  subroutine displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
     integer, intent(in) :: b
-    real(wp), intent(inout) :: term(:, :)
-    integer :: n
-    integer :: m, i(3)
-    real(wp) :: mass, moment(3)      !! of the displaced fluid, moment about the centre of mass
-    real(wp) :: liquid, liquid_moment(3), share
+    type(buoyancy_t), intent(inout) :: self
+    real(wp), intent(out) :: mass, moment(3)   !! [kg, kg m]
+    real(wp) :: liquid, liquid_moment(3), share, total(4)
+    integer :: m, n, i(3)
 
+    call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
     n = 0
     do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
       i = solid%cell(:, m)
@@ -150,8 +117,10 @@ contains
       share = c(i(1), i(2), i(3))
       if (share > 1.0_wp - pure_share) share = 1.0_wp
       if (share < pure_share) share = 0.0_wp
+      n = n + 1
       associate (volume => solid%cell_alpha(m)*grid%volume, &
-                 arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)))
+                 arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)), &
+                 gas => fluid%gas_density, more => fluid%liquid_density - fluid%gas_density)
         if (share > 0.0_wp .and. share < 1.0_wp) then
           call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
                                                        c, i(1), i(2), i(3)), &
@@ -160,18 +129,16 @@ contains
           liquid = share*volume
           liquid_moment = liquid*arm
         end if
-        mass = fluid%gas_density*volume + (fluid%liquid_density - fluid%gas_density)*liquid
-        moment = fluid%gas_density*volume*arm + (fluid%liquid_density &
-                                                 - fluid%gas_density)*liquid_moment
+        self%work(n, 1) = gas*volume + more*liquid
+        self%work(n, 2:4) = gas*volume*arm + more*liquid_moment
       end associate
-      n = n + 1
-      term(n, 1:3) = -mass*fluid%gravity
-      term(n, 4:6) = -cross(moment, fluid%gravity)
     end do
-  end function displaced_weight
+    total = exact_sums(self%work(1:n, 1:4))
+    mass = total(1)
+    moment = total(2:4)
+  end subroutine displaced_fluid
 
-  !> Volume and first moment about x of the part of body b in cell i that lies below the liquid
-  !! plane.
+  !> Volume and first moment about x of what lies below the liquid plane of body b in cell i.
   pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, b, i, volume, moment)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -197,16 +164,14 @@ contains
         if (any(maxval(corner, 2) + image < lower) .or. any(minval(corner, 2) + image > lower &
                                                             + grid%h)) cycle
         call box_clip_moments_below(corner + spread(image, 2, 4), lower, lower + grid%h, normal, &
-                                    d, &
-                                    part, part_moment)
+                                    d, part, part_moment)
       end associate
       volume = volume + part
       moment = moment + part_moment - part*(x + image)
     end do
   end subroutine liquid_part
 
-  !> What the face pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each
-  !! face.
+  !> What the pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each face.
   function hydrostatic_of_faces(grid, gravity, solid, flux, rho, b, term) result(n)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)
