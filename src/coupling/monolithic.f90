@@ -20,6 +20,7 @@ module monolithic_m
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
   use buoyancy_m, only: hydrostatic_correction
+  use film_velocity_m, only: tie_films
   use momentum_return_m, only: return_momentum
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
@@ -87,9 +88,10 @@ contains
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
+      call tie_films(grid, solid, self%viscous%mass, flow%uf, flow%u, self%viscous%y)
       if (case%numerics%momentum == 'conservative') then
-        call return_momentum(grid, case%fluid, solid, self%at_start, bodies, self%u_before, flow, &
-                             self%viscous%z, self%viscous%r)
+        call return_momentum(grid, case%fluid, solid, self%at_start, bodies, self%u_before, &
+                             self%viscous%y, flow, self%viscous%z, self%viscous%r)
       end if
       call fill_velocity_halo(grid, flow%u)
       call extend_pressure(grid, case%fluid%gravity, flow%rho, p%active, p%known, flow%p)

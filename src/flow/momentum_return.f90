@@ -4,8 +4,9 @@
 !! pressure and the forces on bodies move the mean open share of two faces instead, m_d = rho V w_d
 !! (`open_share`), in which a uniform force accelerates all cells alike. So a change of velocity
 !! du relative to that of the wall leaves (m_d - m) du of the momentum that a body has felt without
-!! an owner. It goes to those of the 26 cells around that no body cuts, where the two masses
-!! are the same, so that nothing comes back. Fluid and bodies together keep their momentum.
+!! an owner, and so does what film cells lose when their faces set their velocity
+!! (`film_velocity_m`). It goes to those of the 26 cells around that no body cuts, where the two
+!! masses are the same, so that nothing comes back. Fluid and bodies together keep their momentum.
 module momentum_return_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
@@ -29,7 +30,7 @@ module momentum_return_m
 contains
 
   !> Complete the velocity stage: `flow%u` on entry is its result in all cells.
-  subroutine return_momentum(grid, fluid, solid, before, bodies, u_before, flow, whole, cut)
+  subroutine return_momentum(grid, fluid, solid, before, bodies, u_before, tied, flow, whole, cut)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
@@ -37,6 +38,9 @@ contains
     real(wp), intent(in), contiguous :: u_before(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                                  grid%lo(3) - n_halo:, :)
                                                    !! velocity before the stage [m/s]
+    real(wp), intent(in), contiguous :: tied(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
+                                             grid%lo(3) - n_halo:, :)
+      !! part of the change that no force made (`film_velocity_m`) [m/s]
     type(flow_t), intent(inout) :: flow
     real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                        grid%lo(3) - n_halo:, :), &
@@ -91,7 +95,9 @@ contains
       do d = 1, 3
         u = c + unit_step(:, d)
         owed = (full*open_share(solid%open(c(1), c(2), c(3), d), solid%open(u(1), u(2), u(3), d)) &
-                - mass)*(flow%u(c(1), c(2), c(3), d) - u_before(c(1), c(2), c(3), d) - wall(d))
+                - mass)*(flow%u(c(1), c(2), c(3), d) - tied(c(1), c(2), c(3), d) &
+                         - u_before(c(1), c(2), c(3), d) - wall(d)) &
+               - mass*tied(c(1), c(2), c(3), d)
         if (mass_whole > 0.0_wp) then
           whole(c(1), c(2), c(3), d) = owed/mass_whole
         else

@@ -57,6 +57,8 @@ module viscous_m
     integer, allocatable :: wall_body(:)       !! body of each leg as found, before grouping
     integer, allocatable :: found_cell(:, :)
     real(wp), allocatable :: found_k(:), found_arm(:, :)
+    real(wp), allocatable :: film(:, :)
+      !! (7, cut cells) wall of one body, sum over the walls, as vectors; sum of their sizes [m2]
   end type viscous_t
 
 contains
@@ -81,6 +83,7 @@ contains
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
     allocate (self%cell(3, 0), self%k(0), self%arm(3, 0), self%work(0, 6))
+    allocate (self%film(7, 0))
     allocate (self%wall_body(0), self%found_cell(3, 0), self%found_k(0), self%found_arm(3, 0))
   end subroutine viscous_init
 
@@ -232,11 +235,7 @@ contains
       value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
       select case (grid%side(s, d))
       case (side_no_slip, side_inflow)
-        call add_diagonal(c, value)
-        if (.not. any(abs(grid%side_velocity(:, s, d)) > 0.0_wp)) return
-        self%n_side = self%n_side + 1
-        self%side_cell(:, self%n_side) = c
-        self%side_pull(:, self%n_side) = value*grid%side_velocity(:, s, d)
+        call add_side(self, c, value, grid%side_velocity(:, s, d))
       case (side_slip)
         self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
       case default   ! open sides and outflows hold nothing
@@ -253,9 +252,11 @@ contains
     side = (i == 1 .or. i == grid%n(d) + 1) .and. .not. grid%periodic(d)
   end function at_domain_side
 
-  !> Film cells: centre inside a body, but with open faces. Their fluid, V_o = V(1 - alpha), lies
-  !! in a
-  !! layer of mean thickness V_o/A_w on the wall area A_w and hangs on it by 2 mu A_w^2/V_o.
+  !> Film cells: centre inside a body, but with open faces. Their fluid, V_o = V(1 - alpha), lies in
+  !! layers of mean thickness V_o/A on the walls: A_b of each body there, A_s of no-slip sides of
+  !! the domain, A their sum. With N the sum of the areas as vectors, a wall gets the conductance
+  !! mu (3 - |N|^2/A^2) A_b A/V_o: exact for shear with a free side on one wall, 2 mu A/(V_o/A), and
+  !! for the parabola between two walls face to face, 3 mu A/(V_o/A).
   subroutine film_legs(grid, solid, bodies, mu, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -263,29 +264,141 @@ contains
     real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                            grid%lo(3) - n_halo:)
     type(viscous_t), intent(inout) :: self
-    integer :: i, j, k, d, e(3)
-    real(wp) :: wall(3), area2, layer
+    integer :: b, m, n, c(3)
+    real(wp) :: least   !! smallest sum of the areas that counts [m2]
 
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          if (solid%inside(i, j, k) == 0) cycle
-          if (all(self%mass(i, j, k, :) <= 0.0_wp)) cycle
-          do d = 1, 3
-            e = unit_step(:, d)
-            wall(d) = grid%area(d)*(solid%open(i + e(1), j + e(2), k + e(3), d) - solid%open(i, &
-                j, k, d))
-          end do
-          area2 = max(sum(wall**2), (1.0e-3_wp*minval(grid%area))**2)
-          layer = max(1.0_wp - solid%alpha(i, j, k), 1.0e-3_wp)*grid%volume
-          call add_wall(self, [i, j, k], solid%inside(i, j, k), 2.0_wp*mu(i, j, k)*area2/layer, &
-                        nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, &
-                            3)], &
-                                    bodies%x(:, solid%inside(i, j, k))))
-        end do
+    if (size(self%film, 2) < solid%n_cut) then
+      deallocate (self%film)
+      allocate (self%film(7, 2*solid%n_cut))
+    end if
+    least = 1.0e-3_wp*minval(grid%area)
+    self%film(:, 1:solid%n_cut) = 0.0_wp
+    do b = 1, bodies%n
+      call add_areas(b)
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        n = film_number(solid%cell(:, m))
+        if (n == 0) cycle
+        self%film(4:6, n) = self%film(4:6, n) + self%film(1:3, n)
+        self%film(7, n) = self%film(7, n) + norm2(self%film(1:3, n))
+        self%film(1:3, n) = 0.0_wp
       end do
     end do
+    do n = 1, solid%n_cut
+      c = solid%cut_cell(:, n)
+      if (film_number(c) == 0) cycle
+      call add_sides(c, n)
+      self%film(7, n) = max(self%film(7, n), least)
+      call add_side_legs(c, n)
+    end do
+    do b = 1, bodies%n
+      call add_areas(b)
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        c = solid%cell(:, m)
+        n = film_number(c)
+        if (n == 0) cycle
+        if (solid%inside(c(1), c(2), c(3)) == b .or. any(abs(self%film(1:3, n)) > 0.0_wp)) then
+          call add_wall(self, c, b, film_conductance(c, n)*max(norm2(self%film(1:3, n)), &
+                                                              1.0e-3_wp*least), &
+                        nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), &
+                                           grid%centre(c(3), 3)], bodies%x(:, b)))
+        end if
+        self%film(1:3, n) = 0.0_wp
+      end do
+    end do
+  contains
+    !> Number of a cut cell if it is an own film cell with a component that is an unknown, else 0.
+    pure function film_number(c) result(n)
+      integer, intent(in) :: c(3)
+      integer :: n
+
+      n = 0
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (solid%inside(c(1), c(2), c(3)) == 0) return
+      if (any(self%mass(c(1), c(2), c(3), :) > 0.0_wp)) n = solid%cut(c(1), c(2), c(3))
+    end function film_number
+
+    !> Area of body b in each film cell as a vector: what its shares of the faces lack to close.
+    subroutine add_areas(b)
+      integer, intent(in) :: b
+      integer :: m, d, n
+      real(wp) :: area
+
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        d = solid%face(4, m)
+        area = solid%face_beta(m)*grid%area(d)
+        n = film_number(solid%face(1:3, m))
+        if (n > 0) self%film(d, n) = self%film(d, n) + area
+        n = film_number(solid%face(1:3, m) - unit_step(:, d))
+        if (n > 0) self%film(d, n) = self%film(d, n) - area
+      end do
+    end subroutine add_areas
+
+    !> The open parts of no-slip sides are walls too.
+    subroutine add_sides(c, n)
+      integer, intent(in) :: c(3), n
+      integer :: d, s
+      real(wp) :: area
+
+      do d = 1, 3
+        do s = 1, 2
+          area = area_of_side(c, s, d)
+          self%film(3 + d, n) = self%film(3 + d, n) + merge(area, -area, s == 1)
+          self%film(7, n) = self%film(7, n) + area
+        end do
+      end do
+    end subroutine add_sides
+
+    !> They hold the film as they hold the cells whose centre lies in the fluid.
+    subroutine add_side_legs(c, n)
+      integer, intent(in) :: c(3), n
+      integer :: d, s
+      real(wp) :: value
+
+      do d = 1, 3
+        do s = 1, 2
+          value = area_of_side(c, s, d)
+          if (value > 0.0_wp) call add_side(self, c, film_conductance(c, n)*value, &
+                                            grid%side_velocity(:, s, d))
+        end do
+      end do
+    end subroutine add_side_legs
+
+    !> Open part of side s of direction d, if cell c lies at it and it is a wall without slip [m2].
+    pure function area_of_side(c, s, d) result(area)
+      integer, intent(in) :: c(3), s, d
+      real(wp) :: area
+      integer :: f(3)
+
+      area = 0.0_wp
+      if (grid%periodic(d) .or. c(d) /= merge(1, grid%n(d), s == 1)) return
+      f = c + merge(0, 1, s == 1)*unit_step(:, d)
+      if (grid%side(s, d) == side_no_slip) area = solid%open(f(1), f(2), f(3), d)*grid%area(d)
+    end function area_of_side
+
+    !> Conductance of the film of cut cell n per area of a wall [kg/(s m2)].
+    pure function film_conductance(c, n) result(conductance)
+      integer, intent(in) :: c(3), n
+      real(wp) :: conductance, volume
+
+      volume = max(1.0_wp - solid%alpha(c(1), c(2), c(3)), 1.0e-3_wp)*grid%volume
+      conductance = mu(c(1), c(2), c(3))*self%film(7, n)/volume &
+                    *(3.0_wp - min(1.0_wp, sum((self%film(4:6, n)/self%film(7, n))**2)))
+    end function film_conductance
   end subroutine film_legs
+
+  !> Note what a side that may move does to cell c: conductance k and velocity of the side.
+  subroutine add_side(self, c, k, velocity)
+    type(viscous_t), intent(inout) :: self
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: k             !! [kg/s]
+    real(wp), intent(in) :: velocity(3)   !! [m/s]
+
+    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
+    if (.not. any(abs(velocity) > 0.0_wp)) return
+    self%n_side = self%n_side + 1
+    self%side_cell(:, self%n_side) = c
+    self%side_pull(:, self%n_side) = k*velocity
+  end subroutine add_side
 
   !> Note a wall leg of conductance k between a cell and a body.
   subroutine add_wall(self, c, body, k, arm)

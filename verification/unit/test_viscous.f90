@@ -19,7 +19,7 @@ program test_viscous
     lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
-  real(wp) :: force(6, 1), z, worst, momentum(2), film, drag
+  real(wp) :: force(6, 1), forces(6, 2), z, worst, momentum(2), film, drag
   integer :: k, n, iterations
   logical :: converged
 
@@ -77,6 +77,25 @@ program test_viscous
     worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - (1.0_wp - z)*speed - z*lid)))
   end do
   call check('linear profile below a moving side', worst, 0.0_wp, 1.0e-7_wp)
+
+  ! Between two walls closer than a cell: the mean of the parabola that a force drives, and the mean
+  ! of the speeds of the walls, here of the floor and a body above it. The wall that has no part
+  ! of the centre feels its half of the drag.
+  grid%side_velocity = 0.0_wp
+  call make_gap(3.65_wp*grid%h(3), 3.95_wp*grid%h(3), 2)
+  flow%u(:, :, :, 1) = long_time/rho   ! a force of 1 N/m3 over the step
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+  call solve_viscous(grid, wall, long_time, flow, viscous, forces, iterations, converged)
+  film = 0.3_wp*grid%h(3)
+  call check('film between two walls', flow%u(2, 2, 4, 1), film**2/(12.0_wp*mu), &
+             1.0e-7_wp*film**2/mu)
+  call check('each wall takes half of the force', forces(1, :), 0.5_wp*film*[1.0_wp, 1.0_wp], &
+             1.0e-7_wp*film)
+  call make_gap(0.0_wp, 0.3_wp*grid%h(3), 1)
+  wall%motion(1, 1) = speed
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+  call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+  call check('film between a body and the floor', flow%u(2, 2, 1, 1), 0.5_wp*speed, 1.0e-7_wp)
   call finish_checks()
   call parallel_final()
 contains
@@ -123,7 +142,79 @@ contains
         solid%leg_body_high(:, :, k, 3) = 1
       end if
     end do
+    call list_slab(1, 0.0_wp, z0)
   end subroutine make_wall
+
+  !> Two held bodies with a gap between them, or the floor and a body above it that moves along x;
+  !! the gap is narrower than a cell, whose centre lies in a body.
+  subroutine make_gap(low, high, bodies)
+    real(wp), intent(in) :: low, high   !! of the gap [m]
+    integer, intent(in) :: bodies       !! above the gap the last, below it the first of two
+    integer :: k
+    real(wp) :: gap
+
+    call flow_init(grid, flow)
+    call solid_geometry_init(grid, solid, bodies)
+    call viscous_init(grid, bodies, viscous)
+    call rigid_motion_init(bodies, wall)
+    wall%present = .true.
+    flow%rho = rho
+    flow%mu = mu
+    do k = 1, 8
+      gap = max(min(grid%face(k + 1, 3), high) - max(grid%face(k, 3), low), 0.0_wp)/grid%h(3)
+      solid%alpha(:, :, k) = 1.0_wp - gap
+      solid%open(:, :, k, 1:2) = gap
+      solid%open(:, :, k, 3) = 0.0_wp
+      if (low <= 0.0_wp .and. k == 1) solid%open(:, :, k, 3) = 1.0_wp
+      solid%inside(:, :, k) = merge(1, bodies, grid%centre(k, 3) < low)
+    end do
+    if (low > 0.0_wp) call list_slab(1, 0.0_wp, low)
+    call list_slab(bodies, high, depth)
+  end subroutine make_gap
+
+  !> Append what a slab of body b between two heights covers to the lists; bodies in their order.
+  subroutine list_slab(b, low, high)
+    integer, intent(in) :: b
+    real(wp), intent(in) :: low, high   !! [m]
+    integer :: i, j, k, d, n_cell, n_face
+    real(wp) :: share
+
+    if (b == 1) then
+      n_cell = size(solid%alpha)
+      solid%cell = reshape([integer ::], [3, 2*n_cell], [0])
+      solid%face = reshape([integer ::], [4, 6*n_cell], [0])
+      solid%cut_cell = solid%cell
+      solid%cell_alpha = spread(0.0_wp, 1, 2*n_cell)
+      solid%face_beta = spread(0.0_wp, 1, 6*n_cell)
+    end if
+    n_cell = solid%body_cell(b) - 1
+    n_face = solid%body_face(b) - 1
+    do k = 1, 8
+      share = min(high, grid%face(k + 1, 3)) - max(low, grid%face(k, 3))
+      share = max(share, 0.0_wp)/grid%h(3)
+      do j = lbound(solid%alpha, 2), ubound(solid%alpha, 2)
+        do i = lbound(solid%alpha, 1), ubound(solid%alpha, 1)
+          do d = 1, 3
+            if (d == 3 .and. (grid%face(k, 3) < low .or. grid%face(k, 3) > high)) cycle
+            if (d < 3 .and. share <= 0.0_wp) cycle
+            n_face = n_face + 1
+            solid%face(:, n_face) = [i, j, k, d]
+            solid%face_beta(n_face) = merge(1.0_wp, share, d == 3)
+          end do
+          if (share <= 0.0_wp) cycle
+          n_cell = n_cell + 1
+          solid%cell(:, n_cell) = [i, j, k]
+          solid%cell_alpha(n_cell) = share
+          if (solid%alpha(i, j, k) >= 1.0_wp .or. solid%cut(i, j, k) > 0) cycle
+          solid%n_cut = solid%n_cut + 1
+          solid%cut(i, j, k) = solid%n_cut
+          solid%cut_cell(:, solid%n_cut) = [i, j, k]
+        end do
+      end do
+    end do
+    solid%body_cell(b + 1:) = n_cell + 1
+    solid%body_face(b + 1:) = n_face + 1
+  end subroutine list_slab
 
   !> Momentum of the unknowns along x [kg m/s].
   function fluid_momentum() result(p)

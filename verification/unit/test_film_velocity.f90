@@ -1,0 +1,57 @@
+!> Film cells above a box: which components follow their faces, and which are left alone.
+program test_film_velocity
+  use kinds_m, only: wp
+  use grid_m, only: n_halo
+  use film_velocity_m, only: tie_films
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  integer, parameter :: cells(3) = [8, 8, 6]
+  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.6_wp]         !! cells of 0.1 m
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]   !! x 0.21-0.57, y 0.22-0.58
+  integer, parameter :: top = 4                                     !! open share 0.3 above the box
+  type(one_body_t) :: box
+  real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                      1 - n_halo:cells(3) + n_halo, 3) :: mass, uf, u, before, change
+  integer :: seed = 77
+
+  call describe(cells, tank, sides, 'box', edges, middle, box%case)
+  call place(box)
+  call fill(uf)
+  call fill(u)
+  before = u
+  mass = 1.0_wp
+  mass(4, 4, top, 2) = 0.0_wp
+  call tie_films(box%grid, box%solid, mass, uf, u, change)
+  call check('the cells in the top layer are films', all(box%solid%inside(3:6, 3:6, top) == 1))
+  call check('the normal component is that of the open face', &
+             maxval(abs(u(4:5, 4:5, top, 3) - uf(4:5, 4:5, top + 1, 3))), 0.0_wp, 1.0e-14_wp)
+  call check('between films the tangential component stays', &
+             maxval(abs(u(4:5, 3:6, top, 1) - before(4:5, 3:6, top, 1))), 0.0_wp, 0.0_wp)
+  call check('at the end of the row it is the mean by open shares', u(6, 4, top, 1), &
+             (0.3_wp*uf(6, 4, top, 1) + uf(7, 4, top, 1))/1.3_wp, 1.0e-14_wp)
+  call check('components that move with the wall stay', u(4, 4, top, 2), before(4, 4, top, 2), &
+             0.0_wp)
+  call check('the change is told', maxval(abs(u - before - change)), 0.0_wp, 1.0e-14_wp)
+  change(3:6, 3:6, 1:top, :) = 0.0_wp
+  call check('cells outside the box stay', maxval(abs(change)), 0.0_wp, 0.0_wp)
+  call finish_checks()
+
+contains
+
+  !> Numbers between -1 and 1.
+  subroutine fill(a)
+    real(wp), intent(out) :: a(:, :, :, :)
+    integer :: j, k, d
+
+    do d = 1, 3
+      do k = 1, size(a, 3)
+        do j = 1, size(a, 2)
+          call random_numbers(seed, a(:, j, k, d))
+        end do
+      end do
+    end do
+  end subroutine fill
+end program test_film_velocity
