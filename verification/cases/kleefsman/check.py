@@ -8,10 +8,13 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.checks import main  # noqa: E402
-from micstools.impact_pressure import Experiment  # noqa: E402
+import numpy as np  # noqa: E402
 
-FRONT = 2.42  # of the box [m]
+from micstools.checks import Checks, main  # noqa: E402
+from micstools.impact_pressure import Experiment  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+FRONT = 2.3955  # of the box [m]
 
 BOX = Experiment(
     title="dam break against a box",
@@ -21,8 +24,29 @@ BOX = Experiment(
     level=0.4,  # the table has no points between 0.03 and 0.45
     plateau=(3.0, 5.0),
     column=lambda grid: round(FRONT / grid.spacing[0]) - 1,
-    counts_from=16,
+    counts_from=22,
 )
 
+
+def passes(run: Run, x: float, level: float) -> float:
+    """First time at which the water at a gauge is higher than a level [s]."""
+    column = int(x / run.grid.spacing[0])
+    heights = np.array([run.fields(t).liquid[:, 0, column].sum() for t in run.field_times])
+    heights *= run.grid.spacing[2]
+    i = int(np.flatnonzero(heights > level)[0])
+    return float(np.interp(level, heights[i - 1 : i + 1], run.field_times[i - 1 : i + 1]))
+
+
+def check(runs: list[Run]) -> Checks:
+    """The sensors, and for information when the water passed the gauges before the box."""
+    checks = BOX.check(runs)
+    gauges = np.loadtxt(Path(__file__).with_name("B7_kleefsman_gauges.csv"), delimiter=",")
+    for run in runs:
+        for x, level, time in gauges:
+            label = f"{run.folder.name}: {1000 * level:g} mm of water at {x:g} m [s]"
+            checks.close(label, passes(run, x, level), float(time), 0.04, counts=False)
+    return checks
+
+
 if __name__ == "__main__":
-    main(BOX.check)
+    main(check)
