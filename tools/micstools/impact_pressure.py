@@ -1,6 +1,8 @@
 """Pressures of a dam break where the water strikes: arrival and plateau against an experiment.
 
-Pressures are over rho g H and times over sqrt(H/g), H the height of the column of water.
+Pressures are over rho g H and times over sqrt(H/g), H the height of the column of water. In the
+corner under the sensors an ideal fluid rests, and feels the whole head of the stream that arrives:
+of Ritter's wave, until the wall behind the column is felt.
 """
 
 from collections.abc import Callable
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from micstools.checks import Checks, sound
 from micstools.reader import Grid, Run
 
-ARRIVAL_BAND, PLATEAU_BAND = (0.04, 0.15)
+ARRIVAL_BAND, PLATEAU_BAND, HEAD_BAND = (0.04, 0.15, 0.05)
 
 Values = NDArray[np.float64]
 
@@ -25,7 +27,8 @@ class Experiment:
     title: str
     tables: str  # path of the tables, with {} for the name of a sensor
     height: float  # of the column of water [m]
-    sensors: dict[str, float]  # height above the floor [m]
+    way: float  # of the front to the surface [m]
+    sensors: dict[str, float]  # height above the floor [m], the lowest first
     level: float  # at which the water has arrived
     plateau: tuple[float, float]  # after the impact and before the wave comes back
     column: Callable[[Grid], int]  # number in x of the last cells before the surface, from 0
@@ -61,6 +64,12 @@ class Experiment:
         """Mean pressure of the plateau."""
         return float(np.interp(np.linspace(*self.plateau, 200), time, pressure).mean())
 
+    def ideal_plateau(self) -> float:
+        """Mean of the plateau at the lowest sensor in an ideal fluid (Ritter 1892)."""
+        slope = self.way / self.height / np.linspace(*self.plateau, 200)
+        velocity_head, depth = 2 / 9 * (1 + slope) ** 2, (2 - slope) ** 2 / 9
+        return float((velocity_head + depth).mean()) - min(self.sensors.values()) / self.height
+
     def check(self, runs: list[Run]) -> Checks:
         """Every sensor of each run."""
         checks, ours = Checks(self.title), {}
@@ -68,8 +77,9 @@ class Experiment:
         for run in runs:
             cells = round(self.height / run.grid.spacing[2])
             time, pressures = self.history(run)
+            counts, lowest = cells >= self.counts_from, next(iter(pressures))
             for name, pressure in pressures.items():
-                counts, label = cells >= self.counts_from, f"{run.folder.name}, {name}"
+                label = f"{run.folder.name}, {name}"
                 for what, value, band in (
                     ("arrival", self.arrival, ARRIVAL_BAND),
                     ("plateau", self.mean, PLATEAU_BAND),
@@ -79,6 +89,13 @@ class Experiment:
                         f"{label}: {what}", value(time, pressure), exact, band, counts=counts
                     )
                 ours[f"{name}, {cells} cells"] = (time, pressure)
+            checks.close(
+                f"{run.folder.name}, {lowest}: plateau, ideal fluid",
+                self.mean(time, pressures[lowest]),
+                self.ideal_plateau(),
+                HEAD_BAND,
+                counts=counts,
+            )
             sound(run, checks)
         checks.figure("pressure", "t sqrt(g/H)", "p/(rho g H)", ours, measured)
         return checks

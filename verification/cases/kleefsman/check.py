@@ -20,6 +20,7 @@ BOX = Experiment(
     title="dam break against a box",
     tables=str(Path(__file__).with_name("B7_kleefsman_{}.csv")),
     height=0.55,
+    way=FRONT - 1.228,
     sensors={"p1": 0.021, "p3": 0.101},
     level=0.4,  # the table has no points between 0.03 and 0.45
     plateau=(3.0, 5.0),
