@@ -75,6 +75,7 @@ class Planned:
     name: str
     text: str  # of the case file
     cost: float  # about that many seconds on one core
+    fine: bool = False  # beyond what three resolutions need: for `FULL=1 make verify` only
 
     def write(self, work: Path) -> Path:
         """Put the case file into a folder of its own beside the results."""
@@ -112,8 +113,8 @@ def planned(case: str, work: Path, cost: float = float("inf")) -> list[Planned]:
         tables = tomllib.loads((folder / "variants.toml").read_text())
         for name, table in tables.items():
             base = folder / table.pop("from", "case.nml")
-            own_cost = float(table.pop("cost", COST))
-            found.append(Planned(case, name, changed(base.read_text(), table), own_cost))
+            own_cost, fine = float(table.pop("cost", COST)), bool(table.pop("fine", False))
+            found.append(Planned(case, name, changed(base.read_text(), table), own_cost, fine))
     return [run for run in found if run.cost <= cost]
 
 

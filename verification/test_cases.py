@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import Machine, changed, names, planned, verify
+from verify import LEVELS
 
 COST = 20.0
 """Longest run [s] that is part of `make test`."""
@@ -17,6 +18,14 @@ def test_case(name: str, tmp_path: Path) -> None:
         pytest.skip("all its runs are long")
     holds, report = verify(name, tmp_path, Machine(), COST)
     assert holds, report
+
+
+def test_levels_fit_into_their_time(tmp_path: Path) -> None:
+    """By the costs that the runs state, each level of `make verify` ends before its limit."""
+    plans = [plan for name in names() for plan in planned(name, tmp_path / name)]
+    for level in LEVELS.values():
+        needs = level.needs(plans)
+        assert needs < 0.95 * level.limit, f"{level.name}: {needs / 60:.1f} min"
 
 
 def test_variants_change_only_what_they_name() -> None:

@@ -33,12 +33,23 @@ class Level:
     name: str
     cost: float  # longest run [s on one core]
     limit: float  # all together [s]
+    fine: bool = False  # with the runs that are marked as fine
+
+    def takes(self, plan: Planned) -> bool:
+        """Whether a run belongs to this level."""
+        return plan.cost <= self.cost and (self.fine or not plan.fine)
+
+    def needs(self, plans: list[Planned]) -> float:
+        """What its part of the runs, and the programs of cases without runs, take together [s]."""
+        programs = [getattr(checker(name), "COST", 0.0) for name in names()]
+        costs = [plan.cost for plan in plans if self.takes(plan)]
+        return (sum(costs) + sum(cost for cost in programs if cost <= self.cost)) / AT_ONCE
 
 
 LEVELS = {
-    "QUICK": Level("quick", 120.0, 900.0),
-    "": Level("normal", 3600.0, 3 * 3600.0),
-    "FULL": Level("full", float("inf"), 24 * 3600.0),
+    "QUICK": Level("quick", 40.0, 900.0),
+    "": Level("normal", 2500.0, 3 * 3600.0),
+    "FULL": Level("full", float("inf"), 24 * 3600.0, fine=True),
 }
 
 
@@ -150,7 +161,7 @@ def main() -> int:
     parser.add_argument("case", nargs="*", default=names(), help="default: all")
     chosen, wanted = parser.parse_args().case, level()
     every = {case: planned(case, OUT / case) for case in chosen}
-    plans = [plan for runs in every.values() for plan in runs if plan.cost <= wanted.cost]
+    plans = [plan for runs in every.values() for plan in runs if wanted.takes(plan)]
     plans.sort(key=lambda plan: plan.cost)
     progress, key = Progress(len(plans), wanted.limit), program_key()
     threading.Thread(target=progress.watch, daemon=True).start()
@@ -161,7 +172,7 @@ def main() -> int:
     cases, plain = [], defaults()
     for name in chosen:
         mine = [run for plan, run in zip(plans, ran, strict=True) if plan.case == name]
-        left_out = [plan.name for plan in every[name] if plan.cost > wanted.cost]
+        left_out = [plan.name for plan in every[name] if not wanted.takes(plan)]
         module = checker(name)
         case = Case(name, getattr(module, "VARIES", ()), mine, left_out)
         good = [Run(run.folder) for run in sorted(mine, key=lambda r: r.name) if run.good]
