@@ -52,6 +52,7 @@ SERIES = {
     "max_overlap": "m",
     "contact_courant_max": "1",
     "substeps": "1",
+    "sleeping": "1",
     "curvature_fallback": "1",
     "wall_time": "s",
 }

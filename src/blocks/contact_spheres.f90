@@ -88,7 +88,8 @@ contains
     self%skin = 2*self%free_way + self%clear
   end subroutine contact_spheres_init
 
-  !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.
+  !> All touches at the present poses, but for those between bodies that are still, and those
+  !! (depth <= 0) that may come within a time `ahead`.
   subroutine find_sphere_touches(walls, blocks, ahead, self, touches)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
@@ -111,6 +112,10 @@ contains
     touches%n = 0
     call reserve_touches(self%n_candidates, touches)
     do p = 1, self%n_pairs
+      if (blocks%still(self%pair_a(p))) then
+        if (self%pair_b(p) < 0) cycle
+        if (blocks%still(self%pair_b(p))) cycle
+      end if
       if (self%pair_b(p) == bed_partner) then
         call touch_bed(walls%bed, blocks, self, p, way(self, blocks, p, ahead), touches)
       else if (self%pair_b(p) < 0) then

@@ -110,7 +110,8 @@ contains
     self%clear = 0.5_wp*self%wide_skin
   end subroutine contact_surface_init
 
-  !> All touches at the present poses, and those (depth <= 0) that may come within a time `ahead`.
+  !> All touches at the present poses, but for those between bodies that are still, and those
+  !! (depth <= 0) that may come within a time `ahead`.
   subroutine find_surface_touches(walls, blocks, ahead, self, touches)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
@@ -127,7 +128,7 @@ contains
     p = 1
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
-      if (.not. blocks%fixed(a)) then
+      if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
         if (walls%bed%there) call touch_bed(walls%bed, blocks, a, ahead, self, touches)
         do w = 1, walls%n
           call touch_wall(walls, blocks, a, w, ahead, self, touches)
@@ -136,7 +137,8 @@ contains
       do while (p <= self%near%n)
         if (self%near%a(p) /= a) exit
         b = self%near%b(p)
-        if (.not. (blocks%fixed(a) .and. blocks%fixed(b))) then
+        if (.not. ((blocks%fixed(a) .and. blocks%fixed(b)) &
+                   .or. (blocks%still(a) .and. blocks%still(b)))) then
           call touch_pair(blocks, ahead, self%reach, self%turn, self%surface, self%search, &
             self%pairs(self%slot(p)), touches)
         end if

@@ -6,11 +6,14 @@ module contacts_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use vectors_m, only: cross, norm
-  use rigid_body_m, only: blocks_t, begin_step, drift, kick, space_tensor
+  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers, space_tensor
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
   use neighbours_m, only: pair_list_t, reserve
   use touches_m, only: touch_t, set_apart
+  use springs_m, only: springs_t, reserve_springs, comes_before, move_springs
+  use sleep_m, only: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, &
+    is_tired, balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use lubrication_m, only: lubrication_t, lubricate
@@ -19,23 +22,11 @@ module contacts_m
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
-  public :: springs_t, reserve_springs
 
   !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
   !! pair too slow for one, and of a pile.
   real(wp), parameter :: impact_turn = 0.35_wp, slow_turn = 0.7_wp, pile_turn = 1.2_wp
   integer, parameter :: most_substeps = 1000000   !! of a fluid step; beyond, something went wrong
-
-  !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches.
-  !!
-  !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere
-  !! slides from a sphere of the partner to the next, so that resting blocks do not creep.
-  type :: springs_t
-    integer :: n = 0
-    integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `touch_t`
-    real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
-    real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
-  end type springs_t
 
   !> Touches with one key and one partner act on one tangential spring.
   type :: groups_t
@@ -70,6 +61,8 @@ module contacts_m
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
     type(springs_t) :: springs                   !! the memory: part of the state of a run
     type(springs_t) :: before                    !! work: springs of the substep before
+    type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
+    logical, allocatable :: woken(:)             !! (n) work
     logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
@@ -137,6 +130,8 @@ contains
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
+    call sleep_init(input%sleep, contacts%reach, contacts%sleep)
+    allocate (contacts%woken(n), source=.false.)
   end subroutine contacts_init
 
   !> Move the blocks through one fluid step under gravity, the last fluid forces and contact.
@@ -158,8 +153,15 @@ contains
     contacts%twist = 0.0_wp
     contacts%n_met = 0
     call know_partners(walls, gravity, blocks, contacts%partners)
+    if (contacts%sleep%active) call know_stillness(blocks)
     call find_touches(walls, blocks, 0.0_wp, contacts)
+    if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
     left = dt
+    if (all_still(blocks)) then
+      contacts%impulse(:, 1:) = dt*contacts%sleep%load
+      contacts%twist(:, 1:) = dt*contacts%sleep%load_torque
+      left = 0.0_wp
+    end if
     do while (left > 0.0_wp)
       limit = substep_limit(walls, contacts, blocks, dt)
       if (.not. left < limit*real(most_substeps, wp)) then
@@ -173,6 +175,7 @@ contains
     end do
     blocks%contact_force = contacts%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%twist(:, 1:)/dt
+    call hold_sleepers(gravity, dt, blocks)
     call count_partners(contacts, blocks)
     call find_touches(walls, blocks, 0.0_wp, contacts)
     report%energy = elastic_energy(contacts)
@@ -197,7 +200,7 @@ contains
     contacts%spin = blocks%omega
     longest = limit
     do
-      dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
+      dt_b = equal_part(left, longest)
       call drift(0.5_wp*dt_b, blocks)
       call find_touches(walls, blocks, 0.5_wp*dt_b, contacts)
       allowed = stiffness_limit(contacts)
@@ -210,6 +213,14 @@ contains
     end do
   end subroutine go_half_way
 
+  !> An equal part of the time left, no longer than allowed [s].
+  pure function equal_part(left, longest) result(dt_b)
+    real(wp), intent(in) :: left, longest   !! [s]
+    real(wp) :: dt_b
+
+    dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
+  end function equal_part
+
   !> The rest of a substep: contact and the other half of the drift.
   subroutine finish_substep(walls, gravity, dt_b, contacts, blocks, report)
     type(walls_t), intent(in) :: walls
@@ -219,7 +230,7 @@ contains
     type(contact_report_t), intent(inout) :: report
     integer :: b
 
-    call note_partners(contacts)
+    call note_partners(contacts%touches%n, contacts%touches%a, contacts%touches%b, contacts)
     call match_springs(contacts)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
@@ -227,6 +238,8 @@ contains
     call sum_forces(dt_b, contacts, report)
     if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
                                                     contacts%force)
+    if (contacts%sleep%active) call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
+      contacts%force(:, 1:), contacts%torque(:, 1:), contacts%woken)
     contacts%impulse = contacts%impulse + dt_b*contacts%force
     contacts%twist = contacts%twist + dt_b*contacts%torque
     do b = 1, blocks%n
@@ -234,10 +247,172 @@ contains
     end do
     call kick([0.0_wp, 0.0_wp, 0.0_wp], dt_b, contacts%force(:, 1:), contacts%torque(:, 1:), blocks)
     call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
+    call stop_sleepers(blocks)
     call know_motion(blocks, contacts%partners)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call drift(0.5_wp*dt_b, blocks)
+    if (.not. contacts%sleep%active) return
+    if (any(contacts%woken)) call rouse(blocks, contacts)
+    call note_quiet(gravity, dt_b, blocks, contacts%sleep)
   end subroutine finish_substep
+
+  !> At the start of a step: wake those that the fluid has put out of balance where nothing moves
+  !! (else they wake in the substeps), and let those sleep that are tired and in balance.
+  subroutine wake_or_sleep(walls, gravity, dt, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: dt_b
+    logical :: changed
+    integer :: b
+
+    call know_loads(contacts%sleep)
+    if (all_still(blocks)) then
+      contacts%force = 0.0_wp
+      contacts%torque = 0.0_wp
+      call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, contacts%force(:, 1:), &
+        contacts%torque(:, 1:), contacts%woken)
+      changed = any(contacts%woken)
+      if (changed) call rouse(blocks, contacts)
+    else
+      call note_quiet_end(gravity, blocks, contacts%sleep)
+      changed = .false.
+      do b = 1, blocks%n
+        contacts%sleep%tired(b) = is_tired(gravity, b, blocks, contacts%sleep)
+      end do
+      if (any(contacts%sleep%tired)) then
+        dt_b = equal_part(dt, substep_limit(walls, contacts, blocks, dt))
+        call let_sleep(gravity, dt_b, contacts, blocks, changed)
+      end if
+    end if
+    contacts%woken = .false.
+    if (changed) call find_touches(walls, blocks, 0.0_wp, contacts)
+    call note_partners(contacts%sleep%rest%n, contacts%sleep%rest%a, contacts%sleep%rest%b, &
+      contacts)
+  end subroutine wake_or_sleep
+
+  !> Let tired blocks sleep that touch something, but nothing that is moved at a given rate, and on
+  !! which the forces of a substep balance if they do not move.
+  subroutine let_sleep(gravity, dt_b, contacts, blocks, changed)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt_b         !! the substep [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    logical, intent(out) :: changed      !! somebody fell asleep
+    real(wp), parameter :: half = 0.5_wp
+    type(contact_report_t) :: ignored
+    logical :: touching(blocks%n)
+    integer :: g, a, b
+
+    call match_springs(contacts)
+    call know_motion(blocks, contacts%partners)
+    do b = 1, blocks%n   ! as in the middle of a substep
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      associate (v => contacts%partners%v(:, b), omega => contacts%partners%omega(:, b))
+        if (contacts%sleep%tired(b)) v = 0.0_wp
+        if (contacts%sleep%tired(b)) omega = 0.0_wp
+        v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
+        omega = omega + 0.5_wp*dt_b*matmul(contacts%partners%inverse_inertia(:, :, b), &
+          blocks%fluid_torque(:, b))
+      end associate
+    end do
+    call sum_forces(dt_b, contacts, ignored)
+    touching = .false.
+    associate (sleep => contacts%sleep, springs => contacts%springs)
+      do g = 1, springs%n
+        a = springs%a(g)
+        b = springs%b(g)
+        touching(a) = .true.
+        if (is_carried(b)) sleep%tired(a) = .false.
+        if (b < 1) cycle
+        touching(b) = .true.
+        if (is_carried(a)) sleep%tired(b) = .false.
+      end do
+      changed = .false.
+      do b = 1, blocks%n
+        if (.not. (sleep%tired(b) .and. touching(b))) cycle
+        if (.not. balanced(half, contacts%force(:, b), contacts%torque(:, b), &
+                           contacts%steady(:, b) + blocks%mass(b)*gravity, &
+                           blocks%fluid_torque(:, b), sleep%reach(b))) cycle
+        call put_to_sleep(b, blocks)
+        changed = .true.
+      end do
+    end associate
+    if (changed) call lay_down(dt_b, blocks, contacts)
+  contains
+    !> Whether a partner is moved at a given rate.
+    pure function is_carried(b) result(yes)
+      integer, intent(in) :: b
+      logical :: yes
+
+      if (b < 0) then
+        yes = any(abs(contacts%partners%v(:, b)) > 0.0_wp)
+      else
+        yes = blocks%fixed(b) .and. .not. blocks%still(b)
+      end if
+    end function is_carried
+  end subroutine let_sleep
+
+  !> Move the springs of touches between what does not move to those at rest, with their forces.
+  subroutine lay_down(dt_b, blocks, contacts)
+    real(wp), intent(in) :: dt_b         !! the substep [s]
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    type(contact_report_t) :: ignored
+    integer :: g, t, a, b
+
+    associate (sleep => contacts%sleep, springs => contacts%springs)
+      call reserve(springs%n, sleep%chosen)
+      do g = 1, springs%n
+        a = springs%a(g)
+        b = springs%b(g)
+        sleep%chosen(g) = at_rest(blocks, a, b)
+        if (.not. sleep%chosen(g)) cycle
+        contacts%force(:, [a, b]) = 0.0_wp
+        contacts%torque(:, [a, b]) = 0.0_wp
+        call push_group(g, dt_b, contacts, ignored)
+        springs%force(:, g) = contacts%force(:, a)
+        springs%torque_a(:, g) = contacts%torque(:, a)
+        springs%torque_b(:, g) = contacts%torque(:, b)
+        springs%energy(g) = stored_energy(springs%k(g), contacts%law%gamma_t, &
+          norm2(springs%xi(:, g)))
+        do t = contacts%groups%first(g), contacts%groups%first(g + 1) - 1
+          springs%energy(g) = springs%energy(g) + stored_energy(contacts%response%k(t), &
+            contacts%law%gamma_n, contacts%touches%depth(t))
+        end do
+      end do
+      call move_springs(sleep%chosen, springs, sleep%rest)
+      call know_loads(sleep)
+    end associate
+  end subroutine lay_down
+
+  !> Give the springs of touches with a body that moves now back to those at work.
+  subroutine rouse(blocks, contacts)
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: i
+
+    associate (sleep => contacts%sleep)
+      call reserve(sleep%rest%n, sleep%chosen)
+      do i = 1, sleep%rest%n
+        sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
+      end do
+      call move_springs(sleep%chosen, sleep%rest, contacts%springs)
+      call know_loads(sleep)
+    end associate
+  end subroutine rouse
+
+  !> Whether neither body a nor its partner moves.
+  pure function at_rest(blocks, a, b) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, b
+    logical :: yes
+
+    yes = blocks%still(a)
+    if (yes .and. b > 0) yes = blocks%still(b)
+  end function at_rest
 
   !> The part of a contact force that moves a body, and what else acts on it all through the step.
   !!
@@ -658,20 +833,6 @@ contains
     end associate
   end subroutine match_springs
 
-  !> Order of springs and touches: by body, partner, key.
-  pure function comes_before(a1, b1, key1, a2, b2, key2) result(yes)
-    integer, intent(in) :: a1, b1, key1, a2, b2, key2
-    logical :: yes
-
-    if (a1 /= a2) then
-      yes = a1 < a2
-    else if (b1 /= b2) then
-      yes = b1 < b2
-    else
-      yes = key1 < key2
-    end if
-  end function comes_before
-
   !> The vector xi turned into the plane normal to n, its length kept.
   pure function turned_into_plane(xi, n) result(turned)
     real(wp), intent(in) :: xi(3), n(3)
@@ -719,39 +880,50 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(contacts_t), intent(inout) :: contacts
     type(contact_report_t), intent(inout) :: report
-    real(wp) :: v(3), normal(3), v_n, part, force_n, sum_n, decay, eta
-    integer :: g, t, a, b
+    integer :: g
 
     contacts%force = 0.0_wp
     contacts%torque = 0.0_wp
+    do g = 1, contacts%groups%n
+      call push_group(g, dt, contacts, report)
+    end do
+  end subroutine sum_forces
+
+  !> Normal and tangential forces of one group.
+  pure subroutine push_group(g, dt, contacts, report)
+    integer, intent(in) :: g
+    real(wp), intent(in) :: dt   !! [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(contact_report_t), intent(inout) :: report
+    real(wp) :: v(3), normal(3), v_n, part, force_n, sum_n, decay, eta
+    integer :: t, a, b
+
     associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, &
       r => contacts%response)
-      do g = 1, groups%n
-        a = touches%a(groups%first(g))
-        b = touches%b(groups%first(g))
-        sum_n = 0.0_wp
-        decay = 0.0_wp
-        eta = 0.0_wp
-        do t = groups%first(g), groups%first(g + 1) - 1
-          normal = touches%normal(:, t)
-          v = relative_velocity(contacts%partners, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
-          v_n = dot_product(v, normal)
-          part = 1.0_wp
-          if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-          force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n) &
-            /(1.0_wp + part*r%decay(t)*dt)
-          call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
-          if (touches%weight(t) < 1.0_wp) call push_to_weight(t, contacts)
-          sum_n = sum_n + force_n
-          decay = max(decay, r%decay(t))
-          eta = max(eta, r%eta(t))
-          report%courant_max = max(report%courant_max, abs(v_n)*dt/touches%length(t))
-          report%overlap_max = max(report%overlap_max, touches%depth(t))
-        end do
-        call rub(g, sum_n, eta, 1.0_wp + decay*dt, contacts)
+      a = touches%a(groups%first(g))
+      b = touches%b(groups%first(g))
+      sum_n = 0.0_wp
+      decay = 0.0_wp
+      eta = 0.0_wp
+      do t = groups%first(g), groups%first(g + 1) - 1
+        normal = touches%normal(:, t)
+        v = relative_velocity(contacts%partners, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
+        v_n = dot_product(v, normal)
+        part = 1.0_wp
+        if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
+        force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n) &
+          /(1.0_wp + part*r%decay(t)*dt)
+        call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
+        if (touches%weight(t) < 1.0_wp) call push_to_weight(t, contacts)
+        sum_n = sum_n + force_n
+        decay = max(decay, r%decay(t))
+        eta = max(eta, r%eta(t))
+        report%courant_max = max(report%courant_max, abs(v_n)*dt/touches%length(t))
+        report%overlap_max = max(report%overlap_max, touches%depth(t))
       end do
+      call rub(g, sum_n, eta, 1.0_wp + decay*dt, contacts)
     end associate
-  end subroutine sum_forces
+  end subroutine push_group
 
   !> The part of the force of touch t by which its weight changes with position: the energy of the
   !! spring is k(position) d^(gamma+1)/(gamma+1).
@@ -850,35 +1022,38 @@ contains
         energy = energy + stored_energy(springs%k(g), law%gamma_t, norm2(springs%xi(:, g)))
       end do
     end associate
+    do g = 1, contacts%sleep%rest%n
+      energy = energy + contacts%sleep%rest%energy(g)
+    end do
   end function elastic_energy
 
-  !> Add the pairs that touch now to those that touched in this step.
-  subroutine note_partners(contacts)
+  !> Add pairs that touch to those that touched in this step.
+  subroutine note_partners(n, touches_a, touches_b, contacts)
+    integer, intent(in) :: n                              !! of touches
+    integer, intent(in) :: touches_a(:), touches_b(:)     !! (n) sorted
     type(contacts_t), intent(inout) :: contacts
     integer :: t, m, a, b
 
-    associate (touches => contacts%touches)
-      m = 1
-      t = 1
-      do while (t <= touches%n)
-        a = touches%a(t)
-        b = touches%b(t)
-        do while (m <= contacts%n_met)
-          if (.not. comes_before(contacts%met_a(m), contacts%met_b(m), 0, a, b, 0)) exit
-          m = m + 1
-        end do
-        if (.not. met(contacts, m, a, b)) then
-          call reserve(contacts%n_met + 1, contacts%met_a)
-          call reserve(contacts%n_met + 1, contacts%met_b)
-          contacts%met_a(m + 1:contacts%n_met + 1) = contacts%met_a(m:contacts%n_met)
-          contacts%met_b(m + 1:contacts%n_met + 1) = contacts%met_b(m:contacts%n_met)
-          contacts%met_a(m) = a
-          contacts%met_b(m) = b
-          contacts%n_met = contacts%n_met + 1
-        end if
-        t = last_of_pair(touches, t) + 1
+    a = 0
+    b = 0
+    m = 1
+    do t = 1, n
+      if (a == touches_a(t) .and. b == touches_b(t)) cycle
+      a = touches_a(t)
+      b = touches_b(t)
+      do while (m <= contacts%n_met)
+        if (.not. comes_before(contacts%met_a(m), contacts%met_b(m), 0, a, b, 0)) exit
+        m = m + 1
       end do
-    end associate
+      if (met(contacts, m, a, b)) cycle
+      call reserve(contacts%n_met + 1, contacts%met_a)
+      call reserve(contacts%n_met + 1, contacts%met_b)
+      contacts%met_a(m + 1:contacts%n_met + 1) = contacts%met_a(m:contacts%n_met)
+      contacts%met_b(m + 1:contacts%n_met + 1) = contacts%met_b(m:contacts%n_met)
+      contacts%met_a(m) = a
+      contacts%met_b(m) = b
+      contacts%n_met = contacts%n_met + 1
+    end do
   end subroutine note_partners
 
   !> Whether entry m of the pairs met is the pair (a, b).
@@ -907,17 +1082,5 @@ contains
       if (b == floor_wall .or. b == bed_partner) blocks%on_floor(a) = 1
     end do
   end subroutine count_partners
-
-  !> Make room for at least n springs.
-  subroutine reserve_springs(n, springs)
-    integer, intent(in) :: n
-    type(springs_t), intent(inout) :: springs
-
-    call reserve(n, springs%a)
-    call reserve(n, springs%b)
-    call reserve(n, springs%key)
-    call reserve(n, springs%k)
-    call reserve(n, springs%xi)
-  end subroutine reserve_springs
 
 end module contacts_m

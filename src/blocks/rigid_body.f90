@@ -16,7 +16,7 @@ module rigid_body_m
   implicit none
   private
   public :: blocks_t, blocks_init, release_body
-  public :: begin_step, drift, kick, set_velocity_after_fluid
+  public :: begin_step, drift, kick, hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, kinetic_energy, potential_energy
 
   !> All bodies of a run, in the order of the contract: `&body`, then `&drop`.
@@ -29,6 +29,8 @@ module rigid_body_m
     real(wp), allocatable :: added_mass(:)       !! (n) fluid that moves along in an impact [kg]
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
     logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
+    logical, allocatable :: asleep(:)            !! (n) at rest until woken (`sleep_m`)
+    logical, allocatable :: still(:)             !! (n) asleep, or held at rest for ever
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
     !> (3, n) at release, of fixed bodies for ever: velocity [m/s], and spin, space frame [rad/s].
     real(wp), allocatable :: given_v(:, :), given_omega(:, :)
@@ -100,7 +102,8 @@ contains
     n = blocks%n
     allocate (blocks%inverse_inertia(3, 3, size(blocks%shapes)), source=0.0_wp)
     allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
-    allocate (blocks%fixed(n), blocks%present(n), source=.false.)
+    allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
+      source=.false.)
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), source=0.0_wp)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
       source=0.0_wp)
@@ -165,7 +168,7 @@ contains
     integer :: b
 
     do b = 1, blocks%n
-      if (.not. blocks%present(b)) cycle
+      if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
       if (blocks%fixed(b)) then
         call drift_prescribed(dt, b, blocks)
         cycle
@@ -249,8 +252,30 @@ contains
       blocks%v(:, b) = blocks%v_start(:, b)
       blocks%l(:, b) = blocks%l_start(:, b)
     end do
+    call hold_sleepers(gravity, dt, blocks)
     call kick(gravity, dt, force + blocks%contact_force, torque + blocks%contact_torque, blocks)
+    do b = 1, blocks%n
+      if (.not. blocks%asleep(b)) cycle
+      blocks%v(:, b) = 0.0_wp   ! it is, to round-off
+      blocks%l(:, b) = 0.0_wp
+      blocks%omega(:, b) = 0.0_wp
+    end do
   end subroutine set_velocity_after_fluid
+
+  !> Contact forces on sleepers: what they rest on gives what holds them.
+  pure subroutine hold_sleepers(gravity, dt, blocks)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      if (.not. blocks%asleep(b)) cycle
+      blocks%contact_force(:, b) = -blocks%mass(b)*(gravity + blocks%v_start(:, b)/dt) &
+        - blocks%fluid_force(:, b)
+      blocks%contact_torque(:, b) = -blocks%l_start(:, b)/dt - blocks%fluid_torque(:, b)
+    end do
+  end subroutine hold_sleepers
 
   !> Kinetic energy of the free present bodies [J].
   pure function kinetic_energy(blocks) result(energy)

@@ -146,7 +146,7 @@ contains
     do b = 1, blocks%n
       associate (shape => blocks%shapes(blocks%shape(b)))
         bodies%present(b) = blocks%present(b)
-        bodies%free(b) = blocks%present(b) .and. .not. blocks%fixed(b)
+        bodies%free(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. blocks%asleep(b))
         bodies%x(:, b) = blocks%x(:, b)
         bodies%motion(1:3, b) = merge(blocks%v(:, b), 0.0_wp, blocks%present(b))
         bodies%motion(4:6, b) = merge(blocks%omega(:, b), 0.0_wp, blocks%present(b))

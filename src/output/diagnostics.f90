@@ -44,20 +44,21 @@ module diagnostics_m
     real(wp) :: max_overlap = 0.0_wp          !! [m]
     real(wp) :: contact_courant_max = 0.0_wp
     real(wp) :: substeps = 0.0_wp
+    real(wp) :: sleeping = 0.0_wp             !! blocks asleep
     real(wp) :: curvature_fallback = 0.0_wp   !! cells whose curvature does not come from heights
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 17
+  integer, parameter :: n_columns = 18
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
     'liquid_volume_drift', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
-    'max_overlap', 'contact_courant_max', 'substeps', 'curvature_fallback', &
-    'wall_time']
+    'max_overlap', 'contact_courant_max', 'substeps', 'sleeping', &
+    'curvature_fallback', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
     '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
-    's']
+    '1', 's']
 
 contains
 
@@ -83,6 +84,7 @@ contains
     row%max_overlap = report%max_overlap
     row%contact_courant_max = report%contact_courant_max
     row%substeps = real(report%substeps, wp)
+    row%sleeping = real(count(blocks%asleep), wp)
   end subroutine make_row
 
   !> The columns of the fluid.
@@ -188,7 +190,7 @@ contains
          row%kinetic_energy_bodies, &
          row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
          row%contact_courant_max, &
-         row%substeps, row%curvature_fallback, row%wall_time]
+         row%substeps, row%sleeping, row%curvature_fallback, row%wall_time]
   end function row_values
 
 end module diagnostics_m

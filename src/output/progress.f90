@@ -77,8 +77,8 @@ contains
         nint(row%substeps), &
         row%contact_courant_max
     end if
-    write (line(len_trim(line) + 1:), '(a11, i8, f13.4)') to_text(released)//'/' &
-      //to_text(blocks%n), moving, &
+    write (line(len_trim(line) + 1:), '(a11, i8, i8, f13.4)') to_text(released)//'/' &
+      //to_text(blocks%n), moving, count(blocks%asleep), &
       1.0e3_wp*row%max_overlap
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') row%liquid_volume_drift
     write (output_unit, '(2a)') trim(line), time_left(self, clock)
@@ -89,7 +89,7 @@ contains
     logical, intent(in) :: fluid
     character(:), allocatable :: line
     character(*), parameter :: clock_columns = '    step      t [s]    dt [s]'
-    character(*), parameter :: block_columns = '   released  moving overlap [mm]'
+    character(*), parameter :: block_columns = '   released  moving  asleep overlap [mm]'
 
     if (fluid) then
       line = clock_columns//'  Courant  div. [1/s]  passes  iterations'//block_columns &

@@ -13,7 +13,7 @@ module state_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
   use contacts_m, only: contacts_t
-  use neighbours_m, only: reserve
+  use springs_m, only: springs_t, reserve_springs
   use clock_m, only: clock_t
   implicit none
   private
@@ -146,6 +146,7 @@ contains
     associate (n => blocks%n)
       if (n == 0) return
       call visitor%logicals('/blocks/present', n, blocks%present)
+      call visitor%logicals('/blocks/asleep', n, blocks%asleep)
       call visitor%reals('/blocks/release_time', 's', [n], blocks%release_time)
       call visitor%reals('/blocks/position', 'm', [3, n], blocks%x)
       call visitor%reals('/blocks/quaternion', '1', [4, n], blocks%q)
@@ -163,26 +164,38 @@ contains
     end associate
   end subroutine visit_blocks
 
-  !> The tangential springs, the only memory of the contacts.
+  !> What the contacts remember: tangential springs, at work and at rest, and how long blocks have
+  !! been slow.
   subroutine visit_contacts(visitor, contacts)
     class(state_visitor_t), intent(inout) :: visitor
     type(contacts_t), intent(inout) :: contacts
 
-    associate (s => contacts%springs)
-      call visitor%whole_number('/contacts/n', s%n)
-      if (s%n < 0 .or. s%n > most_springs) s%n = 0   ! a damaged file: its checksum will tell
-      call reserve(max(1, s%n), s%a)
-      call reserve(max(1, s%n), s%b)
-      call reserve(max(1, s%n), s%key)
-      call reserve(max(1, s%n), s%k)
-      call reserve(max(1, s%n), s%xi)
-      call visitor%integers('/contacts/a', [s%n], s%a)
-      call visitor%integers('/contacts/b', [s%n], s%b)
-      call visitor%integers('/contacts/key', [s%n], s%key)
-      call visitor%reals('/contacts/stretch', 'm', [3, s%n], s%xi)
-      call visitor%reals('/contacts/stiffness', 'N/m^gamma', [s%n], s%k)
+    call visit_springs(visitor, '/contacts/', contacts%springs)
+    associate (quiet => contacts%sleep%quiet, rest => contacts%sleep%rest)
+      call visitor%reals('/contacts/quiet', 's', [size(quiet)], quiet)
+      call visit_springs(visitor, '/contacts/rest_', rest)
+      call visitor%reals('/contacts/rest_force', 'N', [3, rest%n], rest%force)
+      call visitor%reals('/contacts/rest_torque_a', 'N m', [3, rest%n], rest%torque_a)
+      call visitor%reals('/contacts/rest_torque_b', 'N m', [3, rest%n], rest%torque_b)
+      call visitor%reals('/contacts/rest_energy', 'J', [rest%n], rest%energy)
     end associate
   end subroutine visit_contacts
+
+  !> A list of tangential springs.
+  subroutine visit_springs(visitor, name, s)
+    class(state_visitor_t), intent(inout) :: visitor
+    character(*), intent(in) :: name
+    type(springs_t), intent(inout) :: s
+
+    call visitor%whole_number(name//'n', s%n)
+    if (s%n < 0 .or. s%n > most_springs) s%n = 0   ! a damaged file: its checksum will tell
+    call reserve_springs(max(1, s%n), s)
+    call visitor%integers(name//'a', [s%n], s%a)
+    call visitor%integers(name//'b', [s%n], s%b)
+    call visitor%integers(name//'key', [s%n], s%key)
+    call visitor%reals(name//'stretch', 'm', [3, s%n], s%xi)
+    call visitor%reals(name//'stiffness', 'N/m^gamma', [s%n], s%k)
+  end subroutine visit_springs
 
   subroutine real_number(self, name, units, x)
     class(state_visitor_t), intent(inout) :: self

@@ -123,6 +123,7 @@ class Series:
     max_overlap: Array
     contact_courant_max: Array
     substeps: Array
+    sleeping: Array
     curvature_fallback: Array
     wall_time: Array
 
@@ -319,9 +320,10 @@ def _true_release(due: Array, rows: dict[str, Array]) -> Array:
 
 def _read_series(h5: h5py.File) -> Series:
     group = h5["series"]
-    names = [f.name for f in fields(Series)]
-    complete = min(len(group[name]) for name in names)
-    return Series(**{name: group[name][:complete] for name in names})
+    names = {f.name for f in fields(Series)}
+    complete = min(len(group[name]) for name in names & set(group))
+    missing = {name: np.full(complete, np.nan) for name in names - set(group)}  # of older versions
+    return Series(**missing, **{name: group[name][:complete] for name in names & set(group)})
 
 
 def _read_timers(h5: h5py.File) -> dict[str, tuple[float, int]]:

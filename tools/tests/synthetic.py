@@ -167,6 +167,7 @@ def _write_series(group: h5py.Group, time: Array, drops: int) -> None:
         "max_overlap": 2e-5 * noise,
         "contact_courant_max": 0.05 * noise,
         "substeps": np.full(len(time), 20),
+        "sleeping": np.zeros(len(time)),
         "curvature_fallback": np.zeros(len(time)),
         "wall_time": 0.1 * np.arange(len(time)),
     }.items():

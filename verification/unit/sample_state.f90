@@ -9,6 +9,7 @@ module sample_state_m
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use contacts_m, only: contacts_t, contacts_init
+  use springs_m, only: springs_t
   use clock_m, only: clock_t, clock_init
   implicit none
   private
@@ -103,17 +104,29 @@ contains
   subroutine make_springs(start, contacts)
     real(wp), intent(in) :: start
     type(contacts_t), intent(inout) :: contacts
+
+    call fill_springs(start, contacts%springs)
+    contacts%springs%n = 4
+    call fill_springs(2*start, contacts%sleep%rest)
+    contacts%sleep%rest%n = 3
+    contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
+  end subroutine make_springs
+
+  subroutine fill_springs(start, s)
+    real(wp), intent(in) :: start
+    type(springs_t), intent(inout) :: s
     integer :: i
 
-    associate (s => contacts%springs)
-      s%n = 4
-      s%a = [2, 2, 3, 3]
-      s%b = [1, -1, 1, 2]
-      s%key = [7, 8, 9, 10]
-      s%k = [(start + 0.1_wp*i, i=1, 4)]
-      s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
-    end associate
-  end subroutine make_springs
+    s%a = [2, 2, 3, 3]
+    s%b = [1, -1, 1, 2]
+    s%key = [7, 8, 9, 10]
+    s%k = [(start + 0.1_wp*i, i=1, 4)]
+    s%energy = 3*s%k
+    s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
+    s%force = 2*s%xi
+    s%torque_a = 3*s%xi
+    s%torque_b = 4*s%xi
+  end subroutine fill_springs
 
   !> Fill an array, halo included, with numbers that tell the cell of the domain: those of periodic
   !! images are equal.

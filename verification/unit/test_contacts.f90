@@ -88,6 +88,7 @@ contains
     world%case%contact%model = models(model)
     world%case%contact%friction = 0.0_wp
     world%case%contact%wall_friction = 0.0_wp
+    world%case%contact%sleep = .false.   ! see test_sleep
     do b = 1, n
       world%case%body(b)%shape = shape
       world%case%body(b)%position = 0.5_wp
@@ -597,12 +598,13 @@ contains
   end subroutine check_periodic_image
 
   !> A pile moves the same to the last bit however often the lists are made anew, and from the state
-  !! of a restart: poses, momenta and springs.
+  !! of a restart: poses, momenta, springs and who sleeps.
   subroutine check_bookkeeping()
     type(world_t) :: one, two
     integer :: b, n
 
     call new_world(one, 6, 'plain')
+    one%case%contact%sleep = .true.
     one%case%contact%friction = 0.6_wp
     one%case%contact%wall_friction = 0.4_wp
     one%case%grid%length = [0.06_wp, 0.05_wp, 1.0_wp]
@@ -627,12 +629,15 @@ contains
       call check('touching', sum(one%blocks%contacts) > 5)
       call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
       two%contacts%springs = one%contacts%springs
+      two%contacts%sleep%quiet = one%contacts%sleep%quiet
+      two%contacts%sleep%rest = one%contacts%sleep%rest
       if (n == 1) then
         call release_body(0.4_wp, 6, one%blocks)
         call release_body(0.4_wp, 6, two%blocks)
       end if
     end do
     two%contacts%springs%xi = 0.0_wp
+    two%contacts%sleep%rest%force = 0.0_wp   ! where they sleep
     call run(one, 1)
     call run(two, 1)
     call check('the springs matter', .not. same(one%blocks, two%blocks))

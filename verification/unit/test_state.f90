@@ -26,7 +26,7 @@ contains
   !! and after the change is undone both agree again.
   subroutine test_every_change_shows()
     type(sample_t) :: s
-    integer, parameter :: n_changes = 30
+    integer, parameter :: n_changes = 35
     integer :: i
     character(:), allocatable :: name, before
     type(image_visitor_t) :: image
@@ -104,6 +104,11 @@ contains
     case (27); name = '/contacts/n'; s%contacts%springs%n = 3
     case (28); name = '/contacts/key'; s%contacts%springs%key(4) = 11
     case (29); name = '/contacts/stretch'; call touch(s%contacts%springs%xi(3, 4))
+    case (30); name = '/contacts/quiet'; call touch(s%contacts%sleep%quiet(1))
+    case (31); name = '/contacts/rest_stretch'; call touch(s%contacts%sleep%rest%xi(2, 3))
+    case (32); name = '/contacts/rest_torque_b'; call touch(s%contacts%sleep%rest%torque_b(1, 1))
+    case (33); name = '/contacts/rest_energy'; call touch(s%contacts%sleep%rest%energy(3))
+    case (34); name = '/blocks/asleep'; s%blocks%asleep(2) = .not. s%blocks%asleep(2)
     case default; name = '/contacts/stiffness'; call touch(s%contacts%springs%k(1))
     end select
   end subroutine change

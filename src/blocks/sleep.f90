@@ -1,0 +1,221 @@
+!> Blocks at rest sleep: they keep their pose, and touches among them are not looked for, until the
+!! forces on them no longer balance.
+!!
+!! A block falls asleep when it has been slow for some time, rests on something, and the forces on
+!! it balance within half of a small share of its load. It stays asleep as long as they balance
+!! within that share: contact from sleepers, held bodies and walls, which is frozen like the poses,
+!! contact from what moves, the fluid, and weight. So a block wakes in the substep in which it is
+!! hit, when the flow changes, and when a neighbour that it rests on wakes and moves away. Nothing
+!! is lost meanwhile: frozen forces and springs are those of the awake block at the same pose, and a
+!! sleeper is never held by more than that share of its load.
+module sleep_m
+  use kinds_m, only: wp
+  use vectors_m, only: norm
+  use rigid_body_m, only: blocks_t
+  use springs_m, only: springs_t, reserve_springs
+  implicit none
+  private
+  public :: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, is_tired
+  public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
+
+  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
+  real(wp), parameter :: patience = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
+  real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
+
+  type :: sleep_t
+    logical :: active = .false.
+    real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
+    real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
+    type(springs_t) :: rest                    !! touches at rest, between what does not move
+    !> (3, n) sums of these on each body [N], [N m].
+    real(wp), allocatable :: load(:, :), load_torque(:, :)
+    logical, allocatable :: tired(:), chosen(:)   !! (n), (springs) work
+  end type sleep_t
+
+contains
+
+  !> Nobody sleeps yet.
+  subroutine sleep_init(active, reach, sleep)
+    logical, intent(in) :: active
+    real(wp), intent(in) :: reach(:)           !! (n) [m]
+    type(sleep_t), intent(out) :: sleep
+
+    sleep%active = active
+    sleep%reach = reach
+    allocate (sleep%quiet(size(reach)), source=0.0_wp)
+    allocate (sleep%tired(size(reach)), source=.false.)
+    allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
+    call reserve_springs(1, sleep%rest)
+  end subroutine sleep_init
+
+  !> Which bodies do not move: sleepers, and fixed ones without a given velocity.
+  pure subroutine know_stillness(blocks)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      blocks%still(b) = blocks%asleep(b) .or. (blocks%fixed(b) .and. &
+        all(abs(blocks%given_v(:, b)) <= 0.0_wp) .and. all(abs(blocks%given_omega(:, b)) <= 0.0_wp))
+    end do
+  end subroutine know_stillness
+
+  !> Whether no body moves.
+  pure function all_still(blocks) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+
+    yes = all(blocks%still .or. .not. blocks%present)
+  end function all_still
+
+  !> Force and torque on each body of the touches at rest.
+  pure subroutine know_loads(sleep)
+    type(sleep_t), intent(inout) :: sleep
+    integer :: i, a, b
+
+    sleep%load = 0.0_wp
+    sleep%load_torque = 0.0_wp
+    do i = 1, sleep%rest%n
+      a = sleep%rest%a(i)
+      b = sleep%rest%b(i)
+      sleep%load(:, a) = sleep%load(:, a) + sleep%rest%force(:, i)
+      sleep%load_torque(:, a) = sleep%load_torque(:, a) + sleep%rest%torque_a(:, i)
+      if (b < 1) cycle
+      sleep%load(:, b) = sleep%load(:, b) - sleep%rest%force(:, i)
+      sleep%load_torque(:, b) = sleep%load_torque(:, b) + sleep%rest%torque_b(:, i)
+    end do
+  end subroutine know_loads
+
+  !> Count the time for which each block has been slow, by a substep.
+  pure subroutine note_quiet(gravity, dt, blocks, sleep)
+    real(wp), intent(in) :: gravity(3), dt     !! [m/s2, s]
+    type(blocks_t), intent(in) :: blocks
+    type(sleep_t), intent(inout) :: sleep
+    integer :: b
+
+    do b = 1, blocks%n
+      if (is_slow(gravity, b, blocks, sleep)) then
+        sleep%quiet(b) = sleep%quiet(b) + dt
+      else
+        sleep%quiet(b) = 0.0_wp
+      end if
+    end do
+  end subroutine note_quiet
+
+  !> Begin to count anew for blocks that the fluid has made faster at the end of a step.
+  pure subroutine note_quiet_end(gravity, blocks, sleep)
+    real(wp), intent(in) :: gravity(3)         !! [m/s2]
+    type(blocks_t), intent(in) :: blocks
+    type(sleep_t), intent(inout) :: sleep
+    integer :: b
+
+    do b = 1, blocks%n
+      if (.not. is_slow(gravity, b, blocks, sleep)) sleep%quiet(b) = 0.0_wp
+    end do
+  end subroutine note_quiet_end
+
+  !> Whether no point of a free block is faster than some share of the speed of a fall by its size.
+  pure function is_slow(gravity, b, blocks, sleep) result(yes)
+    real(wp), intent(in) :: gravity(3)         !! [m/s2]
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+    type(sleep_t), intent(in) :: sleep
+    logical :: yes
+
+    yes = blocks%present(b) .and. .not. blocks%fixed(b)
+    if (yes) yes = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*sleep%reach(b) &
+      <= slow*sqrt(norm(gravity)*sleep%reach(b))
+  end function is_slow
+
+  !> Whether a block has been slow for long: several times that of a fall by its size.
+  pure function is_tired(gravity, b, blocks, sleep) result(yes)
+    real(wp), intent(in) :: gravity(3)         !! [m/s2]
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+    type(sleep_t), intent(in) :: sleep
+    logical :: yes
+
+    yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
+    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= patience**2*sleep%reach(b)
+  end function is_tired
+
+  !> Whether contact forces balance weight and fluid within a share of the tolerance.
+  pure function balanced(share, force, torque, steady, steady_torque, reach) result(yes)
+    real(wp), intent(in) :: share              !! of the tolerance [-]
+    real(wp), intent(in) :: force(3), torque(3)               !! of contact [N], [N m]
+    real(wp), intent(in) :: steady(3), steady_torque(3)       !! all else [N], [N m]
+    real(wp), intent(in) :: reach              !! of the body [m]
+    logical :: yes
+    real(wp) :: bound
+
+    bound = share*tolerance*norm(steady)
+    yes = norm(force + steady) <= bound
+    if (yes) yes = norm(torque + steady_torque) <= bound*reach
+  end function balanced
+
+  !> Let body b sleep at its pose.
+  pure subroutine put_to_sleep(b, blocks)
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%asleep(b) = .true.
+    blocks%still(b) = .true.
+    blocks%v(:, b) = 0.0_wp
+    blocks%l(:, b) = 0.0_wp
+    blocks%omega(:, b) = 0.0_wp
+  end subroutine put_to_sleep
+
+  !> Take from sleepers the velocity of the middle of a substep, at the end of which they have none.
+  pure subroutine stop_sleepers(blocks)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      if (blocks%asleep(b)) call put_to_sleep(b, blocks)
+    end do
+  end subroutine stop_sleepers
+
+  !> Wake body b.
+  pure subroutine wake(b, blocks, sleep)
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    type(sleep_t), intent(inout) :: sleep
+
+    blocks%asleep(b) = .false.
+    blocks%still(b) = .false.
+    sleep%quiet(b) = 0.0_wp
+  end subroutine wake
+
+  !> Complete the contact forces by those of the touches at rest, and wake who is out of balance.
+  !!
+  !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
+  !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those
+  !! who sleep on get the force and torque that hold them.
+  subroutine hold_or_wake(gravity, steady, blocks, sleep, force, torque, woken)
+    real(wp), intent(in) :: gravity(3)         !! [m/s2]
+    real(wp), intent(in) :: steady(:, :)       !! (3, n) of the fluid [N]
+    type(blocks_t), intent(inout) :: blocks
+    type(sleep_t), intent(inout) :: sleep
+    real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) of contact [N], [N m]
+    logical, intent(out) :: woken(:)           !! (n)
+    real(wp) :: other(3)
+    integer :: b
+
+    woken = .false.
+    do b = 1, blocks%n
+      if (.not. blocks%still(b)) cycle
+      force(:, b) = force(:, b) + sleep%load(:, b)
+      torque(:, b) = torque(:, b) + sleep%load_torque(:, b)
+      if (.not. blocks%asleep(b)) cycle
+      other = steady(:, b) + blocks%mass(b)*gravity
+      woken(b) = .not. balanced(1.0_wp, force(:, b), torque(:, b), other, &
+        blocks%fluid_torque(:, b), sleep%reach(b))
+      if (woken(b)) then
+        call wake(b, blocks, sleep)
+      else
+        force(:, b) = -other
+        torque(:, b) = -blocks%fluid_torque(:, b)
+      end if
+    end do
+  end subroutine hold_or_wake
+
+end module sleep_m
