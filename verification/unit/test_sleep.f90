@@ -231,7 +231,7 @@ contains
   !> On a slope a little steeper than friction bears a cube never sleeps, on one less steep it does.
   subroutine check_slope()
     type(world_t) :: world
-    real(wp) :: slope, v
+    real(wp) :: slope, v, energy, x(3)
 
     slope = atan(mu*1.002_wp)
     call new_world(.true., 1, world)
@@ -249,6 +249,13 @@ contains
     call start(world)
     call run(world, 1.5_wp)
     call check('sleeps on a slope less steep', world%blocks%asleep(1))
+    x = world%blocks%x(:, 1)
+    energy = world%report%energy
+    world%blocks%fluid_force(2, 1) = 0.02_wp*weight(world)
+    call step(world)
+    call check('awake on the slope', .not. world%blocks%asleep(1))
+    call check('remembers its springs: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
+    call check('remembers its springs: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
   end subroutine check_slope
 
   !> Fluid force on a sleeper grows: it slides once it passes friction, no later than 1 %, and not
