@@ -719,6 +719,8 @@ contains
       end if
       highest = max(highest, omega2)
     end do
+    if (.not. law%constants) call damp_as_one(touches, first, last, law, partners, response, &
+                                             highest)
     ! no impact: slower than its weight makes a body within a swing
     speed = norm(partners%v(:, b) - partners%v(:, a)) &
       + norm(partners%omega(:, a))*norm(touches%arm_a(:, first)) &
@@ -728,6 +730,66 @@ contains
     if (partners%inverse_mass(a) > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
     if (partners%inverse_mass(b) > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
+
+  !> Scale the damping of the touches of a pair so that together they damp the swing they drive
+  !! like one spring and dashpot.
+  !!
+  !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
+  !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
+  !! part sideways, and weights that change with position make W other than each normal tells.
+  pure subroutine damp_as_one(touches, first, last, law, partners, response, highest)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first, last
+    type(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(response_t), intent(inout) :: response
+    real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
+    real(wp) :: push(3), force(3), torque_a(3), torque_b(3), v(3), spin_a(3), spin_b(3)
+    real(wp) :: stored, energy, mass, drag, omega2
+    integer :: a, b, t
+
+    a = touches%a(first)
+    b = touches%b(first)
+    force = 0.0_wp
+    torque_a = 0.0_wp
+    torque_b = 0.0_wp
+    energy = 0.0_wp
+    do t = first, last
+      if (touches%depth(t) <= 0.0_wp) cycle
+      stored = stored_energy(response%k(t), law%gamma_n, touches%depth(t))
+      push = -response%k(t)*touches%depth(t)*touches%normal(:, t)
+      if (touches%weight(t) < 1.0_wp) then
+        push = push - stored*touches%weight_shift(:, t)
+        torque_a = torque_a - stored*touches%weight_turn(:, t)
+        torque_b = torque_b + stored*touches%weight_turn(:, t)
+      end if
+      force = force + push
+      torque_a = torque_a + cross(touches%arm_a(:, t), push)
+      torque_b = torque_b - cross(touches%arm_b(:, t), push)
+      energy = energy + stored
+    end do
+    v = -(partners%inverse_mass(a) + partners%inverse_mass(b))*force   ! of b against a
+    spin_a = 0.0_wp
+    spin_b = 0.0_wp
+    if (partners%inverse_mass(a) > 0.0_wp) spin_a = matmul(partners%inverse_inertia(:, :, a), &
+                                                           torque_a)
+    if (partners%inverse_mass(b) > 0.0_wp) spin_b = matmul(partners%inverse_inertia(:, :, b), &
+                                                           torque_b)
+    mass = dot_product(spin_a, torque_a) + dot_product(spin_b, torque_b) - dot_product(v, force)
+    drag = 0.0_wp
+    do t = first, last
+      if (touches%depth(t) <= 0.0_wp) cycle
+      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, v &
+        + cross(spin_b, touches%arm_b(:, t)) - cross(spin_a, touches%arm_a(:, t)), &
+        spin_b - spin_a)**2
+    end do
+    if (.not. (energy > 0.0_wp .and. drag > 0.0_wp)) return
+    omega2 = 0.5_wp*mass/energy
+    highest = max(highest, omega2)
+    drag = 2*law%damping_ratio*mass*sqrt(omega2)/drag
+    response%eta(first:last) = drag*response%eta(first:last)
+    response%decay(first:last) = drag*response%decay(first:last)
+  end subroutine damp_as_one
 
   !> The products n_x n_x, n_y n_y, n_z n_z, n_y n_z, n_z n_x, n_x n_y.
   pure function square(n) result(nn)
@@ -895,7 +957,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(contacts_t), intent(inout) :: contacts
     type(contact_report_t), intent(inout) :: report
-    real(wp) :: v(3), normal(3), v_n, part, force_n, sum_n, decay, eta
+    real(wp) :: v(3), normal(3), v_n, opening, part, force_n, sum_n, decay, eta
     integer :: t, a, b
 
     associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, &
@@ -911,10 +973,12 @@ contains
         v_n = dot_product(v, normal)
         part = 1.0_wp
         if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-        force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), v_n) &
+        opening = opening_speed(touches, t, law%gamma_n, v, &
+          contacts%partners%omega(:, b) - contacts%partners%omega(:, a))
+        force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), opening) &
           /(1.0_wp + part*r%decay(t)*dt)
         call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
-        if (touches%weight(t) < 1.0_wp) call push_to_weight(t, contacts)
+        if (touches%weight(t) < 1.0_wp) call push_to_weight(t, force_n, contacts)
         sum_n = sum_n + force_n
         decay = max(decay, r%decay(t))
         eta = max(eta, r%eta(t))
@@ -926,9 +990,10 @@ contains
   end subroutine push_group
 
   !> The part of the force of touch t by which its weight changes with position: the energy of the
-  !! spring is k(position) d^(gamma+1)/(gamma+1).
-  pure subroutine push_to_weight(t, contacts)
+  !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
+  pure subroutine push_to_weight(t, force_n, contacts)
     integer, intent(in) :: t
+    real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
     type(contacts_t), intent(inout) :: contacts
     real(wp) :: energy
     integer :: a, b
@@ -936,13 +1001,27 @@ contains
     associate (touches => contacts%touches)
       a = touches%a(t)
       b = touches%b(t)
-      energy = stored_energy(contacts%response%k(t), contacts%law%gamma_n, touches%depth(t))
+      energy = force_n*touches%depth(t)/(contacts%law%gamma_n + 1.0_wp)
       call act(a, b, -energy*touches%weight_shift(:, t), touches%arm_a(:, t), &
         touches%arm_b(:, t), contacts)
       contacts%torque(:, a) = contacts%torque(:, a) - energy*touches%weight_turn(:, t)
       contacts%torque(:, b) = contacts%torque(:, b) + energy*touches%weight_turn(:, t)
     end associate
   end subroutine push_to_weight
+
+  !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
+  !! where the weight changes with position, of the weight [m/s].
+  pure function opening_speed(touches, t, gamma, v, omega) result(speed)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: t
+    real(wp), intent(in) :: gamma             !! power of the spring [-]
+    real(wp), intent(in) :: v(3), omega(3)    !! of b against a, at the contact [m/s, rad/s]
+    real(wp) :: speed
+
+    speed = dot_product(v, touches%normal(:, t))
+    if (touches%weight(t) < 1.0_wp) speed = speed + touches%depth(t)/(gamma + 1.0_wp) &
+      *(dot_product(v, touches%weight_shift(:, t)) + dot_product(omega, touches%weight_turn(:, t)))
+  end function opening_speed
 
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
   !!

@@ -45,6 +45,7 @@ contains
     call check_colliding_balls()
     call check_landing_cube()
     call check_landing_slab()
+    if (models(model) == 'surface') call check_edge_on_edge()
     call check_swinging_ball()
     call check_slip_to_roll()
     call check_incline()
@@ -272,6 +273,36 @@ contains
       0.05_wp)
   end subroutine check_landing_slab
 
+  !> Edges that meet exactly along one another touch along oblique normals with weights that change
+  !! with position: the pair still returns what is asked for, and makes no energy.
+  subroutine check_edge_on_edge()
+    real(wp), parameter :: e(4) = [0.1_wp, 0.3_wp, 0.7_wp, 1.0_wp]
+    type(world_t) :: world
+    real(wp) :: worst
+    integer :: m, k, phase
+
+    do m = 1, size(e)
+      worst = 0.0_wp
+      do phase = 0, 2
+        call new_world(world, 2, 'cube')
+        world%case%contact%restitution = e(m)
+        do k = 1, 2
+          world%case%body(k)%quaternion = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], &
+            atan(1.0_wp))
+          world%case%body(k)%velocity(3) = merge(0.4_wp, -0.4_wp, k == 1)
+        end do
+        world%case%body(2)%position(3) = 0.5_wp + sqrt(2.0_wp)*d + 1.0e-4_wp &
+          + 3.0e-5_wp*real(phase, wp)
+        call start(world)
+        world%gravity = 0.0_wp
+        call run(world, 8)
+        worst = max(worst, abs((world%blocks%v(3, 2) - world%blocks%v(3, 1))/0.8_wp - e(m)))
+        call check('no turn of edges', maxval(abs(world%blocks%omega)), 0.0_wp, 1.0e-9_wp)
+      end do
+      call check('restitution of edge on edge', worst, 0.0_wp, 0.02_wp)
+    end do
+  end subroutine check_edge_on_edge
+
   !> Height of the centre at which the lowest contact sphere or corner of a shape stands on the
   !! floor [m].
   function lowest(shape, q) result(height)
@@ -432,8 +463,8 @@ contains
   !> Momentum and angular momentum of colliding bodies, with friction and damping, no walls near.
   subroutine check_momentum()
     type(world_t) :: world
-    real(wp) :: p(3), l(3), p0(3), l0(3)
-    integer :: b
+    real(wp) :: p(3), l(3), p0(3), l0(3), round_off
+    integer :: b, i, drifts
 
     call new_world(world, 4, 'hexapod')
     world%case%contact%friction = 0.6_wp
@@ -447,13 +478,20 @@ contains
     end do
     call start(world)
     call total(world%blocks, p0, l0)
-    call run(world, 60)
+    drifts = 0
+    do i = 1, 60
+      call run(world, 1)
+      drifts = drifts + 2*world%report%substeps
+    end do
     call total(world%blocks, p, l)
+    ! each drift rounds the places, by the same amount while nothing touches
+    round_off = real(drifts, wp)*0.5_wp*spacing(0.5_wp)*sum(world%blocks%mass)*0.8_wp
     call check('they met', kinetic_energy(world%blocks) &
       < 0.9_wp*sum(world%blocks%mass)*0.5_wp*0.64_wp &
       .and. world%contacts%springs%n >= 0)
     call check('momentum', maxval(abs(p - p0)), 0.0_wp, 1.0e-14_wp)
-    call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, 1.0e-14_wp)
+    call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, round_off)
+    call check('to round-off', round_off < 1.0e-12_wp)
   end subroutine check_momentum
 
   !> Momentum of all bodies, and angular momentum about the middle of the tank.

@@ -21,7 +21,7 @@ ENERGY_BAND = 1e-3
 ON_FLOOR = ("sphere", "cube flat", "cube on an edge", "cube on a corner")
 PAIRS = ("two spheres", "face on face", "edge on face", "corner on face", "edge across edge")
 OBLIQUE = ("edge on face with ends on its border", "edge along edge", "corner on corner")
-"""These touch along several oblique normals."""
+"""These touch along several oblique normals; the last pair slips off sideways and turns."""
 LENGTH, TIME = 1e-4, 1e-2  # units of the tables D3 [m], [s]
 VARIES = (
     "contact restitution",
@@ -54,7 +54,8 @@ def restitution(run: Run, checks: Checks) -> None:
     for n, how in enumerate(OBLIQUE if oblique else PAIRS):
         i, j = len(floor) + 2 * n, len(floor) + 2 * n + 1
         closing = w[:, i] - w[:, j]
-        checks.within(f"e = {e:g}, {how}", float(-closing[-1] / closing[0]), low, high, not oblique)
+        returned = float(-closing[-1] / closing[0])
+        checks.within(f"e = {e:g}, {how}", returned, low, high, how != "corner on corner")
         total = b.mass[i] * b.velocity[:, i] + b.mass[j] * b.velocity[:, j]
         drift = float(np.abs(total - total[0]).max() / (b.mass[i] * np.abs(w[0, i])))
         checks.below(f"e = {e:g}, {how}: momentum", drift, MOMENTUM_BAND)
