@@ -139,6 +139,44 @@ def below_plane(corner: Array, level: float) -> tuple[float, Array]:
     return float(volume), moment
 
 
+def volume_in_box(corner: Array, low: Array, high: Array) -> float:
+    """Volume [m3] of the part of tetrahedra `corner` (k, 4, 3) between `low` and `high` (3); a
+    bound may be infinite. Exact: each side of the box cuts tetrahedra into tetrahedra."""
+    for axis in range(3):
+        corner = _below(corner, corner[..., axis] - high[axis])
+        corner = _below(corner, low[axis] - corner[..., axis])
+    return float(np.abs(tet_volumes(corner)).sum())
+
+
+def _below(corner: Array, height: Array) -> Array:
+    """Tetrahedra (m, 4, 3), of either sense, that fill the part of `corner` where the linear
+    function `height` (k, 4), given at their corners, is below zero."""
+    order = np.argsort(height, axis=1)
+    height = np.take_along_axis(height, order, axis=1)
+    corner = np.take_along_axis(corner, order[..., None], axis=1)
+    low = (height < 0).sum(axis=1)
+    found = [corner[low == 4]]
+    for n in (1, 2, 3):  # corners below the plane
+        x, h = corner[low == n], height[low == n]
+
+        def cut(a: int, b: int, x: Array = x, h: Array = h) -> Array:
+            share = h[:, a] / (h[:, a] - h[:, b])
+            return np.asarray(x[:, a] + share[:, None] * (x[:, b] - x[:, a]))
+
+        if n == 1:
+            found.append(np.stack([x[:, 0], cut(0, 1), cut(0, 2), cut(0, 3)], axis=1))
+        elif n == 2:
+            found += _prism(x[:, 0], cut(0, 2), cut(0, 3), x[:, 1], cut(1, 2), cut(1, 3))
+        else:
+            found += _prism(x[:, 0], x[:, 1], x[:, 2], cut(0, 3), cut(1, 3), cut(2, 3))
+    return np.concatenate(found)
+
+
+def _prism(*corner: Array) -> list[Array]:
+    """Three tetrahedra (k, 4, 3) of prisms; corners 0, 1, 2 of one end lie along 3, 4, 5."""
+    return [np.stack([corner[m] for m in c], 1) for c in ((0, 1, 2, 5), (0, 1, 5, 4), (0, 3, 4, 5))]
+
+
 def _cut_polygon(points: Array, height: Array) -> list[Array]:
     """The part of a polygon where `height` <= 0, corners in order."""
     kept: list[Array] = []

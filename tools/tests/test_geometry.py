@@ -46,6 +46,32 @@ def test_parts_below_and_above_a_plane_make_the_whole(level: float) -> None:
     assert moment_below + moment_above * [1, 1, -1] == pytest.approx(np.zeros(3), abs=1e-18)
 
 
+def test_volume_in_a_box_is_that_of_a_smaller_box() -> None:
+    shape = box((0.03, 0.02, 0.05), refinement=2)
+    low, high = np.array([-0.004, -1.0, -0.0137]), np.array([0.0071, 0.003, np.inf])
+    found = g.volume_in_box(shape.points[shape.tets], low, high)
+    assert found == pytest.approx(0.0111 * 0.013 * 0.0387, rel=1e-13)
+
+
+def test_boxes_that_fill_space_hold_the_whole_and_agree_with_planes() -> None:
+    shape = hexapod(0.02)
+    corner = g.place(shape.points, np.zeros(3), TILTED)[shape.tets]
+    cuts = np.array([-np.inf, -0.011, 0.004, np.inf])
+    parts = np.array(
+        [
+            [
+                g.volume_in_box(corner, cuts[[i, j, k]], cuts[[i + 1, j + 1, k + 1]])
+                for k in range(3)
+            ]
+            for i in range(3)
+            for j in range(3)
+        ]
+    )
+    below = g.below_plane(corner, -0.011)[0]
+    assert parts.sum() == pytest.approx(shape.volume, rel=1e-13)
+    assert parts[:, 0].sum() == pytest.approx(below, rel=1e-13)
+
+
 def test_inside_agrees_with_the_three_boxes_of_a_hexapod() -> None:
     shape, rng = hexapod(0.02), np.random.default_rng(3)
     points = rng.uniform(-0.032, 0.032, (4000, 3))
