@@ -336,6 +336,9 @@ contains
         if (.not. balanced(half, contacts%force(:, b), contacts%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
                            blocks%fluid_torque(:, b), sleep%reach(b))) cycle
+        ! should it wake before the step ends, contact has taken this
+        contacts%impulse(:, b) = contacts%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
+        contacts%twist(:, b) = contacts%twist(:, b) - blocks%l(:, b)
         call put_to_sleep(b, blocks)
         changed = .true.
       end do
