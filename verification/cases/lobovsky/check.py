@@ -23,5 +23,7 @@ WALL = Experiment(
     counts_from=30,
 )
 
+check = WALL.check
+
 if __name__ == "__main__":
-    main(WALL.check)
+    main(check)
