@@ -47,7 +47,7 @@ class Level:
 
 
 LEVELS = {
-    "QUICK": Level("quick", 40.0, 900.0),
+    "QUICK": Level("quick", 30.0, 900.0),
     "": Level("normal", 2500.0, 3 * 3600.0),
     "FULL": Level("full", float("inf"), 24 * 3600.0, fine=True),
 }
