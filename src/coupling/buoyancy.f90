@@ -1,11 +1,14 @@
-!> Exact weight of the fluid that each body displaces, and what the face pressures miss of it.
+!> Exact weight of the fluid that each body displaces, and what the faces miss of its mass.
 !!
 !! The pressure acts on a body through the solid shares of the grid faces, which measure its volume
 !! by the trapezoid rule: a submerged block would float by the wrong volume, by some per cent at
-!! coarse grids and differently in every pose. The buoyancy is therefore taken from the tetrahedra,
-!! cut by the plane of the liquid where the surface crosses a body, and only the rest of the
-!! pressure force comes from the faces. In still water the force on a body is Archimedes' to
-!! round-off. The same term makes the weight of the fluid that of its true volume, so it closes the
+!! coarse grids and differently in every pose, and with a body that accelerates the wrong mass of
+!! fluid would lie still. The mass and first moment K of the true displaced fluid less that of the
+!! faces is therefore found from the tetrahedra, cut by the plane of the liquid where the surface
+!! crosses a body; K (a - g) adds to the force of the faces, a being the acceleration of the body.
+!! In still water the force is Archimedes' to round-off; a body and the fluid around it that
+!! accelerate alike feel nothing of each other but the pressure that does it, on the true volume.
+!! The same terms make weight and inertia of the fluid those of its true volume, so they close the
 !! momentum of fluid and bodies.
 module buoyancy_m
   use kinds_m, only: wp
@@ -23,12 +26,12 @@ module buoyancy_m
   use exact_sum_m, only: exact_sums
   implicit none
   private
-  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_fluid, hydrostatic_correction
+  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_fluid, uncounted_fluid
 
   real(wp), parameter :: pure_share = 1.0e-12_wp   !! shares this close to 0 or 1 have no surface
 
   type :: buoyancy_t
-    real(wp), allocatable :: work(:, :)   !! (*, 6) terms of the sums
+    real(wp), allocatable :: work(:, :)   !! (*, 12) terms of the sums
   end type buoyancy_t
 
 contains
@@ -37,7 +40,7 @@ contains
   subroutine buoyancy_init(self)
     type(buoyancy_t), intent(out) :: self
 
-    allocate (self%work(0, 6))
+    allocate (self%work(0, 12))
   end subroutine buoyancy_init
 
   !> Archimedes' force and torque: minus the weight of the fluid in the true place of each body.
@@ -62,8 +65,11 @@ contains
     end do
   end subroutine displaced_force
 
-  !> Buoyancy of the true displaced fluid less the hydrostatic part of the face pressures, per body.
-  subroutine hydrostatic_correction(grid, fluid, solid, bodies, flux, c, rho, self, force)
+  !> Mass and first moment of the true displaced fluid less what the faces count of them.
+  !!
+  !! Column d belongs to an acceleration along d: to the pressures at the faces, which it makes,
+  !! `lack(:, d)` times it is to be added for the force and torque on the true body.
+  subroutine uncounted_fluid(grid, fluid, solid, bodies, flux, c, rho, self, lack)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
@@ -73,17 +79,23 @@ contains
                                     - n_halo:), &
       contiguous :: c, rho                 !! liquid share [-] and density [kg/m3] of the fluid
     type(buoyancy_t), intent(inout) :: self
-    real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
-    integer :: b, n
+    real(wp), intent(out) :: lack(:, :, :)   !! (6, 3, bodies) [kg, kg m]
+    real(wp) :: mass, moment(3), counted(12)
+    integer :: b, d, n
 
-    call displaced_force(grid, fluid, solid, bodies, c, self, force)
+    lack = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
+      call displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
       call make_room(self, solid%body_face(b + 1) - solid%body_face(b))
-      n = hydrostatic_of_faces(grid, fluid%gravity, solid, flux, rho, b, self%work)
-      force(:, b) = force(:, b) - exact_sums(self%work(1:n, :))
+      n = mass_at_faces(grid, solid, flux, rho, b, self%work)
+      counted = exact_sums(self%work(1:n, :))
+      do d = 1, 3
+        lack(1:3, d, b) = (mass - counted(d))*unit_step(:, d)
+        lack(4:6, d, b) = cross(moment, real(unit_step(:, d), wp)) - counted(3*d + 1:3*d + 3)
+      end do
     end do
-  end subroutine hydrostatic_correction
+  end subroutine uncounted_fluid
 
   !> Lists long enough for n terms.
   subroutine make_room(self, n)
@@ -92,7 +104,7 @@ contains
 
     if (size(self%work, 1) >= n) return
     deallocate (self%work)
-    allocate (self%work(2*n, 6))
+    allocate (self%work(2*n, 12))
   end subroutine make_room
 
   !> Fluid in the true place of body b: its mass, and its first moment about the centre of mass.
@@ -171,10 +183,10 @@ contains
     end do
   end subroutine liquid_part
 
-  !> What the pressures of fluid at rest do to body b: p_low - p_high = -rho_f g h at each face.
-  function hydrostatic_of_faces(grid, gravity, solid, flux, rho, b, term) result(n)
+  !> What the faces count of the fluid in the place of body b, rho_f h times the flux of the unit
+  !! motions: masses along x, y, z, then the torque of a unit acceleration along each.
+  function mass_at_faces(grid, solid, flux, rho, b, term) result(n)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: gravity(3)
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_flux_t), intent(in) :: flux
     real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
@@ -183,7 +195,7 @@ contains
     real(wp), intent(inout) :: term(:, :)
     integer :: n
     integer :: m, d, f(3), low(3)
-    real(wp) :: head   !! rho_f g h [Pa]
+    real(wp) :: column   !! rho_f h: mass per area between two pressures [kg/m2]
 
     n = 0
     do m = solid%body_face(b), solid%body_face(b + 1) - 1
@@ -192,15 +204,17 @@ contains
       if (.not. flux%mine(m)) cycle
       low = f - unit_step(:, d)
       if (low(d) == 0 .and. gives_pressure(grid%side(1, d))) then
-        head = 0.5_wp*rho(f(1), f(2), f(3))*gravity(d)*grid%h(d)
+        column = 0.5_wp*rho(f(1), f(2), f(3))*grid%h(d)
       else if (f(d) == grid%n(d) + 1 .and. gives_pressure(grid%side(2, d))) then
-        head = 0.5_wp*rho(low(1), low(2), low(3))*gravity(d)*grid%h(d)
+        column = 0.5_wp*rho(low(1), low(2), low(3))*grid%h(d)
       else
-        head = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*gravity(d)*grid%h(d)
+        column = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*grid%h(d)
       end if
       n = n + 1
-      term(n, :) = -flux%s(:, m)*head
+      term(n, :) = 0.0_wp
+      term(n, d) = column*flux%s(d, m)
+      term(n, 3*d + 1:3*d + 3) = column*flux%s(4:6, m)
     end do
-  end function hydrostatic_of_faces
+  end function mass_at_faces
 
 end module buoyancy_m

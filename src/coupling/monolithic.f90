@@ -12,14 +12,14 @@ module monolithic_m
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, solid_face_flux, nearest_arm
   use viscous_m, only: build_viscous
   use pressure_m, only: set_pressure_system, solve_pressure, face_acceleration, &
     cell_mean_of_faces, &
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
-  use buoyancy_m, only: hydrostatic_correction
+  use buoyancy_m, only: uncounted_fluid
   use film_velocity_m, only: tie_films
   use momentum_return_m, only: return_momentum
   use surface_stress_m, only: surface_stress
@@ -62,10 +62,10 @@ contains
                             flow%sides)
       call force_from_tension(grid, solid, bodies, p%operator%flux, self%tension, self%terms, &
                               self%from_pressure)
-      call hydrostatic_correction(grid, case%fluid, solid, bodies, p%operator%flux, flow%c, &
-                                  flow%rho, &
-                                  self%buoyancy, self%from_level)
+      call uncounted_fluid(grid, case%fluid, solid, bodies, p%operator%flux, flow%c, &
+                           flow%rho, self%buoyancy, self%lack)
       free = bodies%motion
+      call count_fluid(case%fluid%gravity, dt, self)
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
 
       call build_viscous(grid, solid, bodies, flow%rho, flow%mu, dt, self%viscous)
@@ -97,8 +97,44 @@ contains
       call extend_pressure(grid, case%fluid%gravity, flow%rho, p%active, p%known, flow%p)
       call force_from_faces(grid, solid, bodies, p%operator%flux, p%phi_total, self%total)
       self%total = self%total + self%from_pressure + self%from_level + self%from_viscosity
+      call add_acceleration(dt, free, self)
     end associate
   end subroutine monolithic_stage
+
+  !> Give the bodies the inertia of the fluid that the faces do not count, and `from_level` its
+  !! force as far as it is known before the solve: -lack (g - a), a by weight and contact.
+  subroutine count_fluid(gravity, dt, self)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! [s]
+    type(stage_t), intent(inout) :: self
+    real(wp) :: lack(6, 6)
+    integer :: b
+
+    do b = 1, size(self%lack, 3)
+      self%from_level(:, b) = -matmul(self%lack(:, :, b), gravity)
+      if (.not. self%bodies%free(b)) cycle
+      lack = 0.0_wp
+      lack(:, 1:3) = self%lack(:, :, b)
+      lack(1:3, 4:6) = transpose(lack(4:6, 1:3))
+      call set_inertia(b, self%bodies, lack)
+      self%from_level(:, b) = self%from_level(:, b) + &
+        matmul(self%bodies%lack(:, :, b), self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
+    end do
+  end subroutine count_fluid
+
+  !> The rest of that force, by the acceleration that the solve has found.
+  subroutine add_acceleration(dt, free, self)
+    real(wp), intent(in) :: dt           !! [s]
+    real(wp), intent(in) :: free(:, :)   !! (6, n) motion before the solve
+    type(stage_t), intent(inout) :: self
+    integer :: b
+
+    do b = 1, self%bodies%n
+      if (.not. self%bodies%free(b)) cycle
+      self%total(:, b) = self%total(:, b) + &
+        matmul(self%bodies%lack(:, :, b), self%bodies%motion(:, b) - free(:, b))/dt
+    end do
+  end subroutine add_acceleration
 
   !> Face velocity of the start made free of divergence, and the pressure of the fluid under gravity
   !! around bodies held in place, so that the first step starts from a balance.

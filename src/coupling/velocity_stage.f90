@@ -3,7 +3,7 @@ module velocity_stage_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: numerics_t
   use fields_m, only: flow_t
   use viscous_m, only: viscous_t, viscous_init, solve_viscous
@@ -37,6 +37,7 @@ module velocity_stage_m
     type(solid_geometry_t) :: whole                !! the domain without solids, for the mixture
     real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
     real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
+    real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_viscosity(:, :)  !! (6, n)
     real(wp), allocatable :: total(:, :)           !! (6, n)
     real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
@@ -69,6 +70,7 @@ contains
     call solid_geometry_init(grid, self%whole, n)
     allocate (self%from_pressure(6, n), source=0.0_wp)
     allocate (self%from_level, self%from_viscosity, self%total, source=self%from_pressure)
+    allocate (self%lack(6, 3, n), source=0.0_wp)
     allocate (self%terms(0, 6))
     allocate (self%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
@@ -157,6 +159,7 @@ contains
                                                        blocks%inverse_inertia(:, :, &
                                                            blocks%shape(b)))
       end associate
+      call set_inertia(b, bodies)
     end do
   end subroutine copy_motion
 
@@ -169,9 +172,7 @@ contains
 
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
-      bodies%motion(1:3, b) = bodies%motion(1:3, b) + dt*force(1:3, b)/bodies%mass(b)
-      bodies%motion(4:6, b) = bodies%motion(4:6, b) + dt*matmul(bodies%inverse_inertia(:, :, b), &
-          force(4:6, b))
+      bodies%motion(:, b) = bodies%motion(:, b) + dt*matmul(bodies%mobility(:, :, b), force(:, b))
     end do
   end subroutine push_bodies
 

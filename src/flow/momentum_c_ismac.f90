@@ -28,7 +28,7 @@ module momentum_c_ismac_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo, unit_step, side_inflow
   use fields_m, only: flow_t
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: tvd5, scheme_of, tvd_scheme
   use viscous_m, only: viscous_t, apply_viscous, force_of_legs, velocity_scale, inertial_momentum, &
                        wrench
@@ -332,28 +332,6 @@ contains
       op%mobility(:, :, b) = inverse_of(matrix)
     end do
   end subroutine eliminate_bodies
-
-  !> Inverse of a symmetric positive matrix, by Gauss-Jordan elimination.
-  pure function inverse_of(matrix) result(a)
-    real(wp), intent(in) :: matrix(:, :)
-    real(wp) :: a(size(matrix, 1), size(matrix, 1))
-    real(wp) :: pivot, row(size(matrix, 1))
-    integer :: i, p
-
-    a = matrix
-    do p = 1, size(a, 1)
-      pivot = a(p, p)
-      a(p, p) = 1.0_wp
-      a(p, :) = a(p, :)/pivot
-      row = a(p, :)
-      do i = 1, size(a, 1)
-        if (i == p) cycle
-        pivot = a(i, p)
-        a(i, p) = 0.0_wp
-        a(i, :) = a(i, :) - pivot*row
-      end do
-    end do
-  end function inverse_of
 
   !> The right side over the diagonal: all accelerations at u^n, walls with the given motions.
   subroutine right_side(grid, rho, dt, u, motion, viscous, self)

@@ -6,7 +6,8 @@
 !! du relative to that of the wall leaves (m_d - m) du of the momentum that a body has felt without
 !! an owner, and so does what film cells lose when their faces set their velocity
 !! (`film_velocity_m`). It goes to those of the 26 cells around that no body cuts, where the two
-!! masses are the same, so that nothing comes back. Fluid and bodies together keep their momentum.
+!! masses are the same, so that nothing comes back; where all of them are cut, as in the corners of
+!! a block, to all of the 124 around. Fluid and bodies together keep their momentum.
 module momentum_return_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
@@ -26,6 +27,7 @@ module momentum_return_m
   real(wp), parameter :: least_sum = 14.0_wp
     !! full cells among which a giver without whole neighbours spreads at least: of what the cells
     !! give to each other less comes back than was given
+  integer, parameter :: far = 2                   !! cells to which it may give
 
 contains
 
@@ -45,7 +47,7 @@ contains
     real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                        grid%lo(3) - n_halo:, :), &
       contiguous :: whole, cut
-        !! work arrays: what a cell owes to its whole neighbours, or to all, cut ones too [m/s]
+        !! work arrays: what a cell owes to its whole neighbours, or to all around [m/s]
     integer :: b, m, c(3), low(3), high(3)
 
     if (bodies%n == 0) return
@@ -56,8 +58,9 @@ contains
     do b = 1, bodies%n
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         c = solid%face(1:3, m)
-        call owe(b, c)
-        call owe(b, c - unit_step(:, solid%face(4, m)))
+        if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call owe(b, c)
+        c = c - unit_step(:, solid%face(4, m))
+        if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call owe(b, c)
       end do
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         call owe(b, solid%cell(:, m))
@@ -65,22 +68,28 @@ contains
     end do
     call halo_exchange(whole, n_halo)
     call halo_exchange(cut, n_halo)
-    call take(max(low, grid%lo), min(high, grid%hi))
+    call take(max(low - 1, grid%lo), min(high + 1, grid%hi))
+    call take_far(max(low - far, grid%lo - far), min(high + far, grid%hi + far))
   contains
     !> What cell c at body b owes, per share of the takers.
     subroutine owe(b, c)
       integer, intent(in) :: b, c(3)
-      real(wp) :: arm(3), wall(3), mass, mass_whole, mass_cut, full, owed, m
+      real(wp) :: arm(3), wall(3), moved(3), mass, mass_whole, mass_cut, full, owed, m
       integer :: i, j, k, d, u(3)
 
-      low = min(low, c - 1)
-      high = max(high, c + 1)
+      low = min(low, c)
+      high = max(high, c)
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], &
                         bodies%x(:, b))
       wall = wall_velocity(bodies%motion(:, b) - before%motion(:, b), arm)
       full = flow%rho(c(1), c(2), c(3))*grid%volume
       mass = mass_of(c(1), c(2), c(3))
+      do d = 1, 3
+        u = c + unit_step(:, d)
+        moved(d) = full*open_share(solid%open(c(1), c(2), c(3), d), solid%open(u(1), u(2), u(3), d))
+      end do
+      if (mass <= 0.0_wp .and. all(moved <= 0.0_wp)) return
       mass_whole = 0.0_wp
       mass_cut = 0.0_wp
       do k = c(3) - 1, c(3) + 1
@@ -88,15 +97,13 @@ contains
           do i = c(1) - 1, c(1) + 1
             m = mass_of(i, j, k)
             if (is_whole(i, j, k) .and. m > heavy*full) mass_whole = mass_whole + m
-            mass_cut = mass_cut + m**2/full
           end do
         end do
       end do
+      if (mass_whole <= 0.0_wp) mass_cut = sum_around(c, full)
       do d = 1, 3
-        u = c + unit_step(:, d)
-        owed = (full*open_share(solid%open(c(1), c(2), c(3), d), solid%open(u(1), u(2), u(3), d)) &
-                - mass)*(flow%u(c(1), c(2), c(3), d) - tied(c(1), c(2), c(3), d) &
-                         - u_before(c(1), c(2), c(3), d) - wall(d)) &
+        owed = (moved(d) - mass)*(flow%u(c(1), c(2), c(3), d) - tied(c(1), c(2), c(3), d) &
+                                  - u_before(c(1), c(2), c(3), d) - wall(d)) &
                - mass*tied(c(1), c(2), c(3), d)
         if (mass_whole > 0.0_wp) then
           whole(c(1), c(2), c(3), d) = owed/mass_whole
@@ -106,29 +113,41 @@ contains
       end do
     end subroutine owe
 
-    !> The own cells between two corners take what their neighbours and they themselves owe.
+    !> Sum of m**2/full of the cells around a giver without whole neighbours.
+    pure function sum_around(c, full) result(total)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: full   !! mass that a full cell of it would have [kg]
+      real(wp) :: total
+      integer :: i, j, k
+
+      total = 0.0_wp
+      do k = c(3) - far, c(3) + far
+        do j = c(2) - far, c(2) + far
+          do i = c(1) - far, c(1) + far
+            total = total + mass_of(i, j, k)**2/full
+          end do
+        end do
+      end do
+    end function sum_around
+
+    !> The own cells between two corners take what their neighbours owe to whole cells.
     subroutine take(first, last)
       integer, intent(in) :: first(3), last(3)
       integer :: i, j, k, p, q, r
       real(wp) :: mass, full, total(3)
-      logical :: here_whole
 
-      !$omp parallel do private(i, j, p, q, r, mass, full, total, here_whole) schedule(static)
+      !$omp parallel do private(i, j, p, q, r, mass, full, total) schedule(static)
       do k = first(3), last(3)
         do j = first(2), last(2)
           do i = first(1), last(1)
             mass = mass_of(i, j, k)
-            here_whole = is_whole(i, j, k)
+            if (.not. is_whole(i, j, k)) cycle
             total = 0.0_wp
             do r = k - 1, k + 1
               do q = j - 1, j + 1
                 do p = i - 1, i + 1
                   full = flow%rho(p, q, r)*grid%volume
-                  if (here_whole .and. mass > heavy*full) then
-                    total = total + whole(p, q, r, :)
-                  else
-                    total = total + cut(p, q, r, :)*mass/full
-                  end if
+                  if (mass > heavy*full) total = total + whole(p, q, r, :)
                 end do
               end do
             end do
@@ -138,11 +157,36 @@ contains
       end do
     end subroutine take
 
-    !> Mass of the fluid in a cell [kg].
+    !> What is owed to all around by the givers between two corners, in the order of their places.
+    subroutine take_far(first, last)
+      integer, intent(in) :: first(3), last(3)
+      integer :: i, j, k, p, q, r
+      real(wp) :: full
+
+      do r = first(3), last(3)
+        do q = first(2), last(2)
+          do p = first(1), last(1)
+            if (all(abs(cut(p, q, r, :)) <= 0.0_wp)) cycle
+            full = flow%rho(p, q, r)*grid%volume
+            do k = max(r - far, grid%lo(3)), min(r + far, grid%hi(3))
+              do j = max(q - far, grid%lo(2)), min(q + far, grid%hi(2))
+                do i = max(p - far, grid%lo(1)), min(p + far, grid%hi(1))
+                  flow%u(i, j, k, :) = flow%u(i, j, k, :) + cut(p, q, r, :)*mass_of(i, j, k)/full
+                end do
+              end do
+            end do
+          end do
+        end do
+      end do
+    end subroutine take_far
+
+    !> Mass of the fluid in a cell [kg]; none outside the domain.
     pure function mass_of(i, j, k) result(mass)
       integer, intent(in) :: i, j, k
       real(wp) :: mass
 
+      mass = 0.0_wp
+      if (any(([i, j, k] < 1 .or. [i, j, k] > grid%n) .and. .not. grid%periodic)) return
       mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
     end function mass_of
 

@@ -238,8 +238,7 @@ contains
 
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
-      a(1:3, b) = a(1:3, b)/bodies%mass(b)
-      a(4:6, b) = matmul(bodies%inverse_inertia(:, :, b), a(4:6, b))
+      a(:, b) = matmul(bodies%mobility(:, :, b), a(:, b))
     end do
   end subroutine motion_of_force
 

@@ -604,9 +604,8 @@ contains
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
         associate (m => self%body_matrix(:, :, b))
-          do c = 1, 3
-            z_body(c, b) = r_body(c, b)/(bodies%mass(b)/dt + m(c, c))
-            z_body(c + 3, b) = r_body(c + 3, b)/(bodies%inertia(c, c, b)/dt + m(c + 3, c + 3))
+          do c = 1, 6
+            z_body(c, b) = r_body(c, b)/(bodies%apparent(c, c, b)/dt + m(c, c))
           end do
         end associate
       end do
@@ -673,8 +672,7 @@ contains
     real(wp), intent(in) :: dt, motion(6)
     real(wp) :: p(6)
 
-    p(1:3) = bodies%mass(b)*motion(1:3)/dt
-    p(4:6) = matmul(bodies%inertia(:, :, b), motion(4:6))/dt
+    p = matmul(bodies%apparent(:, :, b), motion)/dt
   end function inertial_momentum
 
   !> x := x - a y on the own cells; with `inverse` also z := x*inverse and the largest |z|.

@@ -1,10 +1,11 @@
-!> One monolithic step of a free block in liquid: momentum, divergence, added mass.
+!> One monolithic step of a free block in liquid: momentum, divergence, added mass, free fall.
 program test_coupling
   use kinds_m, only: wp
   use vectors_m, only: quaternion_from_axis
   use rigid_body_m, only: begin_step, set_velocity_after_fluid
   use monolithic_m, only: monolithic_stage, start_flow
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
+  use rigid_motion_m, only: set_inertia
   use coupling_m, only: advance_velocity
   use boundary_m, only: fill_velocity_halo
   use one_body_m, only: one_body_t, describe, place
@@ -22,6 +23,13 @@ program test_coupling
   call moving_box()
   call held_box()
   call block_of_water()
+  call block_at_rest()
+  call fall_together('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+  call fall_together('box', [0.043_wp, 0.031_wp, 0.037_wp], 600.0_wp)
+  call wherever_it_lies()
+  call momentum_kept('in the open', spread(0.06_wp, 1, 3))
+  call momentum_kept('at a wall', [0.033_wp, 0.06_wp, 0.06_wp])
+  call limited()
   call finish_checks()
 
 contains
@@ -89,6 +97,7 @@ contains
                                   stage%total(4:6, :), block%blocks)
     call copy_motion(block%blocks, stage%bodies)
     motion = stage%bodies%motion(:, 1)
+    stage%at_start = stage%bodies
     call monolithic_stage(block%case, block%grid, block%solid, dt, block%flow, stage, report)
     gain(1:3) = block%blocks%mass(1)*(stage%bodies%motion(1:3, 1) - motion(1:3))
     gain(4:6) = matmul(stage%bodies%inertia(:, :, 1), stage%bodies%motion(4:6, 1) - motion(4:6))
@@ -136,5 +145,150 @@ contains
     call check('block of water: hovers', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
     call check('block of water: does not turn', maxval(abs(block%blocks%omega)), 0.0_wp, 1.0e-7_wp)
   end subroutine block_of_water
+
+  !> A block that a contact carries, with its weight under water, stays at rest; so does the water.
+  subroutine block_at_rest()
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    block%case%fluid%liquid_viscosity = 10.0_wp
+    call ready()
+    call begin_step(block%blocks)
+    block%blocks%contact_force(3, 1) = 1300.0_wp*stage%bodies%volume(1)*g
+    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
+                          stage, report)
+    call check('block at rest: stays', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
+    call check('block at rest: the water too', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :))), &
+               0.0_wp, 1.0e-8_wp)
+  end subroutine block_at_rest
+
+  !> Where nothing holds block and water, they fall together, whatever their densities: no force
+  !! acts between them.
+  subroutine fall_together(kind, size, density)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3), density
+    integer :: d
+
+    call build(12, kind, size, density)
+    block%case%boundary%kind = 'periodic'
+    block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
+    block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `pressure_m`
+    call ready()
+    block%flow%p = 0.0_wp
+    call begin_step(block%blocks)
+    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
+                          stage, report)
+    associate (fall => dt*block%case%fluid%gravity)
+      call check(kind//' in free fall: velocity', block%blocks%v(:, 1), fall, 1.0e-8_wp*norm2(fall))
+      call check(kind//' in free fall: it does not turn', norm2(block%blocks%omega(:, 1)), 0.0_wp, &
+                 1.0e-8_wp*norm2(fall)/0.05_wp)
+      do d = 1, 3
+        call check(kind//' in free fall: the water too', &
+                   maxval(abs(block%flow%u(1:12, 1:12, 1:12, d) - fall(d))), 0.0_wp, &
+                   1.0e-8_wp*norm2(fall))
+      end do
+    end associate
+  end subroutine fall_together
+
+  !> The added mass of a sphere five cells wide hardly depends on its place between the cells; the
+  !! volume that its faces count does, by 8 %.
+  subroutine wherever_it_lies()
+    real(wp), parameter :: place(3) = [0.0_wp, 0.25_wp, 0.5_wp]   !! [cells]
+    real(wp) :: a(3)
+    integer :: n
+
+    do n = 1, 3
+      call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1100.0_wp)
+      block%case%body(1)%position = 0.08_wp + 0.01_wp*place(n)
+      call ready()
+      call begin_step(block%blocks)
+      call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
+                            stage, report)
+      a(n) = -block%blocks%v(3, 1)/dt
+    end do
+    print '(a, 3f8.4)', 'sphere between the cells: a/g ', a/g
+    call check('sphere: the same wherever it lies', maxval(a)/minval(a) - 1.0_wp, 0.0_wp, 0.01_wp)
+  end subroutine wherever_it_lies
+
+  !> A hexapod with corners of few cells starts to move in still water, between two slip walls in a
+  !! periodic box: along the walls fluid and block keep their momentum.
+  subroutine momentum_kept(name, position)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: position(3)
+    real(wp) :: before(3), after(3), motion(3)
+
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    block%case%boundary%kind = 'periodic'
+    block%case%boundary%kind(:, 1) = 'slip'
+    block%case%fluid%gravity = 0.0_wp
+    block%case%body(1)%position = position
+    block%case%body(1)%velocity = [0.0_wp, 0.3_wp, -0.4_wp]
+    call ready()
+    block%flow%room = (1.0_wp - block%solid%alpha)*block%grid%volume
+    block%flow%liquid = block%flow%room
+    call begin_step(block%blocks)
+    motion = block%blocks%v(:, 1)
+    before = momentum()
+    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
+                          stage, report)
+    after = momentum()
+    motion = block%blocks%v(:, 1) - motion
+    call check('momentum '//name//': the water took some', norm2(motion) > 0.05_wp)
+    call check('momentum '//name//': fluid and block keep it', after(2:3), before(2:3), &
+               5.0e-5_wp*block%blocks%mass(1)*norm2(motion))
+    print '(a, 3es10.2)', 'momentum '//name//': gained over exchanged ', &
+      (after - before)/(block%blocks%mass(1)*norm2(motion))
+  end subroutine momentum_kept
+
+  !> Momentum of fluid and block [kg m/s].
+  function momentum() result(p)
+    real(wp) :: p(3)
+    integer :: d
+
+    associate (n => block%case%grid%cells)
+      do d = 1, 3
+        p(d) = sum(block%flow%room(1:n(1), 1:n(2), 1:n(3))*block%flow%u(1:n(1), 1:n(2), 1:n(3), d))
+      end do
+    end associate
+    p = block%case%fluid%liquid_density*p + block%blocks%mass(1)*block%blocks%v(:, 1)
+  end function momentum
+
+  !> However much the faces miss of a light body, its inertia stays positive.
+  subroutine limited()
+    real(wp) :: lack(6, 6), z(6)
+    integer :: d
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 30.0_wp)
+    call place(block)
+    lack = 0.0_wp
+    do d = 1, 3
+      lack(d, d) = (-1.0_wp)**d*10.0_wp*block%blocks%mass(1)
+      lack(d, 4:6) = [0.02_wp, -0.01_wp, 0.03_wp]*block%blocks%mass(1)
+      lack(4:6, d) = lack(d, 4:6)
+    end do
+    call set_inertia(1, block%bodies, lack)
+    associate (m => block%bodies%apparent(:, :, 1))
+      z = matmul(m, [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp])
+      call check('limited: symmetric', maxval(abs(m - transpose(m))), 0.0_wp, &
+                 1.0e-15_wp*m(1, 1))
+      call check('limited: inverse', matmul(block%bodies%mobility(:, :, 1), z), &
+                 [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp], 1.0e-9_wp)
+      call check('limited: positive', smallest_pivot(m) > 0.0_wp)
+    end associate
+  end subroutine limited
+
+  !> Smallest pivot of the elimination; a symmetric matrix is positive if it is.
+  pure real(wp) function smallest_pivot(matrix)
+    real(wp), intent(in) :: matrix(6, 6)
+    real(wp) :: a(6, 6)
+    integer :: i, p
+
+    a = matrix
+    smallest_pivot = a(1, 1)
+    do p = 1, 6
+      smallest_pivot = min(smallest_pivot, a(p, p))
+      do i = p + 1, 6
+        a(i, :) = a(i, :) - a(i, p)/a(p, p)*a(p, :)
+      end do
+    end do
+  end function smallest_pivot
 
 end program test_coupling

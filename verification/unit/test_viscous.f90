@@ -5,7 +5,7 @@ program test_viscous
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use viscous_m, only: viscous_t, viscous_init, build_viscous, solve_viscous
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
@@ -129,6 +129,7 @@ contains
     wall%inertia(:, :, 1) = reshape([1.0e9_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0e9_wp, 0.0_wp, 0.0_wp, &
                                     0.0_wp, 1.0e9_wp], [3, 3])
     wall%inverse_inertia(:, :, 1) = wall%inertia(:, :, 1)*1.0e-18_wp
+    call set_inertia(1, wall)
     do k = 1, 8
       low = grid%face(k, 3)
       share = min(max((z0 - low)/grid%h(3), 0.0_wp), 1.0_wp)
