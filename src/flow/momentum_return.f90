@@ -58,12 +58,11 @@ contains
     do b = 1, bodies%n
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         c = solid%face(1:3, m)
-        if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call owe(b, c)
-        c = c - unit_step(:, solid%face(4, m))
-        if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call owe(b, c)
+        call owe(b, c, .true.)
+        call owe(b, c - unit_step(:, solid%face(4, m)), .true.)
       end do
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        call owe(b, solid%cell(:, m))
+        call owe(b, solid%cell(:, m), .false.)
       end do
     end do
     call halo_exchange(whole, n_halo)
@@ -72,14 +71,16 @@ contains
     call take_far(max(low - far, grid%lo - far), min(high + far, grid%hi + far))
   contains
     !> What cell c at body b owes, per share of the takers.
-    subroutine owe(b, c)
+    subroutine owe(b, c, beside)
       integer, intent(in) :: b, c(3)
+      logical, intent(in) :: beside   !! only if no body reaches into the cell
       real(wp) :: arm(3), wall(3), moved(3), mass, mass_whole, mass_cut, full, owed, m
       integer :: i, j, k, d, u(3)
 
       low = min(low, c)
       high = max(high, c)
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (beside .and. solid%alpha(c(1), c(2), c(3)) > 0.0_wp) return
       arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], &
                         bodies%x(:, b))
       wall = wall_velocity(bodies%motion(:, b) - before%motion(:, b), arm)
