@@ -88,7 +88,7 @@ contains
       call cell_mean_of_faces(grid, solid%open, p%a_face, p%a_cell)
       flow%u = flow%u + dt*p%a_cell
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)
-      call tie_films(grid, solid, self%viscous%mass, flow%uf, flow%u, self%viscous%y)
+      call tie_films(grid, solid, bodies, self%viscous%mass, flow%uf, flow%u, self%viscous%y)
       if (case%numerics%momentum == 'conservative') then
         call return_momentum(grid, case%fluid, solid, self%at_start, bodies, self%u_before, &
                              self%viscous%y, flow, self%viscous%z, self%viscous%r)

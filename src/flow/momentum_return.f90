@@ -4,7 +4,7 @@
 !! pressure and the forces on bodies move the mean open share of two faces instead, m_d = rho V w_d
 !! (`open_share`), in which a uniform force accelerates all cells alike. So a change of velocity
 !! du relative to that of the wall leaves (m_d - m) du of the momentum that a body has felt without
-!! an owner, and so does what film cells lose when their faces set their velocity
+!! an owner, and so does what film cells lose when wall and faces set their velocity
 !! (`film_velocity_m`). It goes to those of the 26 cells around that no body cuts, where the two
 !! masses are the same, so that nothing comes back; where all of them are cut, as in the corners of
 !! a block, to all of the 124 around. Fluid and bodies together keep their momentum.

@@ -59,6 +59,8 @@ module viscous_m
     real(wp), allocatable :: found_k(:), found_arm(:, :)
     real(wp), allocatable :: film(:, :)
       !! (7, cut cells) wall of one body, sum over the walls, as vectors; sum of their sizes [m2]
+    real(wp), allocatable :: wall_area(:, :)
+      !! (3, cells of the bodies) wall of the body in each film cell as a vector [m2]
   end type viscous_t
 
 contains
@@ -83,7 +85,7 @@ contains
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
     allocate (self%cell(3, 0), self%k(0), self%arm(3, 0), self%work(0, 6))
-    allocate (self%film(7, 0))
+    allocate (self%film(7, 0), self%wall_area(3, 0))
     allocate (self%wall_body(0), self%found_cell(3, 0), self%found_k(0), self%found_arm(3, 0))
   end subroutine viscous_init
 
@@ -271,38 +273,29 @@ contains
       deallocate (self%film)
       allocate (self%film(7, 2*solid%n_cut))
     end if
+    if (size(self%wall_area, 2) < size(solid%cell, 2)) then
+      deallocate (self%wall_area)
+      allocate (self%wall_area(3, size(solid%cell, 2)))
+    end if
     least = 1.0e-3_wp*minval(grid%area)
     self%film(:, 1:solid%n_cut) = 0.0_wp
     do b = 1, bodies%n
-      call add_areas(b)
-      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        n = film_number(solid%cell(:, m))
-        if (n == 0) cycle
-        self%film(4:6, n) = self%film(4:6, n) + self%film(1:3, n)
-        self%film(7, n) = self%film(7, n) + norm2(self%film(1:3, n))
-        self%film(1:3, n) = 0.0_wp
-      end do
+      call find_areas(b)
     end do
     do n = 1, solid%n_cut
-      c = solid%cut_cell(:, n)
-      if (film_number(c) == 0) cycle
-      call add_sides(c, n)
-      self%film(7, n) = max(self%film(7, n), least)
-      call add_side_legs(c, n)
+      if (film_number(solid%cut_cell(:, n)) > 0) call hold_by_sides(solid%cut_cell(:, n), n)
     end do
     do b = 1, bodies%n
-      call add_areas(b)
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         c = solid%cell(:, m)
         n = film_number(c)
         if (n == 0) cycle
-        if (solid%inside(c(1), c(2), c(3)) == b .or. any(abs(self%film(1:3, n)) > 0.0_wp)) then
-          call add_wall(self, c, b, film_conductance(c, n)*max(norm2(self%film(1:3, n)), &
-                                                              1.0e-3_wp*least), &
-                        nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), &
-                                           grid%centre(c(3), 3)], bodies%x(:, b)))
-        end if
-        self%film(1:3, n) = 0.0_wp
+        if (solid%inside(c(1), c(2), c(3)) /= b .and. &
+            .not. any(abs(self%wall_area(:, m)) > 0.0_wp)) cycle
+        call add_wall(self, c, b, film_conductance(c, n)*max(norm2(self%wall_area(:, m)), &
+                                                            1.0e-3_wp*least), &
+                      nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), &
+                                         grid%centre(c(3), 3)], bodies%x(:, b)))
       end do
     end do
   contains
@@ -317,8 +310,9 @@ contains
       if (any(self%mass(c(1), c(2), c(3), :) > 0.0_wp)) n = solid%cut(c(1), c(2), c(3))
     end function film_number
 
-    !> Area of body b in each film cell as a vector: what its shares of the faces lack to close.
-    subroutine add_areas(b)
+    !> Area of body b in each film cell as a vector, what its shares of the faces lack to close, and
+    !! its part of the sums.
+    subroutine find_areas(b)
       integer, intent(in) :: b
       integer :: m, d, n
       real(wp) :: area
@@ -331,37 +325,36 @@ contains
         n = film_number(solid%face(1:3, m) - unit_step(:, d))
         if (n > 0) self%film(d, n) = self%film(d, n) - area
       end do
-    end subroutine add_areas
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        n = film_number(solid%cell(:, m))
+        if (n == 0) cycle
+        self%wall_area(:, m) = self%film(1:3, n)
+        self%film(4:6, n) = self%film(4:6, n) + self%film(1:3, n)
+        self%film(7, n) = self%film(7, n) + norm2(self%film(1:3, n))
+        self%film(1:3, n) = 0.0_wp
+      end do
+    end subroutine find_areas
 
-    !> The open parts of no-slip sides are walls too.
-    subroutine add_sides(c, n)
+    !> The open parts of no-slip sides are walls too, and hold the film as they hold the cells whose
+    !! centre lies in the fluid.
+    subroutine hold_by_sides(c, n)
       integer, intent(in) :: c(3), n
       integer :: d, s
-      real(wp) :: area
+      real(wp) :: area(2, 3)
 
       do d = 1, 3
-        do s = 1, 2
-          area = area_of_side(c, s, d)
-          self%film(3 + d, n) = self%film(3 + d, n) + merge(area, -area, s == 1)
-          self%film(7, n) = self%film(7, n) + area
-        end do
+        area(:, d) = [area_of_side(c, 1, d), area_of_side(c, 2, d)]
+        self%film(3 + d, n) = self%film(3 + d, n) + area(1, d) - area(2, d)
+        self%film(7, n) = self%film(7, n) + area(1, d) + area(2, d)
       end do
-    end subroutine add_sides
-
-    !> They hold the film as they hold the cells whose centre lies in the fluid.
-    subroutine add_side_legs(c, n)
-      integer, intent(in) :: c(3), n
-      integer :: d, s
-      real(wp) :: value
-
+      self%film(7, n) = max(self%film(7, n), least)
       do d = 1, 3
         do s = 1, 2
-          value = area_of_side(c, s, d)
-          if (value > 0.0_wp) call add_side(self, c, film_conductance(c, n)*value, &
-                                            grid%side_velocity(:, s, d))
+          if (area(s, d) > 0.0_wp) call add_side(self, c, film_conductance(c, n)*area(s, d), &
+                                                 grid%side_velocity(:, s, d))
         end do
       end do
-    end subroutine add_side_legs
+    end subroutine hold_by_sides
 
     !> Open part of side s of direction d, if cell c lies at it and it is a wall without slip [m2].
     pure function area_of_side(c, s, d) result(area)

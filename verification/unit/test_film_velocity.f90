@@ -1,8 +1,10 @@
-!> Film cells above a box: which components follow their faces, and which are left alone.
+!> Film cells above a box that moves: which components its faces and its wall set, and which
+!! are left alone.
 program test_film_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use film_velocity_m, only: tie_films
+  use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -12,9 +14,12 @@ program test_film_velocity
   real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
   real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]   !! x 0.21-0.57, y 0.22-0.58
   integer, parameter :: top = 4                                     !! open share 0.3 above the box
+  real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    !! of the box [m/s, rad/s]
   type(one_body_t) :: box
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: mass, uf, u, before, change
+  real(wp) :: faces(2)
   integer :: seed = 77
 
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
@@ -24,14 +29,18 @@ program test_film_velocity
   before = u
   mass = 1.0_wp
   mass(4, 4, top, 2) = 0.0_wp
-  call tie_films(box%grid, box%solid, mass, uf, u, change)
+  box%bodies%motion(:, 1) = motion
+  call tie_films(box%grid, box%solid, box%bodies, mass, uf, u, change)
   call check('the cells in the top layer are films', all(box%solid%inside(3:6, 3:6, top) == 1))
-  call check('the normal component is that of the open face', &
-             maxval(abs(u(4:5, 4:5, top, 3) - uf(4:5, 4:5, top + 1, 3))), 0.0_wp, 1.0e-14_wp)
+  call check('the normal component lies half way to the open face', u(4, 5, top, 3), &
+             0.5_wp*(uf(4, 5, top + 1, 3) + wall(4, 5, 3)), 1.0e-14_wp)
   call check('between films the tangential component stays', &
              maxval(abs(u(4:5, 3:6, top, 1) - before(4:5, 3:6, top, 1))), 0.0_wp, 0.0_wp)
-  call check('at the end of the row it is the mean by open shares', u(6, 4, top, 1), &
-             (0.3_wp*uf(6, 4, top, 1) + uf(7, 4, top, 1))/1.3_wp, 1.0e-14_wp)
+  faces = (0.3_wp*[uf(6, 4, top, 1), uf(6, 4, top, 3)] &
+           + [uf(7, 4, top, 1), uf(6, 4, top + 1, 3)])/1.3_wp
+  call check('at the edge it is the mean by open shares, normal to the edge half way', &
+             u(6, 4, top, 1), faces(1) + 0.25_wp*(wall(6, 4, 1) + wall(6, 4, 3) - sum(faces)), &
+             1.0e-14_wp)
   call check('components that move with the wall stay', u(4, 4, top, 2), before(4, 4, top, 2), &
              0.0_wp)
   call check('the change is told', maxval(abs(u - before - change)), 0.0_wp, 1.0e-14_wp)
@@ -40,6 +49,15 @@ program test_film_velocity
   call finish_checks()
 
 contains
+
+  !> Component d of the velocity of the box at the centre of a cell of the top layer [m/s].
+  function wall(i, j, d) result(velocity)
+    integer, intent(in) :: i, j, d
+    real(wp) :: velocity, v(3)
+
+    v = wall_velocity(motion, 0.1_wp*([i, j, top] - 0.5_wp) - middle)
+    velocity = v(d)
+  end function wall
 
   !> Numbers between -1 and 1.
   subroutine fill(a)
