@@ -9,8 +9,8 @@ module contact_law_m
   private
   public :: contact_law_t, contact_law_init
   public :: restitution_of, impact_duration, damping_ratio_of
-  public :: normal_constant, tangential_constant, normal_stiffness, stored_energy
-  public :: normal_force, tangential_force, tangential_slip
+  public :: normal_constant, tangential_constant, steepness, hardness, elastic_force
+  public :: stored_energy, normal_force, tangential_force, tangential_slip
 
   type :: contact_law_t
     logical :: constants = .false.         !! constants are given, not found from the restitution
@@ -127,14 +127,77 @@ contains
     if (law%constants) k = weight*law%k_t
   end function tangential_constant
 
-  !> Stiffness dF/dd of a spring k d^gamma; not touching yet: as where it begins [N/m].
-  elemental function normal_stiffness(k, gamma, d) result(stiffness)
-    real(wp), intent(in) :: k, gamma, d   !! [N/m^gamma, -, m]
-    real(wp) :: stiffness
+  !> Elastic force and energy of a touch.
+  !!
+  !! Where constants are given, F = w k d^gamma of eq. (1) for the weight w. Else the spring is that
+  !! of the energy
+  !!
+  !! $$ E = \frac{k}{2} s^2, \qquad s = u \Big( 1 + \frac{1}{5} (u/d_h)^4 \Big), \qquad
+  !!    u = d \sqrt{w}, \qquad F = k s \frac{ds}{dd}: $$
+  !!
+  !! linear as long as the depth is below half of d_h, so that the contact time is that asked for,
+  !! and so hard beyond that no block comes out of another one on the wrong side. With the damping
+  !! eta ds/dd an impact is that of the linear spring in the variable s and the time t ds/dd: it
+  !! returns the restitution asked for at every speed.
+  elemental subroutine elastic_force(law, k, weight, d, hard, force, energy)
+    type(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: k               !! where the spring begins, at weight one [N/m^gamma]
+    real(wp), intent(in) :: weight          !! of the touch [-]
+    real(wp), intent(in) :: d, hard         !! overlap, depth d_h [m]
+    real(wp), intent(out) :: force, energy  !! [N], [J]
+    real(wp) :: h
 
-    stiffness = k
-    if (abs(gamma - 1.0_wp) > 0.0_wp) stiffness = k*gamma*max(0.0_wp, d)**(gamma - 1.0_wp)
-  end function normal_stiffness
+    force = 0.0_wp
+    energy = 0.0_wp
+    if (.not. d > 0.0_wp) return
+    if (law%constants) then
+      force = weight*k*power(d, law%gamma_n)
+      energy = force*d/(law%gamma_n + 1.0_wp)
+    else
+      h = beyond(weight, d, hard)
+      force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
+      energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
+    end if
+  end subroutine elastic_force
+
+  !> How far a touch is into the range where it hardens: (u/d_h)^4 [-].
+  elemental function beyond(weight, d, hard) result(h)
+    real(wp), intent(in) :: weight    !! [-]
+    real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
+    real(wp) :: h
+
+    h = (weight*(max(0.0_wp, d)/hard)**2)**2
+  end function beyond
+
+  !> Stiffness over that where the touch begins of the linear spring of the same force and energy:
+  !! the square of ds/du [-].
+  elemental function hardness(law, weight, d, hard) result(ratio)
+    type(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: weight    !! [-]
+    real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
+    real(wp) :: ratio
+
+    ratio = 1.0_wp
+    if (.not. law%constants) ratio = (1.0_wp + beyond(weight, d, hard))**2
+  end function hardness
+
+  !> Stiffness dF/dd of a touch over w k `hardness`; not touching yet: as where it begins
+  !! [m^(gamma-1)].
+  elemental function steepness(law, weight, d, hard) result(ratio)
+    type(contact_law_t), intent(in) :: law
+    real(wp), intent(in) :: weight    !! [-]
+    real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
+    real(wp) :: ratio
+    real(wp) :: h
+
+    ratio = 1.0_wp
+    if (.not. law%constants) then
+      h = beyond(weight, d, hard)
+      ratio = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
+    else if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) then
+      ratio = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
+    end if
+  end function steepness
 
   !> Energy stored in a spring k d^gamma [J].
   elemental function stored_energy(k, gamma, d) result(energy)
@@ -150,13 +213,13 @@ contains
   !!
   !! The paper leaves the sense of v_r open; here it is partner minus self, so that v_r.n < 0 while
   !! closing and the damping dissipates.
-  elemental function normal_force(k, gamma, eta, d_n, v_n) result(f)
-    real(wp), intent(in) :: k, gamma, eta   !! [N/m^gamma, -, N s/m]
-    real(wp), intent(in) :: d_n             !! overlap, > 0 [m]
-    real(wp), intent(in) :: v_n             !! v_r.n: > 0 while opening [m/s]
+  elemental function normal_force(elastic, eta, v_n) result(f)
+    real(wp), intent(in) :: elastic   !! k_n d_n^gamma_n, see `elastic_force` [N]
+    real(wp), intent(in) :: eta       !! [N s/m]
+    real(wp), intent(in) :: v_n       !! v_r.n: > 0 while opening [m/s]
     real(wp) :: f
 
-    f = max(0.0_wp, k*power(d_n, gamma) - eta*v_n)
+    f = max(0.0_wp, elastic - eta*v_n)
   end function normal_force
 
   !> Tangential force on a body before slip, eq. (2) [N].

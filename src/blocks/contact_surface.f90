@@ -29,6 +29,8 @@ module contact_surface_m
     integer :: n = 0
     integer, allocatable :: probe(:)
     real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
+    integer :: n_close = 0
+    integer, allocatable :: close(:)                        !! (n_close) those near enough now
     integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
     integer :: n_facets = 0, n_edges = 0
     integer, allocatable :: facet(:), edge(:)
@@ -45,6 +47,9 @@ module contact_surface_m
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
     real(wp), allocatable :: away(:)             !! way before the two may cross [m]
+    integer :: n_close = 0
+    integer, allocatable :: close(:)             !! (n_close) those near enough now
+    real(wp) :: close_until = -1.0_wp            !! way for which these and those of probes hold [m]
   end type pair_t
 
   !> How far to look for features, and the lists of the search.
@@ -292,7 +297,7 @@ contains
     gap = ahead*speed
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a), &
       pair => self%with_bed(a))
-      way = norm(x - pair%x_a) + 2*self%reach(a)*norm2(blocks%q(:, a) - pair%q_a)
+      way = norm(x - pair%x_a) + 2*self%reach(a)*norm(blocks%q(:, a) - pair%q_a)
       if (is_worn(pair, way, self%search)) then
         pair%a = a
         pair%b = bed_partner
@@ -302,8 +307,10 @@ contains
         way = 0.0_wp
       end if
       pair%uses = pair%uses + 1
-      if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
-      call reserve_touches(touches%n + pair%of_a%n + pair%of_b%n + pair%n_crossings, touches)
+      if (way + gap > pair%close_until) call know_close(way + gap, self%search, pair)
+      if (pair%of_a%n_close + pair%of_b%n_close + pair%n_close == 0) return
+      call reserve_touches(touches%n + pair%of_a%n_close + pair%of_b%n_close + pair%n_close, &
+        touches)
       call touch_probes(.false., a, bed_partner, turn, -x, transpose(turn), -matmul(x, turn), gap, &
         way, bed%surface, surface, pair%of_b, touches)
       call touch_probes(.true., a, bed_partner, no_turn, -x, turn, x, gap, way, surface, &
@@ -327,6 +334,7 @@ contains
     pair%of_a%n = 0
     pair%of_b%n = 0
     pair%n_crossings = 0
+    pair%close_until = -1.0_wp
     pair%valid = skin_for(speed, search)
     margin = pair%valid + search%ahead
     associate (x => pair%x_a, reach => surface%reach + margin)
@@ -395,10 +403,11 @@ contains
       way = 0.0_wp
     end if
     pair%uses = pair%uses + 1
-    if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) return
-    call reserve_touches(touches%n + pair%of_a%n + pair%of_b%n + pair%n_crossings, touches)
-    to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
     gap = ahead*speed
+    if (way + gap > pair%close_until) call know_close(way + gap, search, pair)
+    if (pair%of_a%n_close + pair%of_b%n_close + pair%n_close == 0) return
+    call reserve_touches(touches%n + pair%of_a%n_close + pair%of_b%n_close + pair%n_close, touches)
+    to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
     associate (surface_a => surface(blocks%shape(a)), &
       surface_b => surface(blocks%shape(b)), turn_a => turns(:, :, a), &
       turn_b => turns(:, :, b))
@@ -415,6 +424,36 @@ contains
       call touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
     end associate
   end subroutine touch_pair
+
+  !> Choose from the lists of a pair what may touch within a way little longer than the present one.
+  subroutine know_close(way, search, pair)
+    real(wp), intent(in) :: way                   !! since the lists were made, and ahead [m]
+    type(search_t), intent(in) :: search
+    type(pair_t), intent(inout) :: pair
+    real(wp), parameter :: share = 0.1_wp         !! of a skin: further way for which it holds
+
+    pair%close_until = way + share*search%skin
+    call choose(pair%of_a%n, pair%of_a%away, pair%of_a%n_close, pair%of_a%close)
+    call choose(pair%of_b%n, pair%of_b%away, pair%of_b%n_close, pair%of_b%close)
+    call choose(pair%n_crossings, pair%away, pair%n_close, pair%close)
+  contains
+    !> Those that are no further away.
+    subroutine choose(n, away, n_close, chosen)
+      integer, intent(in) :: n
+      real(wp), allocatable, intent(in) :: away(:)   !! (n) [m]
+      integer, intent(out) :: n_close
+      integer, allocatable, intent(inout) :: chosen(:)
+      integer :: m
+
+      n_close = 0
+      call reserve(n, chosen)
+      do m = 1, n
+        if (away(m) > pair%close_until) cycle
+        n_close = n_close + 1
+        chosen(n_close) = m
+      end do
+    end subroutine choose
+  end subroutine know_close
 
   !> Whether the lists of a pair have to be made anew.
   pure function is_worn(pair, way, search) result(yes)
@@ -447,7 +486,7 @@ contains
     ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
     associate (a => pair%a, b => pair%b)
       way = norm((blocks%x(:, a) - pair%x_a) - (blocks%x(:, b) - pair%x_b)) &
-        + 2*reach(a)*norm2(blocks%q(:, a) - pair%q_a) + 2*reach(b)*norm2(blocks%q(:, b) - pair%q_b)
+        + 2*reach(a)*norm(blocks%q(:, a) - pair%q_a) + 2*reach(b)*norm(blocks%q(:, b) - pair%q_b)
     end associate
   end function way_since
 
@@ -482,9 +521,10 @@ contains
     type(probes_near_t), intent(in) :: list
     type(touch_t), intent(inout) :: touches
     real(wp) :: place(3), distance, depth, outward(3), arm(3)
-    integer :: m, i
+    integer :: c, m, i
 
-    do m = 1, list%n
+    do c = 1, list%n_close
+      m = list%close(c)
       if (list%away(m) > way + gap) cycle
       i = list%probe(m)
       place = x + turn(:, 1)*guest%probe(1, i) + turn(:, 2)*guest%probe(2, i) &
@@ -519,11 +559,12 @@ contains
     type(edge_t) :: guest
     type(crossing_t) :: crossing
     real(wp) :: length, arm(3), with_shift(3), with_turn(3)
-    integer :: m, i, last
+    integer :: c, m, i, last
 
     length = min(surface_a%length, surface_b%length)
     last = 0
-    do m = 1, pair%n_crossings
+    do c = 1, pair%n_close
+      m = pair%close(c)
       if (pair%away(m) > way + gap) cycle
       i = pair%edge_a(m)
       if (i /= last) guest = edge_in_axes(surface_a%edge(i), turn, x)
@@ -570,6 +611,7 @@ contains
     pair%of_a%n = 0
     pair%of_b%n = 0
     pair%n_crossings = 0
+    pair%close_until = -1.0_wp
     to_b = pair%x_b + pair%shift - pair%x_a
     associate (a => surface(blocks%shape(pair%a)), b => surface(blocks%shape(pair%b)))
       apart = norm(to_b) - a%reach - b%reach - search%ahead
@@ -578,6 +620,8 @@ contains
       if (apart > skin) return
       if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
         pair%n_crossings = 1   ! the two spheres
+        call reserve(1, pair%away)
+        pair%away(1) = 0.0_wp
         return
       end if
       turn = matmul(transpose(turns(:, :, pair%b)), turns(:, :, pair%a))

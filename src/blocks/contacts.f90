@@ -6,6 +6,7 @@ module contacts_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use vectors_m, only: cross, norm
+  use mass_properties_m, only: surface_area
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers, space_tensor
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
@@ -18,7 +19,8 @@ module contacts_m
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use lubrication_m, only: lubrication_t, lubricate
   use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
-    normal_stiffness, stored_energy, normal_force, tangential_force, tangential_slip
+    steepness, hardness, elastic_force, stored_energy, normal_force, tangential_force, &
+    tangential_slip
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
@@ -40,6 +42,8 @@ module contacts_m
   !> The law at work at each touch.
   type :: response_t
     real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
+    real(wp), allocatable :: elastic(:)          !! force of the spring [N]
+    real(wp), allocatable :: energy(:)           !! of the spring [J]
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
@@ -50,6 +54,7 @@ module contacts_m
   type :: partners_t
     real(wp) :: gravity = 0.0_wp                         !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -7:n) [m/s], [rad/s]
+    real(wp), allocatable :: hard(:)                     !! (-7:n) depth at which touches harden [m]
     real(wp), allocatable :: inverse_mass(:)             !! (-7:n) 0 for walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
   end type partners_t
@@ -122,7 +127,7 @@ contains
       contacts%clear = contacts%spheres%clear
     end if
     n = blocks%n
-    call partners_init(n, contacts%partners)
+    call partners_init(blocks, contacts%partners)
     allocate (contacts%force(3, -7:n), contacts%torque(3, -7:n), source=0.0_wp)
     allocate (contacts%impulse(3, -7:n), contacts%twist(3, -7:n), source=0.0_wp)
     allocate (contacts%response%frequency2(-7:n), contacts%response_soon%frequency2(-7:n))
@@ -380,10 +385,9 @@ contains
         springs%torque_a(:, g) = contacts%torque(:, a)
         springs%torque_b(:, g) = contacts%torque(:, b)
         springs%energy(g) = stored_energy(springs%k(g), contacts%law%gamma_t, &
-          norm2(springs%xi(:, g)))
+          norm(springs%xi(:, g)))
         do t = contacts%groups%first(g), contacts%groups%first(g + 1) - 1
-          springs%energy(g) = springs%energy(g) + stored_energy(contacts%response%k(t), &
-            contacts%law%gamma_n, contacts%touches%depth(t))
+          springs%energy(g) = springs%energy(g) + contacts%response%energy(t)
         end do
       end do
       call move_springs(sleep%chosen, springs, sleep%rest)
@@ -458,7 +462,7 @@ contains
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      speed = norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b))*contacts%reach(b)
+      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%reach(b)
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
       if (.not. speed <= near) then
@@ -518,11 +522,20 @@ contains
     if (contacts%frequency2 > 0.0_wp) limit = impact_turn/sqrt(contacts%frequency2)
   end function stiffness_limit
 
-  !> Room for the walls and n bodies.
-  subroutine partners_init(n, partners)
-    integer, intent(in) :: n
+  !> Room for the walls and the bodies, and the depth at which touches of each harden: a quarter of
+  !! its mean thickness, twice the volume over the surface.
+  pure subroutine partners_init(blocks, partners)
+    type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(out) :: partners
+    integer :: n, b
 
+    n = blocks%n
+    allocate (partners%hard(-7:n), source=huge(1.0_wp))
+    do b = 1, n
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        partners%hard(b) = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
+      end associate
+    end do
     allocate (partners%v(3, -7:n), partners%omega(3, -7:n), source=0.0_wp)
     allocate (partners%inverse_mass(-7:n), partners%inverse_inertia(3, 3, -7:n), source=0.0_wp)
   end subroutine partners_init
@@ -650,6 +663,8 @@ contains
 
     response%frequency2 = 0.0_wp
     call reserve(touches%n, response%k)
+    call reserve(touches%n, response%elastic)
+    call reserve(touches%n, response%energy)
     call reserve(touches%n, response%eta)
     call reserve(touches%n, response%decay)
     call reserve(touches%n, response%pair_frequency2)
@@ -687,52 +702,79 @@ contains
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
     real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
-    real(wp) :: total, inverse, k, omega2, highest, stiffness, speed
+    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep
     integer :: a, b, t, i
 
     a = touches%a(first)
     b = touches%b(first)
     weights = 0.0_wp
     points = 0.0_wp
+    k = normal_constant(law, 1.0_wp/(partners%inverse_mass(a) + partners%inverse_mass(b)))
+    hard = min(partners%hard(a), partners%hard(b))
     do t = first, last
-      nn = touches%weight(t)*square(touches%normal(:, t))
+      response%k(t) = touches%weight(t)*k
+      call elastic_force(law, k, touches%weight(t), touches%depth(t), hard, response%elastic(t), &
+        response%energy(t))
+      response%eta(t) = touches%weight(t)*hardness(law, touches%weight(t), touches%depth(t), hard)
+      nn = response%eta(t)*square(touches%normal(:, t))
       weights = weights + nn
       do i = 1, 6
         points(:, i) = points(:, i) + nn(i)*touches%arm_a(:, t)
       end do
     end do
     highest = 0.0_wp
-    k = normal_constant(law, 1.0_wp/(partners%inverse_mass(a) + partners%inverse_mass(b)))
+    steep = 0.0_wp
+    load = 0.0_wp
     do t = first, last
+      load = load + response%elastic(t)*touches%normal(:, t)
       nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
       total = dot_product(nn, weights)
       arm = matmul(points, nn)/total
       inverse = inverse_effective_mass(partners, a, arm, touches%normal(:, t))
       arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
       inverse = inverse + inverse_effective_mass(partners, b, arm, touches%normal(:, t))
-      stiffness = normal_stiffness(k, law%gamma_n, touches%depth(t))
-      omega2 = stiffness*total*inverse
-      response%k(t) = touches%weight(t)*k
+      steep = max(steep, steepness(law, touches%weight(t), touches%depth(t), hard))
+      omega2 = k*total*inverse
       if (law%constants) then
         response%eta(t) = touches%weight(t)*law%eta_n
         response%decay(t) = 0.5_wp*law%eta_n*total*inverse
       else
-        response%eta(t) = response%k(t)*2*law%damping_ratio/sqrt(omega2)
+        response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
         response%decay(t) = law%damping_ratio*sqrt(omega2)
       end if
       highest = max(highest, omega2)
     end do
     if (.not. law%constants) call damp_as_one(touches, first, last, law, partners, response, &
                                              highest)
-    ! no impact: slower than its weight makes a body within a swing
-    speed = norm(partners%v(:, b) - partners%v(:, a)) &
-      + norm(partners%omega(:, a))*norm(touches%arm_a(:, first)) &
-      + norm(partners%omega(:, b))*norm(touches%arm_b(:, first))
-    if (speed**2*highest < partners%gravity**2) highest = highest*(impact_turn/slow_turn)**2
+    highest = steep*highest
+    if (.not. is_impact(touches, first, load, highest, partners)) highest = highest &
+      *(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
     if (partners%inverse_mass(a) > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
     if (partners%inverse_mass(b) > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
+
+  !> Whether two touching bodies move against one another faster than weight, or a share of their
+  !! load, makes them move within a swing.
+  pure function is_impact(touches, first, load, frequency2, partners) result(yes)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first           !! touch of the pair
+    real(wp), intent(in) :: load(3)        !! sum of the elastic forces [N]
+    real(wp), intent(in) :: frequency2     !! square of the frequency of the pair [1/s2]
+    type(partners_t), intent(in) :: partners
+    logical :: yes
+    real(wp), parameter :: share = 0.25_wp
+    real(wp) :: speed, calm
+
+    associate (a => touches%a(first), b => touches%b(first))
+      speed = norm(partners%v(:, b) - partners%v(:, a)) &
+        + norm(partners%omega(:, a))*norm(touches%arm_a(:, first)) &
+        + norm(partners%omega(:, b))*norm(touches%arm_b(:, first))
+      calm = max(partners%gravity, share*norm(load)*(partners%inverse_mass(a) &
+                                                     + partners%inverse_mass(b)))
+    end associate
+    yes = speed**2*frequency2 >= calm**2
+  end function is_impact
 
   !> Scale the damping of the touches of a pair so that together they damp the swing they drive
   !! like one spring and dashpot.
@@ -748,7 +790,7 @@ contains
     type(response_t), intent(inout) :: response
     real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
     real(wp) :: push(3), force(3), torque_a(3), torque_b(3), v(3), spin_a(3), spin_b(3)
-    real(wp) :: stored, energy, mass, drag, omega2
+    real(wp) :: by_weight, energy, mass, drag, omega2
     integer :: a, b, t
 
     a = touches%a(first)
@@ -759,17 +801,17 @@ contains
     energy = 0.0_wp
     do t = first, last
       if (touches%depth(t) <= 0.0_wp) cycle
-      stored = stored_energy(response%k(t), law%gamma_n, touches%depth(t))
-      push = -response%k(t)*touches%depth(t)*touches%normal(:, t)
+      push = -response%elastic(t)*touches%normal(:, t)
       if (touches%weight(t) < 1.0_wp) then
-        push = push - stored*touches%weight_shift(:, t)
-        torque_a = torque_a - stored*touches%weight_turn(:, t)
-        torque_b = torque_b + stored*touches%weight_turn(:, t)
+        by_weight = response%elastic(t)*touches%depth(t)/(law%gamma_n + 1.0_wp)
+        push = push - by_weight*touches%weight_shift(:, t)
+        torque_a = torque_a - by_weight*touches%weight_turn(:, t)
+        torque_b = torque_b + by_weight*touches%weight_turn(:, t)
       end if
       force = force + push
       torque_a = torque_a + cross(touches%arm_a(:, t), push)
       torque_b = torque_b - cross(touches%arm_b(:, t), push)
-      energy = energy + stored
+      energy = energy + response%energy(t)
     end do
     v = -(partners%inverse_mass(a) + partners%inverse_mass(b))*force   ! of b against a
     spin_a = 0.0_wp
@@ -851,7 +893,7 @@ contains
         groups%arm_b(:, g) = groups%arm_a(:, g) + (touches%arm_b(:, t) - touches%arm_a(:, t))
         groups%normal(:, g) = matmul(touches%normal(:, t:last), &
           touches%weight(t:last)*touches%depth(t:last))
-        w = norm2(groups%normal(:, g))
+        w = norm(groups%normal(:, g))
         if (w > epsilon(w)*total) then
           groups%normal(:, g) = groups%normal(:, g)/w
         else
@@ -905,8 +947,8 @@ contains
     real(wp) :: length
 
     turned = xi - dot_product(xi, n)*n
-    length = norm2(turned)
-    if (length > 0.0_wp) turned = turned*(norm2(xi)/length)
+    length = norm(turned)
+    if (length > 0.0_wp) turned = turned*(norm(xi)/length)
   end function turned_into_plane
 
   !> Let the springs follow the present tangential velocities for a time dt.
@@ -963,8 +1005,7 @@ contains
     real(wp) :: v(3), normal(3), v_n, opening, part, force_n, sum_n, decay, eta
     integer :: t, a, b
 
-    associate (touches => contacts%touches, groups => contacts%groups, law => contacts%law, &
-      r => contacts%response)
+    associate (touches => contacts%touches, groups => contacts%groups, r => contacts%response)
       a = touches%a(groups%first(g))
       b = touches%b(groups%first(g))
       sum_n = 0.0_wp
@@ -976,10 +1017,9 @@ contains
         v_n = dot_product(v, normal)
         part = 1.0_wp
         if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-        opening = opening_speed(touches, t, law%gamma_n, v, &
+        opening = opening_speed(touches, t, contacts%law%gamma_n, v, &
           contacts%partners%omega(:, b) - contacts%partners%omega(:, a))
-        force_n = normal_force(r%k(t), law%gamma_n, part*r%eta(t), touches%depth(t), opening) &
-          /(1.0_wp + part*r%decay(t)*dt)
+        force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
         call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
         if (touches%weight(t) < 1.0_wp) call push_to_weight(t, force_n, contacts)
         sum_n = sum_n + force_n
@@ -1017,7 +1057,7 @@ contains
   pure function opening_speed(touches, t, gamma, v, omega) result(speed)
     type(touch_t), intent(in) :: touches
     integer, intent(in) :: t
-    real(wp), intent(in) :: gamma             !! power of the spring [-]
+    real(wp), intent(in) :: gamma             !! power of the spring; 1 where it hardens [-]
     real(wp), intent(in) :: v(3), omega(3)    !! of b against a, at the contact [m/s, rad/s]
     real(wp) :: speed
 
@@ -1064,11 +1104,11 @@ contains
       v = relative_velocity(contacts%partners, a, b, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
       f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/implicit
-      size_f = norm2(f)
+      size_f = norm(f)
       if (size_f > bound) then
         f = f*(bound/size_f)
         f_spring = tangential_force(k, law%gamma_t, 0.0_wp, springs%xi(:, g), v)
-        size_f = norm2(f_spring)
+        size_f = norm(f_spring)
         if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
           f_spring*(bound/size_f), v)
       end if
@@ -1098,10 +1138,10 @@ contains
     associate (touches => contacts%touches, r => contacts%response, law => contacts%law, &
       springs => contacts%springs)
       do t = 1, touches%n
-        energy = energy + stored_energy(r%k(t), law%gamma_n, touches%depth(t))
+        energy = energy + r%energy(t)
       end do
       do g = 1, springs%n
-        energy = energy + stored_energy(springs%k(g), law%gamma_t, norm2(springs%xi(:, g)))
+        energy = energy + stored_energy(springs%k(g), law%gamma_t, norm(springs%xi(:, g)))
       end do
     end associate
     do g = 1, contacts%sleep%rest%n

@@ -8,7 +8,7 @@
 !! force.
 module edge_crossing_m
   use kinds_m, only: wp
-  use vectors_m, only: cross
+  use vectors_m, only: cross, norm
   implicit none
   private
   public :: edge_t, crossing_t, cross_edges, turn_before, way_apart, weight_slope
@@ -30,7 +30,7 @@ module edge_crossing_m
 
   real(wp), parameter :: least_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
   real(wp), parameter :: beside = 0.15_wp   !! sine of the angle by which n may leave a fan
-  real(wp), parameter :: share = 0.5_wp    !! of the depth: width in which an end fades
+  real(wp), parameter :: share = 1.0_wp    !! of the depth: width in which an end fades
   real(wp), parameter :: least_weight = 1.0e-12_wp   !! what is below is nothing
   real(wp), parameter :: least_share = 0.01_wp   !! of the edge: the least such width
 
@@ -85,7 +85,7 @@ contains
     real(wp) :: n(3), sine, outside
 
     n = cross(guest%along, host%along)
-    sine = norm2(n)
+    sine = norm(n)
     angle = 0.0_wp
     if (sine <= 0.0_wp) return
     n = n/sign(sine, -dot_product(n, host%outward))
@@ -110,10 +110,10 @@ contains
     way = 0.0_wp
     if (angle > most_angle) return
     n = cross(guest%along, host%along)
-    sine = norm2(n)
+    sine = norm(n)
     if (sine < least_sine) return
     n = n/sign(sine, -dot_product(n, host%outward))
-    if (-dot_product(n, host%outward) < least_cosine*norm2(host%outward)) return
+    if (-dot_product(n, host%outward) < least_cosine*norm(host%outward)) return
     d = host%start - guest%start
     s = dot_product(cross(d, host%along), cross(guest%along, host%along))/sine**2
     t = dot_product(cross(d, guest%along), cross(guest%along, host%along))/sine**2

@@ -5,9 +5,10 @@
 module mass_properties_m
   use kinds_m, only: wp
   use polyhedron_m, only: tet_volume
+  use vectors_m, only: cross, norm
   implicit none
   private
-  public :: volume_and_centroid, inertia_about_origin
+  public :: volume_and_centroid, inertia_about_origin, surface_area
 
 contains
 
@@ -59,5 +60,21 @@ contains
       inertia(i, i) = density*(trace - second(i, i))
     end do
   end function inertia_about_origin
+
+  !> Area of a surface of triangles [m2].
+  pure function surface_area(point, triangle) result(area)
+    real(wp), intent(in) :: point(:, :)      !! (3, n) [m]
+    integer, intent(in) :: triangle(:, :)    !! (3, m) corners
+    real(wp) :: area
+    integer :: t
+
+    area = 0.0_wp
+    do t = 1, size(triangle, 2)
+      associate (p => point(:, triangle(1, t)))
+        area = area + 0.5_wp*norm(cross(point(:, triangle(2, t)) - p, &
+          point(:, triangle(3, t)) - p))
+      end associate
+    end do
+  end function surface_area
 
 end module mass_properties_m

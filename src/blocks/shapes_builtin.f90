@@ -7,8 +7,8 @@ module shapes_builtin_m
   use kinds_m, only: wp, pi
   use case_types_m, only: shape_input_t
   use tet_mesh_m, only: shape_t, surface_of_tets
-  use vectors_m, only: cross, norm
-  use mass_properties_m, only: volume_and_centroid, inertia_about_origin
+  use vectors_m, only: cross
+  use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
   use contact_sphere_placement_m, only: place_at_centroids, place_inscribed, place_one_sphere
   use dense_spheres_m, only: place_densely
@@ -87,7 +87,7 @@ contains
     case ('dense')
       spacing = input%sphere_spacing
       if (spacing <= 0.0_wp) spacing = dense_spacing*shape%smallest_edge
-      expected = surface_area(shape)/spacing**2
+      expected = surface_area(shape%point, shape%triangle)/spacing**2
       if (expected > most_spheres) then
         message = 'sphere_spacing = '//to_text(spacing)//': about '//to_text(nint(min(expected, &
           1.0e9_wp)))//' contact spheres, at most '//to_text(nint(most_spheres))
@@ -100,20 +100,6 @@ contains
       call place_at_centroids(shape)
     end select
   end subroutine place_spheres
-
-  !> Area of the surface [m2].
-  pure function surface_area(shape) result(area)
-    type(shape_t), intent(in) :: shape
-    real(wp) :: area
-    real(wp) :: x(3, 3)
-    integer :: t
-
-    area = 0.0_wp
-    do t = 1, size(shape%triangle, 2)
-      x = shape%point(:, shape%triangle(:, t))
-      area = area + 0.5_wp*norm(cross(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1)))
-    end do
-  end function surface_area
 
   !> Tetrahedra of a file, in its axes. Flat regions of the surface become single facets; the
   !! smallest edge is that of the cube with the same volume over surface.
@@ -137,7 +123,7 @@ contains
     shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
     call merge_flat_facets(shape%point, shape%facet, shape%facet_point)
     call volume_and_centroid(shape%point, shape%tet, volume, centroid)
-    shape%smallest_edge = 6.0_wp*volume/surface_area(shape)
+    shape%smallest_edge = 6.0_wp*volume/surface_area(shape%point, shape%triangle)
   end subroutine build_from_file
 
   !> Points, tetrahedra, facets and smallest edge of a block.

@@ -30,6 +30,9 @@ contains
     integer, intent(in) :: n
     type(touch_t), intent(inout) :: touches
 
+    if (allocated(touches%a)) then
+      if (n <= size(touches%a)) return
+    end if
     call reserve(n, touches%a)
     call reserve(n, touches%b)
     call reserve(n, touches%key)

@@ -5,11 +5,12 @@ program test_contact_law
   use case_types_m, only: contact_input_t
   use contact_law_m, only: contact_law_t, contact_law_init, restitution_of, impact_duration, &
     damping_ratio_of, normal_constant, tangential_constant, stored_energy, &
-    normal_force, tangential_force, tangential_slip
+    hardness, elastic_force, normal_force, tangential_force, tangential_slip
   implicit none
 
   call check_closed_form()
   call check_integrated_impact()
+  call check_hardening()
   call check_constants()
   call check_forces()
   call finish_checks()
@@ -39,6 +40,47 @@ contains
     call check('no damping at e = 1', damping_ratio_of(1.0_wp) <= 0.0_wp)
   end subroutine check_closed_form
 
+  !> The spring that hardens: its force is the slope of its energy, it is linear at a tenth of the
+  !! depth d_h, and an impact that goes far beyond d_h returns the same share of the speed.
+  subroutine check_hardening()
+    real(wp), parameter :: zeta(3) = [0.0_wp, 0.4_wp, 1.0_wp], hard = 0.2_wp, step = 1.0e-6_wp, &
+      weight = 0.7_wp
+    real(wp), parameter :: linear(3) = [1.0_wp, 0.603_wp, 0.368_wp]   !! depth of the linear spring
+    integer, parameter :: steps = 400000
+    type(contact_law_t) :: law
+    real(wp) :: d, v, dt, force(2), energy(2), middle, eta, deepest
+    integer :: i, m
+
+    do m = 1, 5
+      d = 0.15_wp*hard*real(m, wp)**2
+      call elastic_force(law, 3.0_wp, weight, d + [-step, step], hard, force, energy)
+      call elastic_force(law, 3.0_wp, weight, d, hard, middle, eta)
+      call check('force is the slope of energy', (energy(2) - energy(1))/(2*step), &
+        middle, 1.0e-6_wp*middle)
+    end do
+    call elastic_force(law, 3.0_wp, weight, 0.1_wp*hard, hard, middle, eta)
+    call check('linear where shallow', middle, 0.3_wp*weight*hard, 2.0e-4_wp*middle)
+    do m = 1, size(zeta)
+      dt = 4.0_wp/real(steps, wp)
+      d = 0.0_wp
+      v = 1.0_wp
+      deepest = 0.0_wp
+      do i = 1, steps
+        d = d + 0.5_wp*dt*v
+        if (d < 0.0_wp) exit
+        deepest = max(deepest, d)
+        call elastic_force(law, 1.0_wp, 1.0_wp, d, hard, force(1), energy(1))
+        eta = 2*zeta(m)*sqrt(hardness(law, 1.0_wp, d, hard))
+        force(1) = normal_force(force(1), eta, -v)
+        v = v - dt*force(1)/(1.0_wp + merge(0.5_wp*eta*dt, 0.0_wp, force(1) > 0.0_wp))
+        d = d + 0.5_wp*dt*v
+      end do
+      call check('restitution of a deep impact', -v, restitution_of(zeta(m)), 1.0e-3_wp)
+      call check('far beyond the depth d_h', deepest > merge(1.7_wp, 1.2_wp, m == 1)*hard)
+      call check('but not as deep as the linear spring', deepest < 0.75_wp*linear(m))
+    end do
+  end subroutine check_hardening
+
   !> The closed form against an impact followed in small steps with the force of the law itself.
   subroutine check_integrated_impact()
     real(wp), parameter :: zeta(3) = [0.4_wp, 1.0_wp, 3.0_wp]
@@ -52,7 +94,7 @@ contains
       v = 1.0_wp
       do i = 1, steps
         d = d + 0.5_wp*dt*v
-        f = normal_force(1.0_wp, 1.0_wp, 2*zeta(m), d, -v)
+        f = normal_force(d, 2*zeta(m), -v)
         v = v - dt*f/(1.0_wp + merge(zeta(m)*dt, 0.0_wp, f > 0.0_wp))
         d = d + 0.5_wp*dt*v
       end do
@@ -85,14 +127,16 @@ contains
 
   !> Equations (1) and (2) for one touch.
   subroutine check_forces()
-    real(wp) :: f(3), xi(3), v(3)
+    type(contact_law_t) :: law
+    real(wp) :: f(3), xi(3), v(3), force, energy
 
-    call check('spring alone', normal_force(1.0e5_wp, 1.5_wp, 10.0_wp, 1.0e-4_wp, 0.0_wp), 0.1_wp, &
-      1.0e-15_wp)
-    call check('closing adds', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, -0.2_wp), &
-      12.0_wp, 1.0e-13_wp)
-    call check('never pulls', normal_force(1.0e5_wp, 1.0_wp, 10.0_wp, 1.0e-4_wp, 2.0_wp), 0.0_wp, &
-      0.0_wp)
+    law%constants = .true.
+    law%gamma_n = 1.5_wp
+    call elastic_force(law, 2.0e5_wp, 0.5_wp, 1.0e-4_wp, 1.0e-5_wp, force, energy)
+    call check('spring alone', force, 0.1_wp, 1.0e-15_wp)
+    call check('its energy', energy, 4.0e-6_wp, 1.0e-20_wp)
+    call check('closing adds', normal_force(10.0_wp, 10.0_wp, -0.2_wp), 12.0_wp, 1.0e-13_wp)
+    call check('never pulls', normal_force(10.0_wp, 10.0_wp, 2.0_wp), 0.0_wp, 0.0_wp)
     call check('energy of the spring', stored_energy(3.0_wp, 1.0_wp, 2.0_wp), 6.0_wp, 1.0e-15_wp)
     xi = [3.0e-5_wp, -4.0e-5_wp, 0.0_wp]
     v = [0.1_wp, 0.2_wp, 0.0_wp]

@@ -42,6 +42,7 @@ contains
   subroutine check_model()
     print '(a)', 'model '''//trim(models(model))//''''
     call check_bouncing_ball()
+    call check_fast_impact()
     call check_colliding_balls()
     call check_landing_cube()
     call check_landing_slab()
@@ -154,6 +155,37 @@ contains
     end do
     call check('duration of the impact', duration, world%case%contact%contact_time, 1.0e-4_wp)
   end subroutine check_bouncing_ball
+
+  !> Blocks that come down fast do not sink in far, and return what is asked for.
+  subroutine check_fast_impact()
+    real(wp), parameter :: e(3) = [0.1_wp, 0.3_wp, 0.9_wp], speed = 8.0_wp
+    character(4), parameter :: kind(2) = ['ball', 'cube']
+    type(world_t) :: world
+    real(wp) :: worst, deepest
+    integer :: m, s, phase, i
+
+    do s = 1, size(kind)
+      do m = 1, size(e)
+        worst = 0.0_wp
+        deepest = 0.0_wp
+        do phase = 0, 4
+          call new_world(world, 1, kind(s))
+          world%case%contact%restitution = e(m)
+          world%case%body(1)%position(3) = 0.5_wp*d + 1.0e-3_wp + 1.0e-4_wp*real(phase, wp)
+          world%case%body(1)%velocity(3) = -speed
+          call start(world)
+          world%gravity = 0.0_wp
+          do i = 1, 4
+            call run(world, 1)
+            deepest = max(deepest, world%report%overlap_max)
+          end do
+          worst = max(worst, abs(world%blocks%v(3, 1)/speed - e(m)))
+        end do
+        call check('restitution of a fast '//kind(s), worst, 0.0_wp, 0.02_wp)
+        call check('it does not sink in far', deepest < 0.2_wp*d)   ! linear: a third of d
+      end do
+    end do
+  end subroutine check_fast_impact
 
   !> A ball that carries fluid along: restitution and momentum are those of both, and a force that
   !! lasts acts in full.
