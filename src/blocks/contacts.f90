@@ -308,7 +308,6 @@ contains
     logical, intent(out) :: changed      !! somebody fell asleep
     real(wp), parameter :: half = 0.5_wp
     type(contact_report_t) :: ignored
-    logical :: touching(blocks%n)
     integer :: g, a, b
 
     call match_springs(contacts)
@@ -324,20 +323,20 @@ contains
       end associate
     end do
     call sum_forces(dt_b, contacts, ignored)
-    touching = .false.
+    contacts%sleep%touching = .false.
     associate (sleep => contacts%sleep, springs => contacts%springs)
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
-        touching(a) = .true.
+        sleep%touching(a) = .true.
         if (is_carried(b)) sleep%tired(a) = .false.
         if (b < 1) cycle
-        touching(b) = .true.
+        sleep%touching(b) = .true.
         if (is_carried(a)) sleep%tired(b) = .false.
       end do
       changed = .false.
       do b = 1, blocks%n
-        if (.not. (sleep%tired(b) .and. touching(b))) cycle
+        if (.not. (sleep%tired(b) .and. sleep%touching(b))) cycle
         if (.not. balanced(half, contacts%force(:, b), contacts%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
                            blocks%fluid_torque(:, b), sleep%reach(b))) cycle

@@ -56,6 +56,7 @@ contains
   subroutine move_springs(chosen, from, to)
     logical, intent(in) :: chosen(:)         !! (from%n)
     type(springs_t), intent(inout) :: from, to
+    logical :: own_is_next   !! a spring of `to` itself comes after that of `from`
     integer :: i, j, m, kept
 
     m = to%n + count(chosen(:from%n))
@@ -67,19 +68,19 @@ contains
     do while (j > 0)   ! from the end, so that no spring is overwritten before it has moved
       if (.not. chosen(j)) then
         j = j - 1
-      else if (i == 0) then
-        call copy_spring(from, j, to, m)
-        j = j - 1
-        m = m - 1
-      else if (comes_before(to%a(i), to%b(i), to%key(i), from%a(j), from%b(j), from%key(j))) then
-        call copy_spring(from, j, to, m)
-        j = j - 1
-        m = m - 1
-      else
+        cycle
+      end if
+      own_is_next = i > 0
+      if (own_is_next) own_is_next = .not. comes_before(to%a(i), to%b(i), to%key(i), from%a(j), &
+                                                        from%b(j), from%key(j))
+      if (own_is_next) then
         call move_spring(i, m, to)
         i = i - 1
-        m = m - 1
+      else
+        call copy_spring(from, j, to, m)
+        j = j - 1
       end if
+      m = m - 1
     end do
     kept = 0
     do j = 1, from%n

@@ -88,6 +88,25 @@ contains
     call contacts_init(world%case%contact, world%blocks, world%contacts)
   end subroutine start
 
+  !> Start a world, and another one with the same case but without sleep.
+  subroutine start_both(one, two)
+    type(world_t), intent(inout) :: one, two
+
+    call start(one)
+    two%case = one%case
+    two%case%contact%sleep = .false.
+    call start(two)
+  end subroutine start_both
+
+  !> Run both for the same time.
+  subroutine run_both(one, two, time)
+    type(world_t), intent(inout) :: one, two
+    real(wp), intent(in) :: time   !! [s]
+
+    call run(one, time)
+    call run(two, time)
+  end subroutine run_both
+
   !> Run for a time.
   subroutine run(world, time)
     type(world_t), intent(inout) :: world
@@ -124,12 +143,8 @@ contains
     one%case%body(1)%shape = 'slab'
     one%case%body(1)%fixed = .true.
     if (model == 1) one%case%body(2)%position(3) = 1.6826_wp*d   ! on the tips of its spheres
-    call start(one)
-    two%case = one%case
-    two%case%contact%sleep = .false.
-    call start(two)
-    call run(one, 0.9_wp)
-    call run(two, 0.9_wp)
+    call start_both(one, two)
+    call run_both(one, two, 0.9_wp)
     call check('all sleep', count(one%blocks%asleep), n)
     call check('nobody sleeps without sleep', count(two%blocks%asleep), 0)
     call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp, 0.0_wp)
@@ -157,12 +172,8 @@ contains
     one%case%body(3)%position = [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d]
     one%case%body(3)%velocity = [0.5_wp, 0.0_wp, 0.0_wp]
     one%case%body(3)%release_time = 1.0_wp
-    call start(one)
-    two%case = one%case
-    two%case%contact%sleep = .false.
-    call start(two)
-    call run(one, 1.0_wp)
-    call run(two, 1.0_wp)
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
     call check('sleeps', one%blocks%asleep(1))
     call release_body(1.0_wp, 3, one%blocks)
     call release_body(1.0_wp, 3, two%blocks)
@@ -205,20 +216,14 @@ contains
     one%case%body(3)%fixed = .true.
     one%case%body(3)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
     one%case%body(3)%release_time = 1.0_wp
-    call start(one)
-    two%case = one%case
-    two%case%contact%sleep = .false.
-    call start(two)
-    call run(one, 1.0_wp)
-    call run(two, 1.0_wp)
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
     call check('both sleep', count(one%blocks%asleep), 2)
     call release_body(1.0_wp, 3, one%blocks)
     call release_body(1.0_wp, 3, two%blocks)
-    call run(one, 0.03_wp)
-    call run(two, 0.03_wp)
+    call run_both(one, two, 0.03_wp)
     call check('sleep until touched', count(one%blocks%asleep), 2)
-    call run(one, 0.07_wp)
-    call run(two, 0.07_wp)
+    call run_both(one, two, 0.07_wp)
     call check('both are awake', count(one%blocks%asleep), 0)
     call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
     call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
@@ -343,17 +348,12 @@ contains
     one%case%body(n + 1)%position = [0.4_wp - 0.1_wp*d, 0.5_wp, 0.52_wp*d]
     one%case%body(n + 1)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
     one%case%body(n + 1)%release_time = 1.0_wp
-    call start(one)
-    two%case = one%case
-    two%case%contact%sleep = .false.
-    call start(two)
-    call run(one, 1.0_wp)
-    call run(two, 1.0_wp)
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
     call check('all of the row sleep', count(one%blocks%asleep), n)
     call release_body(1.0_wp, n + 1, one%blocks)
     call release_body(1.0_wp, n + 1, two%blocks)
-    call run(one, 0.04_wp)
-    call run(two, 0.04_wp)
+    call run_both(one, two, 0.04_wp)
     call check('all of the row are awake', count(one%blocks%asleep), 0)
     call check('the last one moves', two%blocks%v(1, n) > 0.1_wp)
     call check('row as fast', maxval(abs(one%blocks%v(1, :) - two%blocks%v(1, :))), 0.0_wp, 0.02_wp)
