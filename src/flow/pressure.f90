@@ -21,6 +21,7 @@ module pressure_m
   use outflow_m, only: outflow_t, reach, pressure_outside, mean_velocity
   use mixture_m, only: face_mean
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  use exact_sum_m, only: exact_dot
   use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
   use multigrid_m, only: multigrid_t
   use parallel_m, only: global_max, global_sum, halo_exchange
@@ -40,6 +41,10 @@ module pressure_m
     type(rigid_flux_t) :: flux
     real(wp), allocatable :: push(:, :)
       !! (6, bodies) force of a trial pressure, then its motion
+    real(wp), allocatable :: is_open(:, :, :)    !! of a closed box: 1 in cells with an open face
+    real(wp), allocatable :: swallowed(:, :)
+      !! (6, bodies) what the walls of a closed box swallow of J, per open cell [m2, m3]
+    logical :: pressed = .false.                 !! a free body covers whole cells at such a wall
   contains
     procedure :: apply => apply_pressure
   end type pressure_operator_t
@@ -77,8 +82,10 @@ contains
     b = grid%hi + 1
     allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%operator%push(6, n_bodies), source=0.0_wp)
+    allocate (self%operator%swallowed, source=self%operator%push)
     allocate (self%rhs(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%phi, source=self%rhs)
+    allocate (self%operator%is_open, source=self%rhs)
     a = grid%lo - n_halo
     b = grid%hi + n_halo
     allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
@@ -203,9 +210,30 @@ contains
     call seven_points(self%lo, self%hi, self%cf, x, y)
     if (.not. any(self%bodies%free)) return
     call force_from_cells(self%bodies, self%flux, x, self%lo - 1, self%push)
+    if (self%pressed) self%push = self%push - self%swallowed*exact_dot(x, self%is_open, 1)
     call motion_of_force(self%bodies, self%push)
     call add_cell_flux(self%bodies, self%flux, self%push, self%lo - 1, y)
+    if (self%pressed) y = y - sum(self%swallowed*self%push)*self%is_open
   end subroutine apply_pressure
+
+  !> In a closed box take the mean over the open cells off J, where a free body covers whole cells
+  !! at a wall. These take no part, so that J would not sum up to zero: an even pressure would push
+  !! the body, and no pressure balance what it displaces. So all cells share what the wall swallows.
+  subroutine find_swallowed(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(pressure_t), intent(inout) :: self
+    real(wp), parameter :: rounding = 1.0e-9_wp   !! [area of a face]
+
+    associate (op => self%operator)
+      op%pressed = .false.
+      if (.not. (self%work%singular .and. any(op%bodies%free))) return
+      call force_from_cells(op%bodies, op%flux, self%work%is_open, op%lo - 1, op%swallowed)
+      op%pressed = any(abs(op%swallowed(1:3, :)) > rounding*minval(grid%area))
+      if (.not. op%pressed) return
+      op%swallowed = op%swallowed/self%work%n_open
+      op%is_open = self%work%is_open
+    end associate
+  end subroutine find_swallowed
 
   !> The part of the operator on the grid.
   subroutine seven_points(lo, hi, cf, x, y)
@@ -593,11 +621,13 @@ contains
 
     self%phi_total = 0.0_wp
     self%operator%bodies = bodies
+    call find_swallowed(grid, self)
     tolerance = 0.5_wp*numerics%divergence_tolerance*grid%volume/dt
     do
       call solid_face_flux(grid, solid, bodies, self%operator%flux, flow%solid_flux)
       call divergence(grid, solid%open, flow%uf, flow%solid_flux, self%active, self%rhs, &
                       report%divergence)
+      if (self%work%singular) report%divergence = uneven(grid, self%rhs, self%work)
       report%converged = report%divergence < numerics%divergence_tolerance
       if (report%converged .or. report%passes == numerics%max_pressure_passes) exit
       self%rhs = -self%rhs/dt
@@ -610,6 +640,31 @@ contains
     call fill_scalar_halo(grid, self%phi_total)
     flow%p = flow%p + self%phi_total
   end subroutine solve_pressure
+
+  !> Largest divergence in a closed box less its mean over the open cells [1/s], which is what the
+  !! walls swallow (`find_swallowed`). The transport shares it out, too (`open_flux_m`).
+  function uneven(grid, outflow, work) result(largest)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
+      !! [m3/s]
+    type(krylov_work_t), intent(in) :: work
+    real(wp) :: largest
+    real(wp) :: mean, worst(1)
+    integer :: i, j, k
+
+    mean = exact_dot(outflow, work%is_open, 1)/max(work%n_open, 1.0_wp)
+    worst = 0.0_wp
+    !$omp parallel do private(i, j) reduction(max: worst) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          worst = max(worst, abs(outflow(i, j, k) - mean*work%is_open(i, j, k)))
+        end do
+      end do
+    end do
+    call global_max(worst)
+    largest = worst(1)/grid%volume
+  end function uneven
 
   !> One linear solve for phi with the chosen method.
   subroutine solve_linear(numerics, tolerance, self, iterations)

@@ -30,6 +30,7 @@ program test_pressure
   call held_box('jacobi', tank, 'cg', 'jacobi')
   call held_box('bicgstab', tank, 'bicgstab', 'multigrid')
   call free_box()
+  call pressed_box()
   call still_water()
   call accelerations_at_faces()
   call closed_cells()
@@ -170,6 +171,39 @@ contains
     call check('free box: momentum of fluid and box', fluid_gain + gain(1), 0.0_wp, 1.0e-13_wp)
     call check('free box: momentum changes hands', abs(gain(1)) > 1.0e-5_wp)
   end subroutine free_box
+
+  !> A free box half a millimetre deep in the floor of a closed box: its 4 x 2 covered cells below
+  !! take no part, and all open cells share what they swallow of its way down.
+  subroutine pressed_box()
+    real(wp) :: motion(6), force(6, 1), swallowed
+    integer, parameter :: open_cells = 12*8*12 - 4*2*3
+
+    call build(closed, .true.)
+    box%case%body(1)%quaternion = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    box%case%body(1)%position(3) = 0.018_wp
+    box%case%body(1)%angular_velocity = 0.0_wp
+    call place(box)
+    call mix_fluid(box%case%fluid, box%flow)
+    call stir()
+    motion = box%bodies%motion(:, 1)
+    call solve()
+    call check('pressed box: converged', report%converged .and. any(report%passes == [1, 2]))
+    associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
+      swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
+                  /(open_cells*box%grid%volume)
+    end associate
+    call divergence(box%grid, box%solid%open, box%flow%uf, box%flow%solid_flux, system%active, &
+                    system%rhs, force(1, 1))
+    associate (net => system%rhs(1:12, 1:8, 1:12)/box%grid%volume)
+      call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
+                 system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
+    end associate
+    call check('pressed box: it moves on', abs(swallowed) > 1.0e-3_wp)
+    call force_from_faces(box%grid, box%solid, box%bodies, system%operator%flux, &
+                          system%phi_total, force)
+    call check('pressed box: momentum is force times step', box%bodies%mass(1) &
+               *(box%bodies%motion(1:3, 1) - motion(1:3)), dt*force(1:3, 1), 1.0e-13_wp)
+  end subroutine pressed_box
 
   !> Liquid under gas around a held tilted box, level inside a cell: nothing moves, and the pressure
   !! is the weight above.
