@@ -17,7 +17,7 @@ module contact_surface_m
   use neighbours_m, only: pair_list_t, near_pairs, reserve
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
-    gather_facets, nearest_on_surface, search_surface, least_distance, segment_distance2
+    gather_facets, nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, turn_before, way_apart, &
     weight_slope
   implicit none
@@ -29,27 +29,37 @@ module contact_surface_m
     integer :: n = 0
     integer, allocatable :: probe(:)
     real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
-    integer :: n_close = 0
-    integer, allocatable :: close(:)                        !! (n_close) those near enough now
     integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
     integer :: n_facets = 0, n_edges = 0
     integer, allocatable :: facet(:), edge(:)
   end type probes_near_t
 
+  !> Poses of a pair of bodies.
+  type :: poses_t
+    real(wp) :: x_a(3) = 0.0_wp, x_b(3) = 0.0_wp, q_a(4) = 0.0_wp, q_b(4) = 0.0_wp
+  end type poses_t
+
   !> What may touch of a pair of bodies a > b, and the poses at which that was found.
+  !!
+  !! From the lists at the end those that are near enough now are packed into one short list, which
+  !! is all that is read in most substeps: for each probe of b, then of a, its number, the numbers
+  !! of facets and of edges of the other body that may be nearest to it, and these; then two edges
+  !! for each crossing.
   type :: pair_t
     integer :: a = 0, b = 0
     real(wp) :: shift(3) = 0.0_wp                !! to the image of b near a [m]
-    real(wp) :: valid = -1.0_wp                  !! way the bodies may move meanwhile [m]
-    integer :: uses = 0                          !! of the list
-    real(wp) :: x_a(3) = 0.0_wp, x_b(3) = 0.0_wp, q_a(4) = 0.0_wp, q_b(4) = 0.0_wp
+    type(poses_t) :: when_chosen                 !! poses of the short list
+    real(wp) :: close_until = -1.0_wp            !! way and gap since then for which it holds [m]
+    real(wp) :: left = -1.0_wp                   !! way since then for which the lists hold [m]
+    integer :: n_close_b = 0, n_close_a = 0, n_close_edges = 0
+    integer :: close_a = 1, close_edges = 1      !! begin of these parts of the short list
+    integer, allocatable :: close(:)
+    type(poses_t) :: when_listed                 !! poses of the lists
+    real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
     type(probes_near_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
     real(wp), allocatable :: away(:)             !! way before the two may cross [m]
-    integer :: n_close = 0
-    integer, allocatable :: close(:)             !! (n_close) those near enough now
-    real(wp) :: close_until = -1.0_wp            !! way for which these and those of probes hold [m]
   end type pair_t
 
   !> How far to look for features, and the lists of the search.
@@ -215,9 +225,13 @@ contains
         self%pairs(place)%a = self%near%a(p)
         self%pairs(place)%b = self%near%b(p)
         self%pairs(place)%valid = -1.0_wp
+        self%pairs(place)%left = -1.0_wp
       end if
       associate (pair => self%pairs(self%slot(p)))
-        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) pair%valid = -1.0_wp
+        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) then
+          pair%valid = -1.0_wp
+          pair%left = -1.0_wp
+        end if
         pair%shift = self%near%shift(:, p)
       end associate
     end do
@@ -290,32 +304,29 @@ contains
     type(touch_t), intent(inout) :: touches
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+    type(poses_t) :: now
     real(wp) :: x(3), speed, gap, way
 
     x = bed_place(bed, blocks%x(:, a))
     speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
     gap = ahead*speed
+    now%x_a = x
+    now%q_a = blocks%q(:, a)
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a), &
       pair => self%with_bed(a))
-      way = norm(x - pair%x_a) + 2*self%reach(a)*norm(blocks%q(:, a) - pair%q_a)
-      if (is_worn(pair, way, self%search)) then
-        pair%a = a
-        pair%b = bed_partner
-        pair%x_a = x
-        pair%q_a = blocks%q(:, a)
-        call list_bed(bed, turn, surface, speed, self%search, pair)
-        way = 0.0_wp
+      if (.not. short_list_holds(now, gap, self%reach(a), 0.0_wp, pair)) then
+        way = way_between(pair%when_listed, now, self%reach(a), 0.0_wp)
+        if (way > pair%valid) then
+          pair%a = a
+          pair%b = bed_partner
+          pair%when_listed = now
+          call list_bed(bed, turn, surface, speed, self%search, pair)
+          way = 0.0_wp
+        end if
+        call know_close(turn, no_turn, -x, now, gap, way, self%search%skin, surface, bed%surface, &
+          pair)
       end if
-      pair%uses = pair%uses + 1
-      if (way + gap > pair%close_until) call know_close(way + gap, self%search, pair)
-      if (pair%of_a%n_close + pair%of_b%n_close + pair%n_close == 0) return
-      call reserve_touches(touches%n + pair%of_a%n_close + pair%of_b%n_close + pair%n_close, &
-        touches)
-      call touch_probes(.false., a, bed_partner, turn, -x, transpose(turn), -matmul(x, turn), gap, &
-        way, bed%surface, surface, pair%of_b, touches)
-      call touch_probes(.true., a, bed_partner, no_turn, -x, turn, x, gap, way, surface, &
-        bed%surface, pair%of_a, touches)
-      call touch_edges(no_turn, -x, turn, x, gap, way, surface, bed%surface, pair, touches)
+      call touch_features(turn, no_turn, -x, gap, surface, bed%surface, pair, touches)
     end associate
   end subroutine touch_bed
 
@@ -330,14 +341,12 @@ contains
     real(wp) :: margin, place(3), distance, outward(3)
     integer :: i
 
-    pair%uses = 0
     pair%of_a%n = 0
     pair%of_b%n = 0
     pair%n_crossings = 0
-    pair%close_until = -1.0_wp
     pair%valid = skin_for(speed, search)
     margin = pair%valid + search%ahead
-    associate (x => pair%x_a, reach => surface%reach + margin)
+    associate (x => pair%when_listed%x_a, reach => surface%reach + margin)
       if (.not. bed_is_near(bed, x - reach, x + reach)) return
       call list_probes(transpose(turn), -matmul(x, turn), pair%valid, bed%surface, surface, &
         search, pair%of_b)
@@ -347,7 +356,7 @@ contains
     pair%of_a%n_edges = 0
     margin = margin + surface%ball
     do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
-      place = pair%x_a + matmul(turn, surface%probe(:, i))
+      place = pair%when_listed%x_a + matmul(turn, surface%probe(:, i))
       call bed_distance(bed, place, margin, max(margin, surface%reach), search%facets, &
         search%edges, distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
@@ -390,82 +399,209 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(touch_t), intent(inout) :: touches
-    real(wp) :: to_b(3), speed, gap, way, turn(3, 3), x(3)
+    type(poses_t) :: now
+    real(wp) :: to_b(3), speed, gap, way
     integer :: a, b
 
     a = pair%a
     b = pair%b
     speed = norm(blocks%v(:, a) - blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b)
-    way = way_since(blocks, reach, pair)
-    if (is_worn(pair, way, search)) then
-      call list_features(blocks, turns, surface, speed, search, pair)
-      way = 0.0_wp
-    end if
-    pair%uses = pair%uses + 1
     gap = ahead*speed
-    if (way + gap > pair%close_until) call know_close(way + gap, search, pair)
-    if (pair%of_a%n_close + pair%of_b%n_close + pair%n_close == 0) return
-    call reserve_touches(touches%n + pair%of_a%n_close + pair%of_b%n_close + pair%n_close, touches)
-    to_b = blocks%x(:, b) + pair%shift - blocks%x(:, a)
-    associate (surface_a => surface(blocks%shape(a)), &
-      surface_b => surface(blocks%shape(b)), turn_a => turns(:, :, a), &
-      turn_b => turns(:, :, b))
+    now = poses_t(blocks%x(:, a), blocks%x(:, b), blocks%q(:, a), blocks%q(:, b))
+    to_b = now%x_b + pair%shift - now%x_a
+    associate (surface_a => surface(blocks%shape(a)), surface_b => surface(blocks%shape(b)), &
+      turn_a => turns(:, :, a), turn_b => turns(:, :, b))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
         call touch_balls(a, b, to_b, gap, surface_a, surface_b, touches)
         return
       end if
-      turn = matmul(transpose(turn_b), turn_a)
-      x = matmul(-to_b, turn_b)
-      call touch_probes(.false., a, b, turn_a, to_b, transpose(turn), matmul(to_b, turn_a), gap, &
-        way, surface_b, surface_a, pair%of_b, touches)
-      call touch_probes(.true., a, b, turn_b, to_b, turn, x, gap, way, surface_a, surface_b, &
-        pair%of_a, touches)
-      call touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
+      if (.not. short_list_holds(now, gap, reach(a), reach(b), pair)) then
+        way = way_between(pair%when_listed, now, reach(a), reach(b))
+        if (way > pair%valid) then
+          pair%when_listed = now
+          call list_features(turn_a, turn_b, to_b, surface_a, surface_b, speed, search, pair)
+          way = 0.0_wp
+        end if
+        call know_close(turn_a, turn_b, to_b, now, gap, way, search%skin, surface_a, surface_b, &
+          pair)
+      end if
+      call touch_features(turn_a, turn_b, to_b, gap, surface_a, surface_b, pair, touches)
     end associate
   end subroutine touch_pair
 
-  !> Choose from the lists of a pair what may touch within a way little longer than the present one.
-  subroutine know_close(way, search, pair)
-    real(wp), intent(in) :: way                   !! since the lists were made, and ahead [m]
-    type(search_t), intent(in) :: search
+  !> Touches of the features of a pair in its short list: probes of b, probes of a, crossing edges.
+  subroutine touch_features(turn_a, turn_b, to_b, gap, surface_a, surface_b, pair, touches)
+    real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
+    real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(pair_t), intent(in) :: pair
+    type(touch_t), intent(inout) :: touches
+    real(wp) :: turn(3, 3), x(3)              ! axes of a to those of b: turn.p + x
+    integer :: n
+
+    n = pair%n_close_a + pair%n_close_b + pair%n_close_edges
+    if (n == 0) return
+    call reserve_touches(touches%n + n, touches)
+    turn = matmul(transpose(turn_b), turn_a)
+    x = matmul(-to_b, turn_b)
+    call touch_probes(.false., pair%a, pair%b, turn_a, to_b, transpose(turn), &
+      matmul(to_b, turn_a), gap, surface_b, surface_a, pair%n_close_b, pair%close, touches)
+    call touch_probes(.true., pair%a, pair%b, turn_b, to_b, turn, x, gap, surface_a, surface_b, &
+      pair%n_close_a, pair%close(pair%close_a:), touches)
+    call touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
+  end subroutine touch_features
+
+  !> Whether the short list of a pair still holds.
+  pure function short_list_holds(now, gap, reach_a, reach_b, pair) result(yes)
+    type(poses_t), intent(in) :: now
+    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    real(wp), intent(in) :: reach_a, reach_b  !! of the bodies [m]
+    type(pair_t), intent(in) :: pair
+    logical :: yes
+    real(wp) :: way
+
+    way = way_between(pair%when_chosen, now, reach_a, reach_b)
+    yes = way <= pair%left .and. way + gap <= pair%close_until
+  end function short_list_holds
+
+  !> Choose from the lists of a pair what may touch before the bodies have moved a little.
+  subroutine know_close(turn_a, turn_b, to_b, now, gap, way, skin, surface_a, surface_b, pair)
+    real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
+    real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    type(poses_t), intent(in) :: now
+    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    real(wp), intent(in) :: way               !! of the bodies since the lists were made [m]
+    real(wp), intent(in) :: skin              !! least way before lists are renewed [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(inout) :: pair
-    real(wp), parameter :: share = 0.1_wp         !! of a skin: further way for which it holds
+    real(wp), parameter :: share = 0.02_wp    !! of a skin: way for which the short list holds,
+    real(wp), parameter :: lasting = 10.0_wp  !! or such a multiple of the gap
+    real(wp) :: turn(3, 3), x(3)              ! axes of a to those of b: turn.p + x
+    integer :: n
 
-    pair%close_until = way + share*search%skin
-    call choose(pair%of_a%n, pair%of_a%away, pair%of_a%n_close, pair%of_a%close)
-    call choose(pair%of_b%n, pair%of_b%away, pair%of_b%n_close, pair%of_b%close)
-    call choose(pair%n_crossings, pair%away, pair%n_close, pair%close)
-  contains
-    !> Those that are no further away.
-    subroutine choose(n, away, n_close, chosen)
-      integer, intent(in) :: n
-      real(wp), allocatable, intent(in) :: away(:)   !! (n) [m]
-      integer, intent(out) :: n_close
-      integer, allocatable, intent(inout) :: chosen(:)
-      integer :: m
-
-      n_close = 0
-      call reserve(n, chosen)
-      do m = 1, n
-        if (away(m) > pair%close_until) cycle
-        n_close = n_close + 1
-        chosen(n_close) = m
-      end do
-    end subroutine choose
+    pair%when_chosen = now
+    pair%left = pair%valid - way
+    pair%close_until = gap + max(share*skin, lasting*gap)
+    n = 0
+    turn = matmul(transpose(turn_b), turn_a)
+    x = matmul(-to_b, turn_b)
+    call choose_probes(transpose(turn), matmul(to_b, turn_a), way, pair%close_until, surface_b, &
+      surface_a, pair%of_b, n, pair%n_close_b, pair%close)
+    pair%close_a = n + 1
+    call choose_probes(turn, x, way, pair%close_until, surface_a, surface_b, pair%of_a, n, &
+      pair%n_close_a, pair%close)
+    pair%close_edges = n + 1
+    call choose_edges(turn, x, way, surface_a, surface_b, n, pair)
+    call reserve(n + 1, pair%close)
   end subroutine know_close
 
-  !> Whether the lists of a pair have to be made anew.
-  pure function is_worn(pair, way, search) result(yes)
-    type(pair_t), intent(in) :: pair
-    real(wp), intent(in) :: way                   !! of the bodies since the list was made [m]
-    type(search_t), intent(in) :: search
-    integer, parameter :: worn = 50               !! uses after which a list is renewed early,
-    real(wp), parameter :: fresh = 0.05_wp        !! unless the way is below this share of a skin
-    logical :: yes
+  !> Append to the short list those probes of a guest, with the features of the host, that may touch
+  !! before the bodies have moved by a margin.
+  subroutine choose_probes(turn, x, way, margin, guest, host, list, n, n_chosen, chosen)
+    real(wp), intent(in) :: turn(3, 3), x(3)   !! guest to host axes: turn.p + x [-], [m]
+    real(wp), intent(in) :: way                !! since the lists were made [m]
+    real(wp), intent(in) :: margin             !! [m]
+    type(surface_t), intent(in) :: guest, host
+    type(probes_near_t), intent(in) :: list
+    integer, intent(inout) :: n                !! length of the short list
+    integer, intent(out) :: n_chosen
+    integer, allocatable, intent(inout) :: chosen(:)
+    real(wp) :: place(3), distance, outward(3), reach
+    integer :: m, k, at
 
-    yes = way > pair%valid .or. (pair%uses > worn .and. way > fresh*search%skin)
-  end function is_worn
+    n_chosen = 0
+    do m = 1, list%n
+      if (list%away(m) > way + margin) cycle
+      associate (facets => list%facet(list%facet_first(m):list%facet_first(m + 1) - 1), &
+        edges => list%edge(list%edge_first(m):list%edge_first(m + 1) - 1))
+        place = x + matmul(turn, guest%probe(:, list%probe(m)))
+        call nearest_on_surface(host, place, facets, edges, distance, outward)
+        if (distance - guest%ball > margin .and. distance < nowhere) cycle
+        reach = abs(distance) + 2*margin
+        at = n + 1
+        n = n + 3
+        call reserve(n + size(facets) + size(edges), chosen)
+        chosen(at) = list%probe(m)
+        do k = 1, size(facets)
+          if (.not. facet_is_near(host, facets(k), place, reach)) cycle
+          n = n + 1
+          chosen(n) = facets(k)
+        end do
+        chosen(at + 1) = n - at - 2
+        do k = 1, size(edges)
+          if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
+          n = n + 1
+          chosen(n) = edges(k)
+        end do
+        chosen(at + 2) = n - at - 2 - chosen(at + 1)
+        n_chosen = n_chosen + 1
+      end associate
+    end do
+  end subroutine choose_probes
+
+  !> Append to the short list those pairs of edges that may cross while it holds.
+  subroutine choose_edges(turn, x, way, surface_a, surface_b, n, pair)
+    real(wp), intent(in) :: turn(3, 3), x(3)   !! axes of a to those of b: turn.p + x [-], [m]
+    real(wp), intent(in) :: way                !! since the lists were made [m]
+    type(surface_t), intent(in) :: surface_a, surface_b
+    integer, intent(inout) :: n                !! length of the short list
+    type(pair_t), intent(inout) :: pair
+    type(edge_t) :: guest
+    real(wp) :: margin, reach, angle
+    integer :: m, last
+
+    pair%n_close_edges = 0
+    margin = pair%close_until
+    reach = margin + min(surface_a%length, surface_b%length)
+    angle = margin/min(surface_a%reach, surface_b%reach)
+    last = 0
+    do m = 1, pair%n_crossings
+      if (pair%away(m) > way + margin) cycle
+      if (pair%edge_a(m) /= last) guest = edge_in_axes(surface_a%edge(pair%edge_a(m)), turn, x)
+      last = pair%edge_a(m)
+      associate (host => surface_b%edge(pair%edge_b(m)))
+        if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
+                              host%extent) > reach**2) cycle
+        if (turn_before(guest, host) >= angle) cycle
+        if (way_apart(guest, host, angle) > margin) cycle
+      end associate
+      call reserve(n + 2, pair%close)
+      pair%close(n + 1) = pair%edge_a(m)
+      pair%close(n + 2) = pair%edge_b(m)
+      n = n + 2
+      pair%n_close_edges = pair%n_close_edges + 1
+    end do
+  end subroutine choose_edges
+
+  !> Whether a facet may be the nearest to a place, within reach of it.
+  pure function facet_is_near(host, f, place, reach) result(yes)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: f
+    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    logical :: yes
+    integer :: c
+
+    yes = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= reach
+    if (.not. yes) return
+    do c = host%side(f), host%side(f + 1) - 1
+      yes = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - reach
+      if (.not. yes) return
+    end do
+  end function facet_is_near
+
+  !> Whether an edge is within reach of a place.
+  pure function edge_is_near(edge, place, reach) result(yes)
+    type(edge_t), intent(in) :: edge
+    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    logical :: yes
+    real(wp) :: d(3)
+
+    d = place - edge%start
+    d = d - min(max(dot_product(d, edge%along), 0.0_wp), edge%extent)*edge%along
+    yes = dot_product(d, d) <= reach**2
+  end function edge_is_near
 
   !> Way by which bodies may move before their lists are renewed: wider for fast bodies [m].
   pure function skin_for(speed, search) result(skin)
@@ -476,19 +612,17 @@ contains
     skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
   end function skin_for
 
-  !> Largest way that points of the two bodies have moved since their features were listed [m].
-  pure function way_since(blocks, reach, pair) result(way)
-    type(blocks_t), intent(in) :: blocks
-    real(wp), intent(in) :: reach(:)
-    type(pair_t), intent(in) :: pair
+  !> Largest way that points of two bodies move against one another from one pair of poses to
+  !! another [m].
+  pure function way_between(before, now, reach_a, reach_b) result(way)
+    type(poses_t), intent(in) :: before, now
+    real(wp), intent(in) :: reach_a, reach_b   !! of the bodies [m]
     real(wp) :: way
 
     ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-    associate (a => pair%a, b => pair%b)
-      way = norm((blocks%x(:, a) - pair%x_a) - (blocks%x(:, b) - pair%x_b)) &
-        + 2*reach(a)*norm(blocks%q(:, a) - pair%q_a) + 2*reach(b)*norm(blocks%q(:, b) - pair%q_b)
-    end associate
-  end function way_since
+    way = norm((now%x_a - before%x_a) - (now%x_b - before%x_b)) &
+      + 2*reach_a*norm(now%q_a - before%q_a) + 2*reach_b*norm(now%q_b - before%q_b)
+  end function way_between
 
   !> The one touch of two spheres.
   subroutine touch_balls(a, b, to_b, gap, surface_a, surface_b, touches)
@@ -503,12 +637,13 @@ contains
     if (depth <= -gap) return
     normal = to_b/max(distance, tiny(1.0_wp))
     arm = (surface_a%ball - 0.5_wp*depth)*normal
+    call reserve_touches(touches%n + 1, touches)
     call add_touch(a, b, 1, arm, arm - to_b, normal, depth, 1.0_wp, &
       min(surface_a%length, surface_b%length), touches)
   end subroutine touch_balls
 
   !> Touches of the listed probes of one body (the guest) with the surface of the other (the host).
-  subroutine touch_probes(guest_is_a, a, b, turn_host, to_b, turn, x, gap, way, guest, host, list, &
+  subroutine touch_probes(guest_is_a, a, b, turn_host, to_b, turn, x, gap, guest, host, n, list, &
       touches)
     logical, intent(in) :: guest_is_a
     integer, intent(in) :: a, b
@@ -516,22 +651,23 @@ contains
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
     real(wp), intent(in) :: turn(3, 3), x(3)  !! guest to host axes: turn.p + x [-], [m]
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
-    real(wp), intent(in) :: way               !! of the bodies since the list was made [m]
     type(surface_t), intent(in) :: guest, host
-    type(probes_near_t), intent(in) :: list
+    integer, intent(in) :: n                  !! probes
+    integer, intent(in) :: list(:)            !! their part of the short list, see `pair_t`
     type(touch_t), intent(inout) :: touches
     real(wp) :: place(3), distance, depth, outward(3), arm(3)
-    integer :: c, m, i
+    integer :: c, m, i, edges, next
 
-    do c = 1, list%n_close
-      m = list%close(c)
-      if (list%away(m) > way + gap) cycle
-      i = list%probe(m)
+    next = 1
+    do c = 1, n
+      m = next
+      i = list(m)
+      edges = m + 3 + list(m + 1)
+      next = edges + list(m + 2)
       place = x + turn(:, 1)*guest%probe(1, i) + turn(:, 2)*guest%probe(2, i) &
         + turn(:, 3)*guest%probe(3, i)
-      call nearest_on_surface(host, place, list%facet(list%facet_first(m): &
-        list%facet_first(m + 1) - 1), list%edge(list%edge_first(m):list%edge_first(m + 1) - 1), &
-        distance, outward)
+      call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), distance, &
+        outward)
       depth = guest%ball - distance
       if (depth <= -gap) cycle
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*depth)*outward)
@@ -547,35 +683,33 @@ contains
   end subroutine touch_probes
 
   !> Touches of the listed pairs of edges that cross.
-  subroutine touch_edges(turn_b, to_b, turn, x, gap, way, surface_a, surface_b, pair, touches)
+  subroutine touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
     real(wp), intent(in) :: turn_b(3, 3)      !! axes of b to space
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
     real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
-    real(wp), intent(in) :: way               !! of the bodies since the list was made [m]
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
     type(touch_t), intent(inout) :: touches
     type(edge_t) :: guest
     type(crossing_t) :: crossing
     real(wp) :: length, arm(3), with_shift(3), with_turn(3)
-    integer :: c, m, i, last
+    integer :: m, i, j, last
 
     length = min(surface_a%length, surface_b%length)
     last = 0
-    do c = 1, pair%n_close
-      m = pair%close(c)
-      if (pair%away(m) > way + gap) cycle
-      i = pair%edge_a(m)
+    do m = pair%close_edges, pair%close_edges + 2*pair%n_close_edges - 1, 2
+      i = pair%close(m)
+      j = pair%close(m + 1)
       if (i /= last) guest = edge_in_axes(surface_a%edge(i), turn, x)
       last = i
-      call cross_edges(guest, surface_b%edge(pair%edge_b(m)), -gap, length, crossing)
+      call cross_edges(guest, surface_b%edge(j), -gap, length, crossing)
       if (crossing%weight <= 0.0_wp) cycle
       arm = matmul(turn_b, crossing%place)
       call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, &
         matmul(turn_b, crossing%normal), crossing%depth, crossing%weight, length, touches)
       if (crossing%weight >= 1.0_wp .or. crossing%depth <= 0.0_wp) cycle
-      call weight_slope(guest, surface_b%edge(pair%edge_b(m)), crossing, with_shift, with_turn)
+      call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
       touches%weight_shift(:, touches%n) = matmul(turn_b, with_shift)
       touches%weight_turn(:, touches%n) = matmul(turn_b, with_turn)
     end do
@@ -594,43 +728,27 @@ contains
   end function edge_in_axes
 
   !> List what may touch of a pair before the bodies have moved by a skin: wider for fast bodies.
-  subroutine list_features(blocks, turns, surface, speed, search, pair)
-    type(blocks_t), intent(in) :: blocks
-    real(wp), intent(in) :: turns(:, :, :)       !! (3, 3, bodies) body to space
-    type(surface_t), intent(in) :: surface(:)    !! (shapes)
+  subroutine list_features(turn_a, turn_b, to_b, a, b, speed, search, pair)
+    real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
+    real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    type(surface_t), intent(in) :: a, b
     real(wp), intent(in) :: speed                !! of any two points, at most [m/s]
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    real(wp) :: turn(3, 3), x_a(3), x_b(3), to_b(3), apart, skin
+    real(wp) :: turn(3, 3), x(3), apart, skin
 
-    pair%x_a = blocks%x(:, pair%a)
-    pair%x_b = blocks%x(:, pair%b)
-    pair%q_a = blocks%q(:, pair%a)
-    pair%q_b = blocks%q(:, pair%b)
-    pair%uses = 0
     pair%of_a%n = 0
     pair%of_b%n = 0
     pair%n_crossings = 0
-    pair%close_until = -1.0_wp
-    to_b = pair%x_b + pair%shift - pair%x_a
-    associate (a => surface(blocks%shape(pair%a)), b => surface(blocks%shape(pair%b)))
-      apart = norm(to_b) - a%reach - b%reach - search%ahead
-      skin = skin_for(speed, search)
-      pair%valid = max(apart, skin)
-      if (apart > skin) return
-      if (a%ball > 0.0_wp .and. b%ball > 0.0_wp) then
-        pair%n_crossings = 1   ! the two spheres
-        call reserve(1, pair%away)
-        pair%away(1) = 0.0_wp
-        return
-      end if
-      turn = matmul(transpose(turns(:, :, pair%b)), turns(:, :, pair%a))
-      x_b = matmul(-to_b, turns(:, :, pair%b))
-      x_a = matmul(to_b, turns(:, :, pair%a))
-      call list_probes(transpose(turn), x_a, skin, b, a, search, pair%of_b)
-      call list_probes(turn, x_b, skin, a, b, search, pair%of_a)
-      call list_crossings(turn, x_b, a, b, search, pair)
-    end associate
+    apart = norm(to_b) - a%reach - b%reach - search%ahead
+    skin = skin_for(speed, search)
+    pair%valid = max(apart, skin)
+    if (apart > skin) return
+    turn = matmul(transpose(turn_b), turn_a)
+    x = matmul(-to_b, turn_b)
+    call list_probes(transpose(turn), matmul(to_b, turn_a), skin, b, a, search, pair%of_b)
+    call list_probes(turn, x, skin, a, b, search, pair%of_a)
+    call list_crossings(turn, x, a, b, search, pair)
   end subroutine list_features
 
   !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
@@ -710,8 +828,7 @@ contains
     type(surface_t), intent(in) :: host
     type(search_t), intent(in) :: search
     type(probes_near_t), intent(inout) :: list
-    real(wp) :: d(3)
-    integer :: m, c
+    integer :: m
 
     list%n = list%n + 1
     call reserve(list%n, list%probe)
@@ -721,23 +838,17 @@ contains
     list%probe(list%n) = probe
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
-    facets: do m = 1, search%facets%n
+    do m = 1, search%facets%n
       associate (f => search%facets%item(m))
-        if (abs(dot_product(host%normal(:, f), place) - host%offset(f)) > reach) cycle facets
-        do c = host%side(f), host%side(f + 1) - 1
-          if (dot_product(host%side_normal(:, c), place) < host%side_offset(c) - reach) cycle facets
-        end do
+        if (.not. facet_is_near(host, f, place, reach)) cycle
         list%n_facets = list%n_facets + 1
         call reserve(list%n_facets, list%facet)
         list%facet(list%n_facets) = f
       end associate
-    end do facets
+    end do
     do m = 1, search%edges%n
       associate (e => search%edges%item(m))
-        d = place - host%edge(e)%start
-        d = d - min(max(dot_product(d, host%edge(e)%along), 0.0_wp), host%edge(e)%extent) &
-          *host%edge(e)%along
-        if (dot_product(d, d) > reach**2) cycle
+        if (.not. edge_is_near(host%edge(e), place, reach)) cycle
         list%n_edges = list%n_edges + 1
         call reserve(list%n_edges, list%edge)
         list%edge(list%n_edges) = e

@@ -59,6 +59,24 @@ module contacts_m
     real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
   end type partners_t
 
+  !> One of two partners that touch: what it sets against a force.
+  type :: inertia_t
+    real(wp) :: inverse_mass = 0.0_wp            !! [1/kg]
+    real(wp) :: inverse_inertia(3, 3) = 0.0_wp   !! [1/(kg m2)]
+  end type inertia_t
+
+  !> How two partners move: b against a, and the turning of each.
+  type :: motion_t
+    real(wp) :: v(3) = 0.0_wp                              !! of the centres [m/s]
+    real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp   !! [rad/s]
+  end type motion_t
+
+  !> What a touch does to its two partners.
+  type :: wrench_t
+    real(wp) :: force(3) = 0.0_wp                            !! on a; the opposite on b [N]
+    real(wp) :: torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp   !! about their centres [N m]
+  end type wrench_t
+
   type :: contacts_t
     type(contact_law_t) :: law
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
@@ -368,6 +386,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
     type(contact_report_t) :: ignored
+    type(wrench_t) :: wrench
     integer :: g, t, a, b
 
     associate (sleep => contacts%sleep, springs => contacts%springs)
@@ -377,12 +396,11 @@ contains
         b = springs%b(g)
         sleep%chosen(g) = at_rest(blocks, a, b)
         if (.not. sleep%chosen(g)) cycle
-        contacts%force(:, [a, b]) = 0.0_wp
-        contacts%torque(:, [a, b]) = 0.0_wp
-        call push_group(g, dt_b, contacts, ignored)
-        springs%force(:, g) = contacts%force(:, a)
-        springs%torque_a(:, g) = contacts%torque(:, a)
-        springs%torque_b(:, g) = contacts%torque(:, b)
+        wrench = wrench_t()
+        call push_group(g, dt_b, motion_between(contacts%partners, a, b), contacts, wrench, ignored)
+        springs%force(:, g) = wrench%force
+        springs%torque_a(:, g) = wrench%torque_a
+        springs%torque_b(:, g) = wrench%torque_b
         springs%energy(g) = stored_energy(springs%k(g), contacts%law%gamma_t, &
           norm(springs%xi(:, g)))
         do t = contacts%groups%first(g), contacts%groups%first(g + 1) - 1
@@ -694,21 +712,28 @@ contains
   !! like one. Seen along the normal n_i of touch i the pair has the stiffness
   !! K_i = sum_j k_j (n_i.n_j)^2 and, at the mean of the contact points with the same weights, the
   !! effective mass m_i; then eta_i = (k_i/K_i) 2 zeta sqrt(K_i m_i).
+  !!
+  !! It is no impact where the bodies move against one another no faster than weight, or a share of
+  !! their load, makes them move within a swing.
   pure subroutine respond_pair(touches, first, last, law, partners, response)
     type(touch_t), intent(in) :: touches
     integer, intent(in) :: first, last
     type(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
+    type(inertia_t) :: of_a, of_b
+    real(wp), parameter :: calm_share = 0.25_wp   !! of the load
     real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
-    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep
+    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep, calm, speed
     integer :: a, b, t, i
 
     a = touches%a(first)
     b = touches%b(first)
+    of_a = inertia_of(partners, a)
+    of_b = inertia_of(partners, b)
     weights = 0.0_wp
     points = 0.0_wp
-    k = normal_constant(law, 1.0_wp/(partners%inverse_mass(a) + partners%inverse_mass(b)))
+    k = normal_constant(law, 1.0_wp/(of_a%inverse_mass + of_b%inverse_mass))
     hard = min(partners%hard(a), partners%hard(b))
     do t = first, last
       response%k(t) = touches%weight(t)*k
@@ -729,9 +754,9 @@ contains
       nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
       total = dot_product(nn, weights)
       arm = matmul(points, nn)/total
-      inverse = inverse_effective_mass(partners, a, arm, touches%normal(:, t))
+      inverse = inverse_effective_mass(of_a, arm, touches%normal(:, t))
       arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
-      inverse = inverse + inverse_effective_mass(partners, b, arm, touches%normal(:, t))
+      inverse = inverse + inverse_effective_mass(of_b, arm, touches%normal(:, t))
       steep = max(steep, steepness(law, touches%weight(t), touches%depth(t), hard))
       omega2 = k*total*inverse
       if (law%constants) then
@@ -743,37 +768,17 @@ contains
       end if
       highest = max(highest, omega2)
     end do
-    if (.not. law%constants) call damp_as_one(touches, first, last, law, partners, response, &
+    if (.not. law%constants) call damp_as_one(touches, first, last, law, of_a, of_b, response, &
                                              highest)
     highest = steep*highest
-    if (.not. is_impact(touches, first, load, highest, partners)) highest = highest &
-      *(impact_turn/slow_turn)**2
+    calm = max(partners%gravity, calm_share*norm(load)*(of_a%inverse_mass + of_b%inverse_mass))
+    speed = largest_speed(motion_between(partners, a, b), touches%arm_a(:, first), &
+      touches%arm_b(:, first))
+    if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
-    if (partners%inverse_mass(a) > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
-    if (partners%inverse_mass(b) > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
+    if (of_a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
+    if (of_b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
-
-  !> Whether two touching bodies move against one another faster than weight, or a share of their
-  !! load, makes them move within a swing.
-  pure function is_impact(touches, first, load, frequency2, partners) result(yes)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: first           !! touch of the pair
-    real(wp), intent(in) :: load(3)        !! sum of the elastic forces [N]
-    real(wp), intent(in) :: frequency2     !! square of the frequency of the pair [1/s2]
-    type(partners_t), intent(in) :: partners
-    logical :: yes
-    real(wp), parameter :: share = 0.25_wp
-    real(wp) :: speed, calm
-
-    associate (a => touches%a(first), b => touches%b(first))
-      speed = norm(partners%v(:, b) - partners%v(:, a)) &
-        + norm(partners%omega(:, a))*norm(touches%arm_a(:, first)) &
-        + norm(partners%omega(:, b))*norm(touches%arm_b(:, first))
-      calm = max(partners%gravity, share*norm(load)*(partners%inverse_mass(a) &
-                                                     + partners%inverse_mass(b)))
-    end associate
-    yes = speed**2*frequency2 >= calm**2
-  end function is_impact
 
   !> Scale the damping of the touches of a pair so that together they damp the swing they drive
   !! like one spring and dashpot.
@@ -781,22 +786,18 @@ contains
   !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
   !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
   !! part sideways, and weights that change with position make W other than each normal tells.
-  pure subroutine damp_as_one(touches, first, last, law, partners, response, highest)
+  pure subroutine damp_as_one(touches, first, last, law, of_a, of_b, response, highest)
     type(touch_t), intent(in) :: touches
     integer, intent(in) :: first, last
     type(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
+    type(inertia_t), intent(in) :: of_a, of_b
     type(response_t), intent(inout) :: response
     real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
-    real(wp) :: push(3), force(3), torque_a(3), torque_b(3), v(3), spin_a(3), spin_b(3)
-    real(wp) :: by_weight, energy, mass, drag, omega2
-    integer :: a, b, t
+    type(wrench_t) :: wrench
+    type(motion_t) :: motion   ! that the wrench drives
+    real(wp) :: push(3), by_weight, energy, mass, drag, omega2
+    integer :: t
 
-    a = touches%a(first)
-    b = touches%b(first)
-    force = 0.0_wp
-    torque_a = 0.0_wp
-    torque_b = 0.0_wp
     energy = 0.0_wp
     do t = first, last
       if (touches%depth(t) <= 0.0_wp) cycle
@@ -804,28 +805,21 @@ contains
       if (touches%weight(t) < 1.0_wp) then
         by_weight = response%elastic(t)*touches%depth(t)/(law%gamma_n + 1.0_wp)
         push = push - by_weight*touches%weight_shift(:, t)
-        torque_a = torque_a - by_weight*touches%weight_turn(:, t)
-        torque_b = torque_b + by_weight*touches%weight_turn(:, t)
+        wrench%torque_a = wrench%torque_a - by_weight*touches%weight_turn(:, t)
+        wrench%torque_b = wrench%torque_b + by_weight*touches%weight_turn(:, t)
       end if
-      force = force + push
-      torque_a = torque_a + cross(touches%arm_a(:, t), push)
-      torque_b = torque_b - cross(touches%arm_b(:, t), push)
+      call act(push, touches%arm_a(:, t), touches%arm_b(:, t), wrench)
       energy = energy + response%energy(t)
     end do
-    v = -(partners%inverse_mass(a) + partners%inverse_mass(b))*force   ! of b against a
-    spin_a = 0.0_wp
-    spin_b = 0.0_wp
-    if (partners%inverse_mass(a) > 0.0_wp) spin_a = matmul(partners%inverse_inertia(:, :, a), &
-                                                           torque_a)
-    if (partners%inverse_mass(b) > 0.0_wp) spin_b = matmul(partners%inverse_inertia(:, :, b), &
-                                                           torque_b)
-    mass = dot_product(spin_a, torque_a) + dot_product(spin_b, torque_b) - dot_product(v, force)
+    motion%v = -(of_a%inverse_mass + of_b%inverse_mass)*wrench%force
+    if (of_a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of_a%inverse_inertia, wrench%torque_a)
+    if (of_b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of_b%inverse_inertia, wrench%torque_b)
+    mass = dot_product(motion%omega_a, wrench%torque_a) &
+      + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
     drag = 0.0_wp
     do t = first, last
       if (touches%depth(t) <= 0.0_wp) cycle
-      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, v &
-        + cross(spin_b, touches%arm_b(:, t)) - cross(spin_a, touches%arm_a(:, t)), &
-        spin_b - spin_a)**2
+      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, motion)**2
     end do
     if (.not. (energy > 0.0_wp .and. drag > 0.0_wp)) return
     omega2 = 0.5_wp*mass/energy
@@ -844,20 +838,17 @@ contains
   end function square
 
   !> One over the mass a partner sets against a push along n at the given arm [1/kg].
-  pure function inverse_effective_mass(partners, b, arm, n) result(inverse)
-    type(partners_t), intent(in) :: partners
-    integer, intent(in) :: b
+  pure function inverse_effective_mass(of, arm, n) result(inverse)
+    type(inertia_t), intent(in) :: of
     real(wp), intent(in) :: arm(3), n(3)
     real(wp) :: inverse
     real(wp) :: lever(3)
 
-    inverse = partners%inverse_mass(b)
+    inverse = of%inverse_mass
     if (inverse <= 0.0_wp) return
     lever = cross(arm, n)
-    associate (inverse_inertia => partners%inverse_inertia(:, :, b))
-      inverse = inverse + dot_product(lever, inverse_inertia(:, 1)*lever(1) &
-        + inverse_inertia(:, 2)*lever(2) + inverse_inertia(:, 3)*lever(3))
-    end associate
+    inverse = inverse + dot_product(lever, of%inverse_inertia(:, 1)*lever(1) &
+      + of%inverse_inertia(:, 2)*lever(2) + of%inverse_inertia(:, 3)*lever(3))
   end function inverse_effective_mass
 
   !> Gather the touches of each key and partner; mean normal and point weighted by overlap.
@@ -954,29 +945,69 @@ contains
   pure subroutine stretch_springs(dt, contacts)
     real(wp), intent(in) :: dt   !! [s]
     type(contacts_t), intent(inout) :: contacts
+    type(motion_t) :: motion
     real(wp) :: v(3)
     integer :: g
 
     associate (groups => contacts%groups, springs => contacts%springs)
       do g = 1, groups%n
-        v = relative_velocity(contacts%partners, springs%a(g), springs%b(g), groups%arm_a(:, g), &
-          groups%arm_b(:, g))
+        if (begins_pair(springs, g)) motion = motion_between(contacts%partners, springs%a(g), &
+                                                             springs%b(g))
+        v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
         springs%xi(:, g) = springs%xi(:, g) &
           + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
       end do
     end associate
   end subroutine stretch_springs
 
-  !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
-  pure function relative_velocity(partners, a, b, arm_a, arm_b) result(v)
+  !> Whether spring g is the first of its pair of partners.
+  pure function begins_pair(springs, g) result(yes)
+    type(springs_t), intent(in) :: springs
+    integer, intent(in) :: g
+    logical :: yes
+
+    yes = g == 1
+    if (.not. yes) yes = springs%a(g) /= springs%a(g - 1) .or. springs%b(g) /= springs%b(g - 1)
+  end function begins_pair
+
+  !> Inertia of a partner.
+  pure function inertia_of(partners, b) result(inertia)
+    type(partners_t), intent(in) :: partners
+    integer, intent(in) :: b
+    type(inertia_t) :: inertia
+
+    inertia%inverse_mass = partners%inverse_mass(b)
+    inertia%inverse_inertia = partners%inverse_inertia(:, :, b)
+  end function inertia_of
+
+  !> Motion of partner b against body a.
+  pure function motion_between(partners, a, b) result(motion)
     type(partners_t), intent(in) :: partners
     integer, intent(in) :: a, b
+    type(motion_t) :: motion
+
+    motion%v = partners%v(:, b) - partners%v(:, a)
+    motion%omega_a = partners%omega(:, a)
+    motion%omega_b = partners%omega(:, b)
+  end function motion_between
+
+  !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
+  pure function relative_velocity(motion, arm_a, arm_b) result(v)
+    type(motion_t), intent(in) :: motion
     real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
     real(wp) :: v(3)
 
-    v = (partners%v(:, b) + cross(partners%omega(:, b), arm_b)) &
-      - (partners%v(:, a) + cross(partners%omega(:, a), arm_a))
+    v = motion%v + (cross(motion%omega_b, arm_b) - cross(motion%omega_a, arm_a))
   end function relative_velocity
+
+  !> Highest speed against one another of points of two bodies as far out as a contact [m/s].
+  pure function largest_speed(motion, arm_a, arm_b) result(speed)
+    type(motion_t), intent(in) :: motion
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
+    real(wp) :: speed
+
+    speed = norm(motion%v) + norm(motion%omega_a)*norm(arm_a) + norm(motion%omega_b)*norm(arm_b)
+  end function largest_speed
 
   !> Contact forces and torques of this substep on all bodies.
   !!
@@ -986,83 +1017,98 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(contacts_t), intent(inout) :: contacts
     type(contact_report_t), intent(inout) :: report
+    type(motion_t) :: motion
+    type(wrench_t) :: wrench
     integer :: g
 
     contacts%force = 0.0_wp
     contacts%torque = 0.0_wp
-    do g = 1, contacts%groups%n
-      call push_group(g, dt, contacts, report)
-    end do
+    associate (springs => contacts%springs, n => contacts%groups%n)
+      do g = 1, n
+        if (begins_pair(springs, g)) then
+          motion = motion_between(contacts%partners, springs%a(g), springs%b(g))
+          wrench = wrench_t()
+        end if
+        call push_group(g, dt, motion, contacts, wrench, report)
+        if (g < n) then
+          if (.not. begins_pair(springs, g + 1)) cycle
+        end if
+        associate (a => springs%a(g), b => springs%b(g))
+          contacts%force(:, a) = contacts%force(:, a) + wrench%force
+          contacts%force(:, b) = contacts%force(:, b) - wrench%force
+          contacts%torque(:, a) = contacts%torque(:, a) + wrench%torque_a
+          contacts%torque(:, b) = contacts%torque(:, b) + wrench%torque_b
+        end associate
+      end do
+    end associate
   end subroutine sum_forces
 
   !> Normal and tangential forces of one group.
-  pure subroutine push_group(g, dt, contacts, report)
+  pure subroutine push_group(g, dt, motion, contacts, wrench, report)
     integer, intent(in) :: g
     real(wp), intent(in) :: dt   !! [s]
+    type(motion_t), intent(in) :: motion
     type(contacts_t), intent(inout) :: contacts
+    type(wrench_t), intent(inout) :: wrench
     type(contact_report_t), intent(inout) :: report
-    real(wp) :: v(3), normal(3), v_n, opening, part, force_n, sum_n, decay, eta
-    integer :: t, a, b
+    real(wp) :: v_n, opening, part, force_n, sum_n, decay, eta
+    integer :: t
 
     associate (touches => contacts%touches, groups => contacts%groups, r => contacts%response)
-      a = touches%a(groups%first(g))
-      b = touches%b(groups%first(g))
       sum_n = 0.0_wp
       decay = 0.0_wp
       eta = 0.0_wp
       do t = groups%first(g), groups%first(g + 1) - 1
-        normal = touches%normal(:, t)
-        v = relative_velocity(contacts%partners, a, b, touches%arm_a(:, t), touches%arm_b(:, t))
-        v_n = dot_product(v, normal)
+        v_n = dot_product(relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t)), &
+          touches%normal(:, t))
         part = 1.0_wp
         if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-        opening = opening_speed(touches, t, contacts%law%gamma_n, v, &
-          contacts%partners%omega(:, b) - contacts%partners%omega(:, a))
+        opening = opening_speed(touches, t, contacts%law%gamma_n, motion)
         force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
-        call act(a, b, -force_n*normal, touches%arm_a(:, t), touches%arm_b(:, t), contacts)
-        if (touches%weight(t) < 1.0_wp) call push_to_weight(t, force_n, contacts)
+        call act(-force_n*touches%normal(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
+        if (touches%weight(t) < 1.0_wp) call push_to_weight(touches, t, contacts%law%gamma_n, &
+          force_n, wrench)
         sum_n = sum_n + force_n
         decay = max(decay, r%decay(t))
         eta = max(eta, r%eta(t))
         report%courant_max = max(report%courant_max, abs(v_n)*dt/touches%length(t))
         report%overlap_max = max(report%overlap_max, touches%depth(t))
       end do
-      call rub(g, sum_n, eta, 1.0_wp + decay*dt, contacts)
+      call rub(g, sum_n, eta, 1.0_wp + decay*dt, motion, contacts, wrench)
     end associate
   end subroutine push_group
 
   !> The part of the force of touch t by which its weight changes with position: the energy of the
   !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
-  pure subroutine push_to_weight(t, force_n, contacts)
+  pure subroutine push_to_weight(touches, t, gamma, force_n, wrench)
+    type(touch_t), intent(in) :: touches
     integer, intent(in) :: t
-    real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
-    type(contacts_t), intent(inout) :: contacts
+    real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
+    real(wp), intent(in) :: force_n   !! normal force of the touch [N]
+    type(wrench_t), intent(inout) :: wrench
     real(wp) :: energy
-    integer :: a, b
 
-    associate (touches => contacts%touches)
-      a = touches%a(t)
-      b = touches%b(t)
-      energy = force_n*touches%depth(t)/(contacts%law%gamma_n + 1.0_wp)
-      call act(a, b, -energy*touches%weight_shift(:, t), touches%arm_a(:, t), &
-        touches%arm_b(:, t), contacts)
-      contacts%torque(:, a) = contacts%torque(:, a) - energy*touches%weight_turn(:, t)
-      contacts%torque(:, b) = contacts%torque(:, b) + energy*touches%weight_turn(:, t)
-    end associate
+    energy = force_n*touches%depth(t)/(gamma + 1.0_wp)
+    call act(-energy*touches%weight_shift(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
+    wrench%torque_a = wrench%torque_a - energy*touches%weight_turn(:, t)
+    wrench%torque_b = wrench%torque_b + energy*touches%weight_turn(:, t)
   end subroutine push_to_weight
 
   !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
   !! where the weight changes with position, of the weight [m/s].
-  pure function opening_speed(touches, t, gamma, v, omega) result(speed)
+  pure function opening_speed(touches, t, gamma, motion) result(speed)
     type(touch_t), intent(in) :: touches
     integer, intent(in) :: t
     real(wp), intent(in) :: gamma             !! power of the spring; 1 where it hardens [-]
-    real(wp), intent(in) :: v(3), omega(3)    !! of b against a, at the contact [m/s, rad/s]
+    type(motion_t), intent(in) :: motion
     real(wp) :: speed
+    real(wp) :: v(3)
 
+    v = relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t))
     speed = dot_product(v, touches%normal(:, t))
     if (touches%weight(t) < 1.0_wp) speed = speed + touches%depth(t)/(gamma + 1.0_wp) &
-      *(dot_product(v, touches%weight_shift(:, t)) + dot_product(omega, touches%weight_turn(:, t)))
+      *(dot_product(v, touches%weight_shift(:, t)) &
+        + dot_product(motion%omega_b - motion%omega_a, touches%weight_turn(:, t)))
   end function opening_speed
 
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
@@ -1081,26 +1127,26 @@ contains
   !!
   !! The force of the spring alone is limited too: while it slips, the spring holds what friction
   !! lets it hold, and the dashpot puts no energy into it.
-  pure subroutine rub(g, force_n, eta_n, implicit, contacts)
+  pure subroutine rub(g, force_n, eta_n, implicit, motion, contacts, wrench)
     integer, intent(in) :: g
     real(wp), intent(in) :: force_n    !! sum of the normal forces [N]
     real(wp), intent(in) :: eta_n      !! normal damping of the group [N s/m]
     real(wp), intent(in) :: implicit   !! 1 + eta dt/(2 m): damping acts in mid-substep
+    type(motion_t), intent(in) :: motion
     type(contacts_t), intent(inout) :: contacts
+    type(wrench_t), intent(inout) :: wrench
     real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
-    integer :: t, a, b
+    integer :: t
 
     associate (groups => contacts%groups, springs => contacts%springs, law => contacts%law)
-      a = springs%a(g)
-      b = springs%b(g)
       t = groups%first(g)
       k_n = contacts%response%k(t)
       k = tangential_constant(law, k_n, contacts%touches%weight(t))
       springs%k(g) = k
       eta = contacts%touches%weight(t)*law%eta_t
       if (.not. law%constants) eta = eta_n*(k/k_n)
-      bound = force_n*merge(law%wall_friction, law%friction, b < 0)
-      v = relative_velocity(contacts%partners, a, b, groups%arm_a(:, g), groups%arm_b(:, g))
+      bound = force_n*merge(law%wall_friction, law%friction, springs%b(g) < 0)
+      v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
       f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/implicit
       size_f = norm(f)
@@ -1111,20 +1157,18 @@ contains
         if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
           f_spring*(bound/size_f), v)
       end if
-      call act(a, b, f, groups%arm_a(:, g), groups%arm_b(:, g), contacts)
+      call act(f, groups%arm_a(:, g), groups%arm_b(:, g), wrench)
     end associate
   end subroutine rub
 
-  !> A force on body a at a contact, and its reaction on partner b.
-  pure subroutine act(a, b, f, arm_a, arm_b, contacts)
-    integer, intent(in) :: a, b
+  !> Add a force on body a at a contact, and its reaction on partner b.
+  pure subroutine act(f, arm_a, arm_b, wrench)
     real(wp), intent(in) :: f(3), arm_a(3), arm_b(3)   !! [N], [m]
-    type(contacts_t), intent(inout) :: contacts
+    type(wrench_t), intent(inout) :: wrench
 
-    contacts%force(:, a) = contacts%force(:, a) + f
-    contacts%force(:, b) = contacts%force(:, b) - f
-    contacts%torque(:, a) = contacts%torque(:, a) + cross(arm_a, f)
-    contacts%torque(:, b) = contacts%torque(:, b) - cross(arm_b, f)
+    wrench%force = wrench%force + f
+    wrench%torque_a = wrench%torque_a + cross(arm_a, f)
+    wrench%torque_b = wrench%torque_b - cross(arm_b, f)
   end subroutine act
 
   !> Energy in the normal springs at the present poses and in the tangential springs [J].

@@ -381,12 +381,13 @@ contains
     call gather(surface%facets, size(surface%offset), low, high, list)
   end subroutine gather_facets
 
-  !> Items of the bins that meet a box, each once, ascending.
+  !> Items of the bins that meet a box, each once, ascending; all where there are more such bins.
   subroutine gather(bins, n_items, low, high, list)
     type(bins_t), intent(in) :: bins
     integer, intent(in) :: n_items
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
+    integer, parameter :: scan = 8   !! marks looked at for each item found: quicker than sorting
     integer :: a(3), b(3), i, j, k, m, bin, item
 
     list%n = 0
@@ -397,25 +398,40 @@ contains
       deallocate (list%mark)
       allocate (list%mark(n_items), source=0)
     end if
-    list%search = list%search + 1
     a = bins%place(low)
     b = bins%place(high)
+    if (product(b - a + 1) > n_items) then
+      call reserve(n_items, list%item)
+      list%n = n_items
+      list%item(:n_items) = [(item, item=1, n_items)]
+      return
+    end if
+    list%search = list%search + 1
     do k = a(3), b(3)
       do j = a(2), b(2)
         do i = a(1), b(1)
           bin = bins%number([i, j, k])
+          call reserve(list%n + bins%first(bin + 1) - bins%first(bin), list%item)
           do m = bins%first(bin), bins%first(bin + 1) - 1
             item = bins%item(m)
             if (list%mark(item) == list%search) cycle
             list%mark(item) = list%search
             list%n = list%n + 1
-            call reserve(list%n, list%item)
             list%item(list%n) = item
           end do
         end do
       end do
     end do
-    call sort_items(list%item(:list%n))
+    if (n_items > scan*list%n) then
+      call sort_items(list%item(:list%n))
+    else
+      list%n = 0
+      do item = 1, n_items
+        if (list%mark(item) /= list%search) cycle
+        list%n = list%n + 1
+        list%item(list%n) = item
+      end do
+    end if
   end subroutine gather
 
   !> Ascending order, by Shell's method: lists may be long over a fine bed.

@@ -325,10 +325,11 @@ contains
                                                          world%blocks%q(:, 2)))
   end subroutine move
 
-  !> What is found does not depend on when the lists were made: a body carried past another.
+  !> What is found does not depend on when the lists were made: a body carried past another, in
+  !! strides within which it trembles a little.
   subroutine check_lists()
     type(world_t), save :: new, world, fresh
-    integer :: step, differ, touched, n
+    integer :: step, tremble, differ, touched
 
     call new_world(new, ['hexapod', 'hexapod'])
     world = new
@@ -338,25 +339,32 @@ contains
     do step = 1, 400
       world%blocks%x(:, 2) = 0.5_wp + [0.08_wp - 4.0e-4_wp*step, 0.03_wp, 0.035_wp]
       call move(world, [0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.002_wp, 0.001_wp])
-      call find(world)
-      fresh = new
-      fresh%blocks%x = world%blocks%x
-      fresh%blocks%q = world%blocks%q
-      call find(fresh)
-      if (world%touches%n > 0) touched = touched + 1
-      if (world%touches%n /= fresh%touches%n) then
-        differ = differ + 1
-        cycle
-      end if
-      n = fresh%touches%n
-      if (n == 0) cycle
-      if (any(world%touches%key(:n) /= fresh%touches%key(:n))) differ = differ + 1
-      if (any(abs(world%touches%depth(:n) - fresh%touches%depth(:n)) > 0.0_wp)) then
-        differ = differ + 1
-      end if
+      do tremble = 1, 6
+        call move(world, [-5.0e-6_wp, 3.0e-6_wp, -4.0e-6_wp], [1.0e-4_wp, 0.0_wp, 0.0_wp])
+        call find(world)
+        fresh = new
+        fresh%blocks%x = world%blocks%x
+        fresh%blocks%q = world%blocks%q
+        call find(fresh)
+        if (world%touches%n > 0) touched = touched + 1
+        if (.not. same_touches(world, fresh)) differ = differ + 1
+      end do
     end do
     call check('lists of any age give the same', differ, 0)
-    call check('while the bodies touch', touched > 50)
+    call check('while the bodies touch', touched > 300)
   end subroutine check_lists
+
+  !> Whether what touches is the same in two worlds, bit by bit.
+  function same_touches(one, two) result(same)
+    type(world_t), intent(in) :: one, two
+    logical :: same
+    integer :: n
+
+    n = one%touches%n
+    same = n == two%touches%n
+    if (.not. same .or. n == 0) return
+    same = all(one%touches%key(:n) == two%touches%key(:n)) &
+      .and. .not. any(abs(one%touches%depth(:n) - two%touches%depth(:n)) > 0.0_wp)
+  end function same_touches
 
 end program test_contact_surface
