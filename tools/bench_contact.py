@@ -1,7 +1,7 @@
 """Time the dry pile of hexapods and measure it.
 
 usage: python tools/bench_contact.py [--n 64] [--time 2] [--box 0.3] [--seed 1] [--threads 1]
-                                     [--dt 0.04] [--contact-time 0.006] [--program ./mics]
+                                     [--dt 0.04] [--contact-time 0.008] [--program ./mics]
 
 N hexapods (edge of a cube 20 mm, 2300 kg/m3) start on a loose grid with random attitudes above
 the floor of a square tank, fall and pile up; friction 0.5, restitution 0.3, exact surfaces. `--dt`
@@ -148,7 +148,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--dt", type=float, default=0.04, help="history step [s]")
-    parser.add_argument("--contact-time", type=float, default=0.006, help="of a single impact [s]")
+    parser.add_argument("--contact-time", type=float, default=0.008, help="of a single impact [s]")
     parser.add_argument("--sleep", action="store_true", help="let blocks at rest sleep")
     parser.add_argument("--every", type=int, default=1, help="depth at every so many late rows")
     parser.add_argument("--program", type=Path, default=ROOT / "mics")
