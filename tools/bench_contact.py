@@ -1,12 +1,12 @@
 """Time the dry pile of hexapods and measure it.
 
 usage: python tools/bench_contact.py [--n 64] [--time 2] [--box 0.3] [--seed 1] [--threads 1]
-                                     [--dt 0.04] [--contact-time 0.008] [--program ./mics]
+                                     [--dt 0.1] [--contact-time 0.008] [--program ./mics]
 
 N hexapods (edge of a cube 20 mm, 2300 kg/m3) start on a loose grid with random attitudes above
 the floor of a square tank, fall and pile up; friction 0.5, restitution 0.3, exact surfaces. `--dt`
 is the `dt` of the case, its history step; substeps of contact last at most a twentieth of it and of
-`--contact-time`, so that 0.04 leaves the choice to the latter. Blocks stay awake without `--sleep`.
+`--contact-time`, so that 0.1 leaves the choice to the latter. Blocks stay awake without `--sleep`.
 
 Prints one JSON line: CPU and wall seconds of the whole run, reading and writing included, substeps
 of contact (`dt` is the mean one), and of the pile at the end heights of the centroids, share of
@@ -147,7 +147,7 @@ def main() -> None:
     parser.add_argument("--box", type=float, default=0.3, help="side of the tank [m]")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--dt", type=float, default=0.04, help="history step [s]")
+    parser.add_argument("--dt", type=float, default=0.1, help="history step [s]")
     parser.add_argument("--contact-time", type=float, default=0.008, help="of a single impact [s]")
     parser.add_argument("--sleep", action="store_true", help="let blocks at rest sleep")
     parser.add_argument("--every", type=int, default=1, help="depth at every so many late rows")
