@@ -1084,7 +1084,7 @@ contains
     type(touch_t), intent(in) :: touches
     integer, intent(in) :: t
     real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
-    real(wp), intent(in) :: force_n   !! normal force of the touch [N]
+    real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
     type(wrench_t), intent(inout) :: wrench
     real(wp) :: energy
 
