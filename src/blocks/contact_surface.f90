@@ -116,6 +116,8 @@ contains
     do b = 1, blocks%n
       self%reach(b) = self%surface(blocks%shape(b))%reach
       self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
+      self%with_bed(b)%a = b
+      self%with_bed(b)%b = bed_partner
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest
@@ -224,14 +226,10 @@ contains
         self%slot(p) = place
         self%pairs(place)%a = self%near%a(p)
         self%pairs(place)%b = self%near%b(p)
-        self%pairs(place)%valid = -1.0_wp
-        self%pairs(place)%left = -1.0_wp
+        call forget(self%pairs(place))
       end if
       associate (pair => self%pairs(self%slot(p)))
-        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) then
-          pair%valid = -1.0_wp
-          pair%left = -1.0_wp
-        end if
+        if (any(abs(pair%shift - self%near%shift(:, p)) > 0.0_wp)) call forget(pair)
         pair%shift = self%near%shift(:, p)
       end associate
     end do
@@ -240,6 +238,14 @@ contains
     self%x = blocks%x
     self%q = blocks%q
   end subroutine list_pairs
+
+  !> Let no list of a pair hold any more.
+  pure subroutine forget(pair)
+    type(pair_t), intent(inout) :: pair
+
+    pair%valid = -1.0_wp
+    pair%left = -1.0_wp
+  end subroutine forget
 
   !> Make room for n pairs.
   subroutine reserve_pairs(n, self)
@@ -305,29 +311,14 @@ contains
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(poses_t) :: now
-    real(wp) :: x(3), speed, gap, way
+    real(wp) :: x(3), speed
 
     x = bed_place(bed, blocks%x(:, a))
-    speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
-    gap = ahead*speed
     now%x_a = x
     now%q_a = blocks%q(:, a)
-    associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a), &
-      pair => self%with_bed(a))
-      if (.not. short_list_holds(now, gap, self%reach(a), 0.0_wp, pair)) then
-        way = way_between(pair%when_listed, now, self%reach(a), 0.0_wp)
-        if (way > pair%valid) then
-          pair%a = a
-          pair%b = bed_partner
-          pair%when_listed = now
-          call list_bed(bed, turn, surface, speed, self%search, pair)
-          way = 0.0_wp
-        end if
-        call know_close(turn, no_turn, -x, now, gap, way, self%search%skin, surface, bed%surface, &
-          pair)
-      end if
-      call touch_features(turn, no_turn, -x, gap, surface, bed%surface, pair, touches)
-    end associate
+    speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
+    call touch_features(self%turn(:, :, a), no_turn, -x, now, speed, ahead, &
+      self%surface(blocks%shape(a)), bed%surface, self%search, self%with_bed(a), touches, bed)
   end subroutine touch_bed
 
   !> List what may touch of a body and the bed before the body has moved by a skin.
@@ -400,58 +391,78 @@ contains
     type(pair_t), intent(inout) :: pair
     type(touch_t), intent(inout) :: touches
     type(poses_t) :: now
-    real(wp) :: to_b(3), speed, gap, way
+    real(wp) :: to_b(3), speed
     integer :: a, b
 
     a = pair%a
     b = pair%b
     speed = norm(blocks%v(:, a) - blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*reach(a) + norm(blocks%omega(:, b))*reach(b)
-    gap = ahead*speed
     now = poses_t(blocks%x(:, a), blocks%x(:, b), blocks%q(:, a), blocks%q(:, b))
     to_b = now%x_b + pair%shift - now%x_a
-    associate (surface_a => surface(blocks%shape(a)), surface_b => surface(blocks%shape(b)), &
-      turn_a => turns(:, :, a), turn_b => turns(:, :, b))
+    associate (surface_a => surface(blocks%shape(a)), surface_b => surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
-        call touch_balls(a, b, to_b, gap, surface_a, surface_b, touches)
-        return
+        call touch_balls(a, b, to_b, ahead*speed, surface_a, surface_b, touches)
+      else
+        call touch_features(turns(:, :, a), turns(:, :, b), to_b, now, speed, ahead, surface_a, &
+          surface_b, search, pair, touches)
       end if
-      if (.not. short_list_holds(now, gap, reach(a), reach(b), pair)) then
-        way = way_between(pair%when_listed, now, reach(a), reach(b))
-        if (way > pair%valid) then
-          pair%when_listed = now
-          call list_features(turn_a, turn_b, to_b, surface_a, surface_b, speed, search, pair)
-          way = 0.0_wp
-        end if
-        call know_close(turn_a, turn_b, to_b, now, gap, way, search%skin, surface_a, surface_b, &
-          pair)
-      end if
-      call touch_features(turn_a, turn_b, to_b, gap, surface_a, surface_b, pair, touches)
     end associate
   end subroutine touch_pair
 
-  !> Touches of the features of a pair in its short list: probes of b, probes of a, crossing edges.
-  subroutine touch_features(turn_a, turn_b, to_b, gap, surface_a, surface_b, pair, touches)
+  !> Touches of a pair of bodies, or of body a and the bed: probes of b, probes of a, crossing
+  !! edges. They come from the short list of the pair; this and the lists it comes from are renewed
+  !! first where they no longer hold.
+  subroutine touch_features(turn_a, turn_b, to_b, now, speed, ahead, surface_a, surface_b, &
+      search, pair, touches, bed)
     real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
-    real(wp), intent(in) :: gap               !! still taken as a touch [m]
+    type(poses_t), intent(in) :: now
+    real(wp), intent(in) :: speed             !! of any two points, at most [m/s]
+    real(wp), intent(in) :: ahead             !! [s]
     type(surface_t), intent(in) :: surface_a, surface_b
-    type(pair_t), intent(in) :: pair
+    type(search_t), intent(inout) :: search
+    type(pair_t), intent(inout) :: pair
     type(touch_t), intent(inout) :: touches
+    type(bed_t), intent(in), optional :: bed  !! where it is b
     real(wp) :: turn(3, 3), x(3)              ! axes of a to those of b: turn.p + x
-    integer :: n
+    real(wp) :: gap, way
+    logical :: holds
 
-    n = pair%n_close_a + pair%n_close_b + pair%n_close_edges
-    if (n == 0) return
-    call reserve_touches(touches%n + n, touches)
+    gap = ahead*speed
+    holds = short_list_holds(now, gap, surface_a%reach, surface_b%reach, pair)
+    if (holds .and. n_close(pair) == 0) return
     turn = matmul(transpose(turn_b), turn_a)
     x = matmul(-to_b, turn_b)
+    if (.not. holds) then
+      way = way_between(pair%when_listed, now, surface_a%reach, surface_b%reach)
+      if (way > pair%valid) then
+        pair%when_listed = now
+        if (present(bed)) then
+          call list_bed(bed, turn_a, surface_a, speed, search, pair)
+        else
+          call list_features(turn, x, to_b, turn_a, surface_a, surface_b, speed, search, pair)
+        end if
+        way = 0.0_wp
+      end if
+      call know_close(turn, x, to_b, turn_a, now, gap, way, search%skin, surface_a, surface_b, pair)
+      if (n_close(pair) == 0) return
+    end if
+    call reserve_touches(touches%n + n_close(pair), touches)
     call touch_probes(.false., pair%a, pair%b, turn_a, to_b, transpose(turn), &
       matmul(to_b, turn_a), gap, surface_b, surface_a, pair%n_close_b, pair%close, touches)
     call touch_probes(.true., pair%a, pair%b, turn_b, to_b, turn, x, gap, surface_a, surface_b, &
       pair%n_close_a, pair%close(pair%close_a:), touches)
     call touch_edges(turn_b, to_b, turn, x, gap, surface_a, surface_b, pair, touches)
   end subroutine touch_features
+
+  !> Number of features in the short list of a pair, and of its touches at most.
+  pure function n_close(pair) result(n)
+    type(pair_t), intent(in) :: pair
+    integer :: n
+
+    n = pair%n_close_b + pair%n_close_a + pair%n_close_edges
+  end function n_close
 
   !> Whether the short list of a pair still holds.
   pure function short_list_holds(now, gap, reach_a, reach_b, pair) result(yes)
@@ -467,9 +478,10 @@ contains
   end function short_list_holds
 
   !> Choose from the lists of a pair what may touch before the bodies have moved a little.
-  subroutine know_close(turn_a, turn_b, to_b, now, gap, way, skin, surface_a, surface_b, pair)
-    real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
+  subroutine know_close(turn, x, to_b, turn_a, now, gap, way, skin, surface_a, surface_b, pair)
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    real(wp), intent(in) :: turn_a(3, 3)      !! axes of a to space
     type(poses_t), intent(in) :: now
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
     real(wp), intent(in) :: way               !! of the bodies since the lists were made [m]
@@ -478,15 +490,12 @@ contains
     type(pair_t), intent(inout) :: pair
     real(wp), parameter :: share = 0.02_wp    !! of a skin: way for which the short list holds,
     real(wp), parameter :: lasting = 10.0_wp  !! or such a multiple of the gap
-    real(wp) :: turn(3, 3), x(3)              ! axes of a to those of b: turn.p + x
     integer :: n
 
     pair%when_chosen = now
     pair%left = pair%valid - way
     pair%close_until = gap + max(share*skin, lasting*gap)
     n = 0
-    turn = matmul(transpose(turn_b), turn_a)
-    x = matmul(-to_b, turn_b)
     call choose_probes(transpose(turn), matmul(to_b, turn_a), way, pair%close_until, surface_b, &
       surface_a, pair%of_b, n, pair%n_close_b, pair%close)
     pair%close_a = n + 1
@@ -495,6 +504,8 @@ contains
     pair%close_edges = n + 1
     call choose_edges(turn, x, way, surface_a, surface_b, n, pair)
     call reserve(n + 1, pair%close)
+    ! without any feature in the lists nothing comes near as long as these hold
+    if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) pair%close_until = huge(1.0_wp)
   end subroutine know_close
 
   !> Append to the short list those probes of a guest, with the features of the host, that may touch
@@ -509,7 +520,7 @@ contains
     integer, intent(out) :: n_chosen
     integer, allocatable, intent(inout) :: chosen(:)
     real(wp) :: place(3), distance, outward(3), reach
-    integer :: m, k, at
+    integer :: m, at
 
     n_chosen = 0
     do m = 1, list%n
@@ -522,19 +533,11 @@ contains
         reach = abs(distance) + 2*margin
         at = n + 1
         n = n + 3
-        call reserve(n + size(facets) + size(edges), chosen)
+        call reserve(n, chosen)
         chosen(at) = list%probe(m)
-        do k = 1, size(facets)
-          if (.not. facet_is_near(host, facets(k), place, reach)) cycle
-          n = n + 1
-          chosen(n) = facets(k)
-        end do
+        call append_facets(host, facets, place, reach, n, chosen)
         chosen(at + 1) = n - at - 2
-        do k = 1, size(edges)
-          if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
-          n = n + 1
-          chosen(n) = edges(k)
-        end do
+        call append_edges(host, edges, place, reach, n, chosen)
         chosen(at + 2) = n - at - 2 - chosen(at + 1)
         n_chosen = n_chosen + 1
       end associate
@@ -549,24 +552,19 @@ contains
     integer, intent(inout) :: n                !! length of the short list
     type(pair_t), intent(inout) :: pair
     type(edge_t) :: guest
-    real(wp) :: margin, reach, angle
+    real(wp) :: margin
     integer :: m, last
 
     pair%n_close_edges = 0
     margin = pair%close_until
-    reach = margin + min(surface_a%length, surface_b%length)
-    angle = margin/min(surface_a%reach, surface_b%reach)
     last = 0
     do m = 1, pair%n_crossings
       if (pair%away(m) > way + margin) cycle
       if (pair%edge_a(m) /= last) guest = edge_in_axes(surface_a%edge(pair%edge_a(m)), turn, x)
       last = pair%edge_a(m)
-      associate (host => surface_b%edge(pair%edge_b(m)))
-        if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
-                              host%extent) > reach**2) cycle
-        if (turn_before(guest, host) >= angle) cycle
-        if (way_apart(guest, host, angle) > margin) cycle
-      end associate
+      if (way_to_crossing(guest, surface_b%edge(pair%edge_b(m)), margin, &
+        margin + min(surface_a%length, surface_b%length), &
+        min(surface_a%reach, surface_b%reach)) > margin) cycle
       call reserve(n + 2, pair%close)
       pair%close(n + 1) = pair%edge_a(m)
       pair%close(n + 2) = pair%edge_b(m)
@@ -574,6 +572,24 @@ contains
       pair%n_close_edges = pair%n_close_edges + 1
     end do
   end subroutine choose_edges
+
+  !> Way that two bodies may move before two edges of theirs may cross; `nowhere` where they cannot
+  !! before the bodies have moved by a margin [m].
+  pure function way_to_crossing(guest, host, margin, reach, arm) result(way)
+    type(edge_t), intent(in) :: guest, host   !! in the same axes
+    real(wp), intent(in) :: margin            !! [m]
+    real(wp), intent(in) :: reach             !! distance from which edges cannot come to cross [m]
+    real(wp), intent(in) :: arm               !! reach of the smaller body: it turns by way/arm [m]
+    real(wp) :: way
+    real(wp) :: angle
+
+    way = nowhere
+    if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
+                          host%extent) > reach**2) return
+    angle = turn_before(guest, host)
+    if (angle >= margin/arm) return
+    way = max(way_apart(guest, host, margin/arm), angle*arm)
+  end function way_to_crossing
 
   !> Whether a facet may be the nearest to a place, within reach of it.
   pure function facet_is_near(host, f, place, reach) result(yes)
@@ -728,14 +744,15 @@ contains
   end function edge_in_axes
 
   !> List what may touch of a pair before the bodies have moved by a skin: wider for fast bodies.
-  subroutine list_features(turn_a, turn_b, to_b, a, b, speed, search, pair)
-    real(wp), intent(in) :: turn_a(3, 3), turn_b(3, 3)   !! body axes to space
+  subroutine list_features(turn, x, to_b, turn_a, a, b, speed, search, pair)
+    real(wp), intent(in) :: turn(3, 3), x(3)  !! axes of a to those of b: turn.p + x [-], [m]
     real(wp), intent(in) :: to_b(3)           !! from the centre of a to that of b, space [m]
+    real(wp), intent(in) :: turn_a(3, 3)      !! axes of a to space
     type(surface_t), intent(in) :: a, b
     real(wp), intent(in) :: speed                !! of any two points, at most [m/s]
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    real(wp) :: turn(3, 3), x(3), apart, skin
+    real(wp) :: apart, skin
 
     pair%of_a%n = 0
     pair%of_b%n = 0
@@ -744,8 +761,6 @@ contains
     skin = skin_for(speed, search)
     pair%valid = max(apart, skin)
     if (apart > skin) return
-    turn = matmul(transpose(turn_b), turn_a)
-    x = matmul(-to_b, turn_b)
     call list_probes(transpose(turn), matmul(to_b, turn_a), skin, b, a, search, pair%of_b)
     call list_probes(turn, x, skin, a, b, search, pair%of_a)
     call list_crossings(turn, x, a, b, search, pair)
@@ -828,7 +843,6 @@ contains
     type(surface_t), intent(in) :: host
     type(search_t), intent(in) :: search
     type(probes_near_t), intent(inout) :: list
-    integer :: m
 
     list%n = list%n + 1
     call reserve(list%n, list%probe)
@@ -838,23 +852,45 @@ contains
     list%probe(list%n) = probe
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
-    do m = 1, search%facets%n
-      associate (f => search%facets%item(m))
-        if (.not. facet_is_near(host, f, place, reach)) cycle
-        list%n_facets = list%n_facets + 1
-        call reserve(list%n_facets, list%facet)
-        list%facet(list%n_facets) = f
-      end associate
-    end do
-    do m = 1, search%edges%n
-      associate (e => search%edges%item(m))
-        if (.not. edge_is_near(host%edge(e), place, reach)) cycle
-        list%n_edges = list%n_edges + 1
-        call reserve(list%n_edges, list%edge)
-        list%edge(list%n_edges) = e
-      end associate
-    end do
+    call append_facets(host, search%facets%item(:search%facets%n), place, reach, list%n_facets, &
+      list%facet)
+    call append_edges(host, search%edges%item(:search%edges%n), place, reach, list%n_edges, &
+      list%edge)
   end subroutine append
+
+  !> Append those of some facets that are within reach of a place to a list of n numbers.
+  subroutine append_facets(host, facets, place, reach, n, list)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: facets(:)
+    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    integer, intent(inout) :: n
+    integer, allocatable, intent(inout) :: list(:)
+    integer :: k
+
+    call reserve(n + size(facets), list)
+    do k = 1, size(facets)
+      if (.not. facet_is_near(host, facets(k), place, reach)) cycle
+      n = n + 1
+      list(n) = facets(k)
+    end do
+  end subroutine append_facets
+
+  !> Append those of some edges that are within reach of a place to a list of n numbers.
+  subroutine append_edges(host, edges, place, reach, n, list)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: edges(:)
+    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    integer, intent(inout) :: n
+    integer, allocatable, intent(inout) :: list(:)
+    integer :: k
+
+    call reserve(n + size(edges), list)
+    do k = 1, size(edges)
+      if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
+      n = n + 1
+      list(n) = edges(k)
+    end do
+  end subroutine append_edges
 
   !> Pairs of convex edges that may cross before the bodies have moved by the skin.
   subroutine list_crossings(turn, x, surface_a, surface_b, search, pair)
@@ -863,15 +899,13 @@ contains
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
     type(edge_t) :: guest
-    real(wp) :: reach, reach_both, angle, turn_away, away, low(3), high(3)
+    real(wp) :: reach, away, low(3), high(3)
     integer :: m, k, i, j
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
     reach = pair%valid + search%ahead + min(surface_a%length, surface_b%length)
     call box_in_axes(transpose(turn), -matmul(x, turn), surface_b%low - reach, &
       surface_b%high + reach, low, high)
-    reach_both = min(surface_a%reach, surface_b%reach)
-    angle = pair%valid/reach_both
     call gather_edges(surface_a, low, high, search%guests)
     do m = 1, search%guests%n
       i = search%guests%item(m)
@@ -884,18 +918,14 @@ contains
       do k = 1, search%hosts%n
         j = search%hosts%item(k)
         if (j > surface_b%n_convex) exit
-        associate (host => surface_b%edge(j))
-          if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
-                                host%extent) > reach**2) cycle
-          turn_away = turn_before(guest, host)
-          if (turn_away >= angle) cycle
-          away = max(way_apart(guest, host, angle), turn_away*reach_both)
-        end associate
+        away = way_to_crossing(guest, surface_b%edge(j), pair%valid, reach, &
+          min(surface_a%reach, surface_b%reach))
+        if (away >= nowhere) cycle
         pair%n_crossings = pair%n_crossings + 1
         call reserve(pair%n_crossings, pair%edge_a)
         call reserve(pair%n_crossings, pair%edge_b)
-        pair%edge_a(pair%n_crossings) = i
         call reserve(pair%n_crossings, pair%away)
+        pair%edge_a(pair%n_crossings) = i
         pair%edge_b(pair%n_crossings) = j
         pair%away(pair%n_crossings) = away
       end do
