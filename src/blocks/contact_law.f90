@@ -10,7 +10,7 @@ module contact_law_m
   public :: contact_law_t, contact_law_init
   public :: restitution_of, impact_duration, damping_ratio_of
   public :: normal_constant, tangential_constant, steepness, hardness, elastic_force
-  public :: stored_energy, normal_force, tangential_force, tangential_slip
+  public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip
 
   type :: contact_law_t
     logical :: constants = .false.         !! constants are given, not found from the restitution
@@ -152,7 +152,7 @@ contains
     if (.not. d > 0.0_wp) return
     if (law%constants) then
       force = weight*k*power(d, law%gamma_n)
-      energy = force*d/(law%gamma_n + 1.0_wp)
+      energy = energy_of_force(force, law%gamma_n, d)
     else
       h = beyond(weight, d, hard)
       force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
@@ -198,6 +198,14 @@ contains
       ratio = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
     end if
   end function steepness
+
+  !> Energy stored in a spring k d^gamma that pushes with a force: force d/(gamma + 1) [J].
+  elemental function energy_of_force(force, gamma, d) result(energy)
+    real(wp), intent(in) :: force, gamma, d   !! [N, -, m]
+    real(wp) :: energy
+
+    energy = force*d/(gamma + 1.0_wp)
+  end function energy_of_force
 
   !> Energy stored in a spring k d^gamma [J].
   elemental function stored_energy(k, gamma, d) result(energy)

@@ -5,9 +5,8 @@
 module contacts_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use vectors_m, only: cross, norm
-  use mass_properties_m, only: surface_area
-  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers, space_tensor
+  use vectors_m, only: norm
+  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
   use neighbours_m, only: pair_list_t, reserve
@@ -18,16 +17,16 @@ module contacts_m
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use lubrication_m, only: lubrication_t, lubricate
-  use contact_law_m, only: contact_law_t, contact_law_init, normal_constant, tangential_constant, &
-    steepness, hardness, elastic_force, stored_energy, normal_force, tangential_force, &
-    tangential_slip
+  use contact_law_m, only: contact_law_t, contact_law_init, tangential_constant, stored_energy, &
+    normal_force, tangential_force, tangential_slip
+  use contact_partners_m, only: partners_t, motion_t, wrench_t, partners_init, know_partners, &
+    know_motion, know_inertia, motion_between, relative_velocity, act
+  use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
+    opening_speed, push_to_weight, impact_turn
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
 
-  !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
-  !! pair too slow for one, and of a pile.
-  real(wp), parameter :: impact_turn = 0.35_wp, slow_turn = 0.7_wp, pile_turn = 1.2_wp
   integer, parameter :: most_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
   !> Touches with one key and one partner act on one tangential spring.
@@ -38,44 +37,6 @@ module contacts_m
     real(wp), allocatable :: normal(:, :)        !! (3, n) mean, unit [-]
     real(wp), allocatable :: arm_a(:, :), arm_b(:, :)   !! (3, n) mean contact point [m]
   end type groups_t
-
-  !> The law at work at each touch.
-  type :: response_t
-    real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
-    real(wp), allocatable :: elastic(:)          !! force of the spring [N]
-    real(wp), allocatable :: energy(:)           !! of the spring [J]
-    real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
-    real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
-    real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (-7:n) sum over the pairs of a free body [1/s2]
-  end type response_t
-
-  !> What may touch: bed (-7), walls (-6..-1) and bodies (1..n) alike.
-  type :: partners_t
-    real(wp) :: gravity = 0.0_wp                         !! [m/s2]
-    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -7:n) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)                     !! (-7:n) depth at which touches harden [m]
-    real(wp), allocatable :: inverse_mass(:)             !! (-7:n) 0 for walls, fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
-  end type partners_t
-
-  !> One of two partners that touch: what it sets against a force.
-  type :: inertia_t
-    real(wp) :: inverse_mass = 0.0_wp            !! [1/kg]
-    real(wp) :: inverse_inertia(3, 3) = 0.0_wp   !! [1/(kg m2)]
-  end type inertia_t
-
-  !> How two partners move: b against a, and the turning of each.
-  type :: motion_t
-    real(wp) :: v(3) = 0.0_wp                              !! of the centres [m/s]
-    real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp   !! [rad/s]
-  end type motion_t
-
-  !> What a touch does to its two partners.
-  type :: wrench_t
-    real(wp) :: force(3) = 0.0_wp                            !! on a; the opposite on b [N]
-    real(wp) :: torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp   !! about their centres [N m]
-  end type wrench_t
 
   type :: contacts_t
     type(contact_law_t) :: law
@@ -539,51 +500,6 @@ contains
     if (contacts%frequency2 > 0.0_wp) limit = impact_turn/sqrt(contacts%frequency2)
   end function stiffness_limit
 
-  !> Room for the walls and the bodies, and the depth at which touches of each harden: a quarter of
-  !! its mean thickness, twice the volume over the surface.
-  pure subroutine partners_init(blocks, partners)
-    type(blocks_t), intent(in) :: blocks
-    type(partners_t), intent(out) :: partners
-    integer :: n, b
-
-    n = blocks%n
-    allocate (partners%hard(-7:n), source=huge(1.0_wp))
-    do b = 1, n
-      associate (shape => blocks%shapes(blocks%shape(b)))
-        partners%hard(b) = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
-      end associate
-    end do
-    allocate (partners%v(3, -7:n), partners%omega(3, -7:n), source=0.0_wp)
-    allocate (partners%inverse_mass(-7:n), partners%inverse_inertia(3, 3, -7:n), source=0.0_wp)
-  end subroutine partners_init
-
-  !> Masses of all partners, their gravity and the velocity of the walls.
-  pure subroutine know_partners(walls, gravity, blocks, partners)
-    type(walls_t), intent(in) :: walls
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    type(blocks_t), intent(in) :: blocks
-    type(partners_t), intent(inout) :: partners
-    integer :: w, b
-
-    partners%gravity = norm(gravity)
-    do w = 1, walls%n
-      partners%v(:, walls%number(w)) = walls%velocity(:, w)
-    end do
-    do b = 1, blocks%n
-      partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/(blocks%mass(b) &
-                                                       + blocks%added_mass(b)), blocks%fixed(b))
-    end do
-  end subroutine know_partners
-
-  !> Velocities of the bodies as partners.
-  pure subroutine know_motion(blocks, partners)
-    type(blocks_t), intent(in) :: blocks
-    type(partners_t), intent(inout) :: partners
-
-    partners%v(:, 1:) = blocks%v
-    partners%omega(:, 1:) = blocks%omega
-  end subroutine know_motion
-
   !> Find what touches at the present poses, how each touch responds, and how stiff all is together,
   !! counting also what may touch within a time `ahead`.
   subroutine find_touches(walls, blocks, ahead, contacts)
@@ -591,7 +507,6 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contacts_t), intent(inout) :: contacts
-    integer :: b
 
     if (contacts%exact) then
       call find_surface_touches(walls, blocks, ahead, contacts%surface, contacts%touches)
@@ -603,11 +518,7 @@ contains
     contacts%frequency2 = 0.0_wp
     call know_motion(blocks, contacts%partners)
     if (contacts%touches%n + contacts%soon%n == 0) return
-    do b = 1, blocks%n
-      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      contacts%partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
-        blocks%inverse_inertia(:, :, blocks%shape(b)))
-    end do
+    call know_inertia(blocks, contacts%partners)
     associate (response => contacts%response, soon => contacts%response_soon)
       call respond(contacts%touches, contacts%law, contacts%partners, response)
       if (contacts%soon%n > 0) then
@@ -618,238 +529,6 @@ contains
       contacts%frequency2 = max(contacts%frequency2, highest_frequency2(contacts%touches, response))
     end associate
   end subroutine find_touches
-
-  !> Add the frequencies of what may touch soon to those of what touches, of each pair and of each
-  !! body: springs together swing no faster than the squares of both frequencies together.
-  pure subroutine add_frequencies(touches, soon, response, response_soon)
-    type(touch_t), intent(in) :: touches, soon
-    type(response_t), intent(inout) :: response, response_soon
-    real(wp) :: both
-    integer :: first, last, m, m_last
-
-    response%frequency2 = response%frequency2 + response_soon%frequency2
-    response_soon%frequency2 = response%frequency2
-    m = 1
-    first = 1
-    do while (first <= soon%n)
-      last = last_of_pair(soon, first)
-      do while (m <= touches%n)
-        if (.not. comes_before(touches%a(m), touches%b(m), 0, soon%a(first), soon%b(first), 0)) exit
-        m = m + 1
-      end do
-      if (m > touches%n) return
-      if (touches%a(m) == soon%a(first) .and. touches%b(m) == soon%b(first)) then
-        m_last = last_of_pair(touches, m)
-        both = response%pair_frequency2(m) + response_soon%pair_frequency2(first)
-        response%pair_frequency2(m:m_last) = both
-        response_soon%pair_frequency2(first:last) = both
-      end if
-      first = last + 1
-    end do
-  end subroutine add_frequencies
-
-  !> Square of the highest frequency of a pair of touching bodies, or of all pairs of two touching
-  !! bodies together with a share; a little above [1/s2].
-  !!
-  !! A pile swings no faster than all the pairs of two touching bodies taken together. It only has
-  !! to be stable, so it may turn further in a substep than a single pair.
-  pure function highest_frequency2(touches, response) result(highest)
-    type(touch_t), intent(in) :: touches
-    type(response_t), intent(in) :: response
-    real(wp) :: highest
-    real(wp), parameter :: share = (impact_turn/pile_turn)**2
-    real(wp) :: pair
-    integer :: t
-
-    highest = 0.0_wp
-    do t = 1, touches%n
-      pair = response%pair_frequency2(t)
-      highest = max(highest, pair, share*(pair &
-        + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
-        + max(0.0_wp, response%frequency2(touches%b(t)) - pair)))
-    end do
-  end function highest_frequency2
-
-  !> Stiffness and damping of all touches of a list.
-  subroutine respond(touches, law, partners, response)
-    type(touch_t), intent(in) :: touches
-    type(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
-    type(response_t), intent(inout) :: response
-    integer :: first, last
-
-    response%frequency2 = 0.0_wp
-    call reserve(touches%n, response%k)
-    call reserve(touches%n, response%elastic)
-    call reserve(touches%n, response%energy)
-    call reserve(touches%n, response%eta)
-    call reserve(touches%n, response%decay)
-    call reserve(touches%n, response%pair_frequency2)
-    first = 1
-    do while (first <= touches%n)
-      last = last_of_pair(touches, first)
-      call respond_pair(touches, first, last, law, partners, response)
-      first = last + 1
-    end do
-  end subroutine respond
-
-  !> Last touch of the pair of bodies whose first touch is given.
-  pure function last_of_pair(touches, first) result(last)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: first
-    integer :: last
-
-    do last = first, touches%n - 1
-      if (touches%a(last + 1) /= touches%a(first)) return
-      if (touches%b(last + 1) /= touches%b(first)) return
-    end do
-    last = touches%n
-  end function last_of_pair
-
-  !> Stiffness and damping of the touches `first:last` of one pair of bodies.
-  !!
-  !! Stiffness belongs to each touch alone. Damping is shared: N touches that act together must damp
-  !! like one. Seen along the normal n_i of touch i the pair has the stiffness
-  !! K_i = sum_j k_j (n_i.n_j)^2 and, at the mean of the contact points with the same weights, the
-  !! effective mass m_i; then eta_i = (k_i/K_i) 2 zeta sqrt(K_i m_i).
-  !!
-  !! It is no impact where the bodies move against one another no faster than weight, or a share of
-  !! their load, makes them move within a swing.
-  pure subroutine respond_pair(touches, first, last, law, partners, response)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: first, last
-    type(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
-    type(response_t), intent(inout) :: response
-    type(inertia_t) :: of_a, of_b
-    real(wp), parameter :: calm_share = 0.25_wp   !! of the load
-    real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
-    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep, calm, speed
-    integer :: a, b, t, i
-
-    a = touches%a(first)
-    b = touches%b(first)
-    of_a = inertia_of(partners, a)
-    of_b = inertia_of(partners, b)
-    weights = 0.0_wp
-    points = 0.0_wp
-    k = normal_constant(law, 1.0_wp/(of_a%inverse_mass + of_b%inverse_mass))
-    hard = min(partners%hard(a), partners%hard(b))
-    do t = first, last
-      response%k(t) = touches%weight(t)*k
-      call elastic_force(law, k, touches%weight(t), touches%depth(t), hard, response%elastic(t), &
-        response%energy(t))
-      response%eta(t) = touches%weight(t)*hardness(law, touches%weight(t), touches%depth(t), hard)
-      nn = response%eta(t)*square(touches%normal(:, t))
-      weights = weights + nn
-      do i = 1, 6
-        points(:, i) = points(:, i) + nn(i)*touches%arm_a(:, t)
-      end do
-    end do
-    highest = 0.0_wp
-    steep = 0.0_wp
-    load = 0.0_wp
-    do t = first, last
-      load = load + response%elastic(t)*touches%normal(:, t)
-      nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
-      total = dot_product(nn, weights)
-      arm = matmul(points, nn)/total
-      inverse = inverse_effective_mass(of_a, arm, touches%normal(:, t))
-      arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
-      inverse = inverse + inverse_effective_mass(of_b, arm, touches%normal(:, t))
-      steep = max(steep, steepness(law, touches%weight(t), touches%depth(t), hard))
-      omega2 = k*total*inverse
-      if (law%constants) then
-        response%eta(t) = touches%weight(t)*law%eta_n
-        response%decay(t) = 0.5_wp*law%eta_n*total*inverse
-      else
-        response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
-        response%decay(t) = law%damping_ratio*sqrt(omega2)
-      end if
-      highest = max(highest, omega2)
-    end do
-    if (.not. law%constants) call damp_as_one(touches, first, last, law, of_a, of_b, response, &
-                                             highest)
-    highest = steep*highest
-    calm = max(partners%gravity, calm_share*norm(load)*(of_a%inverse_mass + of_b%inverse_mass))
-    speed = largest_speed(motion_between(partners, a, b), touches%arm_a(:, first), &
-      touches%arm_b(:, first))
-    if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
-    response%pair_frequency2(first:last) = highest
-    if (of_a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
-    if (of_b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
-  end subroutine respond_pair
-
-  !> Scale the damping of the touches of a pair so that together they damp the swing they drive
-  !! like one spring and dashpot.
-  !!
-  !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
-  !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
-  !! part sideways, and weights that change with position make W other than each normal tells.
-  pure subroutine damp_as_one(touches, first, last, law, of_a, of_b, response, highest)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: first, last
-    type(contact_law_t), intent(in) :: law
-    type(inertia_t), intent(in) :: of_a, of_b
-    type(response_t), intent(inout) :: response
-    real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
-    type(wrench_t) :: wrench
-    type(motion_t) :: motion   ! that the wrench drives
-    real(wp) :: push(3), by_weight, energy, mass, drag, omega2
-    integer :: t
-
-    energy = 0.0_wp
-    do t = first, last
-      if (touches%depth(t) <= 0.0_wp) cycle
-      push = -response%elastic(t)*touches%normal(:, t)
-      if (touches%weight(t) < 1.0_wp) then
-        by_weight = response%elastic(t)*touches%depth(t)/(law%gamma_n + 1.0_wp)
-        push = push - by_weight*touches%weight_shift(:, t)
-        wrench%torque_a = wrench%torque_a - by_weight*touches%weight_turn(:, t)
-        wrench%torque_b = wrench%torque_b + by_weight*touches%weight_turn(:, t)
-      end if
-      call act(push, touches%arm_a(:, t), touches%arm_b(:, t), wrench)
-      energy = energy + response%energy(t)
-    end do
-    motion%v = -(of_a%inverse_mass + of_b%inverse_mass)*wrench%force
-    if (of_a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of_a%inverse_inertia, wrench%torque_a)
-    if (of_b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of_b%inverse_inertia, wrench%torque_b)
-    mass = dot_product(motion%omega_a, wrench%torque_a) &
-      + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
-    drag = 0.0_wp
-    do t = first, last
-      if (touches%depth(t) <= 0.0_wp) cycle
-      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, motion)**2
-    end do
-    if (.not. (energy > 0.0_wp .and. drag > 0.0_wp)) return
-    omega2 = 0.5_wp*mass/energy
-    highest = max(highest, omega2)
-    drag = 2*law%damping_ratio*mass*sqrt(omega2)/drag
-    response%eta(first:last) = drag*response%eta(first:last)
-    response%decay(first:last) = drag*response%decay(first:last)
-  end subroutine damp_as_one
-
-  !> The products n_x n_x, n_y n_y, n_z n_z, n_y n_z, n_z n_x, n_x n_y.
-  pure function square(n) result(nn)
-    real(wp), intent(in) :: n(3)
-    real(wp) :: nn(6)
-
-    nn = [n*n, n([2, 3, 1])*n([3, 1, 2])]
-  end function square
-
-  !> One over the mass a partner sets against a push along n at the given arm [1/kg].
-  pure function inverse_effective_mass(of, arm, n) result(inverse)
-    type(inertia_t), intent(in) :: of
-    real(wp), intent(in) :: arm(3), n(3)
-    real(wp) :: inverse
-    real(wp) :: lever(3)
-
-    inverse = of%inverse_mass
-    if (inverse <= 0.0_wp) return
-    lever = cross(arm, n)
-    inverse = inverse + dot_product(lever, of%inverse_inertia(:, 1)*lever(1) &
-      + of%inverse_inertia(:, 2)*lever(2) + of%inverse_inertia(:, 3)*lever(3))
-  end function inverse_effective_mass
 
   !> Gather the touches of each key and partner; mean normal and point weighted by overlap.
   subroutine form_groups(touches, groups)
@@ -970,45 +649,6 @@ contains
     if (.not. yes) yes = springs%a(g) /= springs%a(g - 1) .or. springs%b(g) /= springs%b(g - 1)
   end function begins_pair
 
-  !> Inertia of a partner.
-  pure function inertia_of(partners, b) result(inertia)
-    type(partners_t), intent(in) :: partners
-    integer, intent(in) :: b
-    type(inertia_t) :: inertia
-
-    inertia%inverse_mass = partners%inverse_mass(b)
-    inertia%inverse_inertia = partners%inverse_inertia(:, :, b)
-  end function inertia_of
-
-  !> Motion of partner b against body a.
-  pure function motion_between(partners, a, b) result(motion)
-    type(partners_t), intent(in) :: partners
-    integer, intent(in) :: a, b
-    type(motion_t) :: motion
-
-    motion%v = partners%v(:, b) - partners%v(:, a)
-    motion%omega_a = partners%omega(:, a)
-    motion%omega_b = partners%omega(:, b)
-  end function motion_between
-
-  !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
-  pure function relative_velocity(motion, arm_a, arm_b) result(v)
-    type(motion_t), intent(in) :: motion
-    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
-    real(wp) :: v(3)
-
-    v = motion%v + (cross(motion%omega_b, arm_b) - cross(motion%omega_a, arm_a))
-  end function relative_velocity
-
-  !> Highest speed against one another of points of two bodies as far out as a contact [m/s].
-  pure function largest_speed(motion, arm_a, arm_b) result(speed)
-    type(motion_t), intent(in) :: motion
-    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
-    real(wp) :: speed
-
-    speed = norm(motion%v) + norm(motion%omega_a)*norm(arm_a) + norm(motion%omega_b)*norm(arm_b)
-  end function largest_speed
-
   !> Contact forces and torques of this substep on all bodies.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
@@ -1078,39 +718,6 @@ contains
     end associate
   end subroutine push_group
 
-  !> The part of the force of touch t by which its weight changes with position: the energy of the
-  !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
-  pure subroutine push_to_weight(touches, t, gamma, force_n, wrench)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: t
-    real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
-    real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
-    type(wrench_t), intent(inout) :: wrench
-    real(wp) :: energy
-
-    energy = force_n*touches%depth(t)/(gamma + 1.0_wp)
-    call act(-energy*touches%weight_shift(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
-    wrench%torque_a = wrench%torque_a - energy*touches%weight_turn(:, t)
-    wrench%torque_b = wrench%torque_b + energy*touches%weight_turn(:, t)
-  end subroutine push_to_weight
-
-  !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
-  !! where the weight changes with position, of the weight [m/s].
-  pure function opening_speed(touches, t, gamma, motion) result(speed)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: t
-    real(wp), intent(in) :: gamma             !! power of the spring; 1 where it hardens [-]
-    type(motion_t), intent(in) :: motion
-    real(wp) :: speed
-    real(wp) :: v(3)
-
-    v = relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t))
-    speed = dot_product(v, touches%normal(:, t))
-    if (touches%weight(t) < 1.0_wp) speed = speed + touches%depth(t)/(gamma + 1.0_wp) &
-      *(dot_product(v, touches%weight_shift(:, t)) &
-        + dot_product(motion%omega_b - motion%omega_a, touches%weight_turn(:, t)))
-  end function opening_speed
-
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
   !!
   !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a
@@ -1160,16 +767,6 @@ contains
       call act(f, groups%arm_a(:, g), groups%arm_b(:, g), wrench)
     end associate
   end subroutine rub
-
-  !> Add a force on body a at a contact, and its reaction on partner b.
-  pure subroutine act(f, arm_a, arm_b, wrench)
-    real(wp), intent(in) :: f(3), arm_a(3), arm_b(3)   !! [N], [m]
-    type(wrench_t), intent(inout) :: wrench
-
-    wrench%force = wrench%force + f
-    wrench%torque_a = wrench%torque_a + cross(arm_a, f)
-    wrench%torque_b = wrench%torque_b - cross(arm_b, f)
-  end subroutine act
 
   !> Energy in the normal springs at the present poses and in the tangential springs [J].
   pure function elastic_energy(contacts) result(energy)

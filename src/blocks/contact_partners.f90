@@ -1,0 +1,165 @@
+!> What may touch, be it a body, a wall or the bed: how it moves, and what it sets against a force.
+module contact_partners_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross, norm
+  use mass_properties_m, only: surface_area
+  use rigid_body_m, only: blocks_t, space_tensor
+  use walls_m, only: walls_t
+  implicit none
+  private
+  public :: partners_t, inertia_t, motion_t, wrench_t
+  public :: partners_init, know_partners, know_motion, know_inertia
+  public :: inertia_of, inverse_effective_mass, act
+  public :: motion_between, relative_velocity, largest_speed
+
+  !> What may touch: bed (-7), walls (-6..-1) and bodies (1..n) alike.
+  type :: partners_t
+    real(wp) :: gravity = 0.0_wp                         !! [m/s2]
+    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -7:n) [m/s], [rad/s]
+    real(wp), allocatable :: hard(:)                     !! (-7:n) depth at which touches harden [m]
+    real(wp), allocatable :: inverse_mass(:)             !! (-7:n) 0 for walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
+  end type partners_t
+
+  !> One of two partners that touch: what it sets against a force.
+  type :: inertia_t
+    real(wp) :: inverse_mass = 0.0_wp            !! [1/kg]
+    real(wp) :: inverse_inertia(3, 3) = 0.0_wp   !! [1/(kg m2)]
+  end type inertia_t
+
+  !> How two partners move: b against a, and the turning of each.
+  type :: motion_t
+    real(wp) :: v(3) = 0.0_wp                              !! of the centres [m/s]
+    real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp   !! [rad/s]
+  end type motion_t
+
+  !> What a touch does to its two partners.
+  type :: wrench_t
+    real(wp) :: force(3) = 0.0_wp                            !! on a; the opposite on b [N]
+    real(wp) :: torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp   !! about their centres [N m]
+  end type wrench_t
+
+contains
+
+  !> Room for the walls and the bodies, and the depth at which touches of each harden: a quarter of
+  !! its mean thickness, twice the volume over the surface.
+  pure subroutine partners_init(blocks, partners)
+    type(blocks_t), intent(in) :: blocks
+    type(partners_t), intent(out) :: partners
+    integer :: n, b
+
+    n = blocks%n
+    allocate (partners%hard(-7:n), source=huge(1.0_wp))
+    do b = 1, n
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        partners%hard(b) = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
+      end associate
+    end do
+    allocate (partners%v(3, -7:n), partners%omega(3, -7:n), source=0.0_wp)
+    allocate (partners%inverse_mass(-7:n), partners%inverse_inertia(3, 3, -7:n), source=0.0_wp)
+  end subroutine partners_init
+
+  !> Masses of all partners, their gravity and the velocity of the walls.
+  pure subroutine know_partners(walls, gravity, blocks, partners)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    type(blocks_t), intent(in) :: blocks
+    type(partners_t), intent(inout) :: partners
+    integer :: w, b
+
+    partners%gravity = norm(gravity)
+    do w = 1, walls%n
+      partners%v(:, walls%number(w)) = walls%velocity(:, w)
+    end do
+    do b = 1, blocks%n
+      partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/(blocks%mass(b) &
+                                                       + blocks%added_mass(b)), blocks%fixed(b))
+    end do
+  end subroutine know_partners
+
+  !> Velocities of the bodies as partners.
+  pure subroutine know_motion(blocks, partners)
+    type(blocks_t), intent(in) :: blocks
+    type(partners_t), intent(inout) :: partners
+
+    partners%v(:, 1:) = blocks%v
+    partners%omega(:, 1:) = blocks%omega
+  end subroutine know_motion
+
+  !> Moments of inertia of the free bodies at their present poses.
+  pure subroutine know_inertia(blocks, partners)
+    type(blocks_t), intent(in) :: blocks
+    type(partners_t), intent(inout) :: partners
+    integer :: b
+
+    do b = 1, blocks%n
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
+        blocks%inverse_inertia(:, :, blocks%shape(b)))
+    end do
+  end subroutine know_inertia
+
+  !> Inertia of a partner.
+  pure function inertia_of(partners, b) result(inertia)
+    type(partners_t), intent(in) :: partners
+    integer, intent(in) :: b
+    type(inertia_t) :: inertia
+
+    inertia%inverse_mass = partners%inverse_mass(b)
+    inertia%inverse_inertia = partners%inverse_inertia(:, :, b)
+  end function inertia_of
+
+  !> One over the mass a partner sets against a push along n at the given arm [1/kg].
+  pure function inverse_effective_mass(of, arm, n) result(inverse)
+    type(inertia_t), intent(in) :: of
+    real(wp), intent(in) :: arm(3), n(3)
+    real(wp) :: inverse
+    real(wp) :: lever(3)
+
+    inverse = of%inverse_mass
+    if (inverse <= 0.0_wp) return
+    lever = cross(arm, n)
+    inverse = inverse + dot_product(lever, of%inverse_inertia(:, 1)*lever(1) &
+      + of%inverse_inertia(:, 2)*lever(2) + of%inverse_inertia(:, 3)*lever(3))
+  end function inverse_effective_mass
+
+  !> Motion of partner b against body a.
+  pure function motion_between(partners, a, b) result(motion)
+    type(partners_t), intent(in) :: partners
+    integer, intent(in) :: a, b
+    type(motion_t) :: motion
+
+    motion%v = partners%v(:, b) - partners%v(:, a)
+    motion%omega_a = partners%omega(:, a)
+    motion%omega_b = partners%omega(:, b)
+  end function motion_between
+
+  !> Velocity of partner b relative to body a at a contact: v_r, partner minus self [m/s].
+  pure function relative_velocity(motion, arm_a, arm_b) result(v)
+    type(motion_t), intent(in) :: motion
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
+    real(wp) :: v(3)
+
+    v = motion%v + (cross(motion%omega_b, arm_b) - cross(motion%omega_a, arm_a))
+  end function relative_velocity
+
+  !> Highest speed against one another of points of two bodies as far out as a contact [m/s].
+  pure function largest_speed(motion, arm_a, arm_b) result(speed)
+    type(motion_t), intent(in) :: motion
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! [m]
+    real(wp) :: speed
+
+    speed = norm(motion%v) + norm(motion%omega_a)*norm(arm_a) + norm(motion%omega_b)*norm(arm_b)
+  end function largest_speed
+
+  !> Add a force on body a at a contact, and its reaction on partner b.
+  pure subroutine act(f, arm_a, arm_b, wrench)
+    real(wp), intent(in) :: f(3), arm_a(3), arm_b(3)   !! [N], [m]
+    type(wrench_t), intent(inout) :: wrench
+
+    wrench%force = wrench%force + f
+    wrench%torque_a = wrench%torque_a + cross(arm_a, f)
+    wrench%torque_b = wrench%torque_b - cross(arm_b, f)
+  end subroutine act
+
+end module contact_partners_m

@@ -1,0 +1,287 @@
+!> How stiff and how damped each touch is, and how fast the pairs of bodies swing on them: the first
+!! for the forces, the second for the length of the substep.
+module contact_response_m
+  use kinds_m, only: wp
+  use vectors_m, only: norm
+  use neighbours_m, only: reserve
+  use touches_m, only: touch_t
+  use springs_m, only: comes_before
+  use contact_law_m, only: contact_law_t, normal_constant, steepness, hardness, elastic_force, &
+    energy_of_force
+  use contact_partners_m, only: partners_t, inertia_t, motion_t, wrench_t, inertia_of, &
+    inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
+  implicit none
+  private
+  public :: response_t, respond, add_frequencies, highest_frequency2, opening_speed, push_to_weight
+  public :: impact_turn
+
+  !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
+  !! pair too slow for one, and of a pile.
+  real(wp), parameter :: impact_turn = 0.35_wp, slow_turn = 0.7_wp, pile_turn = 1.2_wp
+
+  !> The law at work at each touch.
+  type :: response_t
+    real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
+    real(wp), allocatable :: elastic(:)          !! force of the spring [N]
+    real(wp), allocatable :: energy(:)           !! of the spring [J]
+    real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
+    real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
+    real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (-7:n) sum over the pairs of a free body [1/s2]
+  end type response_t
+
+contains
+
+  !> Stiffness and damping of all touches of a list.
+  subroutine respond(touches, law, partners, response)
+    type(touch_t), intent(in) :: touches
+    type(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(response_t), intent(inout) :: response
+    integer :: first, last
+
+    response%frequency2 = 0.0_wp
+    call reserve(touches%n, response%k)
+    call reserve(touches%n, response%elastic)
+    call reserve(touches%n, response%energy)
+    call reserve(touches%n, response%eta)
+    call reserve(touches%n, response%decay)
+    call reserve(touches%n, response%pair_frequency2)
+    first = 1
+    do while (first <= touches%n)
+      last = last_of_pair(touches, first)
+      call respond_pair(touches, first, last, law, partners, response)
+      first = last + 1
+    end do
+  end subroutine respond
+
+  !> Last touch of the pair of bodies whose first touch is given.
+  pure function last_of_pair(touches, first) result(last)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first
+    integer :: last
+
+    do last = first, touches%n - 1
+      if (touches%a(last + 1) /= touches%a(first)) return
+      if (touches%b(last + 1) /= touches%b(first)) return
+    end do
+    last = touches%n
+  end function last_of_pair
+
+  !> Stiffness and damping of the touches `first:last` of one pair of bodies.
+  !!
+  !! Stiffness belongs to each touch alone. Damping is shared: N touches that act together must damp
+  !! like one. Seen along the normal n_i of touch i the pair has the stiffness
+  !! K_i = sum_j k_j (n_i.n_j)^2 and, at the mean of the contact points with the same weights, the
+  !! effective mass m_i; then eta_i = (k_i/K_i) 2 zeta sqrt(K_i m_i).
+  !!
+  !! It is no impact where the bodies move against one another no faster than weight, or a share of
+  !! their load, makes them move within a swing.
+  pure subroutine respond_pair(touches, first, last, law, partners, response)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first, last
+    type(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(response_t), intent(inout) :: response
+    type(inertia_t) :: of_a, of_b
+    real(wp), parameter :: calm_share = 0.25_wp   !! of the load
+    real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
+    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep, calm, speed
+    integer :: a, b, t, i
+
+    a = touches%a(first)
+    b = touches%b(first)
+    of_a = inertia_of(partners, a)
+    of_b = inertia_of(partners, b)
+    weights = 0.0_wp
+    points = 0.0_wp
+    k = normal_constant(law, 1.0_wp/(of_a%inverse_mass + of_b%inverse_mass))
+    hard = min(partners%hard(a), partners%hard(b))
+    do t = first, last
+      response%k(t) = touches%weight(t)*k
+      call elastic_force(law, k, touches%weight(t), touches%depth(t), hard, response%elastic(t), &
+        response%energy(t))
+      response%eta(t) = touches%weight(t)*hardness(law, touches%weight(t), touches%depth(t), hard)
+      nn = response%eta(t)*square(touches%normal(:, t))
+      weights = weights + nn
+      do i = 1, 6
+        points(:, i) = points(:, i) + nn(i)*touches%arm_a(:, t)
+      end do
+    end do
+    highest = 0.0_wp
+    steep = 0.0_wp
+    load = 0.0_wp
+    do t = first, last
+      load = load + response%elastic(t)*touches%normal(:, t)
+      nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
+      total = dot_product(nn, weights)
+      arm = matmul(points, nn)/total
+      inverse = inverse_effective_mass(of_a, arm, touches%normal(:, t))
+      arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
+      inverse = inverse + inverse_effective_mass(of_b, arm, touches%normal(:, t))
+      steep = max(steep, steepness(law, touches%weight(t), touches%depth(t), hard))
+      omega2 = k*total*inverse
+      if (law%constants) then
+        response%eta(t) = touches%weight(t)*law%eta_n
+        response%decay(t) = 0.5_wp*law%eta_n*total*inverse
+      else
+        response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
+        response%decay(t) = law%damping_ratio*sqrt(omega2)
+      end if
+      highest = max(highest, omega2)
+    end do
+    if (.not. law%constants) call damp_as_one(touches, first, last, law, of_a, of_b, response, &
+                                             highest)
+    highest = steep*highest
+    calm = max(partners%gravity, calm_share*norm(load)*(of_a%inverse_mass + of_b%inverse_mass))
+    speed = largest_speed(motion_between(partners, a, b), touches%arm_a(:, first), &
+      touches%arm_b(:, first))
+    if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
+    response%pair_frequency2(first:last) = highest
+    if (of_a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
+    if (of_b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
+  end subroutine respond_pair
+
+  !> Scale the damping of the touches of a pair so that together they damp the swing they drive
+  !! like one spring and dashpot.
+  !!
+  !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
+  !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
+  !! part sideways, and weights that change with position make W other than each normal tells.
+  pure subroutine damp_as_one(touches, first, last, law, of_a, of_b, response, highest)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: first, last
+    type(contact_law_t), intent(in) :: law
+    type(inertia_t), intent(in) :: of_a, of_b
+    type(response_t), intent(inout) :: response
+    real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
+    type(wrench_t) :: wrench
+    type(motion_t) :: motion   ! that the wrench drives
+    real(wp) :: push(3), by_weight, energy, mass, drag, omega2
+    integer :: t
+
+    energy = 0.0_wp
+    do t = first, last
+      if (touches%depth(t) <= 0.0_wp) cycle
+      push = -response%elastic(t)*touches%normal(:, t)
+      if (touches%weight(t) < 1.0_wp) then
+        by_weight = energy_of_force(response%elastic(t), law%gamma_n, touches%depth(t))
+        push = push - by_weight*touches%weight_shift(:, t)
+        wrench%torque_a = wrench%torque_a - by_weight*touches%weight_turn(:, t)
+        wrench%torque_b = wrench%torque_b + by_weight*touches%weight_turn(:, t)
+      end if
+      call act(push, touches%arm_a(:, t), touches%arm_b(:, t), wrench)
+      energy = energy + response%energy(t)
+    end do
+    motion%v = -(of_a%inverse_mass + of_b%inverse_mass)*wrench%force
+    if (of_a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of_a%inverse_inertia, wrench%torque_a)
+    if (of_b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of_b%inverse_inertia, wrench%torque_b)
+    mass = dot_product(motion%omega_a, wrench%torque_a) &
+      + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
+    drag = 0.0_wp
+    do t = first, last
+      if (touches%depth(t) <= 0.0_wp) cycle
+      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, motion)**2
+    end do
+    if (.not. (energy > 0.0_wp .and. drag > 0.0_wp)) return
+    omega2 = 0.5_wp*mass/energy
+    highest = max(highest, omega2)
+    drag = 2*law%damping_ratio*mass*sqrt(omega2)/drag
+    response%eta(first:last) = drag*response%eta(first:last)
+    response%decay(first:last) = drag*response%decay(first:last)
+  end subroutine damp_as_one
+
+  !> The products n_x n_x, n_y n_y, n_z n_z, n_y n_z, n_z n_x, n_x n_y.
+  pure function square(n) result(nn)
+    real(wp), intent(in) :: n(3)
+    real(wp) :: nn(6)
+
+    nn = [n*n, n([2, 3, 1])*n([3, 1, 2])]
+  end function square
+
+  !> Add the frequencies of what may touch soon to those of what touches, of each pair and of each
+  !! body: springs together swing no faster than the squares of both frequencies together.
+  pure subroutine add_frequencies(touches, soon, response, response_soon)
+    type(touch_t), intent(in) :: touches, soon
+    type(response_t), intent(inout) :: response, response_soon
+    real(wp) :: both
+    integer :: first, last, m, m_last
+
+    response%frequency2 = response%frequency2 + response_soon%frequency2
+    response_soon%frequency2 = response%frequency2
+    m = 1
+    first = 1
+    do while (first <= soon%n)
+      last = last_of_pair(soon, first)
+      do while (m <= touches%n)
+        if (.not. comes_before(touches%a(m), touches%b(m), 0, soon%a(first), soon%b(first), 0)) exit
+        m = m + 1
+      end do
+      if (m > touches%n) return
+      if (touches%a(m) == soon%a(first) .and. touches%b(m) == soon%b(first)) then
+        m_last = last_of_pair(touches, m)
+        both = response%pair_frequency2(m) + response_soon%pair_frequency2(first)
+        response%pair_frequency2(m:m_last) = both
+        response_soon%pair_frequency2(first:last) = both
+      end if
+      first = last + 1
+    end do
+  end subroutine add_frequencies
+
+  !> Square of the highest frequency of a pair of touching bodies, or of all pairs of two touching
+  !! bodies together with a share; a little above [1/s2].
+  !!
+  !! A pile swings no faster than all the pairs of two touching bodies taken together. It only has
+  !! to be stable, so it may turn further in a substep than a single pair.
+  pure function highest_frequency2(touches, response) result(highest)
+    type(touch_t), intent(in) :: touches
+    type(response_t), intent(in) :: response
+    real(wp) :: highest
+    real(wp), parameter :: share = (impact_turn/pile_turn)**2
+    real(wp) :: pair
+    integer :: t
+
+    highest = 0.0_wp
+    do t = 1, touches%n
+      pair = response%pair_frequency2(t)
+      highest = max(highest, pair, share*(pair &
+        + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
+        + max(0.0_wp, response%frequency2(touches%b(t)) - pair)))
+    end do
+  end function highest_frequency2
+
+  !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
+  !! where the weight changes with position, of the weight [m/s].
+  pure function opening_speed(touches, t, gamma, motion) result(speed)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: t
+    real(wp), intent(in) :: gamma             !! power of the spring; 1 where it hardens [-]
+    type(motion_t), intent(in) :: motion
+    real(wp) :: speed
+    real(wp) :: v(3)
+
+    v = relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t))
+    speed = dot_product(v, touches%normal(:, t))
+    if (touches%weight(t) < 1.0_wp) speed = speed &
+      + energy_of_force(1.0_wp, gamma, touches%depth(t))*( &
+        dot_product(v, touches%weight_shift(:, t)) &
+        + dot_product(motion%omega_b - motion%omega_a, touches%weight_turn(:, t)))
+  end function opening_speed
+
+  !> The part of the force of touch t by which its weight changes with position: the energy of the
+  !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
+  pure subroutine push_to_weight(touches, t, gamma, force_n, wrench)
+    type(touch_t), intent(in) :: touches
+    integer, intent(in) :: t
+    real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
+    real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
+    type(wrench_t), intent(inout) :: wrench
+    real(wp) :: energy
+
+    energy = energy_of_force(force_n, gamma, touches%depth(t))
+    call act(-energy*touches%weight_shift(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
+    wrench%torque_a = wrench%torque_a - energy*touches%weight_turn(:, t)
+    wrench%torque_b = wrench%torque_b + energy*touches%weight_turn(:, t)
+  end subroutine push_to_weight
+
+end module contact_response_m
