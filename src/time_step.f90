@@ -19,6 +19,7 @@ module time_step_m
   use extended_fraction_m, only: extend_fraction
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
+  use mid_step_m, only: to_mid_step, from_mid_step
   use mixture_m, only: mix_fluid
   use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
@@ -293,7 +294,7 @@ contains
     integer :: n, part
 
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
-               carrier => sim%transport)
+               carrier => sim%transport, p => sim%stage%pressure)
       if (sim%stage%implicit_momentum) then
         call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow, parts)
         sim%stage%c_ismac%q = carrier%q_step
@@ -301,6 +302,7 @@ contains
         return
       end if
       call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
+      call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, p%a_face, p%a_cell)
       do part = 1, parts
         call begin_part(grid, sim%before, part, sim%clock%step, carrier)
         call momentum_begin(grid, fluid, carrier%w, carrier%v, carrier%c, flow%u, sim%momentum)
@@ -311,6 +313,7 @@ contains
         call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
       end do
       call finish_transport(grid, sim%solid, carrier, flow)
+      call from_mid_step(grid, fluid, p%a_cell, flow)
       call mix_fluid(fluid, flow)
     end associate
   end subroutine transport

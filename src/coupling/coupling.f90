@@ -7,6 +7,7 @@ module coupling_m
   use solid_geometry_m, only: solid_geometry_t
   use surface_tension_m, only: find_tension
   use face_memory_m, only: note_deviation
+  use film_velocity_m, only: note_films
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
@@ -18,8 +19,8 @@ module coupling_m
 
 contains
 
-  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration, else
-  !! how the faces at the surface differ from the cells.
+  !> What the velocity stage will need of the start of the step: how films move along their walls;
+  !! for C-ISMAC the acceleration, else how the faces at the surface differ from the cells.
   subroutine note_start(case, grid, solid, flow, blocks, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -28,6 +29,10 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(stage_t), intent(inout) :: stage
 
+    call copy_motion(blocks, stage%bodies)
+    if (case%numerics%coupling == 'monolithic') then
+      call note_films(grid, solid, stage%bodies, flow%u, stage%films)
+    end if
     if (.not. stage%implicit_momentum) then
       if (case%numerics%coupling == 'monolithic') then
         call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
@@ -36,7 +41,6 @@ contains
     end if
     call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
     if (case%numerics%coupling == 'mics') then
-      call copy_motion(blocks, stage%bodies)
       call density_of_mixture(grid, solid, stage%bodies, flow%rho, stage%rho_mixture)
       call keep_acceleration(grid, case%fluid%gravity, stage%whole%open, stage%rho_mixture, flow, &
                              stage)

@@ -20,7 +20,7 @@ module monolithic_m
                         predict_face_velocity, face_velocity_at_walls, &
                         extend_pressure
   use buoyancy_m, only: uncounted_fluid
-  use film_velocity_m, only: tie_films
+  use film_velocity_m, only: shift_films, tie_films
   use momentum_return_m, only: return_momentum
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
@@ -69,7 +69,9 @@ contains
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
 
       call build_viscous(grid, solid, bodies, flow%rho, flow%mu, dt, self%viscous)
+      call shift_films(grid, solid, self%films, -1.0_wp, flow%u)
       call predict_velocity(grid, flow%rho, dt, flow, self, report)
+      call shift_films(grid, solid, self%films, 1.0_wp, flow%u)
       bodies%motion = free   ! to round-off the motion that the forces give, not the solver's
       call push_bodies(dt, self%from_pressure + self%from_level + self%from_viscosity, bodies)
       call impose_rigid_velocity(grid, solid, bodies, self%viscous%mass, flow%u)

@@ -12,6 +12,7 @@ module velocity_stage_m
     cell_mean_of_faces
   use buoyancy_m, only: buoyancy_t, buoyancy_init
   use surface_tension_m, only: surface_tension_t, add_tension
+  use film_velocity_m, only: films_t, films_init
   use rigid_body_m, only: blocks_t, space_tensor
   implicit none
   private
@@ -34,6 +35,7 @@ module velocity_stage_m
     type(pressure_t) :: pressure
     type(buoyancy_t) :: buoyancy
     type(surface_tension_t) :: tension
+    type(films_t) :: films
     type(solid_geometry_t) :: whole                !! the domain without solids, for the mixture
     real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
     real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
@@ -67,6 +69,7 @@ contains
     if (self%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, self%c_ismac)
     call pressure_init(grid, n, self%pressure)
     call buoyancy_init(self%buoyancy)
+    call films_init(self%films)
     call solid_geometry_init(grid, self%whole, n)
     allocate (self%from_pressure(6, n), source=0.0_wp)
     allocate (self%from_level, self%from_viscosity, self%total, source=self%from_pressure)

@@ -6,7 +6,7 @@ program test_coupling
   use monolithic_m, only: monolithic_stage, start_flow
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use rigid_motion_m, only: set_inertia
-  use coupling_m, only: advance_velocity
+  use coupling_m, only: advance_velocity, note_start
   use boundary_m, only: fill_velocity_halo
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -22,6 +22,7 @@ program test_coupling
   call released_sphere(1.1_wp)
   call moving_box()
   call held_box()
+  call slipping_films()
   call block_of_water()
   call block_at_rest()
   call fall_together('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
@@ -134,6 +135,33 @@ contains
                1.0e-8_wp)
     call check('held box: it does not move', maxval(abs(block%blocks%v)), 0.0_wp, 0.0_wp)
   end subroutine held_box
+
+  !> Films that slip along a held hexapod do not pull at it by viscosity: the legs of the cells
+  !! beside them hold all of the shear.
+  subroutine slipping_films()
+    real(wp) :: slip
+    integer :: m
+
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    block%case%body(1)%fixed = .true.
+    block%case%fluid%liquid_viscosity = 1.0_wp
+    call ready()
+    associate (u => block%flow%u, films => stage%films)
+      u = 0.1_wp
+      call note_start(block%case, block%grid, block%solid, block%flow, block%blocks, stage)
+      u = 0.0_wp
+      do m = 1, films%n
+        u(films%cell(1, m), films%cell(2, m), films%cell(3, m), :) = films%slip(:, m)
+      end do
+      slip = sum(films%slip(:, 1:films%n))
+    end associate
+    call note_start(block%case, block%grid, block%solid, block%flow, block%blocks, stage)
+    call begin_step(block%blocks)
+    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
+                          stage, report)
+    call check('films: there are some', slip > 1.0_wp)
+    call check('films: slip does not pull', maxval(abs(stage%from_viscosity)), 0.0_wp, 1.0e-9_wp)
+  end subroutine slipping_films
 
   !> A block as heavy as the liquid hovers.
   subroutine block_of_water()

@@ -1,9 +1,9 @@
-!> Film cells above a box that moves: which components its faces and its wall set, and which
-!! are left alone.
+!> Film cells above a box that moves: which components its faces and its wall set, which are left
+!! alone, and how those that are set slip along the wall.
 program test_film_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use film_velocity_m, only: tie_films
+  use film_velocity_m, only: films_t, films_init, note_films, shift_films, tie_films
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -19,6 +19,7 @@ program test_film_velocity
   type(one_body_t) :: box
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: mass, uf, u, before, change
+  type(films_t) :: films
   real(wp) :: faces(2)
   integer :: seed = 77
 
@@ -46,6 +47,21 @@ program test_film_velocity
   call check('the change is told', maxval(abs(u - before - change)), 0.0_wp, 1.0e-14_wp)
   change(3:6, 3:6, 1:top, :) = 0.0_wp
   call check('cells outside the box stay', maxval(abs(change)), 0.0_wp, 0.0_wp)
+
+  call films_init(films)
+  call note_films(box%grid, box%solid, box%bodies, u, films)
+  before = u
+  call shift_films(box%grid, box%solid, films, -1.0_wp, u)
+  call check('without its slip a film moves with the wall', &
+             [u(4, 5, top, 3), u(6, 4, top, 1), u(6, 4, top, 3)], &
+             [wall(4, 5, 3), wall(6, 4, 1), wall(6, 4, 3)], 1.0e-14_wp)
+  call check('what a film does by itself is no slip', &
+             maxval(abs(u(4:5, 3:6, top, 1) - before(4:5, 3:6, top, 1))), 0.0_wp, 0.0_wp)
+  box%solid%inside(6, 4, top) = 0
+  call shift_films(box%grid, box%solid, films, 1.0_wp, u)
+  call check('a cell that the box has left has none', u(6, 4, top, 1), wall(6, 4, 1), 1.0e-14_wp)
+  u(6, 4, top, :) = before(6, 4, top, :)
+  call check('the slip comes back', maxval(abs(u - before)), 0.0_wp, 1.0e-14_wp)
   call finish_checks()
 
 contains
