@@ -14,6 +14,7 @@ from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.geometry import place, volume_in_box  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("contact friction", "contact wall_friction")  # none in `smooth`
 ENERGY_BAND = 1e-3
 ROUND_OFF = 1e-11
 LOOSEST, DENSEST = 0.50, 0.62  # packing of poured cubes
