@@ -294,7 +294,8 @@ contains
     integer :: n, part
 
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
-               carrier => sim%transport, p => sim%stage%pressure)
+               carrier => sim%transport, p => sim%stage%pressure, &
+               monolithic => sim%case%numerics%coupling == 'monolithic')
       if (sim%stage%implicit_momentum) then
         call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow, parts)
         sim%stage%c_ismac%q = carrier%q_step
@@ -302,7 +303,8 @@ contains
         return
       end if
       call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
-      call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, p%a_face, p%a_cell)
+      if (monolithic) call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, p%a_face, &
+                                       p%a_cell)
       do part = 1, parts
         call begin_part(grid, sim%before, part, sim%clock%step, carrier)
         call momentum_begin(grid, fluid, carrier%w, carrier%v, carrier%c, flow%u, sim%momentum)
@@ -313,7 +315,7 @@ contains
         call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
       end do
       call finish_transport(grid, sim%solid, carrier, flow)
-      call from_mid_step(grid, fluid, p%a_cell, flow)
+      if (monolithic) call from_mid_step(grid, fluid, p%a_cell, flow)
       call mix_fluid(fluid, flow)
     end associate
   end subroutine transport

@@ -11,6 +11,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("numerics coupling",)
+
 
 def check(runs: list[Run]) -> Checks:
     """Recompute the divergence from the faces of every restart file, while a block moves."""
