@@ -9,8 +9,8 @@
 !!
 !! Only liquid away from the surface takes part: at the surface and in the gas beside it density and
 !! acceleration jump, and what a cell gives back would no longer be what it got. Cells at an outflow
-!! are left out, too: the pressure outside is known after the transport. Not for `coupling = 'mics'`,
-!! whose pressure near blocks is that of a mixture.
+!! are left out, too: the pressure outside is known after the transport. Not for
+!! `coupling = 'mics'`, whose pressure near blocks is that of a mixture.
 module mid_step_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
