@@ -161,8 +161,11 @@ contains
     call choose_step(sim, report)
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                dt => sim%clock%dt)
-      if (sim%wet) call know_added_mass(sim)
-      if (sim%wet) call note_start(case, grid, sim%solid, flow, blocks, sim%stage)
+      if (sim%wet) then
+        call copy_motion(blocks, sim%stage%bodies)
+        call know_added_mass(sim)
+        call note_start(case, grid, sim%solid, flow, sim%stage)
+      end if
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
@@ -261,7 +264,6 @@ contains
     real(wp) :: push, displaced, moment(3)
     integer :: b
 
-    call copy_motion(sim%blocks, sim%stage%bodies)
     associate (blocks => sim%blocks)
       blocks%added_mass = 0.0_wp
       do b = 1, blocks%n

@@ -21,24 +21,19 @@ contains
 
   !> What the velocity stage will need of the start of the step: how films move along their walls;
   !! for C-ISMAC the acceleration, else how the faces at the surface differ from the cells.
-  subroutine note_start(case, grid, solid, flow, blocks, stage)
+  subroutine note_start(case, grid, solid, flow, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(flow_t), intent(in) :: flow
-    type(blocks_t), intent(in) :: blocks
-    type(stage_t), intent(inout) :: stage
+    type(stage_t), intent(inout) :: stage   !! its bodies as they move at the start
 
-    call copy_motion(blocks, stage%bodies)
     if (case%numerics%coupling == 'monolithic') then
       call note_films(grid, solid, stage%bodies, flow%u, stage%films)
+      if (.not. stage%implicit_momentum) call note_deviation(grid, solid%alpha, flow%rho, flow%u, &
+                                                             flow%uf, stage%deviation)
     end if
-    if (.not. stage%implicit_momentum) then
-      if (case%numerics%coupling == 'monolithic') then
-        call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
-      end if
-      return
-    end if
+    if (.not. stage%implicit_momentum) return
     call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
     if (case%numerics%coupling == 'mics') then
       call density_of_mixture(grid, solid, stage%bodies, flow%rho, stage%rho_mixture)

@@ -3,9 +3,9 @@
 !! A face between a film cell and one whose centre lies in fluid takes its velocity from the latter
 !! alone (`face_velocity_at_walls`). Pressure and weight at such faces accelerate the film cell too,
 !! but nothing it does is felt by the flow, so no pressure would ever stop it: water at rest would
-!! keep films that run for ever. So a component that no open face sees ends every step as the mean
-!! of its faces (`tie_films`); what of it is normal to the wall goes linearly from the faces to the
-!! wall, so half way. Along the wall the film slips with the cells beside it. The legs of those
+!! keep films that run for ever. So a component with such a face is tied: it ends every step as the
+!! mean of its faces (`tie_films`); what of it is normal to the wall goes linearly from the faces to
+!! the wall, so half way. Along the wall the film slips with the cells beside it. The legs of those
 !! cells hold all of this shear already (`viscous_m`), so the legs of the film must not hold it a
 !! second time: they hold what the step adds to the velocity of its start (`note_films`), pressure
 !! and weight that the inertia of the film does not balance.
@@ -21,10 +21,10 @@ module film_velocity_m
   public :: films_t, films_init, note_films, shift_films, tie_films
 
   type :: films_t
-    integer :: n = 0                    !! film cells with a component that no face sees
+    integer :: n = 0                    !! film cells with a tied component
     integer, allocatable :: cell(:, :)  !! (3, *)
     real(wp), allocatable :: slip(:, :)
-      !! (3, *) velocity of these components against the wall at the start of the step [m/s]
+      !! (3, *) velocity of the tied components against the wall at the start of the step [m/s]
   end type films_t
 
 contains
@@ -85,14 +85,14 @@ contains
     end do
   end subroutine shift_films
 
-  !> Set the components of film cells that no face sees to the mean of their faces by open share,
+  !> Set the tied components of film cells to the mean of their faces by open share,
   !! with the part normal to the wall half way to the velocity of the wall.
   subroutine tie_films(grid, solid, bodies, mass, uf, u, change)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                       grid%lo(3) - n_halo:, :), &
+                                    grid%lo(3) - n_halo:, :), &
       contiguous :: mass, uf     !! over dt, 0: moves with the wall [kg/s]; free of divergence [m/s]
     real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
                                        grid%lo(3) - n_halo:, :), &

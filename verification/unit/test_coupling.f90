@@ -148,14 +148,14 @@ contains
     call ready()
     associate (u => block%flow%u, films => stage%films)
       u = 0.1_wp
-      call note_start(block%case, block%grid, block%solid, block%flow, block%blocks, stage)
+      call note_start(block%case, block%grid, block%solid, block%flow, stage)
       u = 0.0_wp
       do m = 1, films%n
         u(films%cell(1, m), films%cell(2, m), films%cell(3, m), :) = films%slip(:, m)
       end do
       slip = sum(films%slip(:, 1:films%n))
     end associate
-    call note_start(block%case, block%grid, block%solid, block%flow, block%blocks, stage)
+    call note_start(block%case, block%grid, block%solid, block%flow, stage)
     call begin_step(block%blocks)
     call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
                           stage, report)
