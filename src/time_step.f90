@@ -1,10 +1,9 @@
 !> One step of fluid and blocks, in the order of the paper.
 !!
 !! The blocks move first, under the fluid force of the step before and in short substeps for
-!! contact;
-!! then the liquid and the momentum are carried through the faces that the moving blocks leave open;
-!! then pressure, viscosity and the rigid motions are solved together at the new place of the
-!! blocks.
+!! contact; then the liquid and the momentum are carried through the faces that the moving blocks
+!! leave open; then pressure, viscosity and the rigid motions are solved together at the new place
+!! of the blocks.
 module time_step_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
@@ -203,8 +202,8 @@ contains
     report%contacts_solved = contact%info == 0
     speed = 0.0_wp
     do b = 1, sim%blocks%n
-      if (sim%blocks%present(b) .and. .not. sim%blocks%fixed(b)) speed = max(speed, &
-          norm2(sim%blocks%v(:, b)))
+      if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
+      speed = max(speed, norm2(sim%blocks%v(:, b)))
     end do
     call sim%clock%note_speed(speed, all(sim%blocks%present))
     if (.not. sim%wet) return
@@ -341,10 +340,11 @@ contains
 
     allowed = sim%case%run%dt
     rate = courant_rate(sim)
-    if (sim%case%run%cfl_max > 0.0_wp .and. rate > 0.0_wp) allowed = min(allowed, &
-        sim%case%run%cfl_max/rate)
-    if (sim%case%run%cfl_max > 0.0_wp .and. sim%wet) allowed = min(allowed, &
-        capillary_step(sim%case%fluid, minval(sim%grid%h, sim%grid%n > 1)))
+    if (sim%case%run%cfl_max > 0.0_wp) then
+      if (rate > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate)
+      if (sim%wet) allowed = &
+        min(allowed, capillary_step(sim%case%fluid, minval(sim%grid%h, sim%grid%n > 1)))
+    end if
     call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
     report%cfl = sim%clock%dt*rate
   end subroutine choose_step

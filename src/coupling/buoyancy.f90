@@ -14,7 +14,7 @@ module buoyancy_m
   use kinds_m, only: wp
   use vectors_m, only: cross
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use boundary_m, only: gives_pressure
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
@@ -49,8 +49,8 @@ contains
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! liquid share of the fluid [-]
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
     real(wp) :: mass, moment(3)
@@ -75,8 +75,7 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: c, rho                 !! liquid share [-] and density [kg/m3] of the fluid
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: lack(:, :, :)   !! (6, 3, bodies) [kg, kg m]
@@ -113,8 +112,8 @@ contains
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! liquid share of the fluid [-]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! liquid share of the fluid [-]
     integer, intent(in) :: b
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: mass, moment(3)   !! [kg, kg m]
@@ -189,8 +188,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_flux_t), intent(in) :: flux
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: b
     real(wp), intent(inout) :: term(:, :)
     integer :: n

@@ -47,10 +47,9 @@ contains
   !> Velocity of the fluid and of the bodies at the end of the step.
   !!
   !! On entry the liquid and the bodies are where the step ends, `flow%u` is the transported
-  !! velocity;
-  !! the bodies carry the mean contact force of the step. On return the bodies have their final
-  !! velocity and the force from the fluid; face velocity and solid flux are those the next step
-  !! uses.
+  !! velocity; the bodies carry the mean contact force of the step. On return the bodies have their
+  !! final velocity and the force from the fluid; face velocity and solid flux are those the next
+  !! step uses.
   subroutine advance_velocity(case, grid, solid, dt, flow, blocks, stage, report)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid

@@ -40,8 +40,7 @@ contains
   !> Velocity after predictor and projection of the mixture, `coupling_passes` times, and the force.
   !!
   !! Weight less buoyancy and the contact force act on the mixture before the projection, in the
-  !! cells
-  !! of the body; gravity in the mixture is that of the fluid, so still water stays still.
+  !! cells of the body; gravity in the mixture is that of the fluid, so still water stays still.
   subroutine mass_average_stage(case, grid, solid, dt, flow, stage, report)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -82,10 +81,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
-    real(wp), intent(inout), contiguous :: mixture(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                   grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: mixture(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: b, m
 
     mixture = (1.0_wp - solid%alpha)*rho
@@ -117,8 +114,7 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(flow_t), intent(inout) :: flow
-    real(wp), intent(in), contiguous :: mixture(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: mixture(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: b, c, m
     real(wp) :: arm(3)
 
@@ -203,14 +199,12 @@ contains
   end subroutine project_mixture
 
   !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum
-  !! that
-  !! the mixture gained in its cells since `u_before`.
+  !! that the mixture gained in its cells since `u_before`.
   subroutine momentum_gained(grid, solid, dt, u, stage)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(stage_t), intent(inout) :: stage
     integer :: b, m, n
     real(wp) :: f(3)

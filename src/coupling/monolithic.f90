@@ -1,11 +1,10 @@
 !> The monolithic coupling: pressure and the motion of the bodies in one solve.
 !!
 !! Fluid moves through the open part of a face, bodies push through the rest (Batty, Bertails &
-!! Bridson
-!! 2007). The added mass is implicit, the velocity is free of divergence and rigid in the bodies at
-!! once. Departure from the paper, whose mass average (`mass_average_m`) thickens the body: how a
-!! released sphere starts depends on the step there, by 5 % to 20 %; here it is within 2 % of
-!! theory at steps of 0.25 to 4 ms (docs/decisions/coupling.md).
+!! Bridson 2007). The added mass is implicit, the velocity is free of divergence and rigid in the
+!! bodies at once. Departure from the paper, whose mass average (`mass_average_m`) thickens the
+!! body: how a released sphere starts depends on the step there, by 5 % to 20 %; here it is within
+!! 2 % of theory at steps of 0.25 to 4 ms (docs/decisions/coupling.md).
 module monolithic_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
@@ -176,10 +175,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: mass(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, b
     real(wp) :: arm(3)
 

@@ -52,8 +52,8 @@ contains
     type(bed_t), intent(in), optional :: bed
     integer :: a(3), b(3), n
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     self%low = merge(a, max(a, 1), grid%periodic)
     self%high = merge(b, min(b, grid%n), grid%periodic)
     if (present(subcells)) self%subcells = subcells
@@ -137,7 +137,7 @@ contains
     do d = 1, 3
       solid%open(cell(1), cell(2), cell(3), d) = open
       i = cell + unit_step(:, d)
-      if (i(d) <= grid%hi(d) + n_halo) solid%open(i(1), i(2), i(3), d) = open
+      if (i(d) <= grid%last(d)) solid%open(i(1), i(2), i(3), d) = open
     end do
   end subroutine set_faces
 
@@ -358,7 +358,7 @@ contains
     integer :: high(3)
 
     high = self%high
-    if (.not. grid%periodic(f(4))) high(f(4)) = min(high(f(4)) + 1, grid%hi(f(4)) + n_halo)
+    if (.not. grid%periodic(f(4))) high(f(4)) = min(high(f(4)) + 1, grid%last(f(4)))
     kept_face = all(f(1:3) >= self%low) .and. all(f(1:3) <= high)
   end function kept_face
 
@@ -692,7 +692,7 @@ contains
       do s = 1, 2
         n = i + (2*s - 3)*unit_step(:, d)
         f = merge(i, n, s == 1)
-        if (f(d) > grid%hi(d) + n_halo) cycle
+        if (f(d) > grid%last(d)) cycle
         if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
         if (n(d) < self%low(d) .or. n(d) > self%high(d)) then
           if (leads_out(grid, d, s, n(d))) return

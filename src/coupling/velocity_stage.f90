@@ -1,7 +1,7 @@
 !> What both couplings share: the bodies as the flow sees them, the solvers, the parts of the force.
 module velocity_stage_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: numerics_t
@@ -60,8 +60,8 @@ contains
     type(stage_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
     call viscous_init(grid, n, self%viscous)
@@ -85,10 +85,9 @@ contains
   subroutine keep_acceleration(grid, gravity, open, rho, flow, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
     type(flow_t), intent(in) :: flow
     type(stage_t), intent(inout) :: self
 
@@ -126,8 +125,8 @@ contains
   !> Viscosity, and with C-ISMAC advection, into a velocity that has gravity and old pressure in.
   subroutine predict_velocity(grid, rho, dt, flow, self, report)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: self

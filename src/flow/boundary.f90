@@ -33,8 +33,8 @@ contains
   !> Normal velocity at the sides where it is given: none through walls, that of an inflow.
   pure subroutine set_side_velocity(grid, uf)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(inout), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:, :)   !! lower faces [m/s]
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! lower faces [m/s]
     integer :: d, s, a(3), b(3)
 
     do d = 1, 3
@@ -53,8 +53,7 @@ contains
   !> Halo of a cell value with zero normal gradient at every side of the domain.
   subroutine fill_scalar_halo(grid, a)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: d, s, m
 
     do d = 1, 3
@@ -69,14 +68,13 @@ contains
     end do
   end subroutine fill_scalar_halo
 
-  !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd
-  !! in the
-  !! normal component only), an inflow has its own velocity outside, open sides and outflows carry
-  !! the value of the last cell outward.
+  !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd in
+  !! the normal component only), an inflow has its own velocity outside, open sides and outflows
+  !! carry the value of the last cell outward.
   subroutine fill_velocity_halo(grid, u)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [m/s]
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
     integer :: d, s, m, c
     real(wp) :: factor, shift
 

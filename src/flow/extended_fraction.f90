@@ -96,10 +96,9 @@ contains
   subroutine cells_without_solid(grid, solid, liquid, room, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: liquid, room
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      liquid, room
+    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
 
     !$omp parallel do private(i, j) schedule(static)
@@ -147,11 +146,10 @@ contains
   subroutine spread_sideways(grid, solid, liquid, room, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: liquid, room
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      liquid, room
     type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: left, l
     integer(i8) :: count(2)   ! values found in this pass, cells left
     logical :: sideways
@@ -197,8 +195,7 @@ contains
     logical, intent(in) :: sideways   !! only within the row
     type(extended_fraction_t), intent(inout) :: self
     integer, intent(inout) :: left    !! cells in the list
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, kept, at(3)
 
     do l = 1, left
@@ -253,12 +250,11 @@ contains
   subroutine planes_of_cut_cells(grid, solid, liquid, room, may_accept, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: liquid, room
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      liquid, room
     logical, intent(in) :: may_accept   !! first pass; later only cells with an own plane take part
     type(extended_fraction_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, at(3)
     real(wp) :: share, row
     logical :: accepted
@@ -291,8 +287,7 @@ contains
     real(wp), intent(in) :: share       !! of the open part
     real(wp), intent(in) :: row         !! value that the row offers
     logical, intent(in) :: may_accept
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(cut_cell_t), intent(inout) :: cut
     real(wp), intent(out) :: value
     logical, intent(out) :: accepted

@@ -11,7 +11,7 @@
 !! \theta = |\rho_2 - \rho_1|/(\rho_2 + \rho_1) $$
 module face_memory_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use mixture_m, only: face_mean
   implicit none
   private
@@ -23,14 +23,14 @@ contains
   !! fluid, at the sides and beside bodies.
   subroutine note_deviation(grid, alpha, rho, u, uf, deviation)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: alpha, rho
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      alpha, rho
       !! solid share [-], density [kg/m3]; halo filled
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:, :) :: u, uf
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: u, uf
       !! velocity of cells, halo filled, and of faces [m/s]
-    real(wp), intent(inout), contiguous :: deviation(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                     grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: &
+      deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
     real(wp) :: keep
 

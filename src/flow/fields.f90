@@ -1,7 +1,7 @@
 !> The state of the fluid on the grid.
 module fields_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use outflow_m, only: outflow_t
   implicit none
   private
@@ -35,8 +35,8 @@ contains
     type(flow_t), intent(out) :: flow
     integer :: a(3), b(3)
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (flow%u(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (flow%uf, source=flow%u)
     allocate (flow%solid_flux, source=flow%u)

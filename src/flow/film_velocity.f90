@@ -11,7 +11,7 @@
 !! and weight that the inertia of the film does not balance.
 module film_velocity_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use boundary_m, only: gives_pressure
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -41,8 +41,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)   !! of the cells [m/s]
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! of the cells [m/s]
     type(films_t), intent(inout) :: self
     integer :: b, m, c(3), most
     logical :: ties(3)
@@ -73,8 +73,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(films_t), intent(in) :: self
     real(wp), intent(in) :: times
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [m/s]
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
     integer :: m
 
     do m = 1, self%n
@@ -91,11 +91,9 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                    grid%lo(3) - n_halo:, :), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: mass, uf     !! over dt, 0: moves with the wall [kg/s]; free of divergence [m/s]
-    real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                       grid%lo(3) - n_halo:, :), &
+    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: u, change    !! of the cells; what was added to it, else zero [m/s]
     integer :: m, b, d, c(3), n(3)
     real(wp) :: low(3), high(3)   !! open shares

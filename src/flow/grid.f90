@@ -1,11 +1,10 @@
 !> The Cartesian grid: cells, spacing and the part of it that this process owns.
 !!
-!! Every array over cells is declared with the *global* cell index and `n_halo` halo cells:
-!! `a(lo(1)-n_halo:hi(1)+n_halo, ...)`. A face array carries the face direction as its last index;
-!! element `(i,j,k,d)` is the *lower* face of cell `(i,j,k)` in direction d, so the upper face of
-!! the
-!! cell is the lower face of its neighbour, and the sides of the tank at the upper end are faces
-!! n+1.
+!! Every array over cells has the *global* cell index and `n_halo` halo cells, so it is declared
+!! `a(grid%first(1):, grid%first(2):, grid%first(3):)`. A face array carries the face direction as
+!! its last index; element `(i,j,k,d)` is the *lower* face of cell `(i,j,k)` in direction d, so the
+!! upper face of the cell is the lower face of its neighbour, and the sides of the tank at the upper
+!! end are faces n+1.
 module grid_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
@@ -28,6 +27,7 @@ module grid_m
     integer :: n(3) = 0           !! cells of the whole domain
     integer :: lo(3) = 1          !! first cell of this process (global index)
     integer :: hi(3) = 0          !! last cell of this process
+    integer :: first(3) = 1 - n_halo, last(3) = n_halo   !! with the halo
     logical :: periodic(3) = .false.
     logical :: at_side(2, 3) = .true.   !! this process touches the lower / upper side of the domain
     integer :: side(2, 3) = side_no_slip
@@ -37,6 +37,7 @@ module grid_m
     real(wp) :: volume = 0.0_wp   !! of a cell [m3]
     real(wp) :: area(3) = 0.0_wp  !! of a face normal to each direction [m2]
   contains
+    procedure :: own => grid_own
     procedure :: face => grid_face
     procedure :: centre => grid_centre
     procedure :: cell_of => grid_cell_of
@@ -49,7 +50,7 @@ contains
     type(grid_input_t), intent(in) :: input
     type(boundary_input_t), intent(in) :: boundary
     type(grid_t), intent(out) :: grid
-    integer :: s, d
+    integer :: s, d, lo(3), hi(3)
 
     grid%n = input%cells
     grid%origin = input%origin
@@ -64,8 +65,20 @@ contains
       end do
       grid%periodic(d) = grid%side(1, d) == side_periodic
     end do
-    call decompose(grid%n, grid%periodic, grid%lo, grid%hi, grid%at_side)
+    call decompose(grid%n, grid%periodic, lo, hi, grid%at_side)
+    call grid%own(lo, hi)
   end subroutine grid_init
+
+  !> The cells lo to hi belong to this process.
+  pure subroutine grid_own(self, lo, hi)
+    class(grid_t), intent(inout) :: self
+    integer, intent(in) :: lo(3), hi(3)
+
+    self%lo = lo
+    self%hi = hi
+    self%first = lo - n_halo
+    self%last = hi + n_halo
+  end subroutine grid_own
 
   !> Code of a boundary kind; zero for an unknown name.
   pure function side_code(kind) result(code)

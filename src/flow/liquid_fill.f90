@@ -2,7 +2,7 @@
 module liquid_fill_m
   use kinds_m, only: wp, i8
   use case_types_m, only: fluid_t, water_t, absent
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -23,8 +23,8 @@ contains
   !> Liquid volume of the whole domain [m3].
   function liquid_volume(grid, liquid) result(volume)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: liquid(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                               grid%lo(3) - n_halo:)   !! W [m3]
+    real(wp), intent(in), contiguous :: liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! W [m3]
     real(wp) :: volume
     integer(i8) :: bins(bin_size, 1)
     real(wp) :: total(1)
@@ -368,8 +368,8 @@ contains
   subroutine find_surface(grid, vertical, c, surface)
     type(grid_t), intent(in) :: grid
     type(vertical_t), intent(in) :: vertical
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! C^, halo filled
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled
     real(wp), allocatable, intent(out) :: surface(:, :)   !! over the two other directions [m]
     integer :: i, j, k, axis, other(2), n(2), e(3), at(3), m
     real(wp) :: here, under, under_2, up, z

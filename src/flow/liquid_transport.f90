@@ -98,8 +98,8 @@ contains
     integer, parameter :: first_size = 1024
     integer :: a(3), b(3), m(3), t
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     call open_flux_init(grid, self%flux)
     call extended_fraction_init(gravity, self%extension)
     allocate (self%q(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
@@ -172,7 +172,7 @@ contains
     if (present(parts)) self%parts = parts
     call find_open_flux(grid, old, new, flow%room, flow%uf, dt, self%flux, self%q_step)
     !$omp parallel do schedule(static)
-    do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
+    do k = grid%first(3), grid%last(3)
       self%w(:, :, k) = flow%liquid(:, :, k)
       self%v(:, :, k) = flow%room(:, :, k)
       self%c(:, :, k) = flow%c(:, :, k)
@@ -196,7 +196,7 @@ contains
 
     self%order = orders(:, 1 + modulo(step + part - 1, size(orders, 2)))
     !$omp parallel do schedule(static)
-    do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
+    do k = grid%first(3), grid%last(3)
       self%q(:, :, k, :) = self%q_step(:, :, k, :)/real(self%parts, wp)
       self%g(:, :, k, :) = 0.0_wp
     end do
@@ -631,14 +631,14 @@ contains
   !! Every value follows from those of the pass before, so the result does not depend on any order.
   subroutine late_values(grid, amount, mass, weight, self, value)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: amount(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                               grid%lo(3) - n_halo:)  !! carried, after the sweeps
-    real(wp), intent(in), contiguous :: mass(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)    !! mass or volume then
+    real(wp), intent(in), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! carried, after the sweeps
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! mass or volume then
     real(wp), intent(in) :: weight(:)   !! of the late faces, like `mass`, positive
     type(liquid_transport_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: value(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:)  !! of small cells
+    real(wp), intent(inout), contiguous :: value(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of small cells
     integer(i8) :: faces(1)
     integer :: it, l, s, at(3)
     real(wp) :: change(2)   ! largest change and largest value
@@ -700,8 +700,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(in) :: self
     real(wp), intent(in) :: flux(:)
-    real(wp), intent(inout), contiguous :: amount(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                  grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, up(3), low(3)
 
     do l = 1, self%n_late

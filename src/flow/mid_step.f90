@@ -14,7 +14,7 @@
 module mid_step_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
@@ -36,8 +36,7 @@ contains
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
-    real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                       grid%lo(3) - n_halo:, :), &
+    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: a_face, given         !! work array [m/s2]; momentum given to the cells [kg m/s]
     integer :: i, j, k, low(3), high(3)
     real(wp) :: mass
@@ -78,8 +77,8 @@ contains
   subroutine from_mid_step(grid, fluid, given, flow)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), contiguous :: given(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:, :)   !! [kg m/s]
+    real(wp), intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [kg m/s]
     type(flow_t), intent(inout) :: flow   !! carried
     integer :: i, j, k
     real(wp) :: mass

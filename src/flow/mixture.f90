@@ -12,9 +12,9 @@ contains
   !> Density and viscosity of the fluid in every cell, halo included:
   !! $$ \rho = \rho_g + (\rho_l - \rho_g) C, \quad \mu = \mu_g + (\mu_l - \mu_g) C $$
   !!
-  !! C is the liquid share of the *fluid* (`flow%c`, extended through bodies), never of the
-  !! mixture with
-  !! the solid: gravity acts on the fluid alone, weight acts on the bodies in their own equations.
+  !! C is the liquid share of the *fluid* (`flow%c`, extended through bodies), never of the mixture
+  !! with the solid: gravity acts on the fluid alone, weight acts on the bodies in their own
+  !! equations.
   subroutine mix_fluid(fluid, flow)
     type(fluid_t), intent(in) :: fluid
     type(flow_t), intent(inout) :: flow

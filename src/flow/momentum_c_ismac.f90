@@ -26,7 +26,7 @@
 !! any Courant number in one direction from 0.70 on.
 module momentum_c_ismac_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, unit_step, side_inflow
+  use grid_m, only: grid_t, unit_step, side_inflow
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: tvd5, scheme_of, tvd_scheme
@@ -89,8 +89,8 @@ contains
     integer :: a(3), b(3)
 
     self%scheme = scheme_of(advection)
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (self%q(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%u_old, self%a_old, self%a_new, self%gain, source=self%q)
     allocate (self%face(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -107,9 +107,7 @@ contains
       allocate (op%first(n + 1), source=1)
       allocate (op%cell(3, 0), op%k(0), op%arm(3, 0), op%work(0, 6))
     end associate
-    stacked%lo = grid%lo
-    stacked%hi = grid%hi
-    stacked%hi(3) = grid%lo(3) + 3*(grid%hi(3) - grid%lo(3) + 1) - 1
+    call stacked%own(grid%lo, [grid%hi(1:2), grid%lo(3) + 3*(grid%hi(3) - grid%lo(3) + 1) - 1])
     call krylov_init(stacked, self%work)
     allocate (self%rhs, self%delta, source=self%work%r)
   end subroutine c_ismac_init
@@ -118,10 +116,10 @@ contains
   subroutine flux_of_faces(grid, dt, uf, q)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)   !! [m/s]
-    real(wp), intent(inout), contiguous :: q(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [m3]
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m3]
     integer :: d
 
     do d = 1, 3
@@ -132,8 +130,8 @@ contains
   !> Advection of the right side, at the velocity from which the step starts; `self%q` is set.
   subroutine begin_predictor(grid, u, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)   !! u^n, halo filled [m/s]
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! u^n, halo filled [m/s]
     type(c_ismac_t), intent(inout) :: self
     integer :: i, j, k, m, d, e(3)
 
@@ -162,11 +160,10 @@ contains
   subroutine face_values(grid, e, q, u, scheme, face)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                    grid%lo(3) - n_halo:), contiguous :: q, u
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: q, u
     integer, intent(in) :: scheme
-    real(wp), intent(inout), contiguous :: face(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: face(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
     logical :: forward
 
@@ -200,8 +197,8 @@ contains
   subroutine solve_predictor(grid, rho, bodies, dt, flow, viscous, self, force, iterations, &
                              converged)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
     type(rigid_motion_t), intent(inout) :: bodies
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
@@ -251,8 +248,7 @@ contains
   !> Coefficients of the left side from the viscous legs and the inflow of each cell.
   subroutine set_operator(grid, rho, bodies, dt, viscous, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt
     type(viscous_t), intent(in) :: viscous
@@ -336,11 +332,9 @@ contains
   !> The right side over the diagonal: all accelerations at u^n, walls with the given motions.
   subroutine right_side(grid, rho, dt, u, motion, viscous, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in) :: motion(:, :)      !! (6, bodies)
     type(viscous_t), intent(in) :: viscous    !! its y is the viscous system applied to u^n
     type(c_ismac_t), intent(inout) :: self
@@ -476,13 +470,12 @@ contains
   !> Add to u, in own cells, what advection alone changed in the last `solve_predictor`.
   subroutine advected_velocity(grid, rho, dt, viscous, self, u)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
     type(viscous_t), intent(in) :: viscous
     type(c_ismac_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [m/s]
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
     integer :: i, j, k, d, m, e(3)
     real(wp) :: rate(3)   !! of momentum [kg m/s2]
 

@@ -5,17 +5,15 @@
 !! $$ m_f = \rho_l G_f + \rho_g (Q_f - G_f) $$
 !! with Q and G the volumes of fluid and of liquid that the sweep moved, and momentum moves as
 !! `m_f u~_f`. Dividing by the mass of the cell, which saw the same volumes, keeps a uniform
-!! velocity
-!! to round-off through any interface and any opening or closing cell. u~ is the fifth-order TVD
-!! value,
-!! carried to the mean over the slab that leaves the donor; that of the donor next to the interface,
-!! and everywhere with `advection = 'upwind'`.
+!! velocity to round-off through any interface and any opening or closing cell. u~ is the
+!! fifth-order TVD value, carried to the mean over the slab that leaves the donor; that of the donor
+!! next to the interface, and everywhere with `advection = 'upwind'`.
 !! Source: consistent transport after Rudman (1998); departs from the velocity form of the paper's
 !! eq. (5), which moves water momentum into air at a density ratio of 830.
 module momentum_conservative_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
   use tvd_m, only: tvd5, scheme_of, tvd_scheme
@@ -47,8 +45,8 @@ contains
     integer :: a(3), b(3)
 
     if (present(advection)) self%scheme = scheme_of(advection)
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%carried(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%mass, source=self%carried)
@@ -69,11 +67,10 @@ contains
   subroutine momentum_begin(grid, fluid, liquid, room, c, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: liquid, room, c   !! W and Vt [m3], liquid share [-]
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)   !! [m/s]
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: i, j, k, m
     real(wp) :: least, most
@@ -102,8 +99,7 @@ contains
     type(solid_geometry_t), intent(in) :: old   !! bodies at the start of the step
     integer, intent(in) :: d
     type(liquid_transport_t), intent(inout) :: transport
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: i, j, k, m, e(3)
@@ -133,8 +129,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(liquid_transport_t), intent(inout) :: transport
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on return [m/s]
     type(momentum_t), intent(inout) :: self
     integer :: m, l, at(3)
@@ -165,13 +160,12 @@ contains
   subroutine velocity_of_momentum(grid, fluid, liquid, room, momentum, u)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: liquid, room   !! [m3]
-    real(wp), intent(in), contiguous :: momentum(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:, :)   !! [kg m/s]
-    real(wp), intent(inout), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)       !! [m/s]
+    real(wp), intent(in), contiguous :: momentum(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [kg m/s]
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
     integer :: i, j, k
     real(wp) :: mass
 
@@ -193,14 +187,11 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: q, g, room, u
-    logical, intent(in), contiguous :: mixed_near(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                  grid%lo(3) - n_halo:)
+    logical, intent(in), contiguous :: mixed_near(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: scheme
-    real(wp), intent(inout), contiguous :: carried(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                   grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
     real(wp) :: behind2, behind, donor, ahead, ahead2, courant, value
     logical :: forward

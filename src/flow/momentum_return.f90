@@ -37,15 +37,12 @@ contains
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: before, bodies   !! at the start and at the end of the step
-    real(wp), intent(in), contiguous :: u_before(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: u_before(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                    !! velocity before the stage [m/s]
-    real(wp), intent(in), contiguous :: tied(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: tied(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! part of the change that no force made (`film_velocity_m`) [m/s]
     type(flow_t), intent(inout) :: flow
-    real(wp), intent(inout), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                       grid%lo(3) - n_halo:, :), &
+    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: whole, cut
         !! work arrays: what a cell owes to its whole neighbours, or to all around [m/s]
     integer :: b, m, c(3), low(3), high(3)

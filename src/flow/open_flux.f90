@@ -11,7 +11,7 @@
 !! carried volume Vt on the right the errors of one step are made good by the next.
 module open_flux_m
   use kinds_m, only: wp, i8
-  use grid_m, only: grid_t, n_halo, unit_step, side_open, side_outflow
+  use grid_m, only: grid_t, unit_step, side_open, side_outflow
   use boundary_m, only: is_wall
   use solid_geometry_m, only: solid_geometry_t
   use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, side_at
@@ -46,14 +46,14 @@ contains
   subroutine find_open_flux(grid, old, new, room, uf, dt, self, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies before and after the step
-    real(wp), intent(in), contiguous :: room(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)   !! carried open volume [m3]
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)   !! of the open part [m/s]
+    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! carried open volume [m3]
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! of the open part [m/s]
     real(wp), intent(in) :: dt   !! [s]
     type(open_flux_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: q(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [m3]
+    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m3]
     real(wp) :: cells(1)
 
     self%iterations = 0
@@ -114,12 +114,10 @@ contains
   subroutine flux_of_velocity(grid, old, new, uf, dt, band, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in) :: dt
     type(flux_band_t), intent(inout) :: band
-    real(wp), intent(inout), contiguous :: q(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: d, i, j, k, e(3), side
     real(wp) :: w, size_of_face
     logical :: coupled
@@ -151,10 +149,8 @@ contains
   subroutine list_band(grid, new, room, q, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: new
-    real(wp), intent(in), contiguous :: room(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: q(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flux_band_t), intent(inout) :: band
     integer :: i, j, k
     real(wp) :: diagonal, outflow, room_left
@@ -210,8 +206,7 @@ contains
   subroutine correct_flux(grid, band, q)
     type(grid_t), intent(in) :: grid
     type(flux_band_t), intent(in) :: band
-    real(wp), intent(inout), contiguous :: q(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: d, i, j, k, e(3)
 
     do d = 1, 3

@@ -15,7 +15,7 @@
 module outflow_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t, is_given
-  use grid_m, only: grid_t, n_halo, side_outflow
+  use grid_m, only: grid_t, side_outflow
   use parallel_m, only: global_max
   implicit none
   private
@@ -89,10 +89,10 @@ contains
   !> The mean velocity of the start is that of the faces.
   subroutine start_outflow(grid, c, uf, sides)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)        !! C^ [-]
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)    !! lower faces [m/s]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^ [-]
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! lower faces [m/s]
     type(outflow_t), intent(inout) :: sides(2, 3)
     integer :: s, d
 
@@ -110,10 +110,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(outflow_t), intent(inout) :: sides(2, 3)
     integer :: s, d
 
@@ -136,10 +134,8 @@ contains
   subroutine gather(grid, s, d, c, uf, side)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
-    real(wp), intent(in), contiguous :: uf(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(outflow_t), intent(inout) :: side
     real(wp) :: values(2*size(side%c))
     integer :: at(3), face(3), i, j, m, n

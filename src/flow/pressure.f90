@@ -1,8 +1,7 @@
 !> C-HSMAC: pressure and velocity correction until the face velocity is free of divergence.
 !!
 !! The unknown of a pass is the pressure change phi. Fluid moves through the open part w of a face
-!! only,
-!! bodies push through the rest:
+!! only, bodies push through the rest:
 !! $$ \sum_f \frac{w_f A_f}{\rho_f h_f} (\phi_c - \phi_{nb}) + \sum_k J_k M_k^{-1} J_k^T \phi =
 !! -D_c/\Delta t $$
 !! with D the net volume outflow of a cell, fluid and solid. Symmetric and positive, so conjugate
@@ -86,8 +85,8 @@ contains
     allocate (self%rhs(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%phi, source=self%rhs)
     allocate (self%operator%is_open, source=self%rhs)
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
     allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%phi_pass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -108,10 +107,10 @@ contains
   subroutine set_pressure_system(grid, numerics, open, rho, self, sides)
     type(grid_t), intent(in) :: grid
     type(numerics_t), intent(in) :: numerics
-    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)   !! [-]
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)       !! [kg/m3]
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [-]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
     type(pressure_t), intent(inout) :: self
     type(outflow_t), intent(in), optional :: sides(2, 3)
     integer :: i, j, k, d, s, e(3), face
@@ -125,8 +124,7 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             self%operator%cf(i, j, k, d) = open(i, j, k, d)*area_over_h &
-                                           /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, &
-                                               j, k))
+              /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           end do
         end do
       end do
@@ -185,8 +183,7 @@ contains
   subroutine mark_active(grid, cf, active)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: cf(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:, :)
-    logical, intent(inout), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:)
+    logical, intent(inout), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
 
     !$omp parallel do private(i, j) schedule(static)
@@ -280,13 +277,11 @@ contains
   subroutine face_acceleration(grid, gravity, rho_w, rho, p, a, sides)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: rho_w, rho           !! [kg/m3]
-    real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)     !! [Pa], halo filled
-    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [Pa], halo filled
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(outflow_t), intent(in), optional :: sides(2, 3)
     integer :: i, j, k, d, e(3)
     logical :: heavy
@@ -298,10 +293,10 @@ contains
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
-            a(i, j, k, d) = (face_mean(rho_w(i - e(1), j - e(2), k - e(3)), rho_w(i, j, &
-                k))*gravity(d) &
-                             - (p(i, j, k) - p(i - e(1), j - e(2), k - e(3)))/grid%h(d)) &
-                            /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+            a(i, j, k, d) = &
+              (face_mean(rho_w(i - e(1), j - e(2), k - e(3)), rho_w(i, j, k))*gravity(d) &
+               - (p(i, j, k) - p(i - e(1), j - e(2), k - e(3)))/grid%h(d)) &
+              /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           end do
         end do
       end do
@@ -340,12 +335,9 @@ contains
   !> Cell vector from a face vector: mean of the two faces of each direction by their open shares.
   subroutine cell_mean_of_faces(grid, open, a_face, a_cell)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
-    real(wp), intent(in), contiguous :: a_face(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                               grid%lo(3) - n_halo:, :)
-    real(wp), intent(inout), contiguous :: a_cell(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                  grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
     real(wp) :: w_low, w_high
 
@@ -370,11 +362,9 @@ contains
   !! volume among the cells that hold moving fluid [1/s].
   subroutine divergence(grid, open, uf, solid_flux, active, outflow, largest)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:, :), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: open, uf, solid_flux
-    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:)
+    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) &
                                                    - 1:)
     real(wp), intent(out) :: largest
@@ -410,9 +400,8 @@ contains
   !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu
   !! \Delta t \sum_d h_d^{-2}) $$
   !!
-  !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt
-  !! keeps the
-  !! steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
+  !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt keeps
+  !! the steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
   !!
   !! `deviation` is what a face at the surface differed from its cells before (`face_memory_m`). It
   !! fades with viscosity like the rest that the cells do not see.
@@ -423,15 +412,14 @@ contains
   subroutine predict_face_velocity(grid, dt, rho, a_face, a_cell, flow, deviation)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:, :), &
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: a_face, a_cell
         !! accelerations already in `flow%u` [m/s2], halo of a_cell filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
-    real(wp), intent(in), contiguous, optional :: deviation(grid%lo(1) - n_halo:, grid%lo(2) &
-                                                            - n_halo:, grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous, optional :: &
+      deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     integer :: i, j, k, d, e(3)
     real(wp) :: nu
@@ -520,26 +508,23 @@ contains
   end function face_step
 
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
-  !! that
-  !! of the cell to that of the wall, where the leg through the face ends; the rest is the cell's.
+  !! that of the cell to that of the wall, where the leg through the face ends; the rest is the
+  !! cell's.
   !!
-  !! A face that opens or closes under a flat side then does so with the velocity of the wall.
-  !! With the
-  !! mean of the two cells instead, each layer of faces that the side crosses takes an impulse of
-  !! about
-  !! rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes smaller
-  !! (measured: docs/decisions/coupling.md). Along the wall the fluid slips past it: taking the
-  !! wall's
-  !! whole velocity there makes the added mass wrong by some per cent.
+  !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
+  !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
+  !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
+  !! smaller (measured: docs/decisions/coupling.md). Along the wall the fluid slips past it: taking
+  !! the wall's whole velocity there makes the added mass wrong by some per cent.
   subroutine face_velocity_at_walls(grid, solid, bodies, dt, rho, a_face, a_cell, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! motion at the start of the step
     real(wp), intent(in) :: dt                   !! [s]
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                    grid%lo(3) - n_halo:, :), contiguous :: a_face, a_cell
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: a_face, a_cell
     type(flow_t), intent(inout) :: flow
     integer :: m, d, f(3), low(3), sides
     real(wp) :: total
@@ -603,14 +588,14 @@ contains
   !> Make the face velocity free of divergence; pressure and motion of the free bodies follow.
   !!
   !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both
-  !! are
-  !! final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final motion.
+  !! are final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final
+  !! motion.
   subroutine solve_pressure(grid, numerics, solid, rho, dt, flow, bodies, self, report)
     type(grid_t), intent(in) :: grid
     type(numerics_t), intent(in) :: numerics
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
     type(rigid_motion_t), intent(inout) :: bodies
@@ -697,8 +682,7 @@ contains
   !> Add phi to the total, its gradient to the face velocity, its push to the bodies.
   subroutine add_correction(grid, rho, dt, bodies, flow, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
     type(rigid_motion_t), intent(inout) :: bodies
     type(flow_t), intent(inout) :: flow
@@ -726,16 +710,12 @@ contains
   subroutine extend_pressure(grid, gravity, rho, active, known, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
-      contiguous :: rho
-    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:)
-    integer, intent(inout), contiguous :: known(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(inout), contiguous :: known(grid%first(1):, grid%first(2):, grid%first(3):)
                                                   !! work: pass in which p was found, 0 unknown
-    real(wp), intent(inout), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)      !! [Pa]
+    real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [Pa]
     integer :: i, j, k, pass, n_found
     integer(i8) :: left(1)
     logical :: sideways

@@ -1,14 +1,13 @@
 !> The six unit motions of each body as volume fluxes through the solid parts of the cell faces.
 !!
-!! A body pushes the volume `s_f . (U, Omega)` through its part of face f. Summed over the faces
-!! of a
-!! cell this is J_k, the column of the coupled pressure equation; the same numbers, by summation by
-!! parts, turn the pressure into the paper's volume integral of -grad p over the body.
+!! A body pushes the volume `s_f . (U, Omega)` through its part of face f. Summed over the faces of
+!! a cell this is J_k, the column of the coupled pressure equation; the same numbers, by summation
+!! by parts, turn the pressure into the paper's volume integral of -grad p over the body.
 !! Source: Batty, Bertails & Bridson (2007) in the variational form, with exact face areas.
 module rigid_flux_m
   use kinds_m, only: wp
   use vectors_m, only: cross
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use boundary_m, only: gives_pressure
   use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
@@ -40,8 +39,8 @@ contains
     type(rigid_flux_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (self%slot(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%first(n + 1), source=1)
     allocate (self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(6, 0), self%work(0, 6))
@@ -62,8 +61,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    logical, intent(in), contiguous :: active(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:)   !! cell has an open face
+    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! cell has an open face
     type(rigid_flux_t), intent(inout) :: self
     integer :: b, m, d, n_entry, entry_of_body
     integer :: low(3), high(3)
@@ -86,8 +85,9 @@ contains
         call add_to_cell(high, -self%s(:, m))
       end do
       do entry_of_body = self%first(b), n_entry
-        self%slot(self%cell(1, entry_of_body), self%cell(2, entry_of_body), self%cell(3, &
-            entry_of_body)) = 0
+        associate (c => self%cell(:, entry_of_body))
+          self%slot(c(1), c(2), c(3)) = 0
+        end associate
       end do
     end do
     self%first(bodies%n + 1) = n_entry + 1
@@ -118,8 +118,8 @@ contains
 
     if (size(self%s, 2) >= n_face) return
     deallocate (self%s, self%mine, self%cell, self%j, self%work)
-    allocate (self%s(6, 2*n_face), self%mine(2*n_face), self%cell(3, 4*n_face), self%j(6, &
-        4*n_face), self%work(4*n_face, 6))
+    allocate (self%s(6, 2*n_face), self%mine(2*n_face))
+    allocate (self%cell(3, 4*n_face), self%j(6, 4*n_face), self%work(4*n_face, 6))
   end subroutine make_room
 
   !> A lower face of index i on a side of the domain where no pressure is given: what a body does
@@ -153,8 +153,7 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: self
-    real(wp), intent(out), contiguous :: flux(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:, :)
+    real(wp), intent(out), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: b, m, f(4)
 
     flux = 0.0_wp
@@ -176,8 +175,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(inout) :: self
-    real(wp), intent(in), contiguous :: p(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! [Pa], halo filled
+    real(wp), intent(in), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [Pa], halo filled
     real(wp), intent(out) :: force(:, :)
       !! (6, bodies) force, torque about the centre of mass [N, N m]
     type(outflow_t), intent(in), optional :: sides(2, 3)

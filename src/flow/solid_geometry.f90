@@ -4,7 +4,7 @@
 !! reads it, and neither room knows the other.
 module solid_geometry_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   implicit none
   private
   public :: solid_geometry_t, solid_geometry_init, no_hit
@@ -61,8 +61,8 @@ contains
     integer, intent(in), optional :: n_bodies   !! length of the lists by body
     integer :: a(3), b(3), n
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
     allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)

@@ -1,7 +1,7 @@
 !> Normal of the liquid surface in a cell, never looking through the closed faces of bodies.
 module surface_normal_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use plic_m, only: unit_normal
   implicit none
@@ -50,8 +50,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(vertical_t), intent(in) :: vertical
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! C^, halo filled
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled
     integer, intent(in) :: i, j, k
     real(wp) :: m(3)
 
@@ -72,8 +72,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: axis
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: at(3)
     real(wp) :: q(-1:1, -1:1, -1:1)
     logical :: seen(-1:1, -1:1, -1:1)

@@ -10,7 +10,7 @@
 !! thrown into water ended two runs).
 module surface_stress_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use mixture_m, only: harmonic_mean
   implicit none
   private
@@ -23,13 +23,12 @@ contains
   !! mu_f is the harmonic mean, as in the implicit stage.
   subroutine surface_stress(grid, alpha, rho, mu, u, a)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: alpha, rho, mu
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      alpha, rho, mu
       !! solid share [-], density that moves [kg/m3], viscosity [Pa s]; halo filled
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)   !! [m/s], halo filled
-    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s], halo filled
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, n, s, e(3), f(3), c(3)
     real(wp) :: change, other, total(3)
 
@@ -66,8 +65,8 @@ contains
   !> Derivative along n of the velocity component d at the lower face d of a cell [1/s].
   pure function face_gradient(grid, u, f, d, n) result(gradient)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! component d [m/s]
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! component d [m/s]
     integer, intent(in) :: f(3), d, n
     real(wp) :: gradient
     integer :: low(3), e(3)

@@ -77,8 +77,8 @@ contains
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! C^, halo filled [-]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
     type(surface_tension_t), intent(inout) :: self
     integer(i8) :: cells(1)
 
@@ -106,8 +106,8 @@ contains
     integer, parameter :: first_size = 1024
     integer :: a(3), b(3)
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     if (sigma <= 0.0_wp) return
     allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -119,8 +119,7 @@ contains
   !> Place of the surface in the columns through every cell at it.
   subroutine find_places(grid, c, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(surface_tension_t), intent(inout) :: self
     integer :: i, j, k, d, way
     real(wp) :: height
@@ -146,8 +145,7 @@ contains
   !> Does the share fall (1) or rise (-1) along direction d at a cell? 0: neither.
   pure function way_of_gas(grid, c, at, d) result(way)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: at(3), d
     integer :: way
     integer :: up(3), low(3)
@@ -164,8 +162,7 @@ contains
   subroutine curvature_from_heights(grid, solid, c, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(surface_tension_t), intent(inout) :: self
     integer :: i, j, k
     logical :: found
@@ -190,8 +187,7 @@ contains
   !> Does the surface pass through a cell or through one of its faces?
   pure function at_surface(grid, c, i, j, k) result(yes)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: i, j, k
     logical :: yes
     real(wp) :: around(6)
@@ -230,10 +226,10 @@ contains
   pure subroutine height_curvature(grid, solid, c, place, at, curvature, found)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! C^, halo filled [-]
-    real(wp), intent(in), contiguous :: place(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                              grid%lo(3) - n_halo:, :)   !! of the surface [cells]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    real(wp), intent(in), contiguous :: place(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! of the surface [cells]
     integer, intent(in) :: at(3)
     real(wp), intent(out) :: curvature   !! [1/m], 0 if not found
     logical, intent(out) :: found
@@ -278,8 +274,7 @@ contains
   !> Unit vector from the liquid to the gas at a cell, zero where there is no direction.
   pure function normal_at(grid, c, at) result(normal)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: at(3)
     real(wp) :: normal(3)
 
@@ -292,8 +287,8 @@ contains
   pure subroutine nine_heights(grid, solid, c, place, at, d, way, height, found)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: c, place
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      c, place
     integer, intent(in) :: at(3), d, way   !! 1: the gas lies above the liquid along d, -1: below
     real(wp), intent(out) :: height(-1:1, -1:1)
     logical, intent(out) :: found
@@ -331,8 +326,8 @@ contains
   !! column that knows it: upwards if the cell is full, downwards if it is empty.
   pure subroutine nearest_height(grid, c, place, at, d, way, height, found)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: c, place
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      c, place
     integer, intent(in) :: at(3), d, way
     real(wp), intent(out) :: height   !! [cells]
     logical, intent(out) :: found
@@ -390,8 +385,7 @@ contains
   !! the first empty one on the other, or to a wall. Not found if it is longer than its reach.
   pure subroutine column_height(grid, c, at, d, way, height, found)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: at(3), d, way
     real(wp), intent(out) :: height
     logical, intent(out) :: found
@@ -476,8 +470,7 @@ contains
   !> Mean of the neighbours that have heights, or the divergence of the normals.
   subroutine curvature_from_others(grid, c, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(surface_tension_t), intent(inout) :: self
     integer :: l, n
 
@@ -506,8 +499,8 @@ contains
   !! one cell.
   pure function normal_curvature(grid, c, at) result(curvature)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)   !! C^, halo filled [-]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
     integer, intent(in) :: at(3)
     real(wp) :: curvature
     real(wp) :: above(3), below(3)
@@ -526,8 +519,7 @@ contains
   subroutine force_at_faces(grid, sigma, c, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: sigma   !! [N/m]
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(surface_tension_t), intent(inout) :: self
     integer :: i, j, k, d, e(3), known
     integer :: f(3)
@@ -567,10 +559,9 @@ contains
   subroutine weight_at_faces(grid, fluid, c, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:)
-    real(wp), intent(inout), contiguous :: force(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                 grid%lo(3) - n_halo:, :)   !! [N/m3]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: force(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [N/m3]
     integer :: i, j, k, d, e(3), f(3)
     real(wp) :: weight
 
@@ -605,11 +596,10 @@ contains
   !> Add the acceleration by surface tension to that of the faces: a_f += f_f/rho_f [m/s2].
   subroutine add_tension(grid, rho, self, a)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)   !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
     type(surface_tension_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
 
     if (.not. self%acts) return

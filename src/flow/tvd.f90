@@ -1,8 +1,7 @@
 !> Fifth-order TVD value on a face.
 !!
 !! Source: Yamamoto & Daiguji (1993), compact MUSCL structure; weights 1/5 and 3/20 make the
-!! unlimited
-!! value (2, -13, 47, 27, -3)/60, fifth order, in place of their 1/6 (fourth order).
+!! unlimited value (2, -13, 47, 27, -3)/60, fifth order, in place of their 1/6 (fourth order).
 module tvd_m
   use kinds_m, only: wp
   implicit none

@@ -1,6 +1,5 @@
 !> Implicit viscosity with no-slip on the bodies: legs to the exact surface, film cells, and the
-!! body
-!! velocities as unknowns of the same system.
+!! body velocities as unknowns of the same system.
 !!
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
@@ -12,8 +11,7 @@ module viscous_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
   use vectors_m, only: cross
-  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip, &
-                    side_inflow
+  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip, side_inflow
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -72,8 +70,8 @@ contains
     type(viscous_t), intent(out) :: self
     integer :: a(3), b(3), m(3), n
 
-    a = grid%lo - n_halo
-    b = grid%hi + n_halo
+    a = grid%first
+    b = grid%last
     m = grid%hi - grid%lo + 1
     n = 2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))
     if (.not. any(abs(grid%side_velocity) > 0.0_wp)) n = 0
@@ -102,8 +100,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-                                    - n_halo:), &
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
@@ -133,8 +130,7 @@ contains
   subroutine unknown_masses(grid, solid, rho, dt, d, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in), contiguous :: rho(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                            grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
     integer, intent(in) :: d
     type(viscous_t), intent(inout) :: self
@@ -159,8 +155,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: d
     type(viscous_t), intent(inout) :: self
     integer :: i, j, k, e(3), low(3), high(3), upper(3)
@@ -184,13 +179,13 @@ contains
           high_wet = solid%inside(i, j, k) == 0
           free_leg = solid%leg_low(i, j, k, d) > 1.0_wp .and. solid%leg_high(i, j, k, d) > 1.0_wp
           if (low_wet .and. high_wet .and. free_leg) then
-            self%leg(i, j, k, d) = conductance*harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, &
-                k))
+            self%leg(i, j, k, d) = conductance &
+              *harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, k))
             call add_diagonal(low, self%leg(i, j, k, d))
             call add_diagonal(high, self%leg(i, j, k, d))
           else
-            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, &
-                j, k, d))
+            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, &
+                                       solid%leg_body_low(i, j, k, d))
             if (high_wet) call wall_leg(high, solid%leg_high(i, j, k, d), -1, &
                                         solid%leg_body_high(i, j, k, d))
           end if
@@ -263,8 +258,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
     integer :: b, m, n, c(3)
     real(wp) :: least   !! smallest sum of the areas that counts [m2]
@@ -464,14 +458,13 @@ contains
   end subroutine group_by_body
 
   !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
-  !! over
-  !! dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave out.
+  !! over dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave
+  !! out.
   subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: mu(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:)
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
     integer :: b, c, m, n
     real(wp) :: unit(6)        !! one of the six unit motions
@@ -483,11 +476,10 @@ contains
         unit = 0.0_wp
         unit(c) = 1.0_wp
         do m = self%first(b), self%first(b + 1) - 1
-          associate (i => self%cell(:, m))
+          associate (i => self%cell(:, m), arm => self%arm(:, m))
             self%work(m - self%first(b) + 1, :) = &
-              wrench(self%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, &
-                  self%arm(:, m))), &
-                     self%arm(:, m))
+              wrench(self%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, arm)), &
+                     arm)
           end associate
         end do
         self%body_matrix(:, c, b) = exact_sums(self%work(1:n, :))
@@ -499,8 +491,7 @@ contains
       end do
     end do
   contains
-    !> Integral of the viscosity of the surrounding fluid over the body, in all six places [Pa s
-    !! m3].
+    !> Integral of the fluid's viscosity over the body, in all six places [Pa s m3].
     function viscosity_times_volume(body) result(total)
       integer, intent(in) :: body
       real(wp) :: total(6)
@@ -644,8 +635,7 @@ contains
   !> Largest velocity of the fluid in own cells, of the bodies and of the sides [m/s]; never zero.
   subroutine velocity_scale(grid, u, bodies, scale)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(out) :: scale
     real(wp) :: m(1)
@@ -672,16 +662,12 @@ contains
   subroutine improve(grid, a, y, x, inverse, z, largest)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: a
-    real(wp), intent(in), contiguous :: y(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
-    real(wp), intent(inout), contiguous :: x(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
-    real(wp), intent(in), contiguous, optional :: inverse(grid%lo(1) - n_halo:, &
-                                                          grid%lo(2) - n_halo:, &
-                                                          grid%lo(3) - n_halo:, :)
-    real(wp), intent(inout), contiguous, optional :: z(grid%lo(1) - n_halo:, &
-                                                       grid%lo(2) - n_halo:, &
-                                                       grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: y(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: x(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous, optional :: &
+      inverse(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous, optional :: &
+      z(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out), optional :: largest
     integer :: i, j, k, c
     real(wp) :: most(1)
@@ -711,10 +697,8 @@ contains
   subroutine new_direction(grid, beta, z, s)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: beta
-    real(wp), intent(in), contiguous :: z(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                          grid%lo(3) - n_halo:, :)
-    real(wp), intent(inout), contiguous :: s(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(in), contiguous :: z(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: s(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, c
 
     !$omp parallel do collapse(2) private(i, j) schedule(static)
@@ -735,11 +719,9 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt
     type(viscous_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: x(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:, :)
+    real(wp), intent(inout), contiguous :: x(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in) :: x_body(:, :)
-    real(wp), intent(out), contiguous :: y(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                           grid%lo(3) - n_halo:, :)
+    real(wp), intent(out), contiguous :: y(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out) :: y_body(:, :)
     integer :: i, j, k, c, b, m
 
@@ -750,11 +732,12 @@ contains
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
             y(i, j, k, c) = self%diagonal(i, j, k, c)*x(i, j, k, c) &
-              - self%leg(i, j, k, 1)*x(i - 1, j, k, c) - self%leg(i + 1, j, k, 1)*x(i + 1, j, k, &
-                  c) &
-              - self%leg(i, j, k, 2)*x(i, j - 1, k, c) - self%leg(i, j + 1, k, 2)*x(i, j + 1, k, &
-                  c) &
-              - self%leg(i, j, k, 3)*x(i, j, k - 1, c) - self%leg(i, j, k + 1, 3)*x(i, j, k + 1, c)
+              - self%leg(i, j, k, 1)*x(i - 1, j, k, c) &
+              - self%leg(i + 1, j, k, 1)*x(i + 1, j, k, c) &
+              - self%leg(i, j, k, 2)*x(i, j - 1, k, c) &
+              - self%leg(i, j + 1, k, 2)*x(i, j + 1, k, c) &
+              - self%leg(i, j, k, 3)*x(i, j, k - 1, c) &
+              - self%leg(i, j, k + 1, 3)*x(i, j, k + 1, c)
           end do
         end do
       end do

@@ -3,7 +3,7 @@ module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
   use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t, kinetic_energy, potential_energy
@@ -160,10 +160,9 @@ contains
   pure subroutine plane_terms(grid, k, liquid, rho, alpha, u, terms)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: k
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: liquid, rho, alpha
-    real(wp), intent(in), contiguous :: u(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-      - n_halo:, :)
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      liquid, rho, alpha
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 2) [m3], [J]
     integer :: i, j, first, last, at
 

@@ -14,7 +14,7 @@ module initial_state_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, fatal, exit_files
   use case_types_m, only: case_t, fluid_t, is_given
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo, fill_velocity_halo
   use liquid_fill_m, only: liquid_volume
@@ -187,9 +187,9 @@ contains
 
     do d = 1, 3
       e = unit_step(:, d)
-      do k = grid%lo(3) - n_halo + 1, grid%hi(3) + n_halo
-        do j = grid%lo(2) - n_halo + 1, grid%hi(2) + n_halo
-          do i = grid%lo(1) - n_halo + 1, grid%hi(1) + n_halo
+      do k = grid%first(3) + 1, grid%last(3)
+        do j = grid%first(2) + 1, grid%last(2)
+          do i = grid%first(1) + 1, grid%last(1)
             flow%uf(i, j, k, d) = 0.5_wp*(flow%u(i - e(1), j - e(2), k - e(3), d) &
                                           + flow%u(i, j, k, d))
           end do

@@ -107,8 +107,8 @@ contains
 
     n = 0
     do b = 1, blocks%n
-      if (blocks%present(b) .and. .not. blocks%fixed(b) .and. norm2(blocks%v(:, &
-        b)) > rest_speed) n = n + 1
+      if (blocks%present(b) .and. .not. blocks%fixed(b) &
+          .and. norm2(blocks%v(:, b)) > rest_speed) n = n + 1
     end do
   end function count_moving
 

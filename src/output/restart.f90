@@ -243,9 +243,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
     real(wp), allocatable :: row(:)
     integer :: first(3), last(3), d
 
@@ -285,9 +285,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
     real(wp), allocatable :: row(:)
     integer :: first(3), last(3), d
 

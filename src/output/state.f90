@@ -43,9 +43,9 @@ module state_m
       type(grid_t), intent(in) :: grid
       logical, intent(in) :: faces   !! component d lives on the lower faces of direction d
       integer, intent(in) :: m       !! components
-      real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                   grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                   grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+      real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                   grid%first(2):grid%last(2), &
+                                   grid%first(3):grid%last(3), m)
     end subroutine visit_cells
 
     !> Reals that are the same on every process.
@@ -248,8 +248,7 @@ contains
   !> Elements first:last of an array with halo, in a row, x fastest.
   pure subroutine pack_part(grid, a, first, last, row)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-      - n_halo:)
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: first(3), last(3)
     real(wp), intent(out) :: row(:)
     integer :: j, k, n, at
@@ -269,8 +268,7 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: row(:)
     integer, intent(in) :: first(3), last(3)
-    real(wp), intent(inout), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                             grid%lo(3) - n_halo:)
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: j, k, n, at
 
     n = last(1) - first(1) + 1

@@ -6,7 +6,7 @@ module state_visitors_m
   use errors_m, only: to_text
   use parallel_m, only: global_sum, global_min
   use checksum_m, only: checksum_t
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use state_m, only: state_visitor_t, owned_part, pack_part
   implicit none
   private
@@ -59,9 +59,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
     integer(i8) :: halves(2)
 
     call self%sum%add_text(name//units)
@@ -75,9 +75,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(in) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                              grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                              grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(in) :: a(grid%first(1):grid%last(1), &
+                              grid%first(2):grid%last(2), &
+                              grid%first(3):grid%last(3), m)
     integer(i8) :: halves(2)   !! of the lower and the upper 32 bits
     integer(i8), parameter :: lower_half = 2_i8**32 - 1_i8
     integer(i8) :: place, bits
@@ -136,9 +136,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
     real(wp) :: place(1)   !! number of the first bad element; whole, exact below 2**53
     integer :: first(3), last(3), d, i, j, k, at
 
@@ -209,9 +209,9 @@ contains
     type(grid_t), intent(in) :: grid
     logical, intent(in) :: faces
     integer, intent(in) :: m
-    real(wp), intent(inout) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                                 grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                                 grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
     real(wp), allocatable :: row(:)
     integer :: first(3), last(3), d
 

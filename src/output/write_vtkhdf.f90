@@ -9,7 +9,7 @@ module write_vtkhdf_m
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
   use vectors_m, only: cross, rotation_matrix
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
@@ -212,10 +212,10 @@ contains
   !> Share of liquid in the fluid of each cell; in cells without fluid the extended share.
   pure subroutine liquid_share(grid, liquid, room, c, values)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous, dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                                grid%lo(3) - n_halo:) :: liquid, room   !! [m3]
-    real(wp), intent(in), contiguous :: c(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-      - n_halo:)
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      liquid, room
+      !! [m3]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     real(sp), intent(out) :: values(:)
     real(wp), parameter :: no_room = 1.0e-9_wp   !! of the cell volume
     integer :: i, j, k, m
@@ -238,8 +238,7 @@ contains
   !> The cells of this process in single precision, in a row.
   pure subroutine single(grid, a, values)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-      - n_halo:)
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     real(sp), intent(out) :: values(:)
     integer :: i, j, k, m
 
@@ -257,8 +256,7 @@ contains
   !> The same for a vector, its components next to one another.
   pure subroutine single_vector(grid, a, values)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: a(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, grid%lo(3) &
-      - n_halo:, :)
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(sp), intent(out) :: values(:)
     integer :: i, j, k, m
 

@@ -2,7 +2,7 @@
 !! bodies.
 module box_solid_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, unit_step, side_slip, side_open, side_periodic
+  use grid_m, only: grid_t, unit_step, side_slip, side_open, side_periodic
   use parallel_m, only: decompose
   use solid_geometry_m, only: solid_geometry_t
   implicit none
@@ -47,9 +47,9 @@ contains
     call set_tetrahedra(low, high, solid)
     solid%n_cut = 0
     solid%cut = 0
-    do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
-      do j = grid%lo(2) - n_halo, grid%hi(2) + n_halo
-        do i = grid%lo(1) - n_halo, grid%hi(1) + n_halo
+    do k = grid%first(3), grid%last(3)
+      do j = grid%first(2), grid%last(2)
+        do i = grid%first(1), grid%last(1)
           cover = 0.0_wp
           do b = 1, size(low, 2)
             cover = cover + product(inside([i, j, k], b))

@@ -2,7 +2,7 @@
 module sample_state_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
-  use grid_m, only: grid_t, grid_init, n_halo
+  use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use tet_mesh_m, only: shape_t
@@ -134,15 +134,15 @@ contains
     real(wp), intent(in) :: start
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: m
-    real(wp), intent(out) :: a(grid%lo(1) - n_halo:grid%hi(1) + n_halo, &
-                               grid%lo(2) - n_halo:grid%hi(2) + n_halo, &
-                               grid%lo(3) - n_halo:grid%hi(3) + n_halo, m)
+    real(wp), intent(out) :: a(grid%first(1):grid%last(1), &
+                               grid%first(2):grid%last(2), &
+                               grid%first(3):grid%last(3), m)
     integer :: i, j, k, d, e, cell(3)
 
     do d = 1, m
-      do k = grid%lo(3) - n_halo, grid%hi(3) + n_halo
-        do j = grid%lo(2) - n_halo, grid%hi(2) + n_halo
-          do i = grid%lo(1) - n_halo, grid%hi(1) + n_halo
+      do k = grid%first(3), grid%last(3)
+        do j = grid%first(2), grid%last(2)
+          do i = grid%first(1), grid%last(1)
             cell = [i, j, k]
             do e = 1, 3
               if (grid%periodic(e)) cell(e) = modulo(cell(e) - 1, grid%n(e)) + 1

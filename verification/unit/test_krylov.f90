@@ -132,8 +132,7 @@ contains
     integer :: m, q
 
     whole = grid
-    whole%lo = 1
-    whole%hi = grid%n
+    call whole%own([1, 1, 1], grid%n)
     whole%at_side = .true.
     call set_random(whole, seed, op)
     call set_right_side(whole, op, b)

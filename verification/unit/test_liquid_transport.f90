@@ -2,7 +2,7 @@
 program test_liquid_transport
   use kinds_m, only: wp, pi
   use case_types_m, only: case_t, fluid_t, water_t
-  use grid_m, only: grid_t, n_halo, side_slip
+  use grid_m, only: grid_t, side_slip
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
@@ -64,8 +64,7 @@ contains
   !> Liquid that is in one field but not in the other [m3].
   function misplaced(grid, liquid, other) result(volume)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%lo(1) - n_halo:, grid%lo(2) - n_halo:, &
-                                    grid%lo(3) - n_halo:) :: liquid, other
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: liquid, other
     real(wp) :: volume
 
     associate (a => grid%lo, b => grid%hi)

@@ -197,7 +197,7 @@ contains
     real(wp) :: cf(0:2, 0:2, 0:2, 3), r(3, 3, 3), z(3, 3, 3)
 
     grid%n = 1
-    grid%hi = 1
+    call grid%own([1, 1, 1], grid%n)
     grid%h = 1.0_wp
     cf = 0.0_wp
     cf(1, 1, 2, 3) = 4.0_wp

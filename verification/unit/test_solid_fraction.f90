@@ -66,8 +66,7 @@ contains
     type(grid_t) :: grid
 
     grid%n = n
-    grid%lo = 1
-    grid%hi = n
+    call grid%own([1, 1, 1], n)
     grid%length = length
     grid%h = length/real(n, wp)
     if (present(origin)) grid%origin = origin
@@ -718,7 +717,7 @@ contains
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: whole, piece
     real(wp) :: x(3, 3), q(4, 3)
-    integer :: a(3), b(3), i, c
+    integer :: lo(3), a(3), b(3), i, c
     logical :: same, tets
 
     grid = make_grid([32, 16, 24], [0.16_wp, 0.08_wp, 0.12_wp])
@@ -732,11 +731,11 @@ contains
     tets = .true.
     do i = 0, 3
       part = grid
-      part%lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
-      part%hi = part%lo + [15, 15, 11]
+      lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
+      call part%own(lo, lo + [15, 15, 11])
       call fill(part, blocks, piece)
-      a = part%lo - n_halo
-      b = part%hi + n_halo
+      a = part%first
+      b = part%last
       associate (low => max(a, 1), high => min(b, grid%n))
         same = same .and. all(abs(piece%alpha(low(1):high(1), low(2):high(2), low(3):high(3)) - &
                                   whole%alpha(low(1):high(1), low(2):high(2), low(3):high(3))) <= 0)

@@ -132,8 +132,7 @@ contains
     call make_sample(0.0_wp, .false., s)
     mine = checksum_of_cells(s%grid, .true., 3, s%flow%uf)
     whole = s%grid
-    whole%lo = 1
-    whole%hi = whole%n
+    call whole%own([1, 1, 1], whole%n)
     allocate (a(1 - n_halo:whole%n(1) + n_halo, 1 - n_halo:whole%n(2) + n_halo, 1 &
       - n_halo:whole%n(3) + n_halo, 3))
     call fill_cells(0.3_wp, whole, 3, a)

@@ -3,7 +3,7 @@
 program test_surface_tension
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t, n_halo, unit_step
+  use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use boundary_m, only: fill_scalar_halo
   use parallel_m, only: parallel_init, parallel_final, global_max
@@ -329,8 +329,8 @@ contains
     call place(block)
     associate (g => block%grid)
       allocate (p, source=block%solid%alpha)
-      allocate (active(g%lo(1) - n_halo:g%hi(1) + n_halo, g%lo(2) - n_halo:g%hi(2) + n_halo, &
-                       g%lo(3) - n_halo:g%hi(3) + n_halo), source=.true.)
+      allocate (active(g%first(1):g%last(1), g%first(2):g%last(2), &
+                       g%first(3):g%last(3)), source=.true.)
       do k = lbound(p, 3), ubound(p, 3)
         do j = lbound(p, 2), ubound(p, 2)
           do i = lbound(p, 1), ubound(p, 1)
