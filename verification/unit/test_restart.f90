@@ -3,7 +3,6 @@
 program test_restart
   use kinds_m, only: wp
   use parallel_m, only: parallel_init, parallel_final, is_root, broadcast
-  use grid_m, only: n_halo
   use hdf5_file_m, only: h5_file_t
   use restart_m, only: write_restart, read_restart
   use state_m, only: visit_state
