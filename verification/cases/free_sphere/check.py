@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("numerics momentum", "numerics solid_fraction", "numerics pressure_solver")  # of one run
 THEORY_BAND, STEP_BAND = 0.02, 0.01
 
 

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("numerics divergence_tolerance",)
 CAPILLARY_BAND = 1e-8  # max|u| mu/sigma
 JUMP_BAND = 0.01
 SHAPES = {"plane": (0.004, 1), "space": (0.007, 2)}  # radius [m], curvature times radius

@@ -14,7 +14,13 @@ from micstools.buoyancy import buoyancy_rows  # noqa: E402
 from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
-VARIES = ("numerics divergence_tolerance",)
+VARIES = (  # every way to compute keeps still water still
+    "numerics divergence_tolerance",
+    "numerics coupling",
+    "numerics momentum",
+    "numerics solid_fraction",
+    "numerics pressure_solver",
+)
 SPEED_BAND = {1e-6: 1e-6, 1e-10: 1e-9}  # divergence tolerance [1/s]: largest speed [m/s]
 
 

@@ -14,6 +14,7 @@ from micstools.checks import Checks, main, sound  # noqa: E402
 from micstools.profiles import table  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
+VARIES = ("numerics momentum",)
 AMPLITUDE_BAND, BAND_CELLS = 0.01, 32
 LEAST_ORDER = {"cells": 1.9, "courant": 1.9, "ismac": 1.9, "long": 0.9}
 LABEL = {
