@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 import numpy as np  # noqa: E402
 from matplotlib import pyplot as plt  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.ticker import LogLocator, MaxNLocator  # noqa: E402
 
 from micstools.checks import Checks, Figure, Result, Study  # noqa: E402
 from micstools.reader import Run  # noqa: E402
@@ -192,6 +193,10 @@ def draw_study(study: Study) -> str:
             axes.loglog(cells[shown], slope, style, color="#999999", label=f"order {order}")
         axes.legend(fontsize=8, frameon=False)
     axes.set_xticks(cells, [f"{c:g}" for c in cells])
+    low, high = axes.get_ylim()
+    narrow = high < 10 * low  # perhaps without a power of ten to label
+    axes.yaxis.set_major_locator(MaxNLocator(4) if narrow else LogLocator())
+    axes.yaxis.set_major_formatter("{x:.2g}")
     axes.minorticks_off()
     return _svg(figure)
 
