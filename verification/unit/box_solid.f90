@@ -20,7 +20,7 @@ contains
     real(wp), intent(in) :: length(3)   !! [m]
     type(grid_t), intent(out) :: grid
     logical, intent(in), optional :: periodic(3)
-    integer :: d
+    integer :: d, lo(3), hi(3)
 
     grid%n = n
     grid%length = length
@@ -33,7 +33,8 @@ contains
     do d = 1, 3
       if (grid%periodic(d)) grid%side(:, d) = side_periodic
     end do
-    call decompose(n, grid%periodic, grid%lo, grid%hi, grid%at_side)
+    call decompose(n, grid%periodic, lo, hi, grid%at_side)
+    call grid%own(lo, hi)
   end subroutine simple_grid
 
   !> Fill shares, open faces and tetrahedra of boxes that do not overlap.
