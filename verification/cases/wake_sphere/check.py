@@ -41,7 +41,7 @@ def check(runs: list[Run]) -> Checks:
         drift = float(speed[before].mean()) / speeds[cells] - 1
         checks.below(f"{name}: change of speed over the last two tenths", drift, 0.005)
         ripple = float(np.ptp(speed[late])) / speeds[cells]
-        checks.below(f"{name}: ripple of the speed in the last tenth", ripple, 0.01, cells > 14)
+        checks.below(f"{name}: ripple of the speed in the last tenth", ripple, 0.01)
         tilted = float(np.abs(b.velocity[late, 0, :2]).max() / unit)
         checks.below(f"{name}: sideways speed", tilted, 0.01)
         curves[name] = (b.time * unit / diameter, speed)
