@@ -4,7 +4,7 @@ program test_state
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan, ieee_positive_inf
   use kinds_m, only: wp, i8
   use parallel_m, only: parallel_init, parallel_final, nproc, my_rank
-  use grid_m, only: grid_t, n_halo
+  use grid_m, only: grid_t
   use state_m, only: visit_state, owned_part, pack_part, unpack_part
   use state_visitors_m, only: checksum_visitor_t, finite_visitor_t, image_visitor_t, &
     checksum_of_cells
@@ -133,8 +133,8 @@ contains
     mine = checksum_of_cells(s%grid, .true., 3, s%flow%uf)
     whole = s%grid
     call whole%own([1, 1, 1], whole%n)
-    allocate (a(1 - n_halo:whole%n(1) + n_halo, 1 - n_halo:whole%n(2) + n_halo, 1 &
-      - n_halo:whole%n(3) + n_halo, 3))
+    allocate (a(whole%first(1):whole%last(1), whole%first(2):whole%last(2), &
+                whole%first(3):whole%last(3), 3))
     call fill_cells(0.3_wp, whole, 3, a)
     all_cells = checksum_of_cells(whole, .true., 3, a)   ! every process adds all of it
     call check('the checksum does not know the processes', all(mine*nproc() == all_cells))
