@@ -9,6 +9,8 @@ LTO := -flto=auto -ffat-lto-objects
 OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \
   -ffpe-trap=invalid,zero,overflow
 FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
+# Without fused multiply-add the results do not depend on what the compiler happens to fuse.
+FFLAGS += -ffp-contract=off
 FFLAGS += $(if $(CI),-Werror)
 PYTHON := .venv/bin/python
 CASE := input/blocks.nml

@@ -19,16 +19,15 @@ module buoyancy_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t, nearest_arm
-  use mixture_m, only: face_mean
+  use mixture_m, only: face_mean, pure_share
   use plic_m, only: unit_constant
   use surface_normal_m, only: surface_normal, vertical_of
-  use polyhedron_m, only: box_clip_moments_below
+  use polyhedron_m, only: polyhedron_t, polyhedron_of_box, polyhedron_moments_below, &
+                          box_clip_moments_below
   use exact_sum_m, only: exact_sums
   implicit none
   private
   public :: buoyancy_t, buoyancy_init, displaced_force, displaced_fluid, uncounted_fluid
-
-  real(wp), parameter :: pure_share = 1.0e-12_wp   !! shares this close to 0 or 1 have no surface
 
   type :: buoyancy_t
     real(wp), allocatable :: work(:, :)   !! (*, 12) terms of the sums
@@ -126,16 +125,14 @@ contains
       i = solid%cell(:, m)
       if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
       share = c(i(1), i(2), i(3))
-      if (share > 1.0_wp - pure_share) share = 1.0_wp
-      if (share < pure_share) share = 0.0_wp
       n = n + 1
       associate (volume => solid%cell_alpha(m)*grid%volume, &
                  arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)), &
                  gas => fluid%gas_density, more => fluid%liquid_density - fluid%gas_density)
-        if (share > 0.0_wp .and. share < 1.0_wp) then
+        if (share > pure_share .and. share < 1.0_wp - pure_share) then
           call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
                                                        c, i(1), i(2), i(3)), &
-                           share, bodies%x(:, b), b, i, liquid, liquid_moment)
+                           share, bodies%x(:, b), m, liquid, liquid_moment)
         else
           liquid = share*volume
           liquid_moment = liquid*arm
@@ -149,37 +146,41 @@ contains
     moment = total(2:4)
   end subroutine displaced_fluid
 
-  !> Volume and first moment about x of what lies below the liquid plane of body b in cell i.
-  pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, b, i, volume, moment)
+  !> Volume and first moment, about the centre of mass x of the body, of what lies below the liquid
+  !! plane in entry m of the list of its cells: of the tetrahedra that reach into a cut cell, of the
+  !! whole cell where the body fills it.
+  pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, m, volume, moment)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: normal_of_cube(3)  !! of the surface, on the unit cube
     real(wp), intent(in) :: share              !! liquid share of the full cell [-]
     real(wp), intent(in) :: x(3)               !! [m]
-    integer, intent(in) :: b, i(3)
+    integer, intent(in) :: m
     real(wp), intent(out) :: volume, moment(3) !! [m3, m4]
-    real(wp) :: lower(3), normal(3), d, part, part_moment(3), image(3)
-    integer :: t, a
+    real(wp) :: lower(3), upper(3), normal(3), d, part, part_moment(3)
+    type(polyhedron_t) :: cell
+    integer :: a, n
 
-    do a = 1, 3
-      lower(a) = grid%face(i(a), a)
-    end do
+    lower = [(grid%face(solid%cell(a, m), a), a=1, 3)]
+    upper = lower + grid%h
     normal = normal_of_cube/grid%h
     d = unit_constant(normal_of_cube, share) + dot_product(normal, lower)
     volume = 0.0_wp
     moment = 0.0_wp
-    image = lower + 0.5_wp*grid%h - x
-    image = image - nearest_arm(grid, lower + 0.5_wp*grid%h, x)   ! period between body and cell
-    do t = solid%body_tet(b), solid%body_tet(b + 1) - 1
-      associate (corner => solid%corner(:, :, t))
-        if (any(maxval(corner, 2) + image < lower) .or. any(minval(corner, 2) + image > lower &
-                                                            + grid%h)) cycle
-        call box_clip_moments_below(corner + spread(image, 2, 4), lower, lower + grid%h, normal, &
-                                    d, part, part_moment)
-      end associate
+    do n = solid%cell_tet(1, m), solid%cell_tet(2, m)
+      call box_clip_moments_below(solid%corner(:, :, solid%tet(n)), lower, upper, normal, d, part, &
+                                  part_moment)
       volume = volume + part
-      moment = moment + part_moment - part*(x + image)
+      moment = moment + part_moment
     end do
+    if (solid%cell_tet(2, m) < solid%cell_tet(1, m)) then
+      call polyhedron_of_box(lower, upper, cell)
+      call polyhedron_moments_below(cell, normal, d, volume, moment)
+      volume = volume*solid%cell_alpha(m)   ! less than one where bodies share a full cell
+      moment = moment*solid%cell_alpha(m)
+    end if
+    lower = solid%cell_centroid(:, m)
+    moment = moment - volume*(lower - nearest_arm(grid, lower, x))   ! about the nearest image of x
   end subroutine liquid_part
 
   !> What the faces count of the fluid in the place of body b, rho_f h times the flux of the unit

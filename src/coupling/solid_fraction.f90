@@ -245,9 +245,10 @@ contains
     if (size(solid%cell_alpha) < cells) then
       cells = max(cells, 2*size(solid%cell_alpha))
       deallocate (solid%cell, solid%cell_alpha, solid%cell_centroid, solid%cut_cell, solid%first)
-      deallocate (solid%closed_cell)
+      deallocate (solid%closed_cell, solid%cell_tet)
       allocate (solid%cell(3, cells), solid%cell_alpha(cells), solid%cell_centroid(3, cells))
       allocate (solid%cut_cell(3, cells), solid%first(cells + 1), solid%closed_cell(3, cells))
+      allocate (solid%cell_tet(2, cells))
     end if
     if (size(self%source, 2) < cells) then
       deallocate (self%source)
@@ -551,12 +552,14 @@ contains
     end if
     do b = size(self%body), 1, -1
       do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
+        solid%cell_tet(:, e) = [1, 0]
         m = number_of_cut(e)
         if (m == 0) cycle
         n = self%source(1, e)
         from = self%body(b)%first_tet(n)
         to = self%body(b)%first_tet(n + 1) - 1
         solid%first(m) = solid%first(m) - (to - from + 1)
+        solid%cell_tet(:, e) = solid%first(m) + [0, to - from]
         do t = from, to
           solid%tet(solid%first(m) + t - from) = self%body(b)%tet(t) + self%source(2, e)
         end do

@@ -5,7 +5,13 @@ module mixture_m
   use fields_m, only: flow_t
   implicit none
   private
-  public :: mix_fluid, face_mean, harmonic_mean
+  public :: mix_fluid, face_mean, harmonic_mean, pure_share
+
+  !> Liquid shares this close to 0 or 1 are those of one phase: the transport leaves shares off by
+  !! its round-off and by what it clips, some 1e-7 of a cell, all through water and air, and a
+  !! surface there would be made of noise. What such a cell holds still counts in full; only the
+  !! place of its surface is not asked for.
+  real(wp), parameter :: pure_share = 1.0e-6_wp
 
 contains
 

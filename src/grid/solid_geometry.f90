@@ -38,6 +38,7 @@ module solid_geometry_m
     integer, allocatable :: cell(:, :)          !! (3, *) cell index
     real(wp), allocatable :: cell_alpha(:)      !! share of the cell volume [-]
     real(wp), allocatable :: cell_centroid(:, :) !! (3, *) centroid of the solid part [m]
+    integer, allocatable :: cell_tet(:, :)      !! (2, *) its own range of `tet`; none if not cut
     !> Per body b: faces `body_face(b):body_face(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_face(:)
     integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
@@ -76,7 +77,8 @@ contains
     n = 0
     if (present(n_bodies)) n = n_bodies
     allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%body_tet(n + 1), source=1)
-    allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
+    allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0), &
+              solid%cell_tet(2, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
     allocate (solid%leg(4, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init

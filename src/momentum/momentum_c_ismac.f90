@@ -29,7 +29,7 @@ module momentum_c_ismac_m
   use grid_m, only: grid_t, unit_step, side_inflow
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
-  use tvd_m, only: tvd5, scheme_of, tvd_scheme
+  use tvd_m, only: face_values, scheme_of, tvd_scheme
   use viscous_m, only: viscous_t, apply_viscous, force_of_legs, velocity_scale, inertial_momentum, &
                        wrench
   use krylov_m, only: linear_operator_t, identity_t, krylov_work_t, krylov_init, bicgstab, solved
@@ -140,7 +140,7 @@ contains
     do m = 1, 3
       do d = 1, 3
         e = unit_step(:, d)
-        call face_values(grid, e, self%q(:, :, :, d), u(:, :, :, m), self%scheme, self%face)
+        call face_values(grid, self%scheme, e, self%q(:, :, :, d), u(:, :, :, m), self%face)
         !$omp parallel do private(i, j) schedule(static)
         do k = grid%lo(3), grid%hi(3)
           do j = grid%lo(2), grid%hi(2)
@@ -155,39 +155,6 @@ contains
       end do
     end do
   end subroutine begin_predictor
-
-  !> Values u~ on the lower faces in one direction, from the side where the fluid comes from.
-  subroutine face_values(grid, e, q, u, scheme, face)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: q, u
-    integer, intent(in) :: scheme
-    real(wp), intent(inout), contiguous :: face(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
-    logical :: forward
-
-    !$omp parallel do private(i, j, forward) schedule(static)
-    do k = grid%lo(3), grid%hi(3) + e(3)
-      do j = grid%lo(2), grid%hi(2) + e(2)
-        do i = grid%lo(1), grid%hi(1) + e(1)
-          forward = q(i, j, k) > 0.0_wp
-          associate (u_3 => u(i - 3*e(1), j - 3*e(2), k - 3*e(3)), &
-                     u_2 => u(i - 2*e(1), j - 2*e(2), k - 2*e(3)), &
-                     u_1 => u(i - e(1), j - e(2), k - e(3)), v_1 => u(i, j, k), &
-                     v_2 => u(i + e(1), j + e(2), k + e(3)), &
-                     v_3 => u(i + 2*e(1), j + 2*e(2), k + 2*e(3)))
-            face(i, j, k) = merge(u_1, v_1, forward)
-            if (scheme == tvd_scheme) then
-              face(i, j, k) = tvd5(merge(u_3, v_3, forward), merge(u_2, v_2, forward), &
-                                   merge(u_1, v_1, forward), merge(v_1, u_1, forward), &
-                                   merge(v_2, u_2, forward))
-            end if
-          end associate
-        end do
-      end do
-    end do
-  end subroutine face_values
 
   !> Solve for the velocity u*, in place, together with the motion of the free bodies.
   !!

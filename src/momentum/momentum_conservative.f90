@@ -16,13 +16,12 @@ module momentum_conservative_m
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
-  use tvd_m, only: tvd5, scheme_of, tvd_scheme
+  use mixture_m, only: pure_share
+  use tvd_m, only: face_values, scheme_of, tvd_scheme
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells, late_values, move_late
   implicit none
   private
   public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_late, mass_through
-
-  real(wp), parameter :: pure_share = 1.0e-6_wp   !! shares this close count as one phase
 
   type :: momentum_t
     integer :: scheme = tvd_scheme                  !! of the carried velocity
@@ -107,9 +106,7 @@ contains
     e = unit_step(:, d)
     call sweep(grid, old, d, transport)
     do m = 1, 3
-      call carried_momentum(grid, fluid, e, transport%q(:, :, :, d), transport%g(:, :, :, d), &
-                            transport%v_before, u(:, :, :, m), self%mixed_near, self%scheme, &
-                            self%carried)
+      call carried_momentum(grid, fluid, transport, d, u(:, :, :, m), self)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
@@ -181,50 +178,41 @@ contains
     call fill_velocity_halo(grid, u)
   end subroutine velocity_of_momentum
 
-  !> Momentum through the lower faces: mass times the mean velocity of the slab that leaves the
-  !! donor.
-  subroutine carried_momentum(grid, fluid, e, q, g, room, u, mixed_near, scheme, carried)
+  !> Momentum through the lower faces in direction d: mass times the mean velocity of the slab that
+  !! leaves the donor.
+  subroutine carried_momentum(grid, fluid, transport, d, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: q, g, room, u
-    logical, intent(in), contiguous :: mixed_near(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(in) :: scheme
-    real(wp), intent(inout), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
-    real(wp) :: behind2, behind, donor, ahead, ahead2, courant, value
-    logical :: forward
+    type(liquid_transport_t), intent(in) :: transport
+    integer, intent(in) :: d
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! one component [m/s]
+    type(momentum_t), intent(inout) :: self
+    integer :: i, j, k, e(3)
+    real(wp) :: donor, room, value
+    logical :: forward, mixed
 
-    !$omp parallel do private(i, j, behind2, behind, donor, ahead, ahead2, courant, value, &
-    !$omp& forward) &
-    !$omp& schedule(static)
-    do k = grid%lo(3), grid%hi(3) + e(3)
-      do j = grid%lo(2), grid%hi(2) + e(2)
-        do i = grid%lo(1), grid%hi(1) + e(1)
-          forward = q(i, j, k) > 0.0_wp
-          associate (u_3 => u(i - 3*e(1), j - 3*e(2), k - 3*e(3)), u_2 => u(i - 2*e(1), j &
-              - 2*e(2), k - 2*e(3)), &
-                     u_1 => u(i - e(1), j - e(2), k - e(3)), v_1 => u(i, j, k), &
-                     v_2 => u(i + e(1), j + e(2), k + e(3)), v_3 => u(i + 2*e(1), j + 2*e(2), k &
-                         + 2*e(3)))
-            behind2 = merge(u_3, v_3, forward)
-            behind = merge(u_2, v_2, forward)
-            donor = merge(u_1, v_1, forward)
-            ahead = merge(v_1, u_1, forward)
-            ahead2 = merge(v_2, u_2, forward)
-          end associate
-          courant = abs(q(i, j, k))/max(merge(room(i - e(1), j - e(2), k - e(3)), room(i, j, k), &
-                                              forward), &
-                                        tiny(1.0_wp))
-          value = tvd5(behind2, behind, donor, ahead, ahead2)
-          value = donor + max(0.0_wp, 1.0_wp - courant)*(value - donor)
-          if (scheme /= tvd_scheme .or. merge(mixed_near(i - e(1), j - e(2), k - e(3)), &
-                                              mixed_near(i, j, k), forward)) value = donor
-          carried(i, j, k) = mass_through(fluid, q(i, j, k), g(i, j, k))*value
+    e = unit_step(:, d)
+    associate (q => transport%q, g => transport%g, v => transport%v_before, &
+               near => self%mixed_near, carried => self%carried)
+      call face_values(grid, self%scheme, e, q(:, :, :, d), u, carried)
+      !$omp parallel do private(i, j, donor, room, value, forward, mixed) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          !$omp simd private(donor, room, value, forward, mixed)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            forward = q(i, j, k, d) > 0.0_wp
+            donor = merge(u(i - e(1), j - e(2), k - e(3)), u(i, j, k), forward)
+            room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
+            mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
+            value = max(0.0_wp, 1.0_wp - abs(q(i, j, k, d))/max(room, tiny(room))) &
+                    *(carried(i, j, k) - donor)
+            carried(i, j, k) = mass_through(fluid, q(i, j, k, d), g(i, j, k, d)) &
+                               *(donor + merge(0.0_wp, value, mixed))
+          end do
         end do
       end do
-    end do
+    end associate
   end subroutine carried_momentum
 
 end module momentum_conservative_m

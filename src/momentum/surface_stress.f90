@@ -11,7 +11,7 @@
 module surface_stress_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
-  use mixture_m, only: harmonic_mean
+  use mixture_m, only: harmonic_mean, pure_share
   implicit none
   private
   public :: surface_stress
@@ -39,16 +39,16 @@ contains
           c = [i, j, k]
           total = 0.0_wp
           a(i, j, k, :) = 0.0_wp
-          if (.not. any(abs(mu(i - 1:i + 1, j, k) - mu(i, j, k)) > 0.0_wp) .and. &
-              .not. any(abs(mu(i, j - 1:j + 1, k) - mu(i, j, k)) > 0.0_wp) .and. &
-              .not. any(abs(mu(i, j, k - 1:k + 1) - mu(i, j, k)) > 0.0_wp)) cycle
+          change = max(abs(mu(i - 1, j, k) - mu(i, j, k)), abs(mu(i + 1, j, k) - mu(i, j, k)), &
+                       abs(mu(i, j - 1, k) - mu(i, j, k)), abs(mu(i, j + 1, k) - mu(i, j, k)), &
+                       abs(mu(i, j, k - 1) - mu(i, j, k)), abs(mu(i, j, k + 1) - mu(i, j, k)))
+          if (change <= pure_share*mu(i, j, k)) cycle
           if (any(alpha(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) > 0.0_wp)) cycle
           do d = 1, 3
             e = unit_step(:, d)
             do s = 0, 1
               f = c + s*e
               other = mu(i + (2*s - 1)*e(1), j + (2*s - 1)*e(2), k + (2*s - 1)*e(3))
-              if (.not. abs(other - mu(i, j, k)) > 0.0_wp) cycle
               change = real(2*s - 1, wp)*(harmonic_mean(mu(i, j, k), other) - mu(i, j, k)) &
                        /grid%h(d)
               do n = 1, 3

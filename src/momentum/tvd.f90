@@ -4,9 +4,10 @@
 !! unlimited value (2, -13, 47, 27, -3)/60, fifth order, in place of their 1/6 (fourth order).
 module tvd_m
   use kinds_m, only: wp
+  use grid_m, only: grid_t
   implicit none
   private
-  public :: tvd5, scheme_of, tvd_scheme, upwind_scheme
+  public :: tvd5, face_values, scheme_of, tvd_scheme, upwind_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell
@@ -23,6 +24,54 @@ contains
 
     scheme = merge(upwind_scheme, tvd_scheme, trim(name) == 'upwind')
   end function scheme_of
+
+  !> Values on the lower faces in one direction, from the side where the fluid comes from.
+  subroutine face_values(grid, scheme, e, q, u, face)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: scheme   !! `tvd_scheme` | `upwind_scheme`
+    integer, intent(in) :: e(3)     !! step along the direction
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: q, u            !! flux through the lower face, any unit; what is carried
+    real(wp), intent(inout), contiguous :: face(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! own lower faces and the upper ones of the last cells
+    integer :: i, j, k, n
+
+    i = grid%lo(1)
+    n = grid%hi(1) + e(1)
+    !$omp parallel do private(j) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        associate (u_1 => u(i - e(1):n - e(1), j - e(2), k - e(3)), v_1 => u(i:n, j, k))
+          if (scheme == upwind_scheme) then
+            face(i:n, j, k) = merge(u_1, v_1, q(i:n, j, k) > 0.0_wp)
+          else
+            call tvd5_row(n - i + 1, q(i:n, j, k), &
+                          u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
+                          u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
+                          u(i + e(1):n + e(1), j + e(2), k + e(3)), &
+                          u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face(i:n, j, k))
+          end if
+        end associate
+      end do
+    end do
+  end subroutine face_values
+
+  !> Values on n faces, each between the cells u_3, u_2, u_1 below and v_1, v_2, v_3 above it.
+  pure subroutine tvd5_row(n, q, u_3, u_2, u_1, v_1, v_2, v_3, face)
+    integer, intent(in) :: n
+    real(wp), intent(in), dimension(n) :: q, u_3, u_2, u_1, v_1, v_2, v_3
+    real(wp), intent(inout) :: face(n)
+    integer :: i
+    logical :: forward
+
+    !$omp simd private(forward)
+    do i = 1, n
+      forward = q(i) > 0.0_wp
+      face(i) = tvd5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
+                     merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
+                     merge(v_2(i), u_2(i), forward))
+    end do
+  end subroutine tvd5_row
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
   !!
