@@ -18,7 +18,7 @@ module time_step_m
   use extended_fraction_m, only: extend_fraction
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
-  use mid_step_m, only: to_mid_step, from_mid_step
+  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, from_mid_step
   use mixture_m, only: mix_fluid
   use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
@@ -57,6 +57,7 @@ module time_step_m
     type(solid_fraction_t) :: fraction
     type(liquid_transport_t) :: transport
     type(momentum_t) :: momentum
+    type(mid_step_t) :: mid_step
     type(stage_t) :: stage
     type(blocks_t) :: blocks
     type(walls_t) :: walls
@@ -77,7 +78,6 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
     type(simulation_t), intent(inout) :: sim
-    type(stage_report_t) :: report
     integer :: d, n_solids
 
     sim%case = case
@@ -113,6 +113,7 @@ contains
       sim%transport%level = case%fluid%water_level
     end if
     call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
+    call mid_step_init(sim%grid, sim%mid_step)
     call stage_init(sim%grid, n_solids, case%numerics, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
@@ -129,7 +130,7 @@ contains
     call outflow_init(sim%grid, case%fluid, sim%flow%sides)
     call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)
     call copy_motion(sim%blocks, sim%stage%bodies)
-    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, report)
+    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage)
     call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
 
@@ -153,7 +154,7 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(out) :: report
     type(contact_report_t) :: contact
-    type(stage_report_t) :: stage
+    type(stage_report_t) :: stage_report
 
     call release(sim, report)
     if (sim%wet) call first_force(sim)
@@ -179,12 +180,13 @@ contains
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
-        call advance_velocity(case, grid, sim%solid, dt, flow, blocks, sim%stage, stage)
+        call advance_velocity(case, grid, sim%solid, dt, flow, blocks, sim%stage, &
+                              stage_report)
         call toc(sim%timer_velocity)
       end if
     end associate
     call sim%clock%advance()
-    call tell(sim, contact, stage, report)
+    call tell(sim, contact, stage_report, report)
   end subroutine take_step
 
   !> What the parts of the step found out, in one report.
@@ -295,7 +297,7 @@ contains
     integer :: n, part
 
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
-               carrier => sim%transport, p => sim%stage%pressure, &
+               carrier => sim%transport, &
                monolithic => sim%case%numerics%coupling == 'monolithic')
       if (sim%stage%implicit_momentum) then
         call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow, parts)
@@ -304,8 +306,7 @@ contains
         return
       end if
       call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
-      if (monolithic) call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, p%a_face, &
-                                       p%a_cell)
+      if (monolithic) call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, sim%mid_step)
       do part = 1, parts
         call begin_part(grid, sim%before, part, sim%clock%step, carrier)
         call momentum_begin(grid, fluid, carrier%w, carrier%v, carrier%c, flow%u, sim%momentum)
@@ -316,7 +317,7 @@ contains
         call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
       end do
       call finish_transport(grid, sim%solid, carrier, flow)
-      if (monolithic) call from_mid_step(grid, fluid, p%a_cell, flow)
+      if (monolithic) call from_mid_step(grid, fluid, sim%mid_step, flow)
       call mix_fluid(fluid, flow)
     end associate
   end subroutine transport

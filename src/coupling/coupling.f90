@@ -71,7 +71,8 @@ contains
     else
       call monolithic_stage(case, grid, solid, dt, flow, stage, report)
       call set_velocity()
-      call solid_face_flux(grid, solid, stage%bodies, stage%pressure%operator%flux, flow%solid_flux)
+      call solid_face_flux(grid, solid, stage%bodies, stage%pressure%system%operator%flux, &
+                           flow%solid_flux)
     end if
   contains
     !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.

@@ -16,10 +16,11 @@ module mass_average_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
-  use viscous_m, only: build_viscous
+  use viscous_legs_m, only: build_viscous
   use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
-  use pressure_m, only: pressure_report_t, set_pressure_system, solve_pressure, face_acceleration, &
-                        cell_mean_of_faces, predict_face_velocity, divergence
+  use pressure_system_m, only: set_pressure_system
+  use pressure_m, only: solve_pressure, divergence
+  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
   use buoyancy_m, only: displaced_force
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
@@ -49,31 +50,35 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
     type(stage_report_t), intent(inout) :: report
-    type(pressure_report_t) :: projection
     integer :: pass
 
-    associate (bodies => stage%bodies, p => stage%pressure)
+    associate (bodies => stage%bodies, system => stage%pressure%system)
       call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%buoyancy, &
                            stage%from_level)
       call push_bodies(dt, stage%from_level, bodies)
       stage%total = stage%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, stage%rho_mixture)
-      call set_pressure_system(grid, case%numerics, stage%whole%open, stage%rho_mixture, p, &
-                               flow%sides)
-      call build_rigid_flux(grid, stage%whole, bodies, p%active, p%operator%flux)
+      call set_pressure_system(grid, stage%whole%open, stage%rho_mixture, system, flow%sides)
+      call build_rigid_flux(grid, stage%whole, bodies, system%active, system%operator%flux)
       do pass = 1, case%numerics%coupling_passes
         call average_cells(grid, solid, bodies, flow, stage%rho_mixture)
         stage%u_before = flow%u
-        call predict_mixture(case, grid, solid, dt, pass == 1, flow, stage, report)
-        call project_mixture(case, grid, dt, flow, stage, projection)
-        report%pressure%passes = report%pressure%passes + projection%passes
-        report%pressure%iterations = report%pressure%iterations + projection%iterations
-        report%pressure%converged = projection%converged
+        if (pass == 1) then
+          call predict_mixture(case, grid, solid, dt, flow, stage)
+        else
+          call predict_again(grid, dt, flow, stage)
+        end if
+        call project_mixture(grid, dt, flow, stage)
+        report%pressure%passes = report%pressure%passes + stage%pressure%report%passes
+        report%pressure%iterations = report%pressure%iterations + stage%pressure%report%iterations
+        report%pressure%converged = stage%pressure%report%converged
         call momentum_gained(grid, solid, dt, flow%u, stage)
         call push_bodies(dt, stage%from_pressure, bodies)
         stage%total = stage%total + stage%from_pressure
       end do
     end associate
+    report%viscous_iterations = stage%viscous%iterations
+    report%viscous_converged = stage%viscous%converged
   end subroutine mass_average_stage
 
   !> Density of fluid and solids in each cell: rho = (1 - alpha) rho_fl + sum alpha_k rho_k [kg/m3].
@@ -135,66 +140,66 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine average_cells
 
-  !> Predictor of the mixture: old pressure and gravity of the fluid, then viscosity (first pass).
-  subroutine predict_mixture(case, grid, solid, dt, first, flow, stage, report)
+  !> Predictor of the mixture: old pressure and gravity of the fluid, then viscosity.
+  subroutine predict_mixture(case, grid, solid, dt, flow, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
-    logical, intent(in) :: first
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(inout) :: report
 
-    associate (p => stage%pressure)
-      p%a_cell = 0.0_wp
-      p%a_face = 0.0_wp
-      if (first) then
-        call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho_mixture, flow%p, &
-                               p%a_face, flow%sides)
-        call add_tension(grid, stage%rho_mixture, stage%tension, p%a_face)
-        call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
-        if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
-        call surface_stress(grid, solid%alpha, stage%rho_mixture, flow%mu, flow%u, &
-                            stage%a_stress)
-        call accelerate_cells(grid, dt, flow, stage)
-        flow%u = flow%u + dt*stage%a_stress
-        call build_viscous(grid, stage%whole, stage%bodies, stage%rho_mixture, flow%mu, dt, &
-                           stage%viscous)
-        call predict_velocity(grid, stage%rho_mixture, dt, flow, stage, report)
-        if (stage%implicit_momentum) then   ! the force on a body has no part in advection
-          call advected_velocity(grid, stage%rho_mixture, dt, stage%viscous, stage%c_ismac, &
-                                 stage%u_before)
-        end if
-        call halo_exchange(p%a_cell, n_halo)
+    associate (a => stage%acceleration, rho => stage%rho_mixture)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, rho, flow%p, a%face, flow%sides)
+      call add_tension(grid, rho, stage%tension, a%face)
+      call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
+      if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
+      call surface_stress(grid, solid%alpha, rho, flow%mu, flow%u, stage%a_stress)
+      call accelerate_cells(grid, dt, flow, stage)
+      flow%u = flow%u + dt*stage%a_stress
+      call build_viscous(grid, stage%whole, stage%bodies, rho, flow%mu, dt, stage%viscous)
+      call predict_velocity(grid, rho, flow, stage)
+      if (stage%implicit_momentum) then   ! the force on a body has no part in advection
+        call advected_velocity(grid, rho, dt, stage%viscous, stage%c_ismac, stage%u_before)
       end if
+      call halo_exchange(a%cell, n_halo)
       call fill_velocity_halo(grid, flow%u)
-      call predict_face_velocity(grid, dt, stage%rho_mixture, p%a_face, p%a_cell, flow)
-      if (first) call renew_acceleration(dt, flow, stage)
+      call predict_face_velocity(grid, dt, rho, a, flow)
     end associate
+    call renew_acceleration(dt, flow, stage)
   end subroutine predict_mixture
 
-  !> Projection of the mixture velocity, on the faces and in the cells.
-  subroutine project_mixture(case, grid, dt, flow, stage, projection)
-    type(case_t), intent(in) :: case
+  !> Later passes start from the mass average alone.
+  subroutine predict_again(grid, dt, flow, stage)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
-    type(pressure_report_t), intent(out) :: projection
+
+    stage%acceleration%cell = 0.0_wp
+    stage%acceleration%face = 0.0_wp
+    call fill_velocity_halo(grid, flow%u)
+    call predict_face_velocity(grid, dt, stage%rho_mixture, stage%acceleration, flow)
+  end subroutine predict_again
+
+  !> Projection of the mixture velocity, on the faces and in the cells.
+  subroutine project_mixture(grid, dt, flow, stage)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(inout) :: stage
     real(wp), parameter :: weightless(3) = 0.0_wp
     type(rigid_motion_t) :: none
 
     none%n = 0
     allocate (none%free(0))
-    associate (p => stage%pressure)
-      call solve_pressure(grid, case%numerics, stage%whole, stage%rho_mixture, dt, flow, none, p, &
-                          projection)
-      call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, p%a_face, &
+    associate (p => stage%pressure, a => stage%acceleration)
+      call solve_pressure(grid, stage%whole, stage%rho_mixture, dt, flow, none, p)
+      call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, a%face, &
                              flow%sides)
-      call cell_mean_of_faces(grid, stage%whole%open, p%a_face, p%a_cell)
+      call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
+      flow%u = flow%u + dt*a%cell
     end associate
-    flow%u = flow%u + dt*stage%pressure%a_cell
     call fill_velocity_halo(grid, flow%u)
   end subroutine project_mixture
 
@@ -267,8 +272,7 @@ contains
       flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, &
           :, d)
     end do
-    call divergence(grid, solid%open, flow%uf, flow%solid_flux, stage%pressure%active, &
-                    stage%pressure%rhs, &
+    call divergence(grid, solid%open, flow, stage%pressure%system%active, stage%pressure%rhs, &
                     report%pressure%divergence)
   end subroutine overlay_bodies
 

@@ -6,10 +6,13 @@ module velocity_stage_m
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: numerics_t
   use fields_m, only: flow_t
-  use viscous_m, only: viscous_t, viscous_init, solve_viscous
+  use viscous_system_m, only: viscous_t, viscous_init
+  use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
-  use pressure_m, only: pressure_t, pressure_report_t, pressure_init, face_acceleration, &
-    cell_mean_of_faces
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+                             cell_mean_of_faces
+  use momentum_return_m, only: momentum_debt_t, momentum_debt_init
   use buoyancy_m, only: buoyancy_t, buoyancy_init
   use surface_tension_m, only: surface_tension_t, add_tension
   use film_velocity_m, only: films_t, films_init
@@ -36,108 +39,115 @@ module velocity_stage_m
     type(buoyancy_t) :: buoyancy
     type(surface_tension_t) :: tension
     type(films_t) :: films
-    type(solid_geometry_t) :: whole                !! the domain without solids, for the mixture
+    type(acceleration_t) :: acceleration
+    real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
     real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
     real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
     real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
-    real(wp), allocatable :: from_viscosity(:, :)  !! (6, n)
     real(wp), allocatable :: total(:, :)           !! (6, n)
-    real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
     real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
-    real(wp), allocatable :: u_before(:, :, :, :)
-      !! velocity before the predictor of the mixture [m/s]
-    real(wp), allocatable :: a_stress(:, :, :, :)   !! acceleration by the surface stress [m/s2]
-    real(wp), allocatable :: deviation(:, :, :, :)  !! of the faces at the start (`face_memory_m`)
+    real(wp), allocatable :: a_stress(:, :, :, :)  !! acceleration by the surface stress [m/s2]
+    ! Of the monolithic coupling.
+    type(momentum_debt_t) :: debt
+    real(wp), allocatable :: deviation(:, :, :, :) !! of the faces at the start (`face_memory_m`)
+    ! Of the mixture.
+    type(solid_geometry_t) :: whole                !! the domain without solids
+    real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
+    real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor [m/s]
   end type stage_t
 
 contains
 
   !> Allocate all work arrays for a grid and n bodies.
-  subroutine stage_init(grid, n, numerics, self)
+  subroutine stage_init(grid, n, numerics, stage)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
     type(numerics_t), intent(in) :: numerics
-    type(stage_t), intent(out) :: self
+    type(stage_t), intent(out) :: stage
     integer :: a(3), b(3)
 
     a = grid%first
     b = grid%last
-    call rigid_motion_init(n, self%bodies)
-    call rigid_motion_init(n, self%at_start)
-    call viscous_init(grid, n, self%viscous)
-    self%implicit_momentum = numerics%momentum == 'c_ismac'
-    if (self%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, self%c_ismac)
-    call pressure_init(grid, n, self%pressure)
-    call buoyancy_init(self%buoyancy)
-    call films_init(self%films)
-    call solid_geometry_init(grid, self%whole, n)
-    allocate (self%from_pressure(6, n), source=0.0_wp)
-    allocate (self%from_level, self%from_viscosity, self%total, source=self%from_pressure)
-    allocate (self%lack(6, 3, n), source=0.0_wp)
-    allocate (self%terms(0, 6))
-    allocate (self%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%a_stress, self%deviation, source=self%u_before)
+    call rigid_motion_init(n, stage%bodies)
+    call rigid_motion_init(n, stage%at_start)
+    call viscous_init(grid, n, stage%viscous)
+    stage%implicit_momentum = numerics%momentum == 'c_ismac'
+    if (stage%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, stage%c_ismac)
+    call pressure_init(grid, n, numerics, stage%pressure)
+    call acceleration_init(grid, stage%acceleration)
+    call buoyancy_init(stage%buoyancy)
+    call films_init(stage%films)
+    allocate (stage%from_pressure(6, n), source=0.0_wp)
+    allocate (stage%from_level, stage%total, stage%dry_motion, source=stage%from_pressure)
+    allocate (stage%lack(6, 3, n), source=0.0_wp)
+    allocate (stage%terms(0, 6))
+    allocate (stage%a_stress(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    if (numerics%coupling == 'mics') then
+      call solid_geometry_init(grid, stage%whole, n)
+      allocate (stage%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+      allocate (stage%u_before, source=stage%a_stress)
+    else
+      call momentum_debt_init(grid, stage%debt)
+      allocate (stage%deviation, source=stage%a_stress)
+    end if
   end subroutine stage_init
 
   !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
-  !! solids change; `self%tension` is that of the start.
-  subroutine keep_acceleration(grid, gravity, open, rho, flow, self)
+  !! solids change; `stage%tension` is that of the start.
+  subroutine keep_acceleration(grid, gravity, open, rho, flow, stage)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(flow_t), intent(in) :: flow
-    type(stage_t), intent(inout) :: self
+    type(stage_t), intent(inout) :: stage
 
-    call face_acceleration(grid, gravity, flow%rho, rho, flow%p, self%pressure%a_face, flow%sides)
-    call add_tension(grid, rho, self%tension, self%pressure%a_face)
-    call cell_mean_of_faces(grid, open, self%pressure%a_face, self%c_ismac%a_old)
+    associate (a => stage%acceleration)
+      call face_acceleration(grid, gravity, flow%rho, rho, flow%p, a%face, flow%sides)
+      call add_tension(grid, rho, stage%tension, a%face)
+      call cell_mean_of_faces(grid, open, a%face, stage%c_ismac%a_old)
+    end associate
   end subroutine keep_acceleration
 
   !> Add gravity and old pressure to the cells; with C-ISMAC those of the start of the step, which
-  !! stand in `pressure%a_cell` then.
-  subroutine accelerate_cells(grid, dt, flow, self)
+  !! stand in `acceleration%cell` then.
+  subroutine accelerate_cells(grid, dt, flow, stage)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: self
+    type(stage_t), intent(inout) :: stage
 
-    if (self%implicit_momentum) then
-      call begin_predictor(grid, flow%u, self%c_ismac)
-      self%c_ismac%a_new = self%pressure%a_cell
-      self%pressure%a_cell = self%c_ismac%a_old
+    if (stage%implicit_momentum) then
+      call begin_predictor(grid, flow%u, stage%c_ismac)
+      stage%c_ismac%a_new = stage%acceleration%cell
+      stage%acceleration%cell = stage%c_ismac%a_old
     end if
-    flow%u = flow%u + dt*self%pressure%a_cell
+    flow%u = flow%u + dt*stage%acceleration%cell
   end subroutine accelerate_cells
 
   !> With C-ISMAC: exchange the acceleration in the cells for that of the density at hand, once the
   !! velocity of the faces is predicted.
-  subroutine renew_acceleration(dt, flow, self)
+  subroutine renew_acceleration(dt, flow, stage)
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(in) :: self
+    type(stage_t), intent(in) :: stage
 
-    if (self%implicit_momentum) flow%u = flow%u + dt*(self%c_ismac%a_new - self%c_ismac%a_old)
+    if (stage%implicit_momentum) flow%u = flow%u + dt*(stage%c_ismac%a_new - stage%c_ismac%a_old)
   end subroutine renew_acceleration
 
   !> Viscosity, and with C-ISMAC advection, into a velocity that has gravity and old pressure in.
-  subroutine predict_velocity(grid, rho, dt, flow, self, report)
+  subroutine predict_velocity(grid, rho, flow, stage)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
-    real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: self
-    type(stage_report_t), intent(inout) :: report
+    type(stage_t), intent(inout) :: stage
 
-    if (self%implicit_momentum) then
-      call solve_predictor(grid, rho, self%bodies, dt, flow, self%viscous, self%c_ismac, &
-                           self%from_viscosity, report%viscous_iterations, report%viscous_converged)
+    if (stage%implicit_momentum) then
+      call solve_predictor(grid, rho, stage%bodies, flow, stage%viscous, stage%c_ismac)
     else
-      call solve_viscous(grid, self%bodies, dt, flow, self%viscous, self%from_viscosity, &
-                         report%viscous_iterations, report%viscous_converged)
+      call solve_viscous(grid, stage%bodies, flow, stage%viscous)
     end if
   end subroutine predict_velocity
 

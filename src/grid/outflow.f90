@@ -20,7 +20,7 @@ module outflow_m
   implicit none
   private
   public :: outflow_t, outflow_init, start_outflow, update_outflow
-  public :: reach, pressure_outside, mean_velocity
+  public :: reach, side_reach, pressure_outside, mean_velocity
 
   real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
 
@@ -250,5 +250,17 @@ contains
     u = 0.0_wp
     if (side%active) u = side%mean(at(side%along(1)), at(side%along(2)))
   end function mean_velocity
+
+  !> Length over which the pressure difference of a cell to the outside acts [m].
+  pure function side_reach(grid, s, d, cell, rho, sides) result(length)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, cell(3)
+    real(wp), intent(in) :: rho   !! of the cell [kg/m3]
+    type(outflow_t), intent(in), optional :: sides(2, 3)
+    real(wp) :: length
+
+    length = 0.5_wp*grid%h(d)
+    if (present(sides)) length = reach(sides(s, d), cell, length, rho)
+  end function side_reach
 
 end module outflow_m

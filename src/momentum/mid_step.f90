@@ -19,43 +19,61 @@ module mid_step_m
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
   use momentum_conservative_m, only: mass_through
-  use pressure_m, only: face_acceleration, cell_mean_of_faces
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+                             cell_mean_of_faces
   implicit none
   private
-  public :: to_mid_step, from_mid_step
+  public :: mid_step_t, mid_step_init, to_mid_step, from_mid_step
 
   real(wp), parameter :: full = 1.0_wp - 1.0e-9_wp   !! liquid share of a cell without gas [-]
   real(wp), parameter :: most_solid = 0.5_wp         !! share of a cell that takes part [-]
 
+  type :: mid_step_t
+    type(acceleration_t) :: acceleration           !! by weight and pressure, at the start
+    real(wp), allocatable :: given(:, :, :, :)     !! momentum given to the cells [kg m/s]
+  end type mid_step_t
+
 contains
 
+  !> Allocate for a grid; nothing given.
+  subroutine mid_step_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(mid_step_t), intent(out) :: self
+
+    call acceleration_init(grid, self%acceleration)
+    allocate (self%given, source=self%acceleration%cell)
+  end subroutine mid_step_init
+
   !> Add half a step of weight and pressure to the velocity of the liquid, halo filled.
-  subroutine to_mid_step(grid, fluid, before, after, dt, flow, a_face, given)
+  subroutine to_mid_step(grid, fluid, before, after, dt, flow, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
-    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: a_face, given         !! work array [m/s2]; momentum given to the cells [kg m/s]
+    type(mid_step_t), intent(inout) :: self
     integer :: i, j, k, low(3), high(3)
     real(wp) :: mass
 
     low = merge(2, 1, flow%sides(1, :)%active)
     high = merge(grid%n - 1, grid%n, flow%sides(2, :)%active)
-    call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a_face, flow%sides)
-    call cell_mean_of_faces(grid, before%open, a_face, given)
+    associate (a => self%acceleration)
+      call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
+      call cell_mean_of_faces(grid, before%open, a%face, a%cell)
+    end associate
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (.not. takes_part(i, j, k)) then
-            given(i, j, k, :) = 0.0_wp
+            self%given(i, j, k, :) = 0.0_wp
             cycle
           end if
           mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
-          flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*given(i, j, k, :)
-          given(i, j, k, :) = 0.5_wp*dt*mass*given(i, j, k, :)
+          associate (a => self%acceleration%cell(i, j, k, :))
+            flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a
+            self%given(i, j, k, :) = 0.5_wp*dt*mass*a
+          end associate
         end do
       end do
     end do
@@ -74,11 +92,10 @@ contains
   end subroutine to_mid_step
 
   !> After the transport: the cells give back the momentum they got, halo filled.
-  subroutine from_mid_step(grid, fluid, given, flow)
+  subroutine from_mid_step(grid, fluid, self, flow)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [kg m/s]
+    type(mid_step_t), intent(in) :: self
     type(flow_t), intent(inout) :: flow   !! carried
     integer :: i, j, k
     real(wp) :: mass
@@ -88,7 +105,7 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
-          if (mass > 0.0_wp) flow%u(i, j, k, :) = flow%u(i, j, k, :) - given(i, j, k, :)/mass
+          if (mass > 0.0_wp) flow%u(i, j, k, :) = flow%u(i, j, k, :) - self%given(i, j, k, :)/mass
         end do
       end do
     end do

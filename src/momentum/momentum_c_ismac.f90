@@ -30,8 +30,8 @@ module momentum_c_ismac_m
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, tvd_scheme
-  use viscous_m, only: viscous_t, apply_viscous, force_of_legs, velocity_scale, inertial_momentum, &
-                       wrench
+  use viscous_system_m, only: viscous_t, wrench
+  use viscous_m, only: apply_viscous, force_of_legs, velocity_scale, inertial_momentum
   use krylov_m, only: linear_operator_t, identity_t, krylov_work_t, krylov_init, bicgstab, solved
   use exact_sum_m, only: exact_sums
   use parallel_m, only: halo_exchange
@@ -159,40 +159,35 @@ contains
   !> Solve for the velocity u*, in place, together with the motion of the free bodies.
   !!
   !! On entry `flow%u` is u^n with gravity and old pressure in, `bodies%motion` likewise, `viscous`
-  !! is built and `begin_predictor` done; on return viscosity and advection are in too. `force` is
-  !! what viscosity did to each body [N, N m].
-  subroutine solve_predictor(grid, rho, bodies, dt, flow, viscous, self, force, iterations, &
-                             converged)
+  !! is built and `begin_predictor` done; on return viscosity and advection are in too.
+  !! `viscous%force` is what viscosity did to each body [N, N m].
+  subroutine solve_predictor(grid, rho, bodies, flow, viscous, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(rigid_motion_t), intent(inout) :: bodies
-    real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
     type(viscous_t), intent(inout) :: viscous
     type(c_ismac_t), intent(inout) :: self
-    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
-    integer, intent(out) :: iterations
-    logical, intent(out) :: converged
     real(wp), dimension(6, bodies%n) :: none, pull, motion
     real(wp) :: scale, residual
     integer :: m, b, info
 
     call velocity_scale(grid, flow%u, bodies, scale)
-    call set_operator(grid, rho, bodies, dt, viscous, self)
+    call set_operator(grid, rho, bodies, viscous%dt, viscous, self)
     viscous%s = merge(self%u_old, 0.0_wp, viscous%mass > 0.0_wp)
     none = 0.0_wp
-    call apply_viscous(grid, bodies, dt, viscous, viscous%s, none, viscous%y, pull)
+    call apply_viscous(grid, bodies, viscous, none, pull)
     do b = 1, bodies%n   ! motion if the fluid kept its velocity
       motion(:, b) = bodies%motion(:, b)
       if (bodies%free(b)) motion(:, b) = matmul(self%operator%mobility(:, :, b), &
-        inertial_momentum(bodies, b, dt, bodies%motion(:, b)) - pull(:, b))
+        inertial_momentum(bodies, b, viscous%dt, bodies%motion(:, b)) - pull(:, b))
     end do
-    call right_side(grid, rho, dt, flow%u, motion, viscous, self)
+    call right_side(grid, rho, viscous%dt, flow%u, motion, viscous, self)
     self%delta = 0.0_wp
     call bicgstab(self%operator, self%identity, self%rhs, self%delta, tolerance*scale, &
-                  max_iterations, iterations, residual, info, self%work)
-    converged = info == solved
+                  max_iterations, viscous%iterations, residual, info, self%work)
+    viscous%converged = info == solved
     call unpack_components(self%delta, self%operator)
     associate (a => grid%lo, z => grid%hi)
       do m = 1, 3
@@ -209,7 +204,7 @@ contains
       if (bodies%free(b)) bodies%motion(:, b) = motion(:, b) &
         + matmul(self%operator%mobility(:, :, b), pull_of_walls(self%operator, b))
     end do
-    call force_of_legs(bodies, flow, viscous, force)
+    call force_of_legs(bodies, flow, viscous)
   end subroutine solve_predictor
 
   !> Coefficients of the left side from the viscous legs and the inflow of each cell.
@@ -274,15 +269,15 @@ contains
     real(wp) :: unit(6), matrix(6, 6)
     integer :: b, c, n
 
-    n = viscous%n_wall
+    n = viscous%walls%n
     if (size(op%k) < n) then
       deallocate (op%cell, op%k, op%arm, op%work)
       allocate (op%cell(3, 2*n), op%k(2*n), op%arm(3, 2*n), op%work(2*n, 6))
     end if
-    op%first = viscous%first
-    op%cell(:, 1:n) = viscous%cell(:, 1:n)
-    op%k(1:n) = viscous%k(1:n)
-    op%arm(:, 1:n) = viscous%arm(:, 1:n)
+    op%first = viscous%walls%first
+    op%cell(:, 1:n) = viscous%walls%cell(:, 1:n)
+    op%k(1:n) = viscous%walls%k(1:n)
+    op%arm(:, 1:n) = viscous%walls%arm(:, 1:n)
     op%free = bodies%free
     do b = 1, bodies%n
       op%mobility(:, :, b) = 0.0_wp
@@ -327,9 +322,9 @@ contains
           end associate
         end do
       end do
-      do l = 1, viscous%n_side
-        associate (c => viscous%side_cell(:, l))
-          op%y(c(1), c(2), c(3), :) = op%y(c(1), c(2), c(3), :) + viscous%side_pull(:, l)
+      do l = 1, viscous%sides%n
+        associate (c => viscous%sides%cell(:, l))
+          op%y(c(1), c(2), c(3), :) = op%y(c(1), c(2), c(3), :) + viscous%sides%pull(:, l)
         end associate
       end do
       op%y = op%inverse*op%y

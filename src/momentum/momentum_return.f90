@@ -17,11 +17,11 @@ module momentum_return_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use momentum_conservative_m, only: mass_through
-  use viscous_m, only: open_share
+  use viscous_system_m, only: open_share
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: return_momentum
+  public :: momentum_debt_t, momentum_debt_init, return_momentum
 
   real(wp), parameter :: heavy = 0.5_wp           !! mass of a full taker over that of a full giver
   real(wp), parameter :: least_sum = 14.0_wp
@@ -29,27 +29,41 @@ module momentum_return_m
     !! give to each other less comes back than was given
   integer, parameter :: far = 2                   !! cells to which it may give
 
+  type :: momentum_debt_t
+    real(wp), allocatable :: u_before(:, :, :, :)   !! velocity before the stage [m/s]
+    real(wp), allocatable :: tied(:, :, :, :)
+      !! part of the change that no force made (`film_velocity_m`) [m/s]
+    real(wp), allocatable :: whole(:, :, :, :), cut(:, :, :, :)
+      !! what a cell owes to its whole neighbours, or to all around [m/s]
+  end type momentum_debt_t
+
 contains
 
+  !> Allocate for a grid; nothing owed.
+  subroutine momentum_debt_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(momentum_debt_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%first
+    b = grid%last
+    allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%tied, self%whole, self%cut, source=self%u_before)
+  end subroutine momentum_debt_init
+
   !> Complete the velocity stage: `flow%u` on entry is its result in all cells.
-  subroutine return_momentum(grid, fluid, solid, before, bodies, u_before, tied, flow, whole, cut)
+  subroutine return_momentum(grid, fluid, solid, before, bodies, self, flow)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: before, bodies   !! at the start and at the end of the step
-    real(wp), intent(in), contiguous :: u_before(grid%first(1):, grid%first(2):, grid%first(3):, :)
-                                                   !! velocity before the stage [m/s]
-    real(wp), intent(in), contiguous :: tied(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! part of the change that no force made (`film_velocity_m`) [m/s]
+    type(momentum_debt_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
-    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: whole, cut
-        !! work arrays: what a cell owes to its whole neighbours, or to all around [m/s]
     integer :: b, m, c(3), low(3), high(3)
 
     if (bodies%n == 0) return
-    whole = 0.0_wp
-    cut = 0.0_wp
+    self%whole = 0.0_wp
+    self%cut = 0.0_wp
     low = grid%hi
     high = grid%lo
     do b = 1, bodies%n
@@ -62,8 +76,8 @@ contains
         call owe(b, solid%cell(:, m), .false.)
       end do
     end do
-    call halo_exchange(whole, n_halo)
-    call halo_exchange(cut, n_halo)
+    call halo_exchange(self%whole, n_halo)
+    call halo_exchange(self%cut, n_halo)
     call take(max(low - 1, grid%lo), min(high + 1, grid%hi))
     call take_far(max(low - far, grid%lo - far), min(high + far, grid%hi + far))
   contains
@@ -100,13 +114,13 @@ contains
       end do
       if (mass_whole <= 0.0_wp) mass_cut = sum_around(c, full)
       do d = 1, 3
-        owed = (moved(d) - mass)*(flow%u(c(1), c(2), c(3), d) - tied(c(1), c(2), c(3), d) &
-                                  - u_before(c(1), c(2), c(3), d) - wall(d)) &
-               - mass*tied(c(1), c(2), c(3), d)
+        owed = (moved(d) - mass)*(flow%u(c(1), c(2), c(3), d) - self%tied(c(1), c(2), c(3), d) &
+                                  - self%u_before(c(1), c(2), c(3), d) - wall(d)) &
+               - mass*self%tied(c(1), c(2), c(3), d)
         if (mass_whole > 0.0_wp) then
-          whole(c(1), c(2), c(3), d) = owed/mass_whole
+          self%whole(c(1), c(2), c(3), d) = owed/mass_whole
         else
-          cut(c(1), c(2), c(3), d) = owed/max(mass_cut, least_sum*full)
+          self%cut(c(1), c(2), c(3), d) = owed/max(mass_cut, least_sum*full)
         end if
       end do
     end subroutine owe
@@ -145,7 +159,7 @@ contains
               do q = j - 1, j + 1
                 do p = i - 1, i + 1
                   full = flow%rho(p, q, r)*grid%volume
-                  if (mass > heavy*full) total = total + whole(p, q, r, :)
+                  if (mass > heavy*full) total = total + self%whole(p, q, r, :)
                 end do
               end do
             end do
@@ -164,12 +178,12 @@ contains
       do r = first(3), last(3)
         do q = first(2), last(2)
           do p = first(1), last(1)
-            if (all(abs(cut(p, q, r, :)) <= 0.0_wp)) cycle
+            if (all(abs(self%cut(p, q, r, :)) <= 0.0_wp)) cycle
             full = flow%rho(p, q, r)*grid%volume
             do k = max(r - far, grid%lo(3)), min(r + far, grid%hi(3))
               do j = max(q - far, grid%lo(2)), min(q + far, grid%hi(2))
                 do i = max(p - far, grid%lo(1)), min(p + far, grid%hi(1))
-                  flow%u(i, j, k, :) = flow%u(i, j, k, :) + cut(p, q, r, :)*mass_of(i, j, k)/full
+                  flow%u(i, j, k, :) = flow%u(i, j, k, :) + self%cut(p, q, r, :)*mass_of(i, j, k)/full
                 end do
               end do
             end do

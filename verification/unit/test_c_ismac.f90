@@ -7,7 +7,9 @@ program test_c_ismac
   use boundary_m, only: fill_velocity_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
-  use viscous_m, only: viscous_t, viscous_init, build_viscous, solve_viscous
+  use viscous_system_m, only: viscous_t, viscous_init
+  use viscous_legs_m, only: build_viscous
+  use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor, &
                                 advected_velocity
   use one_body_m, only: one_body_t, describe, place
@@ -70,12 +72,10 @@ contains
   subroutine solve(dt, converged)
     real(wp), intent(in) :: dt
     logical, intent(out) :: converged
-    real(wp) :: force(6, 0)
-    integer :: iterations
 
     call build_viscous(grid, solid, none, flow%rho, flow%mu, dt, viscous)
-    call solve_predictor(grid, flow%rho, none, dt, flow, viscous, predictor, force, iterations, &
-                         converged)
+    call solve_predictor(grid, flow%rho, none, flow, viscous, predictor)
+    converged = viscous%converged
   end subroutine solve
 
   !> With the donor's value every wave is multiplied by 1 - C l/(1 + a C l), l = 1 - exp(-i k h).
@@ -268,10 +268,9 @@ contains
     real(wp), parameter :: dt = 0.05_wp
     type(one_body_t) :: block
     type(rigid_motion_t) :: bodies
-    real(wp) :: force(6, 1), expected(6, 1)
+    real(wp) :: expected(6, 1)
     real(wp), allocatable :: u(:, :, :, :), u_expected(:, :, :, :)
-    integer :: iterations, c, i, j, k
-    logical :: converged
+    integer :: c, i, j, k
 
     call describe([12, 12, 12], [0.12_wp, 0.12_wp, 0.12_wp], sides, 'hexapod', &
                   [0.02_wp, 0.0_wp, 0.0_wp], [0.061_wp, 0.058_wp, 0.063_wp], block%case)
@@ -294,19 +293,20 @@ contains
     allocate (u, source=block%flow%u)
     call viscous_init(block%grid, 1, viscous)
     call build_viscous(block%grid, block%solid, bodies, block%flow%rho, block%flow%mu, dt, viscous)
-    call solve_viscous(block%grid, bodies, dt, block%flow, viscous, expected, iterations, converged)
+    call solve_viscous(block%grid, bodies, block%flow, viscous)
+    expected = viscous%force
     allocate (u_expected, source=block%flow%u)
     block%flow%u = u
     call c_ismac_init(block%grid, 1, 'tvd5', predictor)
     call begin_predictor(block%grid, 0.9_wp*u, predictor)   ! the rest by the forces of the step
-    call solve_predictor(block%grid, block%flow%rho, block%bodies, dt, block%flow, viscous, &
-                         predictor, force, iterations, converged)
-    call check('with a body: converged', converged)
+    call solve_predictor(block%grid, block%flow%rho, block%bodies, block%flow, viscous, predictor)
+    call check('with a body: converged', viscous%converged)
     call check('with a body: velocity', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :) &
       - u_expected(1:12, 1:12, 1:12, :))), 0.0_wp, 1.0e-7_wp)
     call check('with a body: motion', maxval(abs(block%bodies%motion - bodies%motion)), 0.0_wp, &
                1.0e-6_wp)
-    call check('with a body: force', force(:, 1), expected(:, 1), 1.0e-6_wp*norm2(expected(1:3, 1)))
+    call check('with a body: force', viscous%force(:, 1), expected(:, 1), &
+               1.0e-6_wp*norm2(expected(1:3, 1)))
     call check('with a body: it is dragged', norm2(bodies%motion(:, 1) - [0.3_wp, -0.2_wp, 0.1_wp, &
       2.0_wp, 1.0_wp, -3.0_wp]) > 0.1_wp)
   end subroutine without_advection

@@ -57,7 +57,7 @@ contains
     call place(block)
     call stage_init(block%grid, 1, block%case%numerics, stage)
     call copy_motion(block%blocks, stage%bodies)
-    call start_flow(block%case, block%grid, block%solid, block%flow, stage, report)
+    call start_flow(block%case, block%grid, block%solid, block%flow, stage)
     call fill_velocity_halo(block%grid, block%flow%u)
   end subroutine ready
 
@@ -160,7 +160,7 @@ contains
     call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
                           stage, report)
     call check('films: there are some', slip > 1.0_wp)
-    call check('films: slip does not pull', maxval(abs(stage%from_viscosity)), 0.0_wp, 1.0e-9_wp)
+    call check('films: slip does not pull', maxval(abs(stage%viscous%force)), 0.0_wp, 1.0e-9_wp)
   end subroutine slipping_films
 
   !> A block as heavy as the liquid hovers.
@@ -198,7 +198,7 @@ contains
     call build(12, kind, size, density)
     block%case%boundary%kind = 'periodic'
     block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
-    block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `pressure_m`
+    block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
     call ready()
     block%flow%p = 0.0_wp
     call begin_step(block%blocks)

@@ -6,9 +6,11 @@ program test_pressure
   use mixture_m, only: mix_fluid, face_mean
   use boundary_m, only: fill_velocity_halo
   use rigid_flux_m, only: build_rigid_flux, force_from_faces
-  use pressure_m, only: pressure_t, pressure_report_t, pressure_init, set_pressure_system, &
-    solve_pressure, face_acceleration, cell_mean_of_faces, predict_face_velocity, divergence, &
-    extend_pressure
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+    cell_mean_of_faces, predict_face_velocity
+  use pressure_system_m, only: set_pressure_system
+  use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
+  use pressure_extension_m, only: extend_pressure
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -21,8 +23,8 @@ program test_pressure
   real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
   type(one_body_t) :: box
-  type(pressure_t) :: system
-  type(pressure_report_t) :: report
+  type(pressure_t) :: pressure
+  type(acceleration_t) :: a
   integer :: seed = 77
 
   call held_box('closed box', closed, 'cg', 'multigrid')
@@ -55,7 +57,7 @@ contains
     box%flow%c(:, :, 8:) = 0.0_wp
     box%flow%c(:, :, 7) = 0.3_wp
     call mix_fluid(box%case%fluid, box%flow)
-    call pressure_init(box%grid, 1, system)
+    call acceleration_init(box%grid, a)
     call stir()
   end subroutine build
 
@@ -82,10 +84,12 @@ contains
   end subroutine stir
 
   subroutine solve()
-    call set_pressure_system(box%grid, box%case%numerics, box%solid%open, box%flow%rho, system)
-    call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
-    call solve_pressure(box%grid, box%case%numerics, box%solid, box%flow%rho, dt, box%flow, &
-                        box%bodies, system, report)
+    call pressure_init(box%grid, 1, box%case%numerics, pressure)
+    associate (system => pressure%system)
+      call set_pressure_system(box%grid, box%solid%open, box%flow%rho, system)
+      call build_rigid_flux(box%grid, box%solid, box%bodies, pressure%system%active, pressure%system%operator%flux)
+    end associate
+    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
   end subroutine solve
 
   !> Largest |div u| of fluid and solid in the cells that can move, worked out here [1/s].
@@ -126,8 +130,8 @@ contains
     box%case%numerics%preconditioner = preconditioner
     allocate (before, source=box%flow%uf)
     call solve()
-    call check(name//': converged', report%converged .and. any(report%passes == [1, 2]))
-    call check(name//': divergence told', report%divergence, largest_divergence(), 1.0e-12_wp)
+    call check(name//': converged', pressure%report%converged .and. any(pressure%report%passes == [1, 2]))
+    call check(name//': divergence told', pressure%report%divergence, largest_divergence(), 1.0e-12_wp)
     call check(name//': divergence', largest_divergence() < 1.0e-8_wp)
     expected = -dt*(box%flow%p(at(1), at(2), at(3)) - box%flow%p(at(1), at(2), at(3) - 1)) &
                /(0.01_wp*0.5_wp*(box%flow%rho(at(1), at(2), at(3) - 1) &
@@ -149,13 +153,13 @@ contains
     allocate (before, source=box%flow%uf)
     motion = box%bodies%motion(:, 1)
     call solve()
-    call check('free box: converged', report%converged)
+    call check('free box: converged', pressure%report%converged)
     call check('free box: divergence', largest_divergence() < 1.0e-8_wp)
     call check('free box: it was pushed', all(abs(box%bodies%motion(:, 1) - motion) > 1.0e-5_wp))
     gain(1:3) = box%bodies%mass(1)*(box%bodies%motion(1:3, 1) - motion(1:3))
     gain(4:6) = matmul(box%bodies%inertia(:, :, 1), box%bodies%motion(4:6, 1) - motion(4:6))
-    call force_from_faces(box%grid, box%solid, box%bodies, system%operator%flux, &
-                          system%phi_total, force)
+    call force_from_faces(box%grid, box%solid, box%bodies, pressure%system%operator%flux, &
+                          pressure%phi_total, force)
     call check('free box: momentum is force times step', gain(1:3), dt*force(1:3, 1), 1.0e-14_wp)
     call check('free box: spin is torque times step', gain(4:6), dt*force(4:6, 1), 1.0e-15_wp)
     fluid_gain = 0.0_wp
@@ -187,20 +191,20 @@ contains
     call stir()
     motion = box%bodies%motion(:, 1)
     call solve()
-    call check('pressed box: converged', report%converged .and. any(report%passes == [1, 2]))
+    call check('pressed box: converged', pressure%report%converged .and. any(pressure%report%passes == [1, 2]))
     associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
       swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
     end associate
-    call divergence(box%grid, box%solid%open, box%flow%uf, box%flow%solid_flux, system%active, &
-                    system%rhs, force(1, 1))
-    associate (net => system%rhs(1:12, 1:8, 1:12)/box%grid%volume)
+    call divergence(box%grid, box%solid%open, box%flow, pressure%system%active, pressure%rhs, &
+                    force(1, 1))
+    associate (net => pressure%rhs(1:12, 1:8, 1:12)/box%grid%volume)
       call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
-                 system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
+                 pressure%system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
     end associate
     call check('pressed box: it moves on', abs(swallowed) > 1.0e-3_wp)
-    call force_from_faces(box%grid, box%solid, box%bodies, system%operator%flux, &
-                          system%phi_total, force)
+    call force_from_faces(box%grid, box%solid, box%bodies, pressure%system%operator%flux, &
+                          pressure%phi_total, force)
     call check('pressed box: momentum is force times step', box%bodies%mass(1) &
                *(box%bodies%motion(1:3, 1) - motion(1:3)), dt*force(1:3, 1), 1.0e-13_wp)
   end subroutine pressed_box
@@ -215,10 +219,10 @@ contains
     g = box%case%fluid%gravity
     box%bodies%motion = 0.0_wp
     box%case%numerics%divergence_tolerance = 1.0e-9_wp
-    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, system%a_face)
-    box%flow%uf = dt*system%a_face
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a%face)
+    box%flow%uf = dt*a%face
     call solve()
-    call check('still water: converged', report%converged)
+    call check('still water: converged', pressure%report%converged)
     worst = maxval(abs(box%flow%uf(1:12, 1:8, 1:13, :)), mask=box%solid%open(1:12, 1:8, 1:13, :) &
                    > 0.0_wp)
     call check('still water stays', worst, 0.0_wp, 1.0e-10_wp)
@@ -233,49 +237,47 @@ contains
   !> Accelerations, their cell means by open shares, the face velocity predicted from cells.
   subroutine accelerations_at_faces()
     real(wp), parameter :: g(3) = [0.5_wp, -0.25_wp, -9.81_wp], rho = 1000.0_wp, nu = 1.0e-3_wp
-    real(wp), allocatable :: a_face(:, :, :, :), a_cell(:, :, :, :)
     real(wp) :: short, largest
     integer :: i
 
     call build(tank, .false.)
     box%flow%rho = rho
     box%flow%mu = rho*nu
-    allocate (a_face, a_cell, source=box%flow%uf)
     do i = 1 - n_halo, cells(1) + n_halo
       box%flow%p(i, :, :) = 40.0_wp*box%grid%centre(i, 1)**2
     end do
-    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a_face)
-    call check('acceleration: gravity less gradient', a_face(4, 3, 2, 1), &
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a%face)
+    call check('acceleration: gravity less gradient', a%face(4, 3, 2, 1), &
                0.5_wp - 80.0_wp*box%grid%face(4, 1)/rho, 1.0e-13_wp)
-    call check('acceleration: walls', abs(a_face(1, 3, 2, 1)) + abs(a_face(13, 3, 2, 1)), 0.0_wp, &
+    call check('acceleration: walls', abs(a%face(1, 3, 2, 1)) + abs(a%face(13, 3, 2, 1)), 0.0_wp, &
                0.0_wp)
-    call check('acceleration: open top', a_face(4, 3, 13, 3), &
+    call check('acceleration: open top', a%face(4, 3, 13, 3), &
                -9.81_wp + box%flow%p(4, 3, 12)/(0.005_wp*rho), 1.0e-12_wp)
-    call cell_mean_of_faces(box%grid, box%solid%open, a_face, a_cell)
+    call cell_mean_of_faces(box%grid, box%solid%open, a%face, a%cell)
     i = findloc(box%solid%open(1:12, 4, 6, 1) > 0.0_wp .and. box%solid%open(1:12, 4, 6, 1) &
                 < 1.0_wp, .true., 1)
     call check('a face is partly open', i > 1)
     associate (w => box%solid%open(i:i + 1, 4, 6, 1))
-      call check('mean of faces by open shares', a_cell(i, 4, 6, 1)*sum(w), &
-                 dot_product(w, a_face(i:i + 1, 4, 6, 1)), 1.0e-13_wp)
+      call check('mean of faces by open shares', a%cell(i, 4, 6, 1)*sum(w), &
+                 dot_product(w, a%face(i:i + 1, 4, 6, 1)), 1.0e-13_wp)
     end associate
 
     box%flow%u(:, :, :, 1) = 0.7_wp
     call fill_velocity_halo(box%grid, box%flow%u)
-    a_face = 2.0_wp
-    a_cell = 0.5_wp
-    call predict_face_velocity(box%grid, dt, box%flow%rho, a_face, a_cell, box%flow)
+    a%face = 2.0_wp
+    a%cell = 0.5_wp
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
     short = dt/(1.0_wp + 2.0_wp*nu*dt*3.0_wp/0.01_wp**2)
     call check('predicted face velocity', box%flow%uf(5, 3, 3, 1), 0.7_wp + 1.5_wp*short, &
                1.0e-15_wp)
     call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
     call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
     box%flow%solid_flux = 0.0_wp
-    call divergence(box%grid, 0.0_wp*box%solid%open + 1.0_wp, box%flow%uf, box%flow%solid_flux, &
-                    system%active, system%rhs, largest)
-    call check('divergence: largest', largest, maxval(abs(system%rhs(1:12, 1:8, 1:12))) &
+    call divergence(box%grid, 0.0_wp*box%solid%open + 1.0_wp, box%flow, &
+                    pressure%system%active, pressure%rhs, largest)
+    call check('divergence: largest', largest, maxval(abs(pressure%rhs(1:12, 1:8, 1:12))) &
                /box%grid%volume, 1.0e-12_wp)
-    call check('divergence: wall cell', system%rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
+    call check('divergence: wall cell', pressure%rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
                + 1.5_wp*short), 1.0e-16_wp)
   end subroutine accelerations_at_faces
 
@@ -289,12 +291,12 @@ contains
     do k = 1, cells(3)
       box%flow%p(:, :, k) = hydrostatic(k)
     end do
-    system%active = .true.
-    system%active(4:8, 3:7, 3:9) = .false.
-    system%active(:, :, 1) = .false.
-    system%active(2:3, 2:3, 2) = .false.
-    where (.not. system%active) box%flow%p = 1.0e9_wp
-    call extend_pressure(box%grid, g, box%flow%rho, system%active, system%known, box%flow%p)
+    pressure%system%active = .true.
+    pressure%system%active(4:8, 3:7, 3:9) = .false.
+    pressure%system%active(:, :, 1) = .false.
+    pressure%system%active(2:3, 2:3, 2) = .false.
+    where (.not. pressure%system%active) box%flow%p = 1.0e9_wp
+    call extend_pressure(box%grid, g, box%flow%rho, pressure%system%active, pressure%known, box%flow%p)
     worst = 0.0_wp
     do k = 1, cells(3)
       worst = max(worst, maxval(abs(box%flow%p(1:12, 1:8, k) - hydrostatic(k))))

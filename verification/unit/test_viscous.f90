@@ -6,7 +6,9 @@ program test_viscous
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
-  use viscous_m, only: viscous_t, viscous_init, build_viscous, solve_viscous
+  use viscous_system_m, only: viscous_t, viscous_init
+  use viscous_legs_m, only: build_viscous
+  use viscous_m, only: solve_viscous
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
   implicit none
@@ -19,9 +21,8 @@ program test_viscous
     lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
-  real(wp) :: force(6, 1), forces(6, 2), z, worst, momentum(2), film, drag
-  integer :: k, n, iterations
-  logical :: converged
+  real(wp) :: z, worst, momentum(2), film, drag
+  integer :: k, n
 
   call parallel_init()
   call make_grid()
@@ -29,7 +30,7 @@ program test_viscous
     call make_wall(heights(n))
     ! A long step brings the steady shear flow between the moving surface and the tank's upper wall.
     call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
-    call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+    call solve_viscous(grid, wall, flow, viscous)
     worst = 0.0_wp
     do k = 1, 8
       z = grid%centre(k, 3)
@@ -37,9 +38,9 @@ program test_viscous
       worst = max(worst, maxval(abs(flow%u(1:4, 1:4, k, 1) - speed*(depth - z)/(depth &
           - heights(n)))))
     end do
-    call check('converged', converged)
+    call check('converged', viscous%converged)
     call check('linear profile above a wall inside a cell', worst, 0.0_wp, 1.0e-7_wp)
-    call check('shear force on the wall', force(1, 1), -mu*speed/(depth - heights(n)), &
+    call check('shear force on the wall', viscous%force(1, 1), -mu*speed/(depth - heights(n)), &
                1.0e-7_wp*mu*speed)
   end do
 
@@ -48,18 +49,18 @@ program test_viscous
   wall%free = .true.
   momentum(1) = fluid_momentum() + wall%mass(1)*wall%motion(1, 1)
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
-  call solve_viscous(grid, wall, 5.0_wp, flow, viscous, force, iterations, converged)
+  call solve_viscous(grid, wall, flow, viscous)
   momentum(2) = fluid_momentum() + wall%mass(1)*wall%motion(1, 1) &
                 + 5.0_wp*sum(2.0_wp*mu*8.0_wp*flow%u(1:4, 1:4, 8, 1))/16.0_wp
   call check('momentum of body, fluid and tank wall', momentum(2), momentum(1), &
              1.0e-7_wp*momentum(1))
   call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
-             5.0_wp*force(1, 1), 1.0e-7_wp*momentum(1))
+             5.0_wp*viscous%force(1, 1), 1.0e-7_wp*momentum(1))
 
   ! The film above the wall, centre inside: mass m, drag 2 mu A^2/V_o, nothing else.
   call make_wall(heights(2))
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
-  call solve_viscous(grid, wall, 5.0_wp, flow, viscous, force, iterations, converged)
+  call solve_viscous(grid, wall, flow, viscous)
   film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
   drag = 2.0_wp*mu*grid%area(3)**2/(film*grid%volume)
   call check('film cell', flow%u(2, 2, 2, 1), speed*5.0_wp*drag/(rho*film*grid%volume &
@@ -70,7 +71,7 @@ program test_viscous
   call viscous_init(grid, 1, viscous)
   call make_wall(heights(1))
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
-  call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+  call solve_viscous(grid, wall, flow, viscous)
   worst = 0.0_wp
   do k = 2, 8
     z = (grid%centre(k, 3) - heights(1))/(depth - heights(1))
@@ -85,16 +86,16 @@ program test_viscous
   call make_gap(3.65_wp*grid%h(3), 3.95_wp*grid%h(3), 2)
   flow%u(:, :, :, 1) = long_time/rho   ! a force of 1 N/m3 over the step
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
-  call solve_viscous(grid, wall, long_time, flow, viscous, forces, iterations, converged)
+  call solve_viscous(grid, wall, flow, viscous)
   film = 0.3_wp*grid%h(3)
   call check('film between two walls', flow%u(2, 2, 4, 1), film**2/(12.0_wp*mu), &
              1.0e-7_wp*film**2/mu)
-  call check('each wall takes half of the force', forces(1, :), 0.5_wp*film*[1.0_wp, 1.0_wp], &
+  call check('each wall takes half of the force', viscous%force(1, :), 0.5_wp*film*[1.0_wp, 1.0_wp], &
              1.0e-7_wp*film)
   call make_gap(0.0_wp, 0.3_wp*grid%h(3), 1)
   wall%motion(1, 1) = speed
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
-  call solve_viscous(grid, wall, long_time, flow, viscous, force, iterations, converged)
+  call solve_viscous(grid, wall, flow, viscous)
   call check('film between a body and the floor', flow%u(2, 2, 1, 1), 0.5_wp*speed, 1.0e-7_wp)
   call finish_checks()
   call parallel_final()

@@ -1,0 +1,263 @@
+!> Legs of the viscous stage: between neighbours, to the exact surface of bodies, to sides.
+!!
+!! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
+!! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
+!! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. A cell whose
+!! centre lies in a body but which has open faces (film cell) hangs on the wall alone.
+module viscous_legs_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, unit_step, side_no_slip, side_slip, side_inflow
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm
+  use mixture_m, only: harmonic_mean
+  use viscous_system_m, only: viscous_t, add_wall, add_side, grow_work, open_share, unknown, wrench
+  use film_legs_m, only: film_legs
+  use exact_sum_m, only: exact_sums
+  implicit none
+  private
+  public :: build_viscous
+
+  real(wp), parameter :: least_theta = 1.0e-3_wp    !! shortest leg, in cells
+  real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
+
+contains
+
+  !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: rho, mu      !! [kg/m3], [Pa s]
+    real(wp), intent(in) :: dt   !! [s]
+    type(viscous_t), intent(inout) :: self
+    integer :: d
+
+    self%dt = dt
+    self%walls%n = 0
+    self%sides%n = 0
+    self%diagonal = 0.0_wp
+    do d = 1, 3
+      call unknown_masses(grid, solid, rho, dt, d, self)
+    end do
+    do d = 1, 3
+      call legs_of_direction(grid, solid, bodies, mu, d, self)
+    end do
+    call film_legs(grid, solid, bodies, mu, self)
+    call group_by_body(bodies%n, self)
+    call bodies_seen_by_legs(solid, bodies, mu, grid, self)
+    self%diagonal = self%diagonal + self%mass
+    where (self%mass > 0.0_wp)
+      self%inverse = 1.0_wp/self%diagonal
+    else where
+      self%inverse = 0.0_wp
+    end where
+  end subroutine build_viscous
+
+  !> Mass over dt of component d in each cell; zero where the velocity is the wall's.
+  subroutine unknown_masses(grid, solid, rho, dt, d, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: d
+    type(viscous_t), intent(inout) :: self
+    integer :: i, j, k, e(3)
+    real(wp) :: m
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j, m) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          m = open_share(solid%open(i, j, k, d), solid%open(i + e(1), j + e(2), k + e(3), d))
+          if (m < least_mass) m = merge(least_mass, 0.0_wp, solid%inside(i, j, k) == 0)
+          self%mass(i, j, k, d) = rho(i, j, k)*m*grid%volume/dt
+        end do
+      end do
+    end do
+  end subroutine unknown_masses
+
+  !> Legs between neighbours in direction d: ordinary, or wall legs of one or both cells.
+  subroutine legs_of_direction(grid, solid, bodies, mu, d, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: d
+    type(viscous_t), intent(inout) :: self
+    integer :: i, j, k, e(3), low(3), high(3), upper(3)
+    real(wp) :: conductance   !! A/h [m]
+    logical :: low_wet, high_wet, free_leg
+
+    e = unit_step(:, d)
+    upper = grid%hi + e
+    conductance = grid%area(d)/grid%h(d)
+    do k = grid%lo(3), upper(3)
+      do j = grid%lo(2), upper(2)
+        do i = grid%lo(1), upper(1)
+          high = [i, j, k]
+          low = high - e
+          self%leg(i, j, k, d) = 0.0_wp
+          if (at_domain_side(grid, high(d), d)) then
+            call side_leg(high(d))
+            cycle
+          end if
+          low_wet = solid%inside(low(1), low(2), low(3)) == 0
+          high_wet = solid%inside(i, j, k) == 0
+          free_leg = solid%leg_low(i, j, k, d) > 1.0_wp .and. solid%leg_high(i, j, k, d) > 1.0_wp
+          if (low_wet .and. high_wet .and. free_leg) then
+            self%leg(i, j, k, d) = conductance &
+              *harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, k))
+            call add_diagonal(low, self%leg(i, j, k, d))
+            call add_diagonal(high, self%leg(i, j, k, d))
+          else
+            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, &
+                                       solid%leg_body_low(i, j, k, d))
+            if (high_wet) call wall_leg(high, solid%leg_high(i, j, k, d), -1, &
+                                        solid%leg_body_high(i, j, k, d))
+          end if
+        end do
+      end do
+    end do
+  contains
+    !> Both cells of an ordinary leg, as far as they are ours.
+    subroutine add_diagonal(c, value)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: value
+
+      self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + value
+    end subroutine add_diagonal
+
+    !> Leg from the centre of cell c along +d or -d to the surface of a body.
+    subroutine wall_leg(c, theta, sense, body)
+      integer, intent(in) :: c(3), sense, body
+      real(wp), intent(in) :: theta   !! [cells]
+      real(wp) :: x_wall(3), t
+      integer :: a
+
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      t = min(max(theta, least_theta), 1.0_wp)
+      do a = 1, 3
+        x_wall(a) = grid%centre(c(a), a)
+      end do
+      x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
+      call add_wall(self, c, body, mu(c(1), c(2), c(3))*conductance/t, &
+                    nearest_arm(grid, x_wall, bodies%x(:, body)))
+    end subroutine wall_leg
+
+    !> Half a leg to a wall of the domain or to an inflow, which pulls the cell towards the velocity
+    !! of the side; slip walls hold the normal component only.
+    subroutine side_leg(face)
+      integer, intent(in) :: face
+      integer :: s, c(3)
+      real(wp) :: value
+
+      s = merge(1, 2, face == 1)
+      c = merge(high, low, s == 1)
+      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (solid%inside(c(1), c(2), c(3)) /= 0) return
+      value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
+      select case (grid%side(s, d))
+      case (side_no_slip, side_inflow)
+        call add_side(self, c, value, grid%side_velocity(:, s, d))
+      case (side_slip)
+        self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
+      case default   ! open sides and outflows hold nothing
+      end select
+    end subroutine side_leg
+  end subroutine legs_of_direction
+
+  !> A lower face of index i that lies on a side of the domain with a boundary condition.
+  pure function at_domain_side(grid, i, d) result(side)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: i, d
+    logical :: side
+
+    side = (i == 1 .or. i == grid%n(d) + 1) .and. .not. grid%periodic(d)
+  end function at_domain_side
+
+  !> Bring the wall legs into the order of the bodies, keeping the order of the cells.
+  subroutine group_by_body(n_bodies, self)
+    integer, intent(in) :: n_bodies
+    type(viscous_t), intent(inout) :: self
+    integer :: b, m, place
+
+    self%walls%first = 0
+    do m = 1, self%walls%n
+      self%walls%first(self%walls%found_body(m)) = self%walls%first(self%walls%found_body(m)) + 1
+    end do
+    place = 1
+    do b = 1, n_bodies + 1
+      m = self%walls%first(b)
+      self%walls%first(b) = place
+      place = place + m
+    end do
+    do m = 1, self%walls%n
+      b = self%walls%found_body(m)
+      place = self%walls%first(b)
+      self%walls%first(b) = place + 1
+      self%walls%cell(:, place) = self%walls%found_cell(:, m)
+      self%walls%k(place) = self%walls%found_k(m)
+      self%walls%arm(:, place) = self%walls%found_arm(:, m)
+    end do
+    do b = n_bodies + 1, 2, -1
+      self%walls%first(b) = self%walls%first(b - 1)
+    end do
+    self%walls%first(1) = 1
+  end subroutine group_by_body
+
+  !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
+  !! over dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave
+  !! out.
+  subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(viscous_t), intent(inout) :: self
+    integer :: b, c, m, n
+    real(wp) :: unit(6)        !! one of the six unit motions
+    real(wp) :: mu_volume(6)
+
+    do b = 1, bodies%n
+      n = self%walls%first(b + 1) - self%walls%first(b)
+      do c = 1, 6
+        unit = 0.0_wp
+        unit(c) = 1.0_wp
+        do m = self%walls%first(b), self%walls%first(b + 1) - 1
+          associate (i => self%walls%cell(:, m), arm => self%walls%arm(:, m))
+            self%walls%work(m - self%walls%first(b) + 1, :) = &
+              wrench(self%walls%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, arm)), &
+                     arm)
+          end associate
+        end do
+        self%body_matrix(:, c, b) = exact_sums(self%walls%work(1:n, :))
+      end do
+      mu_volume = viscosity_times_volume(b)
+      self%spin_drag(b) = 2.0_wp*mu_volume(1)
+      do c = 4, 6
+        self%body_matrix(c, c, b) = self%body_matrix(c, c, b) + self%spin_drag(b)
+      end do
+    end do
+  contains
+    !> Integral of the fluid's viscosity over the body, in all six places [Pa s m3].
+    function viscosity_times_volume(body) result(total)
+      integer, intent(in) :: body
+      real(wp) :: total(6)
+      integer :: m, n, i(3)
+
+      n = 0
+      do m = solid%body_cell(body), solid%body_cell(body + 1) - 1
+        i = solid%cell(:, m)
+        if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+        n = n + 1
+        if (n > size(self%walls%work, 1)) call grow_work(self)
+        self%walls%work(n, :) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+      end do
+      total = exact_sums(self%walls%work(1:n, :))
+    end function viscosity_times_volume
+  end subroutine bodies_seen_by_legs
+
+end module viscous_legs_m

@@ -1,0 +1,183 @@
+!> The system of the viscous stage as data: masses, legs between cells, legs to walls.
+!!
+!! `viscous_legs_m` and `film_legs_m` fill it, `viscous_m` and `momentum_c_ismac_m` solve it.
+module viscous_system_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross
+  use grid_m, only: grid_t
+  implicit none
+  private
+  public :: viscous_t, viscous_init, add_wall, add_side, grow_work, open_share, unknown, wrench
+
+  !> Legs between cells and bodies, grouped by body.
+  type :: wall_legs_t
+    integer :: n = 0
+    integer, allocatable :: first(:)          !! (bodies + 1)
+    integer, allocatable :: cell(:, :)        !! (3, *)
+    real(wp), allocatable :: k(:)             !! conductance [kg/s]
+    real(wp), allocatable :: arm(:, :)        !! (3, *) from the centre of mass to the wall [m]
+    real(wp), allocatable :: work(:, :)       !! (*, 6) terms of sums over the legs of a body
+    integer, allocatable :: found_body(:)     !! body of each leg as found, before grouping
+    integer, allocatable :: found_cell(:, :)
+    real(wp), allocatable :: found_k(:), found_arm(:, :)
+  end type wall_legs_t
+
+  !> Half legs to sides of the domain that move.
+  type :: side_legs_t
+    integer :: n = 0
+    integer, allocatable :: cell(:, :)     !! (3, *)
+    real(wp), allocatable :: pull(:, :)    !! (3, *) conductance times velocity [kg m/s2]
+  end type side_legs_t
+
+  !> Walls around film cells.
+  type :: film_walls_t
+    real(wp), allocatable :: sum(:, :)
+      !! (7, cut cells) wall of one body, sum over the walls, as vectors; sum of their sizes [m2]
+    real(wp), allocatable :: area(:, :)
+      !! (3, cells of the bodies) wall of the body in each film cell as a vector [m2]
+  end type film_walls_t
+
+  !> The system, what solves it, and what came out.
+  type :: viscous_t
+    real(wp) :: dt = 0.0_wp   !! [s]
+    real(wp), allocatable :: mass(:, :, :, :)
+      !! rho m V/dt of each component, 0: not an unknown [kg/s]
+    real(wp), allocatable :: leg(:, :, :, :)
+      !! conductance of the leg across the lower face [kg/s]
+    real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
+    real(wp), allocatable :: inverse(:, :, :, :)    !! of the diagonal, 0: not an unknown [s/kg]
+    type(wall_legs_t) :: walls
+    type(side_legs_t) :: sides
+    type(film_walls_t) :: films
+    real(wp), allocatable :: body_matrix(:, :, :)
+      !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
+    real(wp), allocatable :: spin_drag(:)
+      !! 2 mu V of the body: torque per angular velocity [N m s]
+    real(wp), allocatable :: r(:, :, :, :), z(:, :, :, :)
+      !! residual, and the same over the diagonal
+    real(wp), allocatable :: s(:, :, :, :), y(:, :, :, :)   !! direction, the system applied to it
+    real(wp), allocatable :: force(:, :)   !! (6, n) of the fluid on each body [N, N m]
+    integer :: iterations = 0              !! of the last solve
+    logical :: converged = .true.
+  end type viscous_t
+
+contains
+
+  !> Allocate the work arrays.
+  subroutine viscous_init(grid, n_bodies, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_bodies
+    type(viscous_t), intent(out) :: self
+    integer :: a(3), b(3), m(3), n
+
+    a = grid%first
+    b = grid%last
+    m = grid%hi - grid%lo + 1
+    n = 2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))
+    if (.not. any(abs(grid%side_velocity) > 0.0_wp)) n = 0
+    allocate (self%sides%cell(3, n), self%sides%pull(3, n))
+    allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, &
+              source=self%mass)
+    allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
+    allocate (self%force(6, n_bodies), source=0.0_wp)
+    allocate (self%spin_drag(n_bodies), source=0.0_wp)
+    allocate (self%films%sum(7, 0), self%films%area(3, 0))
+    associate (walls => self%walls)
+      allocate (walls%first(n_bodies + 1), source=1)
+      allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0), walls%work(0, 6))
+      allocate (walls%found_body(0), walls%found_cell(3, 0), walls%found_k(0), &
+                walls%found_arm(3, 0))
+    end associate
+  end subroutine viscous_init
+
+  !> Note a wall leg of conductance k between a cell and a body.
+  subroutine add_wall(self, c, body, k, arm)
+    type(viscous_t), intent(inout) :: self
+    integer, intent(in) :: c(3), body
+    real(wp), intent(in) :: k        !! [kg/s]
+    real(wp), intent(in) :: arm(3)   !! [m]
+    integer :: n
+
+    n = self%walls%n + 1
+    if (n > size(self%walls%found_k)) call grow(self)
+    self%walls%n = n
+    self%walls%found_cell(:, n) = c
+    self%walls%found_body(n) = body
+    self%walls%found_k(n) = k
+    self%walls%found_arm(:, n) = arm
+    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
+  end subroutine add_wall
+
+  !> Double the length of the lists of wall legs.
+  subroutine grow(self)
+    type(viscous_t), intent(inout) :: self
+    integer, allocatable :: cells(:, :), body(:)
+    real(wp), allocatable :: k(:), arm(:, :)
+    integer :: n, m
+
+    n = self%walls%n
+    m = max(1024, 2*n)
+    allocate (cells(3, m), body(m), k(m), arm(3, m))
+    cells(:, :n) = self%walls%found_cell(:, :n)
+    body(:n) = self%walls%found_body(:n)
+    k(:n) = self%walls%found_k(:n)
+    arm(:, :n) = self%walls%found_arm(:, :n)
+    call move_alloc(cells, self%walls%found_cell)
+    call move_alloc(body, self%walls%found_body)
+    call move_alloc(k, self%walls%found_k)
+    call move_alloc(arm, self%walls%found_arm)
+    deallocate (self%walls%cell, self%walls%k, self%walls%arm, self%walls%work)
+    allocate (self%walls%cell(3, m), self%walls%k(m), self%walls%arm(3, m), self%walls%work(m, 6))
+  end subroutine grow
+
+  !> Note what a side that may move does to cell c: conductance k and velocity of the side.
+  subroutine add_side(self, c, k, velocity)
+    type(viscous_t), intent(inout) :: self
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: k             !! [kg/s]
+    real(wp), intent(in) :: velocity(3)   !! [m/s]
+
+    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
+    if (.not. any(abs(velocity) > 0.0_wp)) return
+    self%sides%n = self%sides%n + 1
+    self%sides%cell(:, self%sides%n) = c
+    self%sides%pull(:, self%sides%n) = k*velocity
+  end subroutine add_side
+
+  !> Double the length of the work array of the sums.
+  subroutine grow_work(self)
+    type(viscous_t), intent(inout) :: self
+    real(wp), allocatable :: longer(:, :)
+
+    allocate (longer(2*size(self%walls%work, 1) + 64, 6), source=0.0_wp)
+    longer(1:size(self%walls%work, 1), :) = self%walls%work
+    call move_alloc(longer, self%walls%work)
+  end subroutine grow_work
+
+  !> Share of the cell's mass that moves with velocity component d: mean of its two open faces.
+  elemental function open_share(w_low, w_high) result(m)
+    real(wp), intent(in) :: w_low, w_high   !! open shares of the lower and upper face
+    real(wp) :: m
+
+    m = 0.5_wp*(w_low + w_high)
+  end function open_share
+
+  !> Velocity components that are unknowns; the others move with the wall and pull on nothing.
+  pure function unknown(mass, x) result(v)
+    real(wp), intent(in) :: mass(3), x(3)
+    real(wp) :: v(3)
+
+    v = merge(x, 0.0_wp, mass > 0.0_wp)
+  end function unknown
+
+  !> Force at a point and its torque about the centre of mass, as one vector of six.
+  pure function wrench(f, arm) result(w)
+    real(wp), intent(in) :: f(3), arm(3)
+    real(wp) :: w(6)
+
+    w(1:3) = f
+    w(4:6) = cross(arm, f)
+  end function wrench
+
+end module viscous_system_m

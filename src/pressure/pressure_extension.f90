@@ -1,0 +1,80 @@
+!> Pressure of the cells that take no part in the solve.
+module pressure_extension_m
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_m, only: fill_scalar_halo
+  use mixture_m, only: face_mean
+  use parallel_m, only: global_sum, halo_exchange
+  implicit none
+  private
+  public :: extend_pressure
+
+contains
+
+  !> Pressure of cells without open faces, for the cells that will open and for looking: mean of the
+  !! known neighbours of the same height, and only where there are none, hydrostatic from above or
+  !! below.
+  subroutine extend_pressure(grid, gravity, rho, active, known, p)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(inout), contiguous :: known(grid%first(1):, grid%first(2):, grid%first(3):)
+                                                  !! work: pass in which p was found, 0 unknown
+    real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [Pa]
+    integer :: i, j, k, pass, n_found
+    integer(i8) :: left(1)
+    logical :: sideways
+
+    known = 0
+    where (active) known = 1
+    sideways = .true.
+    pass = 1
+    do
+      call halo_exchange(p, n_halo)
+      call halo_exchange(known, n_halo)
+      pass = pass + 1
+      n_found = 0
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            if (known(i, j, k) == 0) call from_neighbours([i, j, k])
+          end do
+        end do
+      end do
+      left = n_found
+      call global_sum(left)
+      if (left(1) > 0_i8) cycle
+      if (.not. sideways) exit
+      sideways = .false.
+    end do
+    call fill_scalar_halo(grid, p)
+  contains
+    !> Mean over the neighbours known before this pass.
+    subroutine from_neighbours(c)
+      integer, intent(in) :: c(3)
+      integer :: d, s, n(3), count
+      real(wp) :: total
+
+      count = 0
+      total = 0.0_wp
+      do d = 1, 3
+        if (sideways .and. abs(gravity(d)) > 0.0_wp) cycle
+        do s = -1, 1, 2
+          n = c + s*unit_step(:, d)
+          if (any((n < 1 .or. n > grid%n) .and. .not. grid%periodic)) cycle
+          if (known(n(1), n(2), n(3)) == 0 .or. known(n(1), n(2), n(3)) == pass) cycle
+          count = count + 1
+          total = total + p(n(1), n(2), n(3)) - real(s, wp)*gravity(d)*grid%h(d) &
+                  *face_mean(rho(n(1), n(2), n(3)), rho(c(1), c(2), c(3)))
+        end do
+      end do
+      if (count == 0) return
+      p(c(1), c(2), c(3)) = total/real(count, wp)
+      known(c(1), c(2), c(3)) = pass
+      n_found = n_found + 1
+    end subroutine from_neighbours
+  end subroutine extend_pressure
+
+end module pressure_extension_m

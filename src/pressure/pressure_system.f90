@@ -1,0 +1,271 @@
+!> The linear system of the pressure and its solvers.
+!!
+!! The unknown is the pressure change phi. Fluid moves through the open part w of a face only,
+!! bodies push through the rest:
+!! $$ \sum_f \frac{w_f A_f}{\rho_f h_f} (\phi_c - \phi_{nb}) + \sum_k J_k M_k^{-1} J_k^T \phi =
+!! -D_c/\Delta t $$
+!! with D the net volume outflow of a cell, fluid and solid. Symmetric and positive, so conjugate
+!! gradients with the multigrid of the first term. Without bodies in the list it is the paper's
+!! system.
+module pressure_system_m
+  use kinds_m, only: wp, name_length
+  use case_types_m, only: numerics_t
+  use grid_m, only: grid_t, unit_step
+  use boundary_m, only: gives_pressure
+  use rigid_motion_m, only: rigid_motion_t
+  use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, force_from_cells, add_cell_flux
+  use outflow_m, only: outflow_t, side_reach
+  use mixture_m, only: face_mean
+  use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  use exact_sum_m, only: exact_dot
+  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
+  use multigrid_m, only: multigrid_t
+  use parallel_m, only: halo_exchange
+  implicit none
+  private
+  public :: pressure_system_t, pressure_system_init, set_pressure_system, set_bodies, solve_linear
+  public :: motion_of_force
+
+  integer, parameter :: max_iterations = 2000   !! of one linear solve
+
+  !> The operator of the module's head, on arrays with one halo cell.
+  type, extends(linear_operator_t) :: pressure_operator_t
+    real(wp), allocatable :: cf(:, :, :, :)    !! w A/(rho h) of the lower faces [m3 s2 / (kg m2)]
+    integer :: lo(3) = 0, hi(3) = 0
+    type(rigid_motion_t) :: bodies
+    type(rigid_flux_t) :: flux
+    real(wp), allocatable :: push(:, :)
+      !! (6, bodies) force of a trial pressure, then its motion
+    real(wp), allocatable :: is_open(:, :, :)    !! of a closed box: 1 in cells with an open face
+    real(wp), allocatable :: swallowed(:, :)
+      !! (6, bodies) what the walls of a closed box swallow of J, per open cell [m2, m3]
+    logical :: pressed = .false.                 !! a free body covers whole cells at such a wall
+  contains
+    procedure :: apply => apply_pressure
+  end type pressure_operator_t
+
+  type :: pressure_system_t
+    type(pressure_operator_t) :: operator
+    type(multigrid_t) :: multigrid
+    type(jacobi_t) :: jacobi
+    type(identity_t) :: identity
+    type(krylov_work_t) :: work
+    logical, allocatable :: active(:, :, :)   !! the cell has an open face
+    character(name_length) :: solver = 'cg', preconditioner = 'multigrid'   !! by their names
+  end type pressure_system_t
+
+contains
+
+  !> Allocate the system and its solvers.
+  subroutine pressure_system_init(grid, n_bodies, numerics, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_bodies
+    type(numerics_t), intent(in) :: numerics   !! names of solver and preconditioner
+    type(pressure_system_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    self%solver = numerics%pressure_solver
+    self%preconditioner = numerics%preconditioner
+    a = grid%lo - 1
+    b = grid%hi + 1
+    allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%operator%push(6, n_bodies), source=0.0_wp)
+    allocate (self%operator%swallowed, source=self%operator%push)
+    allocate (self%operator%is_open(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    a = grid%first
+    b = grid%last
+    allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
+    call rigid_flux_init(grid, n_bodies, self%operator%flux)
+    self%operator%lo = grid%lo
+    self%operator%hi = grid%hi
+    call self%multigrid%init(grid)
+    call krylov_init(grid, self%work)
+  end subroutine pressure_system_init
+
+  !> Coefficients of the system for the open shares and densities at hand, and of its
+  !! preconditioner.
+  !!
+  !! `sides` tells what lies outside the outflows; without it the pressure there is zero.
+  subroutine set_pressure_system(grid, open, rho, self, sides)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [-]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
+    type(pressure_system_t), intent(inout) :: self
+    type(outflow_t), intent(in), optional :: sides(2, 3)
+    integer :: i, j, k, d, s, e(3), face
+    real(wp) :: area_over_h
+
+    do d = 1, 3
+      e = unit_step(:, d)
+      area_over_h = grid%area(d)/grid%h(d)
+      !$omp parallel do private(i, j) schedule(static)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            self%operator%cf(i, j, k, d) = open(i, j, k, d)*area_over_h &
+              /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+          end do
+        end do
+      end do
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
+        face = merge(1, grid%n(d) + 1, s == 1)
+        call side_coefficients(face, merge(face, face - 1, s == 1))
+      end do
+    end do
+    call mark_active(grid, self%operator%cf, self%active)
+    call find_null_space(grid, self%operator%cf, self%work)
+    select case (trim(self%preconditioner))
+    case ('multigrid'); call self%multigrid%setup(self%operator%cf)
+    case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
+    case default   ! 'none' needs nothing
+    end select
+  contains
+    !> A side of the domain: the velocity is given, or the pressure half a cell away.
+    subroutine side_coefficients(face, cell)
+      integer, intent(in) :: face, cell
+      integer :: a(3), b(3), c(3)
+
+      a = grid%lo
+      b = grid%hi
+      a(d) = face
+      b(d) = face
+      if (.not. gives_pressure(grid%side(s, d))) then
+        self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+        return
+      end if
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            c = [i, j, k] + (cell - face)*e
+            self%operator%cf(i, j, k, d) = open(i, j, k, d)*grid%area(d) &
+              /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
+          end do
+        end do
+      end do
+    end subroutine side_coefficients
+  end subroutine set_pressure_system
+
+  !> Own cells that have a face through which fluid can move.
+  subroutine mark_active(grid, cf, active)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: cf(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:, :)
+    logical, intent(inout), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          active(i, j, k) = cf(i, j, k, 1) + cf(i + 1, j, k, 1) + cf(i, j, k, 2) &
+                            + cf(i, j + 1, k, 2) + cf(i, j, k, 3) + cf(i, j, k + 1, 3) > 0.0_wp
+        end do
+      end do
+    end do
+  end subroutine mark_active
+
+  !> The bodies that a pressure moves.
+  !!
+  !! In a closed box take the mean over the open cells off J, where a free body covers whole cells
+  !! at a wall. These take no part, so that J would not sum up to zero: an even pressure would push
+  !! the body, and no pressure balance what it displaces. So all cells share what the wall swallows.
+  subroutine set_bodies(grid, bodies, self)
+    type(grid_t), intent(in) :: grid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(pressure_system_t), intent(inout) :: self
+    real(wp), parameter :: rounding = 1.0e-9_wp   !! [area of a face]
+
+    associate (op => self%operator)
+      op%bodies = bodies
+      op%pressed = .false.
+      if (.not. (self%work%singular .and. any(op%bodies%free))) return
+      call force_from_cells(op%bodies, op%flux, self%work%is_open, op%lo - 1, op%swallowed)
+      op%pressed = any(abs(op%swallowed(1:3, :)) > rounding*minval(grid%area))
+      if (.not. op%pressed) return
+      op%swallowed = op%swallowed/self%work%n_open
+      op%is_open = self%work%is_open
+    end associate
+  end subroutine set_bodies
+
+  !> y = A x: outflow that a pressure x drives, through open faces and by moving the free bodies.
+  subroutine apply_pressure(self, x, y)
+    class(pressure_operator_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: x(:, :, :)
+    real(wp), intent(inout), contiguous :: y(:, :, :)
+
+    call halo_exchange(x, 1)
+    call seven_points(self%lo, self%hi, self%cf, x, y)
+    if (.not. any(self%bodies%free)) return
+    call force_from_cells(self%bodies, self%flux, x, self%lo - 1, self%push)
+    if (self%pressed) self%push = self%push - self%swallowed*exact_dot(x, self%is_open, 1)
+    call motion_of_force(self%bodies, self%push)
+    call add_cell_flux(self%bodies, self%flux, self%push, self%lo - 1, y)
+    if (self%pressed) y = y - sum(self%swallowed*self%push)*self%is_open
+  end subroutine apply_pressure
+
+  !> The part of the operator on the grid.
+  subroutine seven_points(lo, hi, cf, x, y)
+    integer, intent(in) :: lo(3), hi(3)
+    real(wp), intent(in), contiguous :: cf(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:, :)
+    real(wp), intent(in), contiguous :: x(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
+    real(wp), intent(inout), contiguous :: y(lo(1) - 1:, lo(2) - 1:, lo(3) - 1:)
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = lo(3), hi(3)
+      do j = lo(2), hi(2)
+        do i = lo(1), hi(1)
+          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
+                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
+                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
+                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
+                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
+                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+        end do
+      end do
+    end do
+  end subroutine seven_points
+
+  !> Acceleration of the free bodies by given forces: a = M^{-1} F, in place.
+  pure subroutine motion_of_force(bodies, a)
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(inout) :: a(:, :)   !! (6, bodies) force and torque in, acceleration out
+    integer :: b
+
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      a(:, b) = matmul(bodies%mobility(:, :, b), a(:, b))
+    end do
+  end subroutine motion_of_force
+
+  !> One linear solve for phi with the chosen method.
+  subroutine solve_linear(tolerance, self, rhs, phi, iterations)
+    real(wp), intent(in) :: tolerance   !! of the residual [m3/s2]
+    type(pressure_system_t), intent(inout) :: self
+    real(wp), intent(inout), dimension(:, :, :), contiguous :: rhs, phi   !! one halo cell
+    integer, intent(out) :: iterations
+
+    select case (trim(self%preconditioner))
+    case ('multigrid'); call solve_with(self%multigrid)
+    case ('jacobi'); call solve_with(self%jacobi)
+    case default; call solve_with(self%identity)
+    end select
+  contains
+    subroutine solve_with(preconditioner)
+      class(preconditioner_t), intent(inout) :: preconditioner
+      real(wp) :: residual
+      integer :: info   !! 0: converged; the next pass sees what is left either way
+
+      if (trim(self%solver) == 'bicgstab') then
+        call bicgstab(self%operator, preconditioner, rhs, phi, tolerance, &
+                      max_iterations, iterations, residual, info, self%work)
+      else
+        call conjugate_gradient(self%operator, preconditioner, rhs, phi, tolerance, &
+                                max_iterations, iterations, residual, info, self%work)
+      end if
+    end subroutine solve_with
+  end subroutine solve_linear
+
+end module pressure_system_m
