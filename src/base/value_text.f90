@@ -7,7 +7,7 @@ module value_text_m
   implicit none
   private
   public :: parse_real, parse_integer, parse_logical
-  public :: quoted_text, printable
+  public :: quoted_text, printable, fixed_text
   public :: lower_case, nearest_name, edit_distance
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
@@ -111,6 +111,19 @@ contains
     end do
     text = text//"'"
   end function quoted_text
+
+  !> A number with a fixed number of decimals and a digit before the point: 0.20000.
+  pure function fixed_text(x, decimals) result(text)
+    real(wp), intent(in) :: x
+    integer, intent(in) :: decimals   !! at least 1
+    character(:), allocatable :: text
+    character(400) :: buffer          ! room for the largest number
+    character(20) :: form
+
+    write (form, '(a, i0, a)') '(f400.', decimals, ')'
+    write (buffer, form) x
+    text = trim(adjustl(buffer))
+  end function fixed_text
 
   !> A value as it may stand in a message: no control characters, not too long.
   pure function printable(raw) result(text)

@@ -3,6 +3,7 @@ module progress_m
   use, intrinsic :: iso_fortran_env, only: output_unit
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
+  use value_text_m, only: fixed_text
   use parallel_m, only: is_root
   use timers_m, only: wall_clock
   use rigid_body_m, only: blocks_t
@@ -135,8 +136,7 @@ contains
     integer(i8), intent(in) :: cells   !! of the whole domain
     integer, intent(in) :: exit_code
     character(*), intent(in) :: folder
-    character(200) :: line
-    character(:), allocatable :: how
+    character(:), allocatable :: how, line
     real(wp) :: seconds
     integer :: steps
 
@@ -146,12 +146,12 @@ contains
     how = 'stopped with code '//to_text(exit_code)
     if (exit_code == 0) how = 'finished'
     if (exit_code == 0 .and. clock%settled) how = 'settled'
-    write (line, '(2a, f0.5, a, i0, a, f0.1, a)') how, ' at t = ', clock%t, ' s: ', steps, &
-      ' steps in ', seconds, ' s'
-    if (self%fluid .and. steps > 0) write (line(len_trim(line) + 1:), '(a, f0.3, a)') ', ', &
-      1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), ' us per cell and step'
-    if (self%warnings > 0) line = trim(line)//', '//to_text(self%warnings)//' warnings'
-    write (output_unit, '(a)') trim(line)
+    line = how//' at t = '//fixed_text(clock%t, 5)//' s: '//to_text(steps)//' steps in ' &
+      //fixed_text(seconds, 1)//' s'
+    if (self%fluid .and. steps > 0) line = line//', ' &
+      //fixed_text(1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), 3)//' us per cell and step'
+    if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
+    write (output_unit, '(a)') line
     write (output_unit, '(2a)') 'results in ', folder
     flush (output_unit)
   end subroutine write_summary

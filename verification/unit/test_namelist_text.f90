@@ -4,8 +4,8 @@ program test_namelist_text
   use errors_m, only: problems_t
   use namelist_text_m, only: namelist_text_t, cut_groups, read_text
   use value_text_m, only: parse_real, parse_integer, parse_logical, edit_distance, nearest_name, &
-    printable, quoted_text, value_ok, value_malformed, value_not_finite, value_too_large, &
-    value_not_whole
+    printable, quoted_text, fixed_text, value_ok, value_malformed, value_not_finite, &
+    value_too_large, value_not_whole
   use kinds_m, only: wp
   implicit none
 
@@ -27,6 +27,9 @@ contains
     integer :: n, info
     logical :: flag
 
+    call check('a digit before the point', fixed_text(0.2_wp, 5) == '0.20000')
+    call check('also of a negative number', fixed_text(-0.04_wp, 1) == '-0.0')
+    call check('large', fixed_text(123456.789_wp, 2) == '123456.79')
     call check('plain', number('1.25'), 1.25_wp, 0.0_wp)
     call check('no digit in front', number('.5'), 0.5_wp, 0.0_wp)
     call check('no digit behind', number('5.'), 5.0_wp, 0.0_wp)
