@@ -2,7 +2,8 @@
 module file_words_m
   use kinds_m, only: wp
   use errors_m, only: to_text
-  use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, quoted_text
+  use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, &
+    quoted_text, printable
   implicit none
   private
   public :: words_t, read_whole, next_word, get_integer, get_real, get_count, expected, complain
@@ -125,7 +126,7 @@ contains
     if (len(word) == 0) then
       call complain(words, 'the file ends where '//what//' should stand')
     else
-      call complain(words, quoted_text(word)//' stands where '//what//' should')
+      call complain(words, quoted_text(printable(word))//' stands where '//what//' should')
     end if
   end subroutine expected
 

@@ -71,6 +71,11 @@ contains
     real(wp) :: first(2), spacing(2)
     integer :: n(2), i, j, k
 
+    if (index(words%text, achar(0)) > 0 .or. index(words%text, 'solid') == 1) then
+      words%line = 0
+      call complain(words, 'looks like an STL or another binary file, not a map of heights; ' &
+        //'an STL file is read with kind = ''stl''')
+    end if
     do k = 1, 2
       call get_integer(words, n(k))
     end do

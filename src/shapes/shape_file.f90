@@ -53,7 +53,8 @@ contains
     case ('mics-shape'); call read_own(words, point, tet)
     case ('$MeshFormat'); call read_gmsh(words, point, tet)
     case default
-      call complain(words, 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file')
+      call complain(words, 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file; ' &
+        //'tools/make_shape.py makes one of .stl, .obj and .step')
       words%line = 0
     end select
     message = place_of(words)//words%problem

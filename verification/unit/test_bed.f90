@@ -86,6 +86,10 @@ contains
     call read_bed_file('b.stl', 'stl', form, message)
     call check('binary STL: '//message, size(form%triangle, 2), 1)
     call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
+    call bad('b.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
+      //'heights; an STL file is read with kind = ''stl''')
+    call write_text('a.txt', 'x'//achar(27)//'[2J')
+    call bad('a.txt', 'heightmap', 'line 1: ''x?[2J'' stands where a whole number should')
     call bad('missing.txt', 'heightmap', 'there is no such file, or it may not be read')
     call write_text('a.txt', '')
     call bad('a.txt', 'heightmap', 'the file is empty')

@@ -256,12 +256,14 @@ contains
   subroutine faults_of_form()
     type(shape_t) :: s
     character(:), allocatable :: message
+    character(*), parameter :: neither = 'is neither a Gmsh .msh file ($MeshFormat) nor a ' &
+      //'mics-shape file; tools/make_shape.py makes one of .stl, .obj and .step'
 
     call read_file('missing.msh', 1.0_wp, s, message)
     call check('missing: '//message, message == &
                'file = ''missing.msh'': there is no such file, or it may not be read')
-    call expect('', 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file')
-    call expect('solid cube', 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file')
+    call expect('', neither)
+    call expect('solid cube', neither)
     call expect('mics-shape 2', 'line 1: mics-shape 2 is unknown, this program reads 1')
     call expect('mics-shape 1'//lf//'points 2'//lf//'0 0 0 0 x 0', &
                 'line 3: ''x'' stands where a number should')
