@@ -276,6 +276,7 @@ def test_vtk_reads_the_blocks(wet: Path) -> None:
             seen = seen_by_vtk(wet / "blocks.vtkhdf", frame)
             row = int(np.flatnonzero(h5["bodies/time"][:] == times[frame])[0])
             first = 0
+            fixed, due = h5["bodies/fixed"][:], h5["bodies/release_time"][:]
             for body, name in enumerate(h5["bodies/shape"][:]):
                 shape = h5[f"shapes/{name.decode()}"]
                 turn = rotation(h5["bodies/quaternion"][row, body])
@@ -289,7 +290,11 @@ def test_vtk_reads_the_blocks(wet: Path) -> None:
                 assert np.allclose(seen.points[part], at, rtol=0, atol=1e-7)
                 assert np.allclose(seen.point_data["velocity"][part], v, rtol=1e-6, atol=1e-6)
                 triangles = len(shape["triangles"])
-                assert (seen.cell_data["body"] == body).sum() == triangles
+                mine = seen.cell_data["body"] == body + 1  # for people, blocks count from 1
+                assert mine.sum() == triangles
+                assert (seen.cell_data["fixed"][mine] == fixed[body]).all()
+                there = due[body] == 0 or due[body] < times[frame]  # released as a step begins
+                assert (seen.cell_data["released"][mine] == there).all()
             assert seen.n_points == first
 
 

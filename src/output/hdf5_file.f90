@@ -927,15 +927,20 @@ contains
     end if
   end subroutine append_rows
 
-  subroutine append_integers(self, column, a)
+  !> Append a row of integers, or several, their elements in a row.
+  subroutine append_integers(self, column, a, n)
     class(h5_file_t), intent(inout) :: self
     type(h5_column_t), intent(inout) :: column
     integer, intent(in) :: a(:)
+    integer, intent(in), optional :: n   !! rows, else one
     integer, target :: copy(max(1, size(a)))
+    integer :: rows
 
     if (self%info /= 0) return
     copy(:size(a)) = a
-    call self%transfer_rows(column, memory_type(file_integer32), 1, size(a), c_loc(copy))
+    rows = 1
+    if (present(n)) rows = n
+    call self%transfer_rows(column, memory_type(file_integer32), rows, size(a), c_loc(copy))
   end subroutine append_integers
 
   !> Append a row of integers of 64 bits.

@@ -14,7 +14,8 @@ module write_vtkhdf_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
   use clock_m, only: clock_t
-  use hdf5_file_m, only: h5_file_t, h5_column_t, file_real32, file_real64, file_integer64
+  use hdf5_file_m, only: h5_file_t, h5_column_t, file_real32, file_real64, file_integer32, &
+    file_integer64
   implicit none
   private
   public :: field_file_t, create_field_file, reopen_field_file, write_field_frame
@@ -41,10 +42,10 @@ module write_vtkhdf_m
     type(h5_file_t) :: file
     integer :: frames = 0
     logical :: up_to_date = .false.   !! a run that goes on has a frame of its very start
-    integer, private :: n_points = 0
-    type(h5_column_t), private :: points, velocity, time
+    integer, private :: n_points = 0, n_cells = 0
+    type(h5_column_t), private :: points, velocity, released, time
     type(h5_column_t), private :: part_offset, parts, point_offset, cell_offset, connectivity_offset
-    type(h5_column_t), private :: body_offset, velocity_offset
+    type(h5_column_t), private :: body_offset, fixed_offset, released_offset, velocity_offset
   end type block_file_t
 
 contains
@@ -279,12 +280,15 @@ contains
 
     if (.not. is_root()) return
     self%n_points = count_points(blocks)
+    self%n_cells = count_cells(blocks)
     associate (file => self%file, n => self%n_points)
       call file%create(path, .false.)
       call start_file(file, 'PolyData')
       call file%store_wide_integers(root//'/NumberOfPoints', '1', [n])
       call file%new_column(root//'/Points', 'm', file_real32, [3], n, self%points, 3)
       call write_cells(blocks, file)
+      call file%new_column(root//'/CellData/released', '1', file_integer32, [integer ::], &
+        self%n_cells, self%released)
       call file%group(root//'/PointData')
       call file%new_column(root//'/PointData/velocity', 'm/s', file_real32, [3], n, self%velocity, &
         3)
@@ -303,8 +307,11 @@ contains
         chunk_frames, &
                            self%connectivity_offset)
       call file%new_column(steps//'/CellDataOffsets/body', '1', file_integer64, [integer ::], &
-        chunk_frames, &
-                           self%body_offset)
+        chunk_frames, self%body_offset)
+      call file%new_column(steps//'/CellDataOffsets/fixed', '1', file_integer64, [integer ::], &
+        chunk_frames, self%fixed_offset)
+      call file%new_column(steps//'/CellDataOffsets/released', '1', file_integer64, [integer ::], &
+        chunk_frames, self%released_offset)
       call file%new_column(steps//'/PointDataOffsets/velocity', '1', file_integer64, [integer ::], &
         chunk_frames, &
                            self%velocity_offset)
@@ -322,25 +329,36 @@ contains
     end do
   end function count_points
 
-  !> The triangles of all blocks and the block each belongs to; counted from 0 like the bodies of
-  !! run.h5.
+  pure function count_cells(blocks) result(n)
+    type(blocks_t), intent(in) :: blocks
+    integer :: n, b
+
+    n = 0
+    do b = 1, blocks%n
+      n = n + size(blocks%shapes(blocks%shape(b))%triangle, 2)
+    end do
+  end function count_cells
+
+  !> The triangles of all blocks, the number of the block each belongs to, from 1 as in every text
+  !! for people, and whether that block is fixed.
   subroutine write_cells(blocks, file)
     type(blocks_t), intent(in) :: blocks
     type(h5_file_t), intent(inout) :: file
     character(*), parameter :: other(3) = [character(8) :: 'Vertices', 'Lines', 'Strips']
-    integer, allocatable :: corner(:), body(:)
+    integer, allocatable :: corner(:), body(:), fixed(:)
     integer :: b, m, i, n_cells, points_before
 
-    allocate (corner(0), body(0))
+    allocate (corner(0))
     points_before = 0
     do b = 1, blocks%n
       associate (shape => blocks%shapes(blocks%shape(b)))
         m = size(shape%triangle, 2)
         corner = [corner, reshape(shape%triangle - 1 + points_before, [3*m])]
-        body = [body, [(b - 1, i=1, m)]]
         points_before = points_before + size(shape%point, 2)
       end associate
     end do
+    body = on_cells(blocks, [(b, b=1, blocks%n)])
+    fixed = on_cells(blocks, merge(1, 0, blocks%fixed))
     n_cells = size(body)
     call write_cell_group(file, root//'/Polygons', corner, [(3*i, i=0, n_cells)])
     do i = 1, size(other)
@@ -348,7 +366,23 @@ contains
     end do
     call file%group(root//'/CellData')
     call file%store(root//'/CellData/body', '1', body)
+    call file%store(root//'/CellData/fixed', '1', fixed)
   end subroutine write_cells
+
+  !> A number of each block on its triangles.
+  pure function on_cells(blocks, of_block) result(of_cell)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: of_block(:)
+    integer :: of_cell(count_cells(blocks))
+    integer :: b, m, first
+
+    first = 0
+    do b = 1, blocks%n
+      m = size(blocks%shapes(blocks%shape(b))%triangle, 2)
+      of_cell(first + 1:first + m) = of_block(b)
+      first = first + m
+    end do
+  end function on_cells
 
   !> Cells of one kind.
   subroutine write_cell_group(file, name, corner, offset)
@@ -373,10 +407,12 @@ contains
 
     if (.not. is_root()) return
     self%n_points = count_points(blocks)
+    self%n_cells = count_cells(blocks)
     associate (file => self%file)
       call file%open(path, .false., .true.)
       call file%open_column(root//'/Points', file_real32, self%points)
       call file%open_column(root//'/PointData/velocity', file_real32, self%velocity)
+      call file%open_column(root//'/CellData/released', file_integer32, self%released)
       call file%open_column(steps//'/Values', file_real64, self%time)
       call file%open_column(steps//'/PartOffsets', file_integer64, self%part_offset)
       call file%open_column(steps//'/NumberOfParts', file_integer64, self%parts)
@@ -385,6 +421,9 @@ contains
       call file%open_column(steps//'/ConnectivityIdOffsets', file_integer64, &
         self%connectivity_offset)
       call file%open_column(steps//'/CellDataOffsets/body', file_integer64, self%body_offset)
+      call file%open_column(steps//'/CellDataOffsets/fixed', file_integer64, self%fixed_offset)
+      call file%open_column(steps//'/CellDataOffsets/released', file_integer64, &
+        self%released_offset)
       call file%open_column(steps//'/PointDataOffsets/velocity', file_integer64, &
         self%velocity_offset)
       call file%count_rows(self%time, clock%n_frames, clock%t, self%frames, self%up_to_date)
@@ -400,6 +439,7 @@ contains
       call count_frames(file, frames)
       call file%resize(self%points, int(frames, i8)*self%n_points)
       call file%resize(self%velocity, int(frames, i8)*self%n_points)
+      call file%resize(self%released, int(frames, i8)*self%n_cells)
       call file%resize(self%time, int(frames, i8))
       call file%resize(self%part_offset, int(frames, i8))
       call file%resize(self%parts, int(frames, i8))
@@ -407,6 +447,8 @@ contains
       call file%resize(self%cell_offset, int(frames, i8))
       call file%resize(self%connectivity_offset, int(frames, i8))
       call file%resize(self%body_offset, int(frames, i8))
+      call file%resize(self%fixed_offset, int(frames, i8))
+      call file%resize(self%released_offset, int(frames, i8))
       call file%resize(self%velocity_offset, int(frames, i8))
       call file%flush()
     end associate
@@ -444,6 +486,8 @@ contains
     associate (file => self%file, n => self%n_points, none => [0_i8, 0_i8, 0_i8, 0_i8])
       call file%append_rows(self%points, n, reshape(x, [3*n]))
       call file%append_rows(self%velocity, n, reshape(v, [3*n]))
+      call file%append_integers(self%released, on_cells(blocks, merge(1, 0, blocks%present)), &
+        self%n_cells)
       call file%append(self%time, [t])
       call file%append_wide(self%part_offset, [0_i8])
       call file%append_wide(self%parts, [1_i8])
@@ -451,6 +495,8 @@ contains
       call file%append_wide(self%cell_offset, none)
       call file%append_wide(self%connectivity_offset, none)
       call file%append_wide(self%body_offset, [0_i8])
+      call file%append_wide(self%fixed_offset, [0_i8])
+      call file%append_wide(self%released_offset, [int(self%frames, i8)*self%n_cells])
       call file%append_wide(self%velocity_offset, [int(self%frames, i8)*n])
       self%frames = self%frames + 1
       call count_frames(file, self%frames)
