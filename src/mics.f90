@@ -7,11 +7,11 @@ program mics
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
-  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, set_threads, &
-    global_max
+  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, nproc, &
+    set_threads, global_max
   use patience_m, only: spin_briefly
   use signals_m, only: catch_signals, signal_caught
-  use command_line_m, only: options_t, read_command_line, print_help
+  use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use namelist_text_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case, parameters_text
@@ -65,8 +65,8 @@ program mics
                     report, output)
   call stop_on_trouble()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
-  if (code /= exit_ok) call fatal(code, &
-                                  'stopped by a signal; the run can go on from its restart file')
+  if (code /= exit_ok) call fatal(code, 'stopped by a signal; the run goes on with'//new_line('a') &
+    //'  '//restart_command(program_name(), nproc(), options, output%restart_file))
   call parallel_final()
 
 contains
@@ -78,6 +78,16 @@ contains
     text = parameters_text(case)
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
   end function parameters
+
+  !> The program as it was called.
+  function program_name() result(name)
+    character(:), allocatable :: name
+    integer :: length
+
+    call get_command_argument(0, length=length)
+    allocate (character(length) :: name)
+    call get_command_argument(0, name)
+  end function program_name
 
   !> Number of the signal that any process has caught, 0 for none.
   function any_signal() result(number)

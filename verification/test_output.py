@@ -352,16 +352,34 @@ def test_signal(wet: Path, tmp_path: Path, number: int) -> None:
     while not has_rows(output, 4) and process.poll() is None:
         time.sleep(0.002)
     process.send_signal(number)
-    process.communicate(timeout=60)
+    said = process.communicate(timeout=60)[1]
     if process.returncode == 0:
         pytest.skip("the run was faster than the signal")
     assert process.returncode == 128 + number
     with opened(output / "run.h5") as h5:
         assert h5["provenance"].attrs["exit_status"] == 128 + number
     newest = max(output.glob("restart-?.h5"), key=lambda path: path.stat().st_mtime_ns)
-    code, said = run(None, "--restart", newest)
-    assert code == 0, said
+    command = said.splitlines()[-1].strip()
+    assert command == f"{MICS} --restart {newest} --threads 1 --quiet {CASE}"
+    again = subprocess.run(command, shell=True, capture_output=True, timeout=300, text=True)
+    assert again.returncode == 0, again.stderr
     assert but_restarts(differences(wet, output)) == []
+
+
+def test_how_to_go_on_with_a_case_from_standard_input(tmp_path: Path) -> None:
+    output = tmp_path / "run"
+    with CASE.open() as case:
+        process = subprocess.Popen(
+            [MICS, "--output", output], stdin=case, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        while not has_rows(output, 4) and process.poll() is None:
+            time.sleep(0.002)
+        process.terminate()
+        table, said = (text.decode() for text in process.communicate(timeout=60))
+    if process.returncode == 0:
+        pytest.skip("the run was faster than the signal")
+    assert f"{MICS} --restart {output}/restart-a.h5 < CASE" in said
+    assert "at t = 0.0" in table  # a digit before the point
 
 
 def has_rows(output: Path, rows: int) -> bool:
@@ -415,6 +433,7 @@ def test_older_results_are_kept(wet: Path, tmp_path: Path) -> None:
     for _ in range(3):
         code, said = run(output, case=CASES / "ranks" / "dry.nml")
         assert code == 0, said
+    assert said == f"mics: the older results in {output} are kept as {output}.bak-2\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.bak-1", "run.bak-2"]
 
 

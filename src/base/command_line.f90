@@ -1,10 +1,11 @@
 !> The options of the program.
 module command_line_m
-  use errors_m, only: problems_t
+  use errors_m, only: problems_t, to_text
   use value_text_m, only: nearest_name, parse_integer, value_ok
   implicit none
   private
   public :: options_t, argument_t, read_command_line, parse_arguments, print_help
+  public :: restart_command
 
   type :: options_t
     logical :: check = .false.       !! read, validate, print the plan, write nothing
@@ -162,6 +163,50 @@ contains
       options%threads = n
     end if
   end subroutine take_threads
+
+  !> The command line that goes on from a restart file, as a shell reads it.
+  !!
+  !! The results of a run that goes on stay in the folder of that file, so `--output` is not said
+  !! again. What stood on standard input has no name: `CASE` stands for it.
+  pure function restart_command(program, processes, options, restart_file) result(command)
+    character(*), intent(in) :: program        !! as it was called
+    integer, intent(in) :: processes           !! of a parallel run
+    type(options_t), intent(in) :: options     !! of the run that stopped
+    character(*), intent(in) :: restart_file
+    character(:), allocatable :: command
+
+    command = ''
+    if (processes > 1) command = 'mpirun -n '//to_text(processes)//' '
+    command = command//shell_word(program)//' --restart '//shell_word(restart_file)
+    if (options%threads > 0) command = command//' --threads '//to_text(options%threads)
+    if (options%quiet) command = command//' --quiet'
+    if (len(options%case_file) > 0) then
+      command = command//' '//shell_word(options%case_file)
+    else
+      command = command//' < CASE   (CASE: the case file, which came on standard input)'
+    end if
+  end function restart_command
+
+  !> A word between quotes where a shell would take it apart.
+  pure function shell_word(word) result(text)
+    character(*), intent(in) :: word
+    character(:), allocatable :: text
+    character(*), parameter :: plain = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ' &
+      //'0123456789_-+=.,:/@%'
+    integer :: i
+
+    text = word
+    if (verify(word, plain) == 0) return
+    text = "'"
+    do i = 1, len(word)
+      if (word(i:i) == "'") then
+        text = text//"'\''"
+      else
+        text = text//word(i:i)
+      end if
+    end do
+    text = text//"'"
+  end function shell_word
 
   !> How to use the program.
   subroutine print_help(unit)

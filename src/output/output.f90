@@ -36,6 +36,7 @@ module output_m
     integer :: code = exit_ok                !! exit code of the trouble met
     character(:), allocatable :: message     !! what the trouble was
     character(:), allocatable :: folder
+    character(:), allocatable :: restart_file   !! the newest, empty: none yet
     character(:), allocatable, private :: text, parameters   !! of the case
     real(wp), private :: gravity(3) = 0.0_wp                 !! [m/s2]
     logical, private :: quiet = .false.      !! no table
@@ -66,6 +67,7 @@ contains
     type(output_t), intent(out) :: output
 
     output%message = ''
+    output%restart_file = options%restart
     output%phase = timer('output')
     output%restart_phase = timer('restart files')
     call tic(output%phase)
@@ -266,6 +268,7 @@ contains
     call write_restart(output%folder//restart_name(output%next_restart), output%text, &
       output%parameters, grid, clock, &
                        flow, solid, blocks, contacts, info, message)
+    if (info == 0) output%restart_file = output%folder//restart_name(output%next_restart)
     output%next_restart = 3 - output%next_restart
     output%restart_step = clock%step
     call toc(output%restart_phase)

@@ -4,6 +4,7 @@
 !! empty is refused. Only the root process looks and acts; the outcome is told to all.
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_long, c_char, c_ptr, c_null_char, c_associated
+  use, intrinsic :: iso_fortran_env, only: error_unit
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
   implicit none
@@ -114,6 +115,8 @@ contains
     end do
     call rename_file(path, path//'.bak-'//to_text(n), code, message)
     if (code /= 0) code = exit_files
+    if (code == 0) write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as ' &
+      //path//'.bak-'//to_text(n)
   end subroutine keep_old_results
 
   !> Make a folder and those around it, as far as they are missing.

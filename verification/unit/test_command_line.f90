@@ -1,7 +1,7 @@
 !> Options: every form understood, every mistake named with the nearest option.
 program test_command_line
   use check_m, only: check, finish_checks
-  use command_line_m, only: options_t, argument_t, parse_arguments
+  use command_line_m, only: options_t, argument_t, parse_arguments, restart_command
   use errors_m, only: problems_t
   implicit none
   type(options_t) :: options
@@ -29,6 +29,13 @@ program test_command_line
   call refused('--output --quiet', 'option --output needs a folder behind it')
   call refused('--quiet=yes', "option --quiet takes no value, got 'yes'")
   call refused('a.nml b.nml', "two case files given, 'a.nml' and 'b.nml'")
+  call parse('--output out --threads 3 --quiet input/a.nml')
+  call check('how to go on', restart_command('./mics', 1, options, 'out/restart-a.h5') &
+    == './mics --restart out/restart-a.h5 --threads 3 --quiet input/a.nml')
+  call parse('')
+  call check('how to go on with a case from standard input', &
+    restart_command('./mics_mpi', 4, options, "my run/a's.h5") == 'mpirun -n 4 ./mics_mpi ' &
+    //"--restart 'my run/a'\''s.h5' < CASE   (CASE: the case file, which came on standard input)")
   call parse('--chek --threads x')
   call check('all problems at once', problems%n, 2)
   call finish_checks()
