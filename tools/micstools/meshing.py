@@ -12,13 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from micstools import holes
 from micstools.geometry import Array, IntArray, tet_volumes
 from micstools.shapes import Shape, from_tets
 
 LARGEST_CHANGE = 0.01
 """Change of volume by repairs or by meshing that is refused."""
 LONGEST = 20.0
-"""Length of a block above which its file is taken to be in mm [m]."""
+"""Length of a block above which its file is taken to be in mm or cm [m]."""
+LONG = 1.0
+"""Length of a block above which its unit is asked after [m]."""
 
 
 class BadSurface(Exception):
@@ -58,9 +61,10 @@ def load(path: Path, element: float = 0.0) -> Surface:
 
 
 def closed(points: Array, triangles: IntArray, volume: float | None = None) -> Surface:
-    """A closed surface seen from outside; warnings tell what was repaired.
+    """A closed surface in one piece, seen from outside; warnings tell what was repaired.
 
-    `volume` is that of the true form, if it is known.
+    `volume` is that of the true form, if it is known. Only plane holes are filled: those have one
+    filling, any other would guess the form of the block.
     """
     import trimesh
 
@@ -70,17 +74,24 @@ def closed(points: Array, triangles: IntArray, volume: float | None = None) -> S
     if len(mesh.faces) < 4:
         raise BadSurface("the file holds no closed surface")
     warnings = []
-    flipped = not mesh.is_winding_consistent or (mesh.is_watertight and mesh.volume < 0)
     if not mesh.is_watertight:
         open_edges = _open_edges(mesh)
-        trimesh.repair.fill_holes(mesh)
-        if not mesh.is_watertight:
+        try:
+            faces, n_holes = holes.fill(np.asarray(mesh.vertices, float), np.asarray(mesh.faces))
+        except holes.NotPlane as reason:
             raise BadSurface(
-                f"the surface is open: {open_edges} edges have not just two triangles, and the "
-                "holes could not be filled; repair it where it was drawn"
-            )
-        warnings.append(f"the surface was open at {open_edges} edges; the holes were filled")
-    if flipped:
+                f"the surface is open: {open_edges} edges have not just two triangles, and what "
+                f"is missing cannot be known ({reason}); repair it where it was drawn"
+            ) from reason
+        mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
+        what = "1 plane hole was" if n_holes == 1 else f"{n_holes} plane holes were"
+        warnings.append(f"the surface was open at {open_edges} edges; {what} filled")
+    if (pieces := _pieces(mesh)) > 1:
+        raise BadSurface(
+            f"the surface is in {pieces} pieces, a block is one without hollows; unite what "
+            "belongs together where it was drawn, and make a file of each block"
+        )
+    if not mesh.is_winding_consistent or mesh.volume < 0:
         trimesh.repair.fix_normals(mesh, multibody=False)  # type: ignore[no-untyped-call]
         warnings.append("some or all triangles were seen from inside; they were turned")
         if not mesh.is_winding_consistent:
@@ -103,16 +114,30 @@ def _open_edges(mesh: Any) -> int:
     return int((count != 2).sum())
 
 
+def _pieces(mesh: Any) -> int:
+    """Parts of a surface that share no edge."""
+    from trimesh import graph
+
+    nodes = np.arange(len(mesh.faces))
+    return len(graph.connected_components(mesh.face_adjacency, nodes=nodes, min_len=1))
+
+
 def scale_of(surface: Surface, size: float | None, scale: float | None) -> float:
-    """Factor from the file's units to m: from the wanted length, as given, or 1."""
+    """Factor from the file's units to m: from the wanted length, as given, or 1 with a warning
+    where the block then is a large one."""
     if size is not None:
         return size / surface.length
-    if scale is None and surface.length > LONGEST:
-        raise BadSurface(
-            f"read as m the block is {surface.length:g} m long; if the file is in mm give "
-            "--scale 0.001, or give the length in m with --size"
-        )
-    return 1.0 if scale is None else scale
+    if scale is not None:
+        return scale
+    said = (
+        f"read as m the block is {surface.length:g} m long; if the file is in mm give "
+        "--scale 0.001, in cm --scale 0.01, or give the length in m with --size"
+    )
+    if surface.length > LONGEST:
+        raise BadSurface(said)
+    if surface.length > LONG:
+        surface.warnings.append(said)
+    return 1.0
 
 
 def fill(surface: Surface, element: float = 0.0) -> Array:

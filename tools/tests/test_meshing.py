@@ -64,8 +64,52 @@ def test_holes_are_filled_with_a_warning(tmp_path: Path) -> None:
     mesh = hexapod_surface()
     mesh.update_faces(np.arange(len(mesh.faces)) != 7)
     surface = meshing.load(save(mesh, tmp_path / "holed.stl"))
-    assert "open at 3 edges" in surface.warnings[0]
+    assert surface.warnings == ["the surface was open at 3 edges; 1 plane hole was filled"]
     assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
+
+
+def test_plane_holes_of_any_form_are_filled_exactly(tmp_path: Path) -> None:
+    corners = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (3, 2), (3, 3), (0, 3), (0, 1.5)]
+    n = len(corners)
+    points = np.array([(x, y, z) for z in (0.0, 1.0) for x, y in corners])
+    sides = [(k, (k + 1) % n, (k + 1) % n + n) for k in range(n)]
+    sides += [(k, (k + 1) % n + n, k + n) for k in range(n)]
+    for order in (1, -1):  # seen from outside, and from inside
+        surface = meshing.closed(points, np.array(sides)[:, ::order])
+        assert "2 plane holes were filled" in surface.warnings[0]
+        assert surface.volume == pytest.approx(7.0, rel=1e-12)
+        assert np.abs(meshing.tet_volumes(meshing.fill(surface))).sum() == pytest.approx(7.0)
+
+
+def test_holes_that_are_not_plane_are_refused() -> None:
+    """A box without a triangle on each of two sides: a filling across the edge would cut it off."""
+    box = trimesh.creation.box((20, 10, 10))
+    normals, corners = np.asarray(box.face_normals), np.asarray(box.faces)
+    outcomes = set()
+    for other in range(1, len(corners)):
+        if normals[0] @ normals[other] > 0.5:
+            continue
+        faces = np.delete(corners, [0, other], axis=0)
+        shared = len(set(corners[0]) & set(corners[other]))
+        outcomes.add(shared)
+        if shared == 0:
+            assert meshing.closed(box.vertices, faces).volume == pytest.approx(2000.0)
+            continue
+        reason = "two holes meet at a point" if shared == 1 else "between 4 edges is not plane"
+        with pytest.raises(meshing.BadSurface, match=reason):
+            meshing.closed(box.vertices, faces)
+    assert outcomes == {0, 1, 2}
+
+
+def test_pieces_and_hollows_are_refused() -> None:
+    box = trimesh.creation.box((20, 20, 20))
+    apart = box.copy().apply_translation((50, 0, 0))
+    hollow = trimesh.creation.box((5, 5, 5))
+    hollow.invert()
+    for second in (apart, hollow):
+        both = trimesh.util.concatenate([box, second])
+        with pytest.raises(meshing.BadSurface, match="surface is in 2 pieces"):
+            meshing.closed(both.vertices, both.faces)
 
 
 def test_a_surface_that_is_far_from_closed_is_refused(tmp_path: Path) -> None:
@@ -86,9 +130,11 @@ def test_flipped_triangles_are_turned_with_a_warning(tmp_path: Path) -> None:
 def test_overlapping_parts_are_refused(tmp_path: Path) -> None:
     boxes = [trimesh.creation.box((20, 20, 20)) for _ in range(2)]
     boxes[1].apply_translation((10, 5, 3))
-    surface = meshing.load(save(trimesh.util.concatenate(boxes), tmp_path / "two.stl"))
+    both = trimesh.util.concatenate(boxes)
+    with pytest.raises(meshing.BadSurface, match="2 pieces"):
+        meshing.load(save(both, tmp_path / "two.stl"))
     with pytest.raises(meshing.BadSurface, match="meets itself"):
-        meshing.fill(surface)
+        meshing.fill(meshing.Surface(both.vertices, both.faces, both.volume))
 
 
 def test_millimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
@@ -97,6 +143,18 @@ def test_millimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
         meshing.scale_of(surface, None, None)
     assert meshing.scale_of(surface, None, 1e-3) == 1e-3
     assert meshing.scale_of(surface, 0.06, None) == pytest.approx(1e-3)
+    assert surface.warnings == []
+
+
+def test_centimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
+    mesh = hexapod_surface()
+    mesh.apply_scale(0.1)
+    surface = meshing.load(save(mesh, tmp_path / "block.stl"))
+    assert meshing.scale_of(surface, None, None) == 1.0
+    assert re.search(r"6 m long.*in cm --scale 0\.01", surface.warnings[0])
+    small = meshing.Surface(surface.points / 100, surface.triangles, surface.volume / 1e6)
+    assert meshing.scale_of(small, None, None) == 1.0
+    assert small.warnings == []
 
 
 def test_script_writes_a_file_the_program_reads(tmp_path: Path) -> None:
