@@ -15,7 +15,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("run", type=Path, help="output folder of a run")
     parser.add_argument("--times", type=float, nargs="+", help="[s]; default: as in the paper")
-    parser.add_argument("--view", nargs="+", choices=scene.VIEWS, default=list(scene.VIEWS))
+    parser.add_argument("--view", nargs="+", choices=scene.VIEWS)
     parser.add_argument("--out", type=Path, help="folder for the pictures, default RUN/pictures")
     parser.add_argument("--width", type=int, default=1200, help="of a picture [pixels]")
     given = parser.parse_args()
@@ -23,9 +23,11 @@ def main() -> None:
     run = Run(given.run)
     out = given.out or given.run / "pictures"
     out.mkdir(parents=True, exist_ok=True)
-    style = scene.Style(width=given.width)
     times = given.times or pile.telling_times(run)
-    for view in given.view:
+    views = given.view or scene.telling_views(run)
+    speed = scene.arrow_speed(run, times, views)
+    style = scene.Style(width=given.width, speed=speed)
+    for view in views:
         pictures = [
             scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style) for t in times
         ]

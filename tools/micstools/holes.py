@@ -64,7 +64,7 @@ def _closed(points: Array, loop: list[int], flat: float) -> IntArray:
             raise NotPlane(f"the border of the hole between {len(loop)} edges crosses itself")
         found.append([left[ear - 1], left[ear], left[(ear + 1) % len(left)]])
         del left[ear]
-    return np.array(loop)[np.array([*found, left])]
+    return np.asarray(np.array(loop)[np.array([*found, left])])
 
 
 def _area(x: Array, y: Array) -> float:

@@ -13,6 +13,9 @@ from micstools.geometry import Array
 from micstools.reader import Run
 from micstools.scene import DROPPED
 
+MANY = 32  # blocks that have a line of their own in the legend
+DASHES = ("-", "--", ":", "-.")
+
 Panel = Callable[[Axes, Run], None]
 
 
@@ -43,22 +46,63 @@ def history(run: Run) -> Figure:
         axis.tick_params(labelbottom=True)
     title = run.value("run", "title", "") or run.folder.name
     figure.suptitle(str(title).strip())
+    _name_blocks(figure, list(axes), run)
     return figure
 
 
 def _each_block(axis: Axes, run: Run, values: Array, title: str) -> None:
-    """One line per dropped block, from its release on; `values` (T, N)."""
+    """One line per dropped block, from its release on; `values` (T, N).
+
+    Blocks have their colour of the pictures; the dashes, too, differ from one to the next, and with
+    both of them 32 blocks can be told apart, four without colours.
+    """
     time = run.bodies.time
     for order, k in enumerate(run.bodies.dropped):
         here = time >= run.bodies.release_time[k] - 1e-12
-        colour = DROPPED[order % len(DROPPED)]
-        axis.plot(time[here], values[here, k], color=colour, lw=1, label=f"{order + 1}")
+        axis.plot(
+            time[here],
+            values[here, k],
+            color=DROPPED[order % len(DROPPED)],
+            ls=DASHES[(order + order // len(DROPPED)) % len(DASHES)],
+            lw=1,
+            label=f"{k + 1}",
+        )
     axis.set_title(title, loc="left")
+
+
+def _name_blocks(figure: Figure, axes: list[Axes], run: Run) -> None:
+    """One legend of the blocks below all panels, over no curve; the numbers are those of the case,
+    from 1."""
+    lines = axes[0].get_legend_handles_labels()[0] if run.bodies.dropped.size else []
+    if not lines:
+        return
+    title = "block" if len(lines) <= MANY else f"block, the first {MANY} of {len(lines)}"
+    figure.legend(
+        handles=lines[:MANY],
+        title=title,
+        loc="outside lower center",
+        ncols=min(len(lines), MANY // 2),
+        fontsize=7,
+        title_fontsize=7,
+        handlelength=2.4,
+        columnspacing=1.2,
+    )
+
+
+def _legend_above(axis: Axes) -> None:
+    """The legend of a panel beside its title, where no curve runs."""
+    axis.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=3,
+        fontsize=7,
+        frameon=False,
+        borderpad=0,
+    )
 
 
 def _heights(axis: Axes, run: Run) -> None:
     _each_block(axis, run, 1e3 * run.bodies.position[..., 2], "height of the centroid [mm]")
-    axis.legend(title="block", ncols=3, fontsize=7, title_fontsize=7, loc="upper right")
 
 
 def _speeds(axis: Axes, run: Run) -> None:
@@ -95,14 +139,14 @@ def _divergence(axis: Axes, run: Run) -> None:
 
 def _energies(axis: Axes, run: Run) -> None:
     s = run.series
-    for values, label, colour in (
-        (s.kinetic_energy_bodies, "kinetic, blocks", "#d1495b"),
-        (s.kinetic_energy_fluid, "kinetic, fluid", "#00798c"),
-        (s.contact_energy, "contact", "#edae49"),
+    for values, label, colour, dashes in (
+        (s.kinetic_energy_bodies, "kinetic, blocks", "#d1495b", "-"),
+        (s.kinetic_energy_fluid, "kinetic, fluid", "#00798c", "--"),
+        (s.contact_energy, "contact", "#edae49", ":"),
     ):
         if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0:
-            axis.plot(s.time, 1e3 * values, color=colour, lw=1, label=label)
-    axis.legend(fontsize=7)
+            axis.plot(s.time, 1e3 * values, color=colour, ls=dashes, lw=1, label=label)
+    _legend_above(axis)
     axis.set_title("energy [mJ]", loc="left")
 
 
@@ -116,7 +160,7 @@ def _solver(axis: Axes, run: Run) -> None:
     s = run.series
     axis.plot(s.time, s.solver_iterations, color="#6a4c93", lw=0.6, label="iterations")
     axis.plot(s.time, s.pressure_passes, color="#edae49", lw=0.8, label="pressure passes")
-    axis.legend(fontsize=7)
+    _legend_above(axis)
     axis.set_title("pressure solver, per step", loc="left")
 
 

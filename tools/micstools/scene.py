@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
+from micstools import labels
 from micstools.geometry import Array, IntArray
 from micstools.overlap import present_bodies
 from micstools.reader import Fields, Run
@@ -23,6 +25,25 @@ BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
 DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
 VIEWS = ("front", "side")
+ARROW = 0.12  # length of an arrow of the speed of a style, over the height of the tank
+STILL = 1e-4  # [m/s] below this no arrows are drawn
+HIGHEST = 2.6  # height of a picture over its width; a slice of a tank has room at its sides
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the viewer stands so that the whole tank fills the picture."""
+
+    focus: Array  # (3) [m]
+    position: Array  # (3) [m]
+    angle: float  # of view, vertical [degrees]
+    aspect: float  # height of the picture over its width
+
+    @property
+    def width_at_focus(self) -> float:
+        """What the picture shows across, as far away as the focus [m]."""
+        distance = float(np.linalg.norm(self.position - self.focus))
+        return float(2 * distance * np.tan(np.radians(self.angle / 2)) / self.aspect)
 
 
 @dataclass(frozen=True)
@@ -32,7 +53,8 @@ class Style:
     width: int = 1200  # [pixels]
     arrows: bool = True
     water: bool = True
-    label: bool = True
+    label: bool = True  # numbers on the blocks; time, arrow and length above
+    speed: float = 0.0  # of an arrow `ARROW` long [m/s], 0: as suits the picture
 
 
 def missing_libraries() -> str:
@@ -70,30 +92,83 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     style = style or Style()
     fields = run.fields(t) if run.field_times.size else None
     t = t if fields is None else fields.time
-    low, high = run.grid.low, run.grid.high
-    camera = camera_for(low, high, view)
+    camera = camera_for(run.grid.low, run.grid.high, view)
     width = style.width if view == "front" else int(0.55 * style.width)
     plotter = _plotter(width, int(width * camera.aspect))
     row = run.bodies.row(t)
     _add_blocks(plotter, run, row)
-    _add_tank(plotter, low, high)
+    _add_tank(plotter, run.grid.low, run.grid.high)
     _add_bed(plotter, run)
-    label = f"t = {run.bodies.time[row]:.2f} s"
+    arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
     if fields is not None:
         if style.water:
             _add_water(plotter, run, fields)
         if style.arrows:
-            fastest = _add_arrows(plotter, run, fields, view)
-            label += f"   longest arrow {fastest:.2f} m/s" if fastest else ""
-    if style.label:
-        size = max(7, int(width / 90))
-        plotter.add_text(
-            label, position=(0.02, 0.955), viewport=True, font_size=size, color="black"
-        )
+            arrows = arrows_of(run, fields, view)
+    speed = style.speed or usual_speed(arrows.velocity)
+    height = float(run.grid.high[2] - run.grid.low[2])
+    _add_arrows(plotter, arrows, speed, ARROW * height)
     _look(plotter, camera)
-    plotter.screenshot(str(path))
+    image = Image.fromarray(plotter.screenshot(return_img=True)).convert("RGB")
+    if style.label:
+        labels.number_blocks(image, _block_numbers(plotter, run, row, camera))
+        keys = _keys(run, speed, width / camera.width_at_focus, view)
+        image = labels.with_header(image, f"t = {run.bodies.time[row]:.2f} s", keys)
     plotter.close()
+    image.save(path)
     return path
+
+
+def arrow_speed(run: Run, times: list[float], views: list[str]) -> float:
+    """Speed [m/s] that gives the pictures of these times and views one scale of their arrows, as
+    `Style.speed`."""
+    if not run.field_times.size:
+        return 0.0
+    found = [arrows_of(run, run.fields(t), view).velocity for t in times for view in views]
+    return usual_speed(np.concatenate(found))
+
+
+def usual_speed(velocity: Array) -> float:
+    """Speed [m/s] that few of the velocities (n, 3) exceed: a splash does not make all others
+    dots."""
+    speeds = np.linalg.norm(velocity, axis=1)
+    return float(np.percentile(speeds, 99)) if speeds.size else 0.0
+
+
+def telling_views(run: Run) -> list[str]:
+    """The views of a run; a slice one cell thick is seen from its flat side only."""
+    cells = [len(faces) - 1 for faces in run.grid.faces]
+    hidden = {"side": cells[1] == 1, "front": cells[0] == 1 and cells[1] > 1}
+    return [view for view in VIEWS if not hidden[view]]
+
+
+def _keys(run: Run, speed: float, pixels: float, view: str) -> list[labels.Key]:
+    """What an arrow and a length mean, in the middle of the tank, `pixels` to the metre."""
+    size = run.grid.high - run.grid.low
+    keys = []
+    if speed > STILL:
+        told = labels.round_below(speed)
+        length = told / speed * ARROW * float(size[2])
+        keys.append(labels.Key("arrow", round(pixels * length), f"{told:g} m/s"))
+    length = labels.round_below(0.25 * float(size[0 if view == "front" else 1]))
+    text = f"{length:g} m" if length >= 1 else f"{1e3 * length:g} mm"
+    return [*keys, labels.Key("bar", round(pixels * length), text)]
+
+
+def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labels.Ids:
+    """Number of the block seen at each pixel (height, width), 0 elsewhere: the scene once more,
+    each block in a colour that is its number."""
+    plotter.clear_actors()
+    plotter.disable_anti_aliasing()
+    flat = {"lighting": False, "smooth_shading": False}
+    for k, body in present_bodies(run, row).items():
+        colour = [(k + 1) % 256, (k + 1) // 256 % 256, (k + 1) // 65536]
+        plotter.add_mesh(_surface(body.points, body.shape), color=colour, **flat)
+    _add_bed(plotter, run, color="white", **flat)
+    _look(plotter, camera)
+    seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
+    ids = seen @ np.array([1, 256, 65536])
+    return np.where(ids <= run.bodies.n, ids, 0)
 
 
 def _plotter(width: int, height: int) -> Plotter:
@@ -155,7 +230,7 @@ def _add_tank(plotter: Plotter, low: Array, high: Array) -> None:
     plotter.add_mesh(floor, color="#e8e4dc", ambient=0.4)
 
 
-def _add_bed(plotter: Plotter, run: Run) -> None:
+def _add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
     """The surface of the bed in the tank, and below its border the sides of the tank."""
     import pyvista as pv
 
@@ -172,19 +247,21 @@ def _add_bed(plotter: Plotter, run: Run) -> None:
             bed = bed.clip(normal=normal, origin=at, invert=False)
     if not bed.n_cells:
         return
-    plotter.add_mesh(bed, color=BED, smooth_shading=False, ambient=0.3, diffuse=0.8)
+    look = look or {"color": BED, "smooth_shading": False, "ambient": 0.4, "diffuse": 0.7}
+    plotter.add_mesh(bed, **look)
     edges = bed.extract_feature_edges(
         boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
     )
     if not edges.n_cells:
         return
-    plotter.add_mesh(edges, color="#303030", line_width=1.5)
+    if "ambient" in look:
+        plotter.add_mesh(edges, color="#303030", line_width=1.5)
     ends = np.asarray(edges.lines).reshape(-1, 3)[:, 1:]
     below = np.array(edges.points)
     below[:, 2] = low[2]
     fours = np.column_stack([np.full(len(ends), 4), ends, ends[:, ::-1] + len(below)])
     walls = pv.PolyData(np.vstack([edges.points, below]), faces=fours.ravel())
-    plotter.add_mesh(walls, color=BED, ambient=0.5, diffuse=0.5)
+    plotter.add_mesh(walls, **look)
 
 
 def _point_grid(run: Run, fields: Fields) -> Any:
@@ -221,10 +298,16 @@ def _add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
     plotter.add_mesh(water, color=WATER, opacity=0.12, lighting=False)
 
 
-def _add_arrows(plotter: Plotter, run: Run, fields: Fields, view: str) -> float:
-    """Velocity of the water in the middle plane that faces the viewer; the largest [m/s]."""
-    import pyvista as pv
+@dataclass(frozen=True)
+class Arrows:
+    """Velocities of the water in the middle plane that faces the viewer."""
 
+    points: Array  # (n, 3) [m]
+    velocity: Array  # (n, 3) in that plane [m/s]
+
+
+def arrows_of(run: Run, fields: Fields, view: str) -> Arrows:
+    """Where arrows stand in a view: about 20 in each direction, in water free of solid."""
     axis = 1 if view == "front" else 0
     x, y, z = run.grid.centres
     here = [x, y, z]
@@ -241,32 +324,26 @@ def _add_arrows(plotter: Plotter, run: Run, fields: Fields, view: str) -> float:
     every[tuple(slice(None, None, 1 if n == 1 else max(1, round(n / 20))) for n in wet.shape)] = (
         True
     )
-    chosen = wet & every
-    speed = np.linalg.norm(velocity, axis=-1)
-    fastest = float(speed[chosen].max(initial=0.0))
-    chosen &= speed > 0.02 * fastest
-    if fastest < 1e-4 or not chosen.any():
-        return 0.0
-    arrows = pv.PolyData(points[chosen])
-    arrows["velocity"] = velocity[chosen]
-    glyphs = arrows.glyph(
+    return Arrows(points[wet & every], velocity[wet & every])
+
+
+def _add_arrows(plotter: Plotter, arrows: Arrows, unit: float, length: float) -> None:
+    """Draw arrows; one of the speed `unit` [m/s] is `length` [m] long."""
+    import pyvista as pv
+
+    speed = np.linalg.norm(arrows.velocity, axis=1)
+    chosen = speed > 0.02 * unit
+    if unit < STILL or not chosen.any():
+        return
+    cloud = pv.PolyData(arrows.points[chosen])
+    cloud["velocity"] = arrows.velocity[chosen]
+    glyphs = cloud.glyph(
         orient="velocity",
         scale="velocity",
-        factor=0.1 * float(run.grid.high[2] - run.grid.low[2]) / fastest,
+        factor=length / unit,
         geom=pv.Arrow(tip_length=0.3, tip_radius=0.09, shaft_radius=0.025),
     )
     plotter.add_mesh(glyphs, color="#1d3557", ambient=0.5)
-    return fastest
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where the viewer stands so that the whole tank fills the picture."""
-
-    focus: Array  # (3) [m]
-    position: Array  # (3) [m]
-    angle: float  # of view, vertical [degrees]
-    aspect: float  # height of the picture over its width
 
 
 def camera_for(low: Array, high: Array, view: str) -> Camera:
@@ -283,11 +360,12 @@ def camera_for(low: Array, high: Array, view: str) -> Camera:
     focus = (low + high) / 2
     for _ in range(3):  # shifts the focus until the picture is centred
         across, up, near = axes @ (corner - focus).T
-        distance = float((np.abs(across) / half_width + near).max()) * 1.04
+        widest = np.maximum(np.abs(across), np.abs(up) / HIGHEST)
+        distance = float((widest / half_width + near).max()) * 1.04
         height = up / (distance - near)
         middle = (height.max() + height.min()) / 2
-        half_height = 1.13 * (height.max() - height.min()) / 2
-        focus = focus + axes[1] * distance * (middle + 0.08 * half_height)  # room for the label
+        half_height = 1.04 * (height.max() - height.min()) / 2
+        focus = focus + axes[1] * distance * middle
     angle = 2 * np.degrees(np.arctan(half_height))
     return Camera(focus, focus + distance * towards, float(angle), float(half_height / half_width))
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from micstools import plots, scene
+from micstools import labels, plots, scene
 from micstools.reader import Run
 from micstools.shapes import hexapod
+from synthetic import UPRIGHT, Motion
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())
 TOOLS = Path(__file__).parents[1]
@@ -39,6 +41,70 @@ def test_blocks_not_yet_released_are_not_drawn(loose_pile: Run, tmp_path: Path) 
     purple = [((c[:, 2] > c[:, 1] + 25) & (c[:, 0] > c[:, 1] + 10)).mean() for c in (early, late)]
     assert purple[0] == 0.0
     assert purple[1] > 0.001
+
+
+@can_draw
+def test_blocks_are_found_by_their_numbers_from_one(loose_pile: Run) -> None:
+    camera = scene.camera_for(loose_pile.grid.low, loose_pile.grid.high, "front")
+    for t, seen in ((0.0, {1, 2, 3, 4}), (2.5, {1, 2, 3, 4, 5, 6})):
+        plotter = scene._plotter(300, int(300 * camera.aspect))
+        ids = scene._block_numbers(plotter, loose_pile, loose_pile.bodies.row(t), camera)
+        plotter.close()
+        assert set(np.unique(ids[ids > 0])) == seen
+        middle = [np.nonzero(ids == k)[1].mean() for k in (1, 2, 3)]
+        assert middle == sorted(middle)
+
+
+def test_a_number_is_written_where_its_block_is_seen() -> None:
+    image = Image.new("RGB", (400, 200), "#2e4057")
+    ids = np.zeros((200, 400), dtype=int)
+    ids[50:100, 300:360] = 17
+    ids[150:154, 20:24] = 5  # too little of it is seen
+    labels.number_blocks(image, ids)
+    changed = np.argwhere(np.any(np.asarray(image) != (0x2E, 0x40, 0x57), axis=2))
+    assert changed.min(axis=0).tolist() > [50, 300] and changed.max(axis=0).tolist() < [100, 360]
+    grey = np.asarray(image.convert("L")).astype(int)
+    assert grey.max() > 240 and grey.min() < 40  # black on white on any block
+
+
+@can_draw
+def test_pictures_have_one_scale_of_arrows(loose_pile: Run, tmp_path: Path) -> None:
+    """The key beside the time is the same although the wave is at rest in one of them."""
+    speed = scene.arrow_speed(loose_pile, [0.0, 0.5, 3.0], ["front"])
+    assert 0.05 < speed < 0.15
+    style = scene.Style(width=400, speed=speed)
+    heads = []
+    for t in (0.5, 3.0):
+        image = Image.open(scene.picture(loose_pile, t, "front", tmp_path / "a.png", style))
+        after_time = round(5 * labels.letter_size(400))
+        heads.append(np.asarray(image)[: labels.letter_size(400), after_time:])
+    assert np.array_equal(*heads)
+    assert (heads[0] < 100).any()
+
+
+def test_the_line_above_a_picture_is_never_cut_off() -> None:
+    """In a narrow picture it takes several lines, with the same ink."""
+    keys = [labels.Key("arrow", 90, "0.05 m/s"), labels.Key("bar", 70, "200 mm")]
+    ink, heights = [], []
+    for width in (150, 220, 380):  # letters of one size
+        whole = labels.with_header(Image.new("RGB", (width, 40), "white"), "t = 10.00 s", keys)
+        header = 255 - np.asarray(whole.convert("L")).astype(int)[:-40]
+        ink.append(header.sum())
+        heights.append(len(header))
+    assert ink == [ink[2]] * 3
+    assert heights[0] > heights[1] > heights[2]
+
+
+def test_keys_are_round_numbers() -> None:
+    found = [labels.round_below(x) for x in (0.0131, 0.2, 0.19999, 7.0, 10.0)]
+    assert found == pytest.approx([0.01, 0.2, 0.1, 5.0, 10.0])
+
+
+def test_a_slice_is_seen_from_its_flat_side(make_run) -> None:
+    run = make_run(Motion(cells=(60, 1, 40), t_end=0.5))
+    assert scene.telling_views(run) == ["front"]
+    thin = scene.camera_for(np.zeros(3), np.array([0.584, 0.006, 0.365]), "side")
+    assert thin.aspect < 1.1 * scene.HIGHEST
 
 
 @can_draw
@@ -79,6 +145,20 @@ def test_history_has_a_panel_for_each_matter(loose_pile: Run) -> None:
     assert titles[:2] == ["height of the centroid [mm]", "speed [m/s]"]
     assert "drift of the liquid volume [-]" in titles
     assert len(titles) == 10
+
+
+def test_the_legend_names_every_block_and_covers_no_curve(make_run) -> None:
+    ends = [(np.array([0.02 * k, 0.05, 0.1]), UPRIGHT) for k in range(1, 13)]
+    figure = plots.history(make_run(Motion(places=ends, t_end=13.0, field_step=13.0)))
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [str(k) for k in range(4, 16)]
+    lines = figure.axes[0].get_lines()
+    assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 12
+    FigureCanvasAgg(figure).draw()
+    panels = [axis.get_window_extent() for axis in figure.axes]
+    legends = [axis.get_legend() for axis in figure.axes]
+    for box in [found.get_window_extent() for found in [legend, *legends] if found]:
+        assert not any(box.overlaps(panel) for panel in panels)
 
 
 def test_contact_sheet_places_all(tmp_path: Path) -> None:
