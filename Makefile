@@ -95,8 +95,8 @@ deps:
 run: deps
 	@$(MAKE) --no-print-directory
 	./mics < $(CASE)
-	$(PYTHON) tools/plot_pile.py mics-out
-	$(PYTHON) tools/plot_history.py mics-out
+	$(PYTHON) tools/plot_pile.py $(CASE)
+	$(PYTHON) tools/plot_history.py $(CASE)
 
 test: deps
 	@verification/run_tests

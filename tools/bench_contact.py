@@ -28,6 +28,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+from micstools import command  # noqa: E402
 from micstools.geometry import Array, place  # noqa: E402
 from micstools.reader import Run  # noqa: E402
 
@@ -157,9 +158,9 @@ def main() -> None:
         output = Path(folder) / "run"
         path = Path(folder) / "pile.nml"
         path.write_text(case(given, output))
-        command = [given.program.resolve(), "--quiet", "--threads", str(given.threads), path]
+        words = [given.program.resolve(), "--quiet", "--threads", str(given.threads), path]
         before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        subprocess.run(command, check=True)
+        subprocess.run(words, check=True)
         wall, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
         run = Run(output)
         steps = int(run.series.substeps.sum())
@@ -188,4 +189,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command.run_script(main)

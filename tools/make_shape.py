@@ -2,14 +2,15 @@
 
 usage: python tools/make_shape.py FILE.stl|.obj|.step [--size M | --scale X] --out BLOCK.txt
 
-Exit code 1 and a message for a surface that cannot become a block.
+Exit code 2 and a message for a surface that cannot become a block.
 """
 
 import argparse
 import sys
 from pathlib import Path
 
-from micstools import meshing, scene
+from micstools import command, meshing, scene
+from micstools.reader import BadRun
 
 
 def main() -> None:
@@ -29,7 +30,7 @@ def main() -> None:
         scale = meshing.scale_of(surface, given.size, given.scale)
         tets = scale * meshing.fill(surface, given.element)
     except meshing.BadSurface as problem:
-        sys.exit(f"make_shape: {problem}")
+        raise BadRun(problem) from problem
     for warning in surface.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     shape, centroid = meshing.block(given.file.stem, tets, given.density)
@@ -42,4 +43,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command.run_script(main)

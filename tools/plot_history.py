@@ -6,21 +6,21 @@ usage: python tools/plot_history.py RUN [--out FILE]
 import argparse
 from pathlib import Path
 
-from micstools import plots
-from micstools.reader import Run
+from micstools import command, plots
 
 
 def main() -> None:
     """Draw and save the diagrams."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", type=Path, help="output folder of a run")
+    parser.add_argument("run", type=Path, help=command.RUN_HELP)
     parser.add_argument("--out", type=Path, help="default RUN/pictures/history.png")
     given = parser.parse_args()
-    out = given.out or given.run / "pictures" / "history.png"
+    run = command.open_run(given.run)
+    out = given.out or run.folder / "pictures" / "history.png"
     out.parent.mkdir(parents=True, exist_ok=True)
-    plots.history(Run(given.run)).savefig(out, dpi=110)
+    plots.history(run).savefig(out, dpi=110)
     print(out)
 
 
 if __name__ == "__main__":
-    main()
+    command.run_script(main)

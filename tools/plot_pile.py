@@ -6,22 +6,21 @@ usage: python tools/plot_pile.py RUN [--times 0.2 0.5 ...] [--view front side] [
 import argparse
 from pathlib import Path
 
-from micstools import pile, plots, scene
-from micstools.reader import Run
+from micstools import command, pile, plots, scene
 
 
 def main() -> None:
     """Draw every time and view, and the sheets."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", type=Path, help="output folder of a run")
+    parser.add_argument("run", type=Path, help=command.RUN_HELP)
     parser.add_argument("--times", type=float, nargs="+", help="[s]; default: as in the paper")
     parser.add_argument("--view", nargs="+", choices=scene.VIEWS)
     parser.add_argument("--out", type=Path, help="folder for the pictures, default RUN/pictures")
     parser.add_argument("--width", type=int, default=1200, help="of a picture [pixels]")
     given = parser.parse_args()
     scene.require_libraries()
-    run = Run(given.run)
-    out = given.out or given.run / "pictures"
+    run = command.open_run(given.run)
+    out = given.out or run.folder / "pictures"
     out.mkdir(parents=True, exist_ok=True)
     times = given.times or pile.telling_times(run)
     views = given.view or scene.telling_views(run)
@@ -36,4 +35,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command.run_script(main)

@@ -1,7 +1,7 @@
-"""The paper's words on its figures 5 to 7, checked on a run.
+"""What can be said of any pile, and the paper's words on its figures 5 to 7, checked on a run.
 
-Every finding is seen or not seen, with the figures behind it. Geometry is that of the true
-shapes; a contact counts where the gap is at most `REACH`.
+Every finding is seen or not seen, with the figures behind it, in which blocks are counted from 1.
+Geometry is that of the true shapes; a contact counts where the gap is at most `REACH`.
 """
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import numpy as np
 
 from micstools.geometry import attitude_change_deg, below_plane
 from micstools.overlap import overlap, present_bodies, touches
-from micstools.reader import Run
+from micstools.reader import BadRun, Run
 
 REACH = 5e-4  # [m] blocks nearer than this touch
 REST_SPEED = 5e-3  # [m/s]
@@ -41,12 +41,42 @@ class Level:
         return (self.found - self.start) / (self.demanded - self.start) - 1
 
 
-def findings(run: Run) -> list[Finding]:
-    """Everything that can be said about the run so far."""
-    found = [turning(run), *first_block(run), walls(run), at_rest(run), pattern(run), depth(run)]
-    if run.field_times.size and run.value("fluid", "water_level", None) is not None:
+def findings(run: Run, paper: bool | None = None) -> list[Finding]:
+    """Everything that can be said about the run so far; with what the `paper` says of its pile if
+    the tank is the paper's, or as given."""
+    if not run.bodies.n:
+        raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
+    found = [at_rest(run), depth(run)]
+    if is_papers_tank(run) if paper is None else paper:
+        found = [turning(run), *first_block(run), walls(run), found[0], pattern(run), found[1]]
+    if has_level(run):
         found.append(level(run))
     return found
+
+
+def is_papers_tank(run: Run) -> bool:
+    """Do blocks of 60 mm drop on three fixed ones in a tank with water of 0.3 x 0.1 x 0.2 m?"""
+    b, size = run.bodies, run.grid.high - run.grid.low
+    lengths = [np.ptp(run.shapes[name].points, axis=0) for name in set(b.shape)]
+    return bool(
+        run.field_times.size
+        and np.allclose(size, (0.3, 0.1, 0.2))
+        and b.fixed.sum() == 3
+        and b.dropped.size
+        and np.allclose(lengths, 0.06)
+    )
+
+
+def has_level(run: Run) -> bool:
+    """Does the level follow from the blocks alone: still water, in a box, that cannot leave?"""
+    ways_out = {"inflow", "outflow", "open"} & {k for s, k in run.sides.items() if s != "z_max"}
+    known = run.value("fluid", "water_level", None) is not None and not run.parameters.get("water")
+    return bool(run.field_times.size and known and not ways_out and not len(run.bed[1]))
+
+
+def _named(blocks: list[int]) -> list[int]:
+    """Numbers of blocks as a person reads them, from 1."""
+    return [k + 1 for k in blocks]
 
 
 def telling_times(run: Run) -> list[float]:
@@ -83,7 +113,7 @@ def turning(run: Run) -> Finding:
     """The paper on figure 5: no change of attitude is seen while a block falls."""
     turns = turning_before_touch(run)
     worst = max(turns.values(), default=np.nan)
-    figures = ", ".join(f"body {k}: {turn:.2f}" for k, turn in turns.items())
+    figures = ", ".join(f"block {k + 1}: {turn:.2f}" for k, turn in turns.items())
     statement = f"attitude changes less than {TURN_LIMIT:g} degrees before the first touch"
     return Finding(statement, bool(worst < TURN_LIMIT), f"degrees, {figures}")
 
@@ -108,7 +138,7 @@ def first_block(run: Run) -> list[Finding]:
             Finding(
                 f"the first block lies on fixed blocks and a wall {when}",
                 bool(on_fixed) and bool(sides),
-                f"t = {b.time[row]:.3f} s: fixed blocks {on_fixed}, walls {sides}, "
+                f"t = {b.time[row]:.3f} s: fixed blocks {_named(on_fixed)}, walls {sides}, "
                 f"speed {1e3 * speed:.2f} mm/s",
             )
         )
@@ -119,7 +149,7 @@ def walls(run: Run) -> Finding:
     """The paper on figure 7: the blocks pile up in touch with the front and the back wall."""
     seen = touches(run, len(run.bodies.time) - 1, REACH)
     by_side = {s: [k for k, side in seen.walls if side == s] for s in ("y_min", "y_max")}
-    figures = ", ".join(f"{side}: blocks {blocks}" for side, blocks in by_side.items())
+    figures = ", ".join(f"{side}: blocks {_named(blocks)}" for side, blocks in by_side.items())
     statement = "blocks of the final pile touch the front and the back wall"
     return Finding(statement, all(by_side.values()), figures)
 
@@ -158,15 +188,15 @@ def pattern(run: Run) -> Finding:
     statement = "all dropped blocks lie on the fixed ones (pattern A)"
     b = run.bodies
     released = int(b.present(-1)[b.dropped].sum())
-    figures = f"pattern {kind}; dropped blocks on the floor: {low}"
+    figures = f"pattern {kind}; dropped blocks on the floor: {_named(low)}"
     return Finding(statement, kind == "A", f"{figures}; {released} of {b.dropped.size} released")
 
 
 def depth(run: Run, limit: float = 1e-3) -> Finding:
     """True overlap of the final pile."""
     found = overlap(run)
-    pairs = {f"{i}-{j}": d for (i, j), d in found.blocks.items()}
-    pairs |= {f"{k}-{side}": d for (k, side), d in found.walls.items()}
+    pairs = {f"{i + 1}-{j + 1}": d for (i, j), d in found.blocks.items()}
+    pairs |= {f"{k + 1}-{side}": d for (k, side), d in found.walls.items()}
     worst = max(pairs, key=lambda key: pairs[key], default="none")
     figures = f"largest {1e3 * found.largest:.4f} mm ({worst}), {len(pairs)} overlapping pairs"
     statement = f"true overlap of the pile below {1e3 * limit:g} mm"

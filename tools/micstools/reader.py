@@ -29,6 +29,10 @@ _DEFAULT_SIDES = {"z_max": "open"}
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
 
+class BadRun(Exception):
+    """What was given is not the results that are wanted; the text says what is wrong."""
+
+
 @dataclass(frozen=True)
 class Grid:
     """Face coordinates of the cells [m]."""
@@ -249,8 +253,14 @@ class Run:
                     return extract(h5)
             except (OSError, RuntimeError):
                 time.sleep(wait)
-        with h5py.File(self.folder / name, "r", locking=False) as h5:
-            return extract(h5)
+            except KeyError as error:
+                text = str(error).strip("'\"")
+                raise BadRun(f"{self.folder / name}: not a whole result file ({text})") from error
+        try:
+            with h5py.File(self.folder / name, "r", locking=False) as h5:
+                return extract(h5)
+        except (OSError, RuntimeError) as error:
+            raise BadRun(f"{self.folder / name}: cannot be read ({error})") from error
 
 
 def _plain(value: Any) -> Any:

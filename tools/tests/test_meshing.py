@@ -192,6 +192,6 @@ def test_script_refuses_a_bad_file(tmp_path: Path) -> None:
         text=True,
         timeout=60,
     )
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert done.stderr.startswith("make_shape: ")
     assert not (tmp_path / "block.txt").exists()

@@ -1,9 +1,12 @@
 """The findings on piles whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from micstools import pile
+from micstools.reader import BadRun, Run
 from synthetic import UPRIGHT, Motion
 
 
@@ -26,7 +29,7 @@ def test_first_block_on_a_fixed_block_and_a_wall(make_run) -> None:
     run = make_run(Motion(places=places(on_fixed, (0.25, 0.05, 0.12)), t_end=3.0, field_step=3.0))
     before, end = pile.first_block(run)
     assert before.seen and end.seen
-    assert "fixed blocks [0], walls ['y_max']" in before.figures
+    assert "fixed blocks [1], walls ['y_max']" in before.figures
     free = make_run(Motion(places=places((0.09, 0.05, 0.12)), t_end=2.0, field_step=2.0))
     assert [f.seen for f in pile.first_block(free)] == [False]
 
@@ -62,7 +65,7 @@ def test_front_and_back_walls(make_run) -> None:
     run = make_run(Motion(places=ends, t_end=3.0, field_step=3.0))
     found = pile.walls(run)
     assert found.seen
-    assert found.figures == "y_min: blocks [3], y_max: blocks [4]"
+    assert found.figures == "y_min: blocks [4], y_max: blocks [5]"
     only_front = make_run(Motion(places=ends[:1], t_end=2.0, field_step=2.0))
     assert not pile.walls(only_front).seen
 
@@ -78,7 +81,7 @@ def test_depth_names_the_pair(make_run) -> None:
     ends = places((0.06, 0.05, 0.12), (0.1195, 0.05, 0.12))
     found = pile.depth(make_run(Motion(places=ends, t_end=3.0, field_step=3.0)))
     assert found.seen
-    assert found.figures.startswith("largest 0.5000 mm (3-4)")
+    assert found.figures.startswith("largest 0.5000 mm (4-5)")
 
 
 def test_level_follows_the_submerged_volume(make_run) -> None:
@@ -106,6 +109,41 @@ def test_telling_times_are_written_times(loose_pile) -> None:
     assert set(times) <= set(loose_pile.field_times)
     assert times[-1] == 8.0
     assert {0.0, 0.5, 1.5, 2.5, 3.5, 4.5} <= set(times)
+
+
+def test_the_paper_is_spoken_of_in_its_own_tank_only(make_run, loose_pile) -> None:
+    assert pile.is_papers_tank(loose_pile)
+    assert len(pile.findings(loose_pile)) == 8
+    general = [f.statement for f in pile.findings(loose_pile, paper=False)]
+    assert [text.split(" (")[0] for text in general] == [
+        "all blocks at rest in the end",
+        "true overlap of the pile below 1 mm",
+        "final level within 1 % of the rise the blocks demand",
+    ]
+    dry = make_run(Motion(t_end=2.0))
+    (dry.folder / "fields.vtkhdf").unlink()
+    assert not pile.is_papers_tank(dry)
+    assert len(pile.findings(dry)) == 2
+    assert len(pile.findings(dry, paper=True)) == 7
+
+
+def test_a_level_is_demanded_of_a_closed_box_of_still_water_only(loose_pile) -> None:
+    assert pile.has_level(loose_pile)
+    for name, value in {
+        "sides": loose_pile.sides | {"x_max": "outflow"},
+        "bed": (np.zeros((3, 3)), np.array([[0, 1, 2]])),
+        "parameters": loose_pile.parameters | {"water": [{}]},
+    }.items():
+        run = Run(loose_pile.folder)
+        run.__dict__[name] = value
+        assert not pile.has_level(run), name
+
+
+def test_a_run_without_blocks_has_no_pile(make_run) -> None:
+    run = make_run(Motion(t_end=0.1))
+    run.__dict__["bodies"] = replace(run.bodies, shape=[])
+    with pytest.raises(BadRun, match="holds no blocks"):
+        pile.findings(run)
 
 
 def test_report_says_yes_and_no(loose_pile) -> None:

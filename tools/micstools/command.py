@@ -1,0 +1,52 @@
+"""What all scripts do alike: find the results asked for, say in one line what is wrong."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import f90nml
+import h5py
+
+from micstools.reader import BadRun, Run
+
+OUTPUT = "mics-out"
+"""Folder of a case that names none."""
+RUN_HELP = "output folder of a run, or its case file"
+
+
+def results_of(path: Path) -> Path:
+    """The folder of results that is meant by a folder, a file in it, or the case file of the run.
+
+    The folder a case file names is taken from where we are, as the program does.
+    """
+    if path.is_dir():
+        return path
+    if not path.exists():
+        raise BadRun(f"{path}: there is no such folder or file")
+    if h5py.is_hdf5(path):
+        return path.parent
+    try:
+        case = f90nml.Parser().reads(path.read_text())
+    except Exception as error:  # f90nml raises what Python has for a text it cannot follow
+        raise BadRun(f"{path}: neither a folder of results nor a case file ({error})") from error
+    if "grid" not in case:
+        raise BadRun(f"{path}: neither a folder of results nor a case file (it has no &grid)")
+    folder = Path(str(case.get("run", {}).get("output", OUTPUT)).strip())
+    if not (folder / "run.h5").is_file():
+        raise BadRun(f"{folder}, the output of {path}, holds no run.h5: run the case first")
+    return folder
+
+
+def open_run(path: Path) -> Run:
+    """The run of a folder or of a case file."""
+    return Run(results_of(path))
+
+
+def run_script(main: Callable[[], None]) -> None:
+    """Call a script; trouble with what the user gave it is one line and the exit code 2."""
+    try:
+        main()
+    except (BadRun, OSError, subprocess.SubprocessError) as problem:
+        print(f"{Path(sys.argv[0]).stem}: {problem}", file=sys.stderr)
+        raise SystemExit(2) from problem
