@@ -183,7 +183,8 @@ contains
             do k = max(r - far, grid%lo(3)), min(r + far, grid%hi(3))
               do j = max(q - far, grid%lo(2)), min(q + far, grid%hi(2))
                 do i = max(p - far, grid%lo(1)), min(p + far, grid%hi(1))
-                  flow%u(i, j, k, :) = flow%u(i, j, k, :) + self%cut(p, q, r, :)*mass_of(i, j, k)/full
+                  flow%u(i, j, k, :) = flow%u(i, j, k, :) &
+                    + self%cut(p, q, r, :)*mass_of(i, j, k)/full
                 end do
               end do
             end do

@@ -229,8 +229,8 @@ contains
         do m = self%walls%first(b), self%walls%first(b + 1) - 1
           associate (i => self%walls%cell(:, m), arm => self%walls%arm(:, m))
             self%walls%work(m - self%walls%first(b) + 1, :) = &
-              wrench(self%walls%k(m)*unknown(self%mass(i(1), i(2), i(3), :), wall_velocity(unit, arm)), &
-                     arm)
+              wrench(self%walls%k(m)*unknown(self%mass(i(1), i(2), i(3), :), &
+                                             wall_velocity(unit, arm)), arm)
           end associate
         end do
         self%body_matrix(:, c, b) = exact_sums(self%walls%work(1:n, :))

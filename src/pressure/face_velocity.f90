@@ -138,12 +138,12 @@ contains
   !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
   !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
   !! that `a_face` does not hold, so half of it goes to the cell, too.
-  subroutine predict_face_velocity(grid, dt, rho, acceleration, flow, deviation)
+  subroutine predict_face_velocity(grid, dt, rho, a, flow, deviation)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
-    type(acceleration_t), intent(in) :: acceleration   !! already in `flow%u`, halo of cells filled
+    type(acceleration_t), intent(in) :: a   !! already in `flow%u`, halo of cells filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
     real(wp), intent(in), contiguous, optional :: &
       deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -161,8 +161,8 @@ contains
               nu = face_mean(flow%mu(il, jl, kl), flow%mu(i, j, k)) &
                    /face_mean(rho(il, jl, kl), rho(i, j, k))
               flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
-                + face_step(grid, dt, nu)*(acceleration%face(i, j, k, d) - face_mean(acceleration%cell(il, jl, kl, d), &
-                    acceleration%cell(i, j, k, d)))
+                + face_step(grid, dt, nu)*(a%face(i, j, k, d) - face_mean(a%cell(il, jl, kl, d), &
+                    a%cell(i, j, k, d)))
               if (present(deviation)) flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
                 + face_step(grid, dt, nu)/dt*deviation(i, j, k, d)
             end associate
@@ -191,7 +191,7 @@ contains
             do i = lower(1), upper(1)
               f = [i, j, k] + merge(0, 1, s == 1)*unit_step(:, d)
               flow%u(i, j, k, d) = flow%u(i, j, k, d) + 0.5_wp*(flow%uf(f(1), f(2), f(3), d) &
-                - flow%u(i, j, k, d) + dt*(acceleration%cell(i, j, k, d) - acceleration%face(f(1), f(2), f(3), d)))
+                - flow%u(i, j, k, d) + dt*(a%cell(i, j, k, d) - a%face(f(1), f(2), f(3), d)))
             end do
           end do
         end do
@@ -216,7 +216,7 @@ contains
               share = 0.5_wp*grid%h(d)/side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), flow%sides)
               mean = merge(-1.0_wp, 1.0_wp, s == 1)*mean_velocity(flow%sides(s, d), c)
               flow%uf(i, j, k, d) = share*(flow%u(c(1), c(2), c(3), d) &
-                - dt*acceleration%cell(c(1), c(2), c(3), d)) + (1.0_wp - share)*mean + dt*acceleration%face(i, j, k, d)
+                - dt*a%cell(c(1), c(2), c(3), d)) + (1.0_wp - share)*mean + dt*a%face(i, j, k, d)
             end do
           end do
         end do
@@ -243,14 +243,14 @@ contains
   !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
   !! smaller (measured: docs/decisions/coupling.md). Along the wall the fluid slips past it: taking
   !! the wall's whole velocity there makes the added mass wrong by some per cent.
-  subroutine face_velocity_at_walls(grid, solid, bodies, dt, rho, acceleration, flow)
+  subroutine face_velocity_at_walls(grid, solid, bodies, dt, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! motion at the start of the step
     real(wp), intent(in) :: dt                   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
-    type(acceleration_t), intent(in) :: acceleration
+    type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
     integer :: m, d, f(3), low(3), sides
     real(wp) :: total
@@ -280,33 +280,30 @@ contains
       integer, intent(in) :: c(3), sense, body
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: x_wall(3), wall(3), n(3), u(3), nu, dt_face
-      integer :: a
 
       if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
       dt_face = face_step(grid, dt, nu)
-      do a = 1, 3
-        x_wall(a) = grid%centre(c(a), a)
-      end do
+      x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))
-      u = flow%u(c(1), c(2), c(3), :) - dt_face*acceleration%cell(c(1), c(2), c(3), :)
+      u = flow%u(c(1), c(2), c(3), :) - dt_face*a%cell(c(1), c(2), c(3), :)
       n = wall_normal(low) + wall_normal(f)
       sides = sides + 1
       total = total + u(d) + min(1.0_wp, 0.5_wp/theta)*n(d)*dot_product(n, wall - u) &
-              /max(dot_product(n, n), tiny(1.0_wp)) + dt_face*acceleration%face(f(1), f(2), f(3), d)
+              /max(dot_product(n, n), tiny(1.0_wp)) + dt_face*a%face(f(1), f(2), f(3), d)
     end subroutine add_side
 
     !> Wall area of a cell as a vector into the fluid: what its open faces lack to close [m2].
     pure function wall_normal(c) result(area)
       integer, intent(in) :: c(3)
       real(wp) :: area(3)
-      integer :: a, e(3)
+      integer :: d, e(3)
 
-      do a = 1, 3
-        e = unit_step(:, a)
-        area(a) = grid%area(a)*(solid%open(c(1) + e(1), c(2) + e(2), c(3) + e(3), a) &
-                                - solid%open(c(1), c(2), c(3), a))
+      do d = 1, 3
+        e = unit_step(:, d)
+        area(d) = grid%area(d)*(solid%open(c(1) + e(1), c(2) + e(2), c(3) + e(3), d) &
+                                - solid%open(c(1), c(2), c(3), d))
       end do
     end function wall_normal
   end subroutine face_velocity_at_walls

@@ -147,11 +147,13 @@ contains
     call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_pass, flow%sides)
     flow%uf = flow%uf + dt*self%a_pass
     self%phi_total = self%phi_total + self%phi_pass
-    call force_from_cells(bodies, self%system%operator%flux, self%phi, grid%lo - 1, self%system%operator%push)
-    call motion_of_force(bodies, self%system%operator%push)
-    do b = 1, bodies%n
-      if (bodies%free(b)) bodies%motion(:, b) = bodies%motion(:, b) + dt*self%system%operator%push(:, b)
-    end do
+    associate (op => self%system%operator)
+      call force_from_cells(bodies, op%flux, self%phi, grid%lo - 1, op%push)
+      call motion_of_force(bodies, op%push)
+      do b = 1, bodies%n
+        if (bodies%free(b)) bodies%motion(:, b) = bodies%motion(:, b) + dt*op%push(:, b)
+      end do
+    end associate
   end subroutine add_correction
 
   !> Net volume outflow of fluid and solid from each own cell [m3/s], and its largest value per cell

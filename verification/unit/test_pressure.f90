@@ -87,7 +87,7 @@ contains
     call pressure_init(box%grid, 1, box%case%numerics, pressure)
     associate (system => pressure%system)
       call set_pressure_system(box%grid, box%solid%open, box%flow%rho, system)
-      call build_rigid_flux(box%grid, box%solid, box%bodies, pressure%system%active, pressure%system%operator%flux)
+      call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
     end associate
     call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
   end subroutine solve
@@ -130,8 +130,10 @@ contains
     box%case%numerics%preconditioner = preconditioner
     allocate (before, source=box%flow%uf)
     call solve()
-    call check(name//': converged', pressure%report%converged .and. any(pressure%report%passes == [1, 2]))
-    call check(name//': divergence told', pressure%report%divergence, largest_divergence(), 1.0e-12_wp)
+    call check(name//': converged', pressure%report%converged .and. &
+               any(pressure%report%passes == [1, 2]))
+    call check(name//': divergence told', pressure%report%divergence, largest_divergence(), &
+               1.0e-12_wp)
     call check(name//': divergence', largest_divergence() < 1.0e-8_wp)
     expected = -dt*(box%flow%p(at(1), at(2), at(3)) - box%flow%p(at(1), at(2), at(3) - 1)) &
                /(0.01_wp*0.5_wp*(box%flow%rho(at(1), at(2), at(3) - 1) &
@@ -191,7 +193,8 @@ contains
     call stir()
     motion = box%bodies%motion(:, 1)
     call solve()
-    call check('pressed box: converged', pressure%report%converged .and. any(pressure%report%passes == [1, 2]))
+    call check('pressed box: converged', pressure%report%converged .and. &
+               any(pressure%report%passes == [1, 2]))
     associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
       swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
@@ -296,7 +299,8 @@ contains
     pressure%system%active(:, :, 1) = .false.
     pressure%system%active(2:3, 2:3, 2) = .false.
     where (.not. pressure%system%active) box%flow%p = 1.0e9_wp
-    call extend_pressure(box%grid, g, box%flow%rho, pressure%system%active, pressure%known, box%flow%p)
+    call extend_pressure(box%grid, g, box%flow%rho, pressure%system%active, pressure%known, &
+                         box%flow%p)
     worst = 0.0_wp
     do k = 1, cells(3)
       worst = max(worst, maxval(abs(box%flow%p(1:12, 1:8, k) - hydrostatic(k))))

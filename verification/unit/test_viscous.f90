@@ -90,8 +90,8 @@ program test_viscous
   film = 0.3_wp*grid%h(3)
   call check('film between two walls', flow%u(2, 2, 4, 1), film**2/(12.0_wp*mu), &
              1.0e-7_wp*film**2/mu)
-  call check('each wall takes half of the force', viscous%force(1, :), 0.5_wp*film*[1.0_wp, 1.0_wp], &
-             1.0e-7_wp*film)
+  call check('each wall takes half of the force', viscous%force(1, :), &
+             0.5_wp*film*[1.0_wp, 1.0_wp], 1.0e-7_wp*film)
   call make_gap(0.0_wp, 0.3_wp*grid%h(3), 1)
   wall%motion(1, 1) = speed
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
