@@ -6,8 +6,8 @@
 !! keep films that run for ever. So a component with such a face is tied: it ends every step as the
 !! mean of its faces (`tie_films`); what of it is normal to the wall goes linearly from the faces to
 !! the wall, so half way. Along the wall the film slips with the cells beside it. The legs of those
-!! cells hold all of this shear already (`viscous_legs_m`), so the legs of the film must not hold it a
-!! second time: they hold what the step adds to the velocity of its start (`note_films`), pressure
+!! cells hold all of this shear already (`viscous_legs_m`), so the legs of the film must not hold it
+!! a second time: they hold what the step adds to the velocity of its start (`note_films`), pressure
 !! and weight that the inertia of the film does not balance.
 module film_velocity_m
   use kinds_m, only: wp

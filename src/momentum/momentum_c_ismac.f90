@@ -8,8 +8,8 @@
 !! The right side has the accurate advection (fifth-order TVD, or the donor's value), the left side
 !! that of first order, whose matrix is diagonally dominant at any Courant number. Where the flow is
 !! steady delta is zero, so neither the step nor the first-order operator leaves a trace in it. The
-!! viscous part, the wall legs and the motion of the free bodies are those of `viscous_legs_m`, in the
-!! same system; the bodies are eliminated, the rest is solved with BiCGSTAB.
+!! viscous part, the wall legs and the motion of the free bodies are those of `viscous_legs_m`, in
+!! the same system; the bodies are eliminated, the rest is solved with BiCGSTAB.
 !!
 !! Advection is written with the volumes q that pass the open faces in the step,
 !! $$ V\Delta t\,(u_f\cdot\nabla) u = \sum_f q_f (\tilde u_f - u_c), $$
