@@ -10,7 +10,7 @@ module contacts_m
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
   use neighbours_m, only: pair_list_t, reserve
-  use touches_m, only: touch_t, set_apart
+  use touches_m, only: touch_t, reserve_touches, set_apart
   use springs_m, only: springs_t, reserve_springs, comes_before, move_springs
   use sleep_m, only: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, &
     is_tired, balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
@@ -112,6 +112,8 @@ contains
     allocate (contacts%response%frequency2(-7:n), contacts%response_soon%frequency2(-7:n))
     allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
+    call reserve_touches(1, contacts%touches)
+    call reserve_touches(1, contacts%soon)
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
     call sleep_init(input%sleep, contacts%reach, contacts%sleep)
