@@ -2,8 +2,8 @@
 !! for the forces, the second for the length of the substep.
 module contact_response_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: norm
-  use neighbours_m, only: reserve
   use touches_m, only: touch_t
   use springs_m, only: comes_before
   use contact_law_m, only: contact_law_t, normal_constant, steepness, hardness, elastic_force, &
@@ -41,12 +41,12 @@ contains
     integer :: first, last
 
     response%frequency2 = 0.0_wp
-    call reserve(touches%n, response%k)
-    call reserve(touches%n, response%elastic)
-    call reserve(touches%n, response%energy)
-    call reserve(touches%n, response%eta)
-    call reserve(touches%n, response%decay)
-    call reserve(touches%n, response%pair_frequency2)
+    call ensure_room(touches%n, response%k)
+    call ensure_room(touches%n, response%elastic)
+    call ensure_room(touches%n, response%energy)
+    call ensure_room(touches%n, response%eta)
+    call ensure_room(touches%n, response%decay)
+    call ensure_room(touches%n, response%pair_frequency2)
     first = 1
     do while (first <= touches%n)
       last = last_of_pair(touches, first)

@@ -4,13 +4,14 @@
 !! that others may touch. What comes out, and its order, do not depend on when the list was made.
 module contact_spheres_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: rotation_matrix
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
   use surface_features_m, only: near_list_t
-  use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, reserve
+  use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
   use touches_m, only: touch_t, reserve_touches
   implicit none
   private
@@ -199,7 +200,7 @@ contains
         p = p + 1
       end do
     end do
-    call reserve(self%n_pairs + 1, self%first)
+    call ensure_room(self%n_pairs + 1, self%first)
     self%first(self%n_pairs + 1) = self%n_candidates + 1
     self%listed = .true.
     self%present = blocks%present
@@ -214,10 +215,10 @@ contains
     type(contact_spheres_t), intent(inout) :: self
 
     self%n_pairs = self%n_pairs + 1
-    call reserve(self%n_pairs, self%pair_a)
-    call reserve(self%n_pairs, self%pair_b)
-    call reserve(self%n_pairs, self%first)
-    call reserve(self%n_pairs, self%shift)
+    call ensure_room(self%n_pairs, self%pair_a)
+    call ensure_room(self%n_pairs, self%pair_b)
+    call ensure_room(self%n_pairs, self%first)
+    call ensure_room(self%n_pairs, self%shift)
     self%pair_a(self%n_pairs) = a
     self%pair_b(self%n_pairs) = b
     self%first(self%n_pairs) = self%n_candidates + 1
@@ -230,8 +231,8 @@ contains
     type(contact_spheres_t), intent(inout) :: self
 
     self%n_candidates = self%n_candidates + 1
-    call reserve(self%n_candidates, self%i)
-    call reserve(self%n_candidates, self%j)
+    call ensure_room(self%n_candidates, self%i)
+    call ensure_room(self%n_candidates, self%j)
     self%i(self%n_candidates) = i
     self%j(self%n_candidates) = j
   end subroutine add_candidate
@@ -248,10 +249,10 @@ contains
     self%n_slots = self%n_slots + 1
     slot = self%n_slots
     self%slot_of(self%offset(b) + sphere) = slot
-    call reserve(slot, self%body)
-    call reserve(slot, self%sphere)
-    call reserve(slot, self%centre)
-    call reserve(slot, self%radius)
+    call ensure_room(slot, self%body)
+    call ensure_room(slot, self%sphere)
+    call ensure_room(slot, self%centre)
+    call ensure_room(slot, self%radius)
     self%body(slot) = b
     self%sphere(slot) = sphere
     self%radius(slot) = blocks%shapes(blocks%shape(b))%sphere_radius(sphere)

@@ -10,11 +10,12 @@
 !! another by a skin. What comes out, and its order, do not depend on when the list was made.
 module contact_surface_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
-  use neighbours_m, only: pair_list_t, near_pairs, reserve
+  use neighbours_m, only: pair_list_t, near_pairs
   use touches_m, only: touch_t, reserve_touches
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
     gather_facets, nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere
@@ -190,16 +191,16 @@ contains
     integer :: p, m, n_old, place
 
     n_old = self%near%n
-    call reserve(n_old, self%old_slot)
-    call reserve(n_old, self%old_a)
-    call reserve(n_old, self%old_b)
+    call ensure_room(n_old, self%old_slot)
+    call ensure_room(n_old, self%old_a)
+    call ensure_room(n_old, self%old_b)
     if (n_old > 0) then
       self%old_slot(:n_old) = self%slot(:n_old)
       self%old_a(:n_old) = self%near%a(:n_old)
       self%old_b(:n_old) = self%near%b(:n_old)
     end if
     call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%wide_skin, self%near)
-    call reserve(self%near%n, self%slot)
+    call ensure_room(self%near%n, self%slot)
     self%taken = .false.
     m = 1
     do p = 1, self%near%n
@@ -503,7 +504,7 @@ contains
       pair%n_close_a, pair%close)
     pair%close_edges = n + 1
     call choose_edges(turn, x, way, surface_a, surface_b, n, pair)
-    call reserve(n + 1, pair%close)
+    call ensure_room(n + 1, pair%close)
     ! without any feature in the lists nothing comes near as long as these hold
     if (pair%of_a%n + pair%of_b%n + pair%n_crossings == 0) pair%close_until = huge(1.0_wp)
   end subroutine know_close
@@ -533,7 +534,7 @@ contains
         reach = abs(distance) + 2*margin
         at = n + 1
         n = n + 3
-        call reserve(n, chosen)
+        call ensure_room(n, chosen)
         chosen(at) = list%probe(m)
         call append_facets(host, facets, place, reach, n, chosen)
         chosen(at + 1) = n - at - 2
@@ -565,7 +566,7 @@ contains
       if (way_to_crossing(guest, surface_b%edge(pair%edge_b(m)), margin, &
         margin + min(surface_a%length, surface_b%length), &
         min(surface_a%reach, surface_b%reach)) > margin) cycle
-      call reserve(n + 2, pair%close)
+      call ensure_room(n + 2, pair%close)
       pair%close(n + 1) = pair%edge_a(m)
       pair%close(n + 2) = pair%edge_b(m)
       n = n + 2
@@ -817,8 +818,8 @@ contains
   subroutine end_lists(list)
     type(probes_near_t), intent(inout) :: list
 
-    call reserve(list%n + 1, list%facet_first)
-    call reserve(list%n + 1, list%edge_first)
+    call ensure_room(list%n + 1, list%facet_first)
+    call ensure_room(list%n + 1, list%edge_first)
     list%facet_first(list%n + 1) = list%n_facets + 1
     list%edge_first(list%n + 1) = list%n_edges + 1
   end subroutine end_lists
@@ -845,10 +846,10 @@ contains
     type(probes_near_t), intent(inout) :: list
 
     list%n = list%n + 1
-    call reserve(list%n, list%probe)
-    call reserve(list%n, list%away)
-    call reserve(list%n, list%facet_first)
-    call reserve(list%n, list%edge_first)
+    call ensure_room(list%n, list%probe)
+    call ensure_room(list%n, list%away)
+    call ensure_room(list%n, list%facet_first)
+    call ensure_room(list%n, list%edge_first)
     list%probe(list%n) = probe
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
@@ -867,7 +868,7 @@ contains
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
-    call reserve(n + size(facets), list)
+    call ensure_room(n + size(facets), list)
     do k = 1, size(facets)
       if (.not. facet_is_near(host, facets(k), place, reach)) cycle
       n = n + 1
@@ -884,7 +885,7 @@ contains
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
-    call reserve(n + size(edges), list)
+    call ensure_room(n + size(edges), list)
     do k = 1, size(edges)
       if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
       n = n + 1
@@ -922,9 +923,9 @@ contains
           min(surface_a%reach, surface_b%reach))
         if (away >= nowhere) cycle
         pair%n_crossings = pair%n_crossings + 1
-        call reserve(pair%n_crossings, pair%edge_a)
-        call reserve(pair%n_crossings, pair%edge_b)
-        call reserve(pair%n_crossings, pair%away)
+        call ensure_room(pair%n_crossings, pair%edge_a)
+        call ensure_room(pair%n_crossings, pair%edge_b)
+        call ensure_room(pair%n_crossings, pair%away)
         pair%edge_a(pair%n_crossings) = i
         pair%edge_b(pair%n_crossings) = j
         pair%away(pair%n_crossings) = away

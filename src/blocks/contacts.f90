@@ -4,12 +4,13 @@
 !! them the other half, so that springs are second order in time and a free fall is exact.
 module contacts_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use case_types_m, only: contact_input_t
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
-  use neighbours_m, only: pair_list_t, reserve
+  use neighbours_m, only: pair_list_t
   use touches_m, only: touch_t, reserve_touches, set_apart
   use springs_m, only: springs_t, reserve_springs, comes_before, move_springs
   use sleep_m, only: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, &
@@ -353,7 +354,7 @@ contains
     integer :: g, t, a, b
 
     associate (sleep => contacts%sleep, springs => contacts%springs)
-      call reserve(springs%n, sleep%chosen)
+      call ensure_room(springs%n, sleep%chosen)
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
@@ -382,7 +383,7 @@ contains
     integer :: i
 
     associate (sleep => contacts%sleep)
-      call reserve(sleep%rest%n, sleep%chosen)
+      call ensure_room(sleep%rest%n, sleep%chosen)
       do i = 1, sleep%rest%n
         sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
       end do
@@ -540,11 +541,11 @@ contains
     integer :: t, g, last
 
     groups%n = 0
-    call reserve(touches%n + 1, groups%first)
-    call reserve(touches%n, groups%new)
-    call reserve(touches%n, groups%normal)
-    call reserve(touches%n, groups%arm_a)
-    call reserve(touches%n, groups%arm_b)
+    call ensure_room(touches%n + 1, groups%first)
+    call ensure_room(touches%n, groups%new)
+    call ensure_room(touches%n, groups%normal)
+    call ensure_room(touches%n, groups%arm_a)
+    call ensure_room(touches%n, groups%arm_b)
     t = 1
     do while (t <= touches%n)
       g = groups%n + 1
@@ -810,8 +811,8 @@ contains
         m = m + 1
       end do
       if (met(contacts, m, a, b)) cycle
-      call reserve(contacts%n_met + 1, contacts%met_a)
-      call reserve(contacts%n_met + 1, contacts%met_b)
+      call ensure_room(contacts%n_met + 1, contacts%met_a)
+      call ensure_room(contacts%n_met + 1, contacts%met_b)
       contacts%met_a(m + 1:contacts%n_met + 1) = contacts%met_a(m:contacts%n_met)
       contacts%met_b(m + 1:contacts%n_met + 1) = contacts%met_b(m:contacts%n_met)
       contacts%met_a(m) = a

@@ -1,7 +1,7 @@
 !> Tangential springs: what a touch remembers from substep to substep.
 module springs_m
   use kinds_m, only: wp
-  use neighbours_m, only: reserve
+  use growing_m, only: ensure_room
   implicit none
   private
   public :: springs_t, reserve_springs, comes_before, move_springs
@@ -27,15 +27,15 @@ contains
     integer, intent(in) :: n
     type(springs_t), intent(inout) :: springs
 
-    call reserve(n, springs%a)
-    call reserve(n, springs%b)
-    call reserve(n, springs%key)
-    call reserve(n, springs%k)
-    call reserve(n, springs%xi)
-    call reserve(n, springs%force)
-    call reserve(n, springs%torque_a)
-    call reserve(n, springs%torque_b)
-    call reserve(n, springs%energy)
+    call ensure_room(n, springs%a)
+    call ensure_room(n, springs%b)
+    call ensure_room(n, springs%key)
+    call ensure_room(n, springs%k)
+    call ensure_room(n, springs%xi)
+    call ensure_room(n, springs%force)
+    call ensure_room(n, springs%torque_a)
+    call ensure_room(n, springs%torque_b)
+    call ensure_room(n, springs%energy)
   end subroutine reserve_springs
 
   !> Order of springs and touches: by body, partner, key.

@@ -1,7 +1,7 @@
 !> The one list of touches: every contact model fills it, and the contact forces come from it.
 module touches_m
   use kinds_m, only: wp
-  use neighbours_m, only: reserve
+  use growing_m, only: ensure_room
   implicit none
   private
   public :: touch_t, reserve_touches, set_apart
@@ -33,17 +33,17 @@ contains
     if (allocated(touches%a)) then
       if (n <= size(touches%a)) return
     end if
-    call reserve(n, touches%a)
-    call reserve(n, touches%b)
-    call reserve(n, touches%key)
-    call reserve(n, touches%arm_a)
-    call reserve(n, touches%arm_b)
-    call reserve(n, touches%normal)
-    call reserve(n, touches%depth)
-    call reserve(n, touches%weight)
-    call reserve(n, touches%length)
-    call reserve(n, touches%weight_shift)
-    call reserve(n, touches%weight_turn)
+    call ensure_room(n, touches%a)
+    call ensure_room(n, touches%b)
+    call ensure_room(n, touches%key)
+    call ensure_room(n, touches%arm_a)
+    call ensure_room(n, touches%arm_b)
+    call ensure_room(n, touches%normal)
+    call ensure_room(n, touches%depth)
+    call ensure_room(n, touches%weight)
+    call ensure_room(n, touches%length)
+    call ensure_room(n, touches%weight_shift)
+    call ensure_room(n, touches%weight_turn)
   end subroutine reserve_touches
 
   !> Keep in a list the entries in which the bodies touch, and move the others to a list of their

@@ -7,11 +7,11 @@
 !! periodic sides the bed reaches beyond the cells that are kept there, so it has no images.
 module bed_solid_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo
   use bed_m, only: bed_t, facet_within, clip_polygon, most_corners
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t
-  use neighbours_m, only: reserve
   implicit none
   private
   public :: make_bed_solid
@@ -76,11 +76,11 @@ contains
     integer :: v
 
     parts%n_facet = parts%n_facet + 1
-    call reserve(parts%n_facet, parts%first)
+    call ensure_room(parts%n_facet, parts%first)
     parts%first(parts%n_facet) = parts%n_corner + 1
     do v = 1, size(p, 2)
       parts%n_corner = parts%n_corner + 1
-      call reserve(parts%n_corner, parts%corner)
+      call ensure_room(parts%n_corner, parts%corner)
       parts%corner(:, parts%n_corner) = p(:, v)
     end do
   end subroutine add_facet
@@ -138,7 +138,7 @@ contains
       real(wp), intent(in) :: corner(3, 4)
 
       if (abs(tet_volume(corner)) < least) return
-      call reserve(parts%n_tet_corner + 4, parts%tet_corner)
+      call ensure_room(parts%n_tet_corner + 4, parts%tet_corner)
       parts%tet_corner(:, parts%n_tet_corner + 1:parts%n_tet_corner + 4) = corner
       parts%n_tet_corner = parts%n_tet_corner + 4
     end subroutine add_tet

@@ -21,6 +21,7 @@
 !! gives the same shares to round-off (tested), but takes all tetrahedra instead of the surface.
 module body_shares_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: cross, rotation_matrix
   use grid_m, only: grid_t, unit_step
   use tet_mesh_m, only: shape_t, most_facet_corners
@@ -144,11 +145,7 @@ contains
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
-    if (.not. allocated(work%point)) allocate (work%point(3, 0), work%low(3, 0), work%high(3, 0))
-    if (size(work%point, 2) < n) then
-      deallocate (work%point)
-      allocate (work%point(3, n))
-    end if
+    call ensure_room(n, work%point)
     r = rotation_matrix(self%q)
     centre = (self%x - grid%origin)/grid%h
     self%base = floor(centre)
@@ -163,10 +160,8 @@ contains
       end do
     end do
     n = size(shape%facet) - 1
-    if (size(work%low, 2) < n) then
-      deallocate (work%low, work%high)
-      allocate (work%low(3, n), work%high(3, n))
-    end if
+    call ensure_room(n, work%low)
+    call ensure_room(n, work%high)
     do m = 1, n
       associate (p => shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
         do d = 1, 3
@@ -202,7 +197,6 @@ contains
   subroutine prepare_rows(self, work)
     type(body_shares_t), intent(inout) :: self
     type(share_work_t), intent(inout) :: work
-    integer, parameter :: first_size = 256
     integer :: m(3)
 
     m = max(abs(self%low), abs(self%high)) + 1
@@ -219,14 +213,41 @@ contains
       allocate (work%run(4, -m(2):m(2), -m(3):m(3)))
     end if
     work%full(self%low(1):self%high(1), self%low(3):self%high(3)) = .false.
-    if (.not. allocated(work%pair)) allocate (work%pair(2, first_size))
-    if (.not. allocated(self%cell)) then
-      allocate (self%cell(3, first_size), self%inside(first_size), self%alpha(first_size))
-      allocate (self%centroid(3, first_size), self%first_tet(first_size + 1), self%tet(first_size))
-      allocate (self%face(4, first_size), self%beta(first_size), self%face_centroid(3, first_size))
-      allocate (self%hit(4, first_size), self%at(first_size))
-    end if
+    call ensure_room(1, work%pair, rows=2)   ! a body may have no cell, no face or no hit
+    call ensure_cell(1, self)
+    call ensure_face(1, self)
+    call ensure_hit(1, self)
   end subroutine prepare_rows
+
+  !> Make room for n cells.
+  pure subroutine ensure_cell(n, self)
+    integer, intent(in) :: n
+    type(body_shares_t), intent(inout) :: self
+
+    call ensure_room(n, self%cell)
+    call ensure_room(n, self%inside)
+    call ensure_room(n, self%alpha)
+    call ensure_room(n, self%centroid)
+  end subroutine ensure_cell
+
+  !> Make room for n faces.
+  pure subroutine ensure_face(n, self)
+    integer, intent(in) :: n
+    type(body_shares_t), intent(inout) :: self
+
+    call ensure_room(n, self%face, rows=4)
+    call ensure_room(n, self%beta)
+    call ensure_room(n, self%face_centroid)
+  end subroutine ensure_face
+
+  !> Make room for n hits.
+  pure subroutine ensure_hit(n, self)
+    integer, intent(in) :: n
+    type(body_shares_t), intent(inout) :: self
+
+    call ensure_room(n, self%hit, rows=4)
+    call ensure_room(n, self%at)
+  end subroutine ensure_hit
 
   !> Prisms, areas and crossings of all facets in the row of cells number j.
   subroutine sum_row(shape, j, self, work)
@@ -728,8 +749,8 @@ contains
     integer :: n
 
     n = self%n_cell + 1
-    if (n > size(self%alpha)) call double_cells(self)
     self%n_cell = n
+    call ensure_cell(n, self)
     self%cell(:, n) = cell
     self%inside(n) = inside
     if (moment(1) > 1.0_wp - full_cell) then
@@ -749,8 +770,8 @@ contains
     integer :: n, d
 
     n = self%n_face + 1
-    if (n > size(self%beta)) call double_faces(self)
     self%n_face = n
+    call ensure_face(n, self)
     self%face(:, n) = face
     d = face(4)
     self%face_centroid(d, n) = 0.0_wp
@@ -771,8 +792,8 @@ contains
     integer :: n
 
     n = self%n_hit + 1
-    if (n > size(self%at)) call double_hits(self)
     self%n_hit = n
+    call ensure_hit(n, self)
     self%hit(:, n) = leg
     self%at(n) = at
   end subroutine add_hit
@@ -824,8 +845,8 @@ contains
           call row_range(n, d, j, k, first, last)
           do i = first, last
             if (work%number(i, j, k) == 0) cycle
-            if (n_pair == size(work%pair, 2)) call double_pairs(work)
             n_pair = n_pair + 1
+            call ensure_room(n_pair, work%pair)
             work%pair(:, n_pair) = [work%number(i, j, k), t]
           end do
         end do
@@ -884,10 +905,8 @@ contains
     type(body_shares_t), intent(inout) :: self
     integer :: p, m
 
-    if (size(self%tet) < n_pair) then
-      deallocate (self%tet)
-      allocate (self%tet(2*n_pair))
-    end if
+    call ensure_room(n_pair, self%tet)
+    call ensure_room(self%n_cell + 1, self%first_tet)
     self%first_tet(:self%n_cell + 1) = 0
     do p = 1, n_pair
       m = pair(1, p)
@@ -905,63 +924,5 @@ contains
       self%tet(self%first_tet(m)) = pair(2, p)
     end do
   end subroutine sort_pairs
-
-  subroutine double_pairs(work)
-    type(share_work_t), intent(inout) :: work
-    integer, allocatable :: longer(:, :)
-    integer :: n
-
-    n = size(work%pair, 2)
-    allocate (longer(2, 2*n))
-    longer(:, :n) = work%pair
-    call move_alloc(longer, work%pair)
-  end subroutine double_pairs
-
-  subroutine double_cells(self)
-    type(body_shares_t), intent(inout) :: self
-    type(body_shares_t) :: longer
-    integer :: n
-
-    n = size(self%alpha)
-    allocate (longer%cell(3, 2*n), longer%inside(2*n), longer%alpha(2*n), longer%centroid(3, 2*n))
-    longer%cell(:, :n) = self%cell
-    longer%inside(:n) = self%inside
-    longer%alpha(:n) = self%alpha
-    longer%centroid(:, :n) = self%centroid
-    call move_alloc(longer%cell, self%cell)
-    call move_alloc(longer%inside, self%inside)
-    call move_alloc(longer%alpha, self%alpha)
-    call move_alloc(longer%centroid, self%centroid)
-    deallocate (self%first_tet)
-    allocate (self%first_tet(2*n + 1))
-  end subroutine double_cells
-
-  subroutine double_faces(self)
-    type(body_shares_t), intent(inout) :: self
-    type(body_shares_t) :: longer
-    integer :: n
-
-    n = size(self%beta)
-    allocate (longer%face(4, 2*n), longer%beta(2*n), longer%face_centroid(3, 2*n))
-    longer%face(:, :n) = self%face
-    longer%beta(:n) = self%beta
-    longer%face_centroid(:, :n) = self%face_centroid
-    call move_alloc(longer%face, self%face)
-    call move_alloc(longer%beta, self%beta)
-    call move_alloc(longer%face_centroid, self%face_centroid)
-  end subroutine double_faces
-
-  subroutine double_hits(self)
-    type(body_shares_t), intent(inout) :: self
-    type(body_shares_t) :: longer
-    integer :: n
-
-    n = size(self%at)
-    allocate (longer%hit(4, 2*n), longer%at(2*n))
-    longer%hit(:, :n) = self%hit
-    longer%at(:n) = self%at
-    call move_alloc(longer%hit, self%hit)
-    call move_alloc(longer%at, self%at)
-  end subroutine double_hits
 
 end module body_shares_m

@@ -12,6 +12,7 @@
 !! momentum of fluid and bodies.
 module buoyancy_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_rows
   use vectors_m, only: cross
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, unit_step
@@ -85,7 +86,7 @@ contains
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
       call displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
-      call make_room(self, solid%body_face(b + 1) - solid%body_face(b))
+      call ensure_rows(solid%body_face(b + 1) - solid%body_face(b), self%work)
       n = mass_at_faces(grid, solid, flux, rho, b, self%work)
       counted = exact_sums(self%work(1:n, :))
       do d = 1, 3
@@ -94,16 +95,6 @@ contains
       end do
     end do
   end subroutine uncounted_fluid
-
-  !> Lists long enough for n terms.
-  subroutine make_room(self, n)
-    type(buoyancy_t), intent(inout) :: self
-    integer, intent(in) :: n
-
-    if (size(self%work, 1) >= n) return
-    deallocate (self%work)
-    allocate (self%work(2*n, 12))
-  end subroutine make_room
 
   !> Fluid in the true place of body b: its mass, and its first moment about the centre of mass.
   subroutine displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
@@ -119,7 +110,7 @@ contains
     real(wp) :: liquid, liquid_moment(3), share, total(4)
     integer :: m, n, i(3)
 
-    call make_room(self, solid%body_cell(b + 1) - solid%body_cell(b))
+    call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), self%work)
     n = 0
     do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
       i = solid%cell(:, m)

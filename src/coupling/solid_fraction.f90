@@ -6,6 +6,7 @@
 module solid_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
   use solid_geometry_m, only: solid_geometry_t, no_hit
   use tet_mesh_m, only: shape_t
@@ -79,7 +80,7 @@ contains
 
     call clear(grid, solid)
     call find_shares(grid, blocks, self)
-    call reserve(self, solid)
+    call ensure_lists(self, solid)
     call place_bodies(grid, self, solid)
     do b = 1, size(self%body)
       call paint_body(self, grid, b, solid)
@@ -218,7 +219,7 @@ contains
   end function floor_ratio
 
   !> Lists long enough for all bodies in all their images; they grow by doubling.
-  subroutine reserve(self, solid)
+  subroutine ensure_lists(self, solid)
     type(solid_fraction_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, copies, cells, faces, legs, tets, n
@@ -242,34 +243,24 @@ contains
       legs = legs + copies*(self%body(b)%n_hit + 6*self%body(b)%n_cell)
       tets = tets + (1 + copies)*size(self%body(b)%corner, 3)
     end do
-    if (size(solid%cell_alpha) < cells) then
-      cells = max(cells, 2*size(solid%cell_alpha))
-      deallocate (solid%cell, solid%cell_alpha, solid%cell_centroid, solid%cut_cell, solid%first)
-      deallocate (solid%closed_cell, solid%cell_tet)
-      allocate (solid%cell(3, cells), solid%cell_alpha(cells), solid%cell_centroid(3, cells))
-      allocate (solid%cut_cell(3, cells), solid%first(cells + 1), solid%closed_cell(3, cells))
-      allocate (solid%cell_tet(2, cells))
-    end if
-    if (size(self%source, 2) < cells) then
-      deallocate (self%source)
-      allocate (self%source(2, size(solid%cell_alpha)))
-    end if
-    if (size(solid%face_beta) < faces) then
-      faces = max(faces, 2*size(solid%face_beta))
-      deallocate (solid%face, solid%face_beta, solid%face_centroid)
-      allocate (solid%face(4, faces), solid%face_beta(faces), solid%face_centroid(3, faces))
-    end if
-    if (size(solid%leg, 2) < legs) then
-      legs = max(legs, 2*size(solid%leg, 2))
-      deallocate (solid%leg)
-      allocate (solid%leg(4, legs))
-    end if
+    call ensure_room(cells, solid%cell)
+    call ensure_room(cells, solid%cell_alpha)
+    call ensure_room(cells, solid%cell_centroid)
+    call ensure_room(cells, solid%cut_cell)
+    call ensure_room(cells + 1, solid%first)
+    call ensure_room(cells, solid%closed_cell)
+    call ensure_room(cells, solid%cell_tet)
+    call ensure_room(cells, self%source)
+    call ensure_room(faces, solid%face)
+    call ensure_room(faces, solid%face_beta)
+    call ensure_room(faces, solid%face_centroid)
+    call ensure_room(legs, solid%leg)
     if (size(solid%corner, 3) < tets) then
       tets = max(tets, 2*size(solid%corner, 3))
       deallocate (solid%corner)
       allocate (solid%corner(3, 4, tets))
     end if
-  end subroutine reserve
+  end subroutine ensure_lists
 
   !> Add one body with all its images.
   subroutine paint_body(self, grid, b, solid)
@@ -546,10 +537,7 @@ contains
       solid%first(m) = total + 1
     end do
     solid%first(solid%n_cut + 1) = total + 1
-    if (size(solid%tet) < total) then
-      deallocate (solid%tet)
-      allocate (solid%tet(2*total))
-    end if
+    call ensure_room(total, solid%tet)
     do b = size(self%body), 1, -1
       do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
         solid%cell_tet(:, e) = [1, 0]

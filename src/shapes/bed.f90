@@ -6,12 +6,13 @@
 !! the form is repeated.
 module bed_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t
-  use neighbours_m, only: bins_t, bins_build, reserve
+  use neighbours_m, only: bins_t, bins_build
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_edges, gather_facets, &
     nearest_on_surface, pair_edges, nowhere
   use bed_file_m, only: bed_form_t, read_bed_file
@@ -368,8 +369,8 @@ contains
       if (way == 0) cycle
       height = height_of(bed, f, at)
       layers%n = layers%n + 1
-      call reserve(layers%n, layers%height)
-      call reserve(layers%n, layers%way)
+      call ensure_room(layers%n, layers%height)
+      call ensure_room(layers%n, layers%way)
       k = layers%n
       do while (k > 1)
         if (layers%height(k - 1) > height + same .or. (layers%height(k - 1) > height - same .and. &

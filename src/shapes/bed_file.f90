@@ -12,6 +12,7 @@ module bed_file_m
   use, intrinsic :: iso_fortran_env, only: real32
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use errors_m, only: to_text
   use checksum_m, only: checksum_t
   use file_words_m, only: words_t, read_whole, next_word, get_integer, get_real, expected, &
@@ -117,7 +118,6 @@ contains
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(inout) :: form
     character(:), allocatable :: word
-    real(wp), allocatable :: longer(:, :)
     integer :: n, c, k
 
     word = next_word(words)
@@ -127,12 +127,8 @@ contains
       word = next_word(words)
       if (len(word) == 0) exit
       if (word /= 'vertex') cycle
-      if (n + 1 > size(form%point, 2)) then
-        allocate (longer(3, max(3000, 2*n)))
-        longer(:, :n) = form%point(:, :n)
-        call move_alloc(longer, form%point)
-      end if
       n = n + 1
+      call ensure_room(n, form%point)
       do c = 1, 3
         call get_real(words, form%point(c, n))
       end do

@@ -5,6 +5,7 @@
 !! centre, and the faces that belong to one part only are the surface.
 module convex_parts_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: cross
   use polyhedron_m, only: tet_volume
   implicit none
@@ -122,18 +123,11 @@ contains
     real(wp), intent(in) :: x(3)
     type(points_t), intent(inout) :: points
     integer, intent(out) :: number
-    integer, parameter :: first_size = 64
-    real(wp), allocatable :: longer(:, :)
 
-    if (.not. allocated(points%x)) allocate (points%x(3, first_size))
-    if (points%n == size(points%x, 2)) then
-      allocate (longer(3, 2*points%n))
-      longer(:, :points%n) = points%x
-      call move_alloc(longer, points%x)
-    end if
-    points%n = points%n + 1
-    points%x(:, points%n) = x
-    number = points%n
+    number = points%n + 1
+    points%n = number
+    call ensure_room(number, points%x)
+    points%x(:, number) = x
   end subroutine append
 
   !> The tetrahedra of the parts, from the centre of each part to the triangles of its faces, and

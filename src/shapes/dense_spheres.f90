@@ -8,6 +8,7 @@
 !! Departure from the paper, which names dense spheres as an improvement and says no more.
 module dense_spheres_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t, most_facet_corners
   implicit none
@@ -131,7 +132,6 @@ contains
     type(facets_t), intent(in) :: facets
     real(wp), allocatable, intent(inout) :: ball(:, :)
     integer, intent(inout) :: n
-    real(wp), allocatable :: longer(:, :)
     real(wp) :: radius, c(3)
     integer :: i
 
@@ -141,12 +141,8 @@ contains
     do i = 1, n
       if (norm(ball(1:3, i) - c) + abs(ball(4, i) - radius) < alike*spacing) return
     end do
-    if (n == size(ball, 2)) then
-      allocate (longer(4, 2*n))
-      longer(:, :n) = ball
-      call move_alloc(longer, ball)
-    end if
     n = n + 1
+    call ensure_room(n, ball)
     ball(:, n) = [c, radius]
   end subroutine add_ball
 

@@ -1,9 +1,10 @@
 !> Who is near whom: boxes sorted into bins, and pairs of bodies whose bounding spheres come close.
 module neighbours_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   implicit none
   private
-  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift, reserve
+  public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
   type :: bins_t
@@ -26,11 +27,6 @@ module neighbours_m
     real(wp), allocatable :: shift(:, :)
     integer, allocatable, private :: cell(:, :), chain(:), head(:)   !! work: linked lists
   end type pair_list_t
-
-  !> Make room for at least n entries, by doubling; the entries present are kept.
-  interface reserve
-    procedure :: reserve_integer, reserve_real, reserve_vector, reserve_logical
-  end interface reserve
 
 contains
 
@@ -218,9 +214,9 @@ contains
     type(pair_list_t), intent(inout) :: pairs
 
     pairs%n = pairs%n + 1
-    call reserve(pairs%n, pairs%a)
-    call reserve(pairs%n, pairs%b)
-    call reserve(pairs%n, pairs%shift)
+    call ensure_room(pairs%n, pairs%a)
+    call ensure_room(pairs%n, pairs%b)
+    call ensure_room(pairs%n, pairs%shift)
     pairs%a(pairs%n) = a
     pairs%b(pairs%n) = b
     pairs%shift(:, pairs%n) = shift
@@ -247,53 +243,5 @@ contains
       pairs%shift(:, j + 1) = shift
     end do
   end subroutine sort_partners
-
-  subroutine reserve_integer(n, a)
-    integer, intent(in) :: n
-    integer, allocatable, intent(inout) :: a(:)
-    integer, allocatable :: longer(:)
-
-    if (.not. allocated(a)) allocate (a(max(n, 16)))
-    if (n <= size(a)) return
-    allocate (longer(max(n, 2*size(a))))
-    longer(:size(a)) = a
-    call move_alloc(longer, a)
-  end subroutine reserve_integer
-
-  subroutine reserve_real(n, a)
-    integer, intent(in) :: n
-    real(wp), allocatable, intent(inout) :: a(:)
-    real(wp), allocatable :: longer(:)
-
-    if (.not. allocated(a)) allocate (a(max(n, 16)))
-    if (n <= size(a)) return
-    allocate (longer(max(n, 2*size(a))))
-    longer(:size(a)) = a
-    call move_alloc(longer, a)
-  end subroutine reserve_real
-
-  subroutine reserve_logical(n, a)
-    integer, intent(in) :: n
-    logical, allocatable, intent(inout) :: a(:)
-    logical, allocatable :: longer(:)
-
-    if (.not. allocated(a)) allocate (a(max(n, 16)))
-    if (n <= size(a)) return
-    allocate (longer(max(n, 2*size(a))))
-    longer(:size(a)) = a
-    call move_alloc(longer, a)
-  end subroutine reserve_logical
-
-  subroutine reserve_vector(n, a)
-    integer, intent(in) :: n
-    real(wp), allocatable, intent(inout) :: a(:, :)   !! (3, :)
-    real(wp), allocatable :: longer(:, :)
-
-    if (.not. allocated(a)) allocate (a(3, max(n, 16)))
-    if (n <= size(a, 2)) return
-    allocate (longer(3, max(n, 2*size(a, 2))))
-    longer(:, :size(a, 2)) = a
-    call move_alloc(longer, a)
-  end subroutine reserve_vector
 
 end module neighbours_m
