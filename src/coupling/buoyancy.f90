@@ -158,13 +158,13 @@ contains
     d = unit_constant(normal_of_cube, share) + dot_product(normal, lower)
     volume = 0.0_wp
     moment = 0.0_wp
-    do n = solid%cell_tet(1, m), solid%cell_tet(2, m)
-      call box_clip_moments_below(solid%corner(:, :, solid%tet(n)), lower, upper, normal, d, part, &
-                                  part_moment)
+    do n = solid%tets%of_cell(1, m), solid%tets%of_cell(2, m)
+      call box_clip_moments_below(solid%tets%corner(:, :, solid%tets%list(n)), lower, upper, &
+                                  normal, d, part, part_moment)
       volume = volume + part
       moment = moment + part_moment
     end do
-    if (solid%cell_tet(2, m) < solid%cell_tet(1, m)) then
+    if (solid%tets%of_cell(2, m) < solid%tets%of_cell(1, m)) then
       call polyhedron_of_box(lower, upper, cell)
       call polyhedron_moments_below(cell, normal, d, volume, moment)
       volume = volume*solid%cell_alpha(m)   ! less than one where bodies share a full cell

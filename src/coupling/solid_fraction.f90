@@ -226,8 +226,8 @@ contains
 
     n = size(self%body) + 1
     if (size(solid%body_cell) /= n) then
-      deallocate (solid%body_cell, solid%body_face, solid%body_tet)
-      allocate (solid%body_cell(n), solid%body_face(n), solid%body_tet(n))
+      deallocate (solid%body_cell, solid%body_face, solid%tets%of_body)
+      allocate (solid%body_cell(n), solid%body_face(n), solid%tets%of_body(n))
     end if
     solid%body_cell(1) = 1
     solid%body_face(1) = 1
@@ -247,18 +247,18 @@ contains
     call ensure_room(cells, solid%cell_alpha)
     call ensure_room(cells, solid%cell_centroid)
     call ensure_room(cells, solid%cut_cell)
-    call ensure_room(cells + 1, solid%first)
+    call ensure_room(cells + 1, solid%tets%first)
     call ensure_room(cells, solid%closed_cell)
-    call ensure_room(cells, solid%cell_tet)
+    call ensure_room(cells, solid%tets%of_cell)
     call ensure_room(cells, self%source)
     call ensure_room(faces, solid%face)
     call ensure_room(faces, solid%face_beta)
     call ensure_room(faces, solid%face_centroid)
     call ensure_room(legs, solid%leg)
-    if (size(solid%corner, 3) < tets) then
-      tets = max(tets, 2*size(solid%corner, 3))
-      deallocate (solid%corner)
-      allocate (solid%corner(3, 4, tets))
+    if (size(solid%tets%corner, 3) < tets) then
+      tets = max(tets, 2*size(solid%tets%corner, 3))
+      deallocate (solid%tets%corner)
+      allocate (solid%tets%corner(3, 4, tets))
     end if
   end subroutine ensure_lists
 
@@ -277,9 +277,9 @@ contains
       do j = self%first(2, b), self%last(2, b)
         do i = self%first(1, b), self%last(1, b)
           associate (offset => self%body(b)%base + [i, j, k]*grid%n)
-            first_tet = solid%body_tet(b)
+            first_tet = solid%tets%of_body(b)
             if (any([i, j, k] /= 0)) then
-              first_tet = solid%n_tet + 1
+              first_tet = solid%tets%n + 1
               call place_tets(grid, self%body(b), offset, solid)
             end if
             call paint_cells(self, grid, b, offset, first_tet, solid)
@@ -491,11 +491,11 @@ contains
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b
 
-    solid%body_tet(1) = 1
-    solid%n_tet = 0
+    solid%tets%of_body(1) = 1
+    solid%tets%n = 0
     do b = 1, size(self%body)
       if (self%near(b)) call place_tets(grid, self%body(b), self%body(b)%base, solid)
-      solid%body_tet(b + 1) = solid%n_tet + 1
+      solid%tets%of_body(b + 1) = solid%tets%n + 1
     end do
   end subroutine place_bodies
 
@@ -508,9 +508,9 @@ contains
     integer :: t, v
 
     do t = 1, size(body%corner, 3)
-      solid%n_tet = solid%n_tet + 1
+      solid%tets%n = solid%tets%n + 1
       do v = 1, 4
-        solid%corner(:, v, solid%n_tet) = grid%origin + &
+        solid%tets%corner(:, v, solid%tets%n) = grid%origin + &
                                           (real(offset, wp) + body%corner(:, v, t))*grid%h
       end do
     end do
@@ -522,37 +522,39 @@ contains
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, e, m, n, t, total, from, to
 
-    solid%first(1:solid%n_cut + 1) = 0
-    do b = 1, size(self%body)
-      do e = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        m = number_of_cut(e)
-        if (m == 0) cycle
-        n = self%source(1, e)
-        solid%first(m) = solid%first(m) + self%body(b)%first_tet(n + 1) - self%body(b)%first_tet(n)
-      end do
-    end do
-    total = 0
-    do m = 1, solid%n_cut
-      total = total + solid%first(m)
-      solid%first(m) = total + 1
-    end do
-    solid%first(solid%n_cut + 1) = total + 1
-    call ensure_room(total, solid%tet)
-    do b = size(self%body), 1, -1
-      do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
-        solid%cell_tet(:, e) = [1, 0]
-        m = number_of_cut(e)
-        if (m == 0) cycle
-        n = self%source(1, e)
-        from = self%body(b)%first_tet(n)
-        to = self%body(b)%first_tet(n + 1) - 1
-        solid%first(m) = solid%first(m) - (to - from + 1)
-        solid%cell_tet(:, e) = solid%first(m) + [0, to - from]
-        do t = from, to
-          solid%tet(solid%first(m) + t - from) = self%body(b)%tet(t) + self%source(2, e)
+    associate (tets => solid%tets)
+      tets%first(1:solid%n_cut + 1) = 0
+      do b = 1, size(self%body)
+        do e = solid%body_cell(b), solid%body_cell(b + 1) - 1
+          m = number_of_cut(e)
+          if (m == 0) cycle
+          n = self%source(1, e)
+          tets%first(m) = tets%first(m) + self%body(b)%first_tet(n + 1) - self%body(b)%first_tet(n)
         end do
       end do
-    end do
+      total = 0
+      do m = 1, solid%n_cut
+        total = total + tets%first(m)
+        tets%first(m) = total + 1
+      end do
+      tets%first(solid%n_cut + 1) = total + 1
+      call ensure_room(total, tets%list)
+      do b = size(self%body), 1, -1
+        do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
+          tets%of_cell(:, e) = [1, 0]
+          m = number_of_cut(e)
+          if (m == 0) cycle
+          n = self%source(1, e)
+          from = self%body(b)%first_tet(n)
+          to = self%body(b)%first_tet(n + 1) - 1
+          tets%first(m) = tets%first(m) - (to - from + 1)
+          tets%of_cell(:, e) = tets%first(m) + [0, to - from]
+          do t = from, to
+            tets%list(tets%first(m) + t - from) = self%body(b)%tet(t) + self%source(2, e)
+          end do
+        end do
+      end do
+    end associate
   contains
     pure integer function number_of_cut(e)
       integer, intent(in) :: e

@@ -11,6 +11,18 @@ module solid_geometry_m
 
   real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
 
+  !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
+  !! hold is taken away again (see `bed_solid_m`).
+  type :: solid_tets_t
+    integer :: n = 0
+    real(wp), allocatable :: corner(:, :, :)    !! (3, 4, n) [m]
+    integer, allocatable :: of_body(:)          !! (n_bodies + 1) of b: of_body(b):of_body(b+1)-1
+    !> Those that may reach into cut cell m: `list(first(m):first(m+1)-1)`, body by body; entry e of
+    !! the cells by body has the part `list(of_cell(1, e):of_cell(2, e))`, none if it is not cut.
+    integer, allocatable :: first(:), list(:)
+    integer, allocatable :: of_cell(:, :)       !! (2, *)
+  end type solid_tets_t
+
   type :: solid_geometry_t
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
@@ -21,24 +33,17 @@ module solid_geometry_m
     real(wp), allocatable :: leg_low(:, :, :, :), leg_high(:, :, :, :)
     integer, allocatable :: leg_body_low(:, :, :, :), leg_body_high(:, :, :, :)
 
-    !> Tetrahedra of all bodies present, in space: `corner(:, 1:4, t)` [m]. Of the bed some may have
-    !! negative volume: what they hold is taken away again (see `bed_solid_m`).
-    integer :: n_tet = 0
-    real(wp), allocatable :: corner(:, :, :)
-    integer, allocatable :: body_tet(:)         !! (n_bodies + 1) of b: body_tet(b):body_tet(b+1)-1
-    !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0;
-    !! its tetrahedra are `tet(first(m):first(m+1)-1)`, indices into `corner`.
+    type(solid_tets_t) :: tets
+    !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0.
     integer :: n_cut = 0
     integer, allocatable :: cut(:, :, :)
     integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
-    integer, allocatable :: first(:), tet(:)
 
     !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
     integer, allocatable :: cell(:, :)          !! (3, *) cell index
     real(wp), allocatable :: cell_alpha(:)      !! share of the cell volume [-]
     real(wp), allocatable :: cell_centroid(:, :) !! (3, *) centroid of the solid part [m]
-    integer, allocatable :: cell_tet(:, :)      !! (2, *) its own range of `tet`; none if not cut
     !> Per body b: faces `body_face(b):body_face(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_face(:)
     integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
@@ -72,15 +77,14 @@ contains
     allocate (solid%leg_body_low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
     allocate (solid%leg_body_high, source=solid%leg_body_low)
     allocate (solid%cut(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (solid%corner(3, 4, 0), solid%cut_cell(3, 0), solid%first(1), solid%tet(0))
-    solid%first = 1
+    allocate (solid%tets%corner(3, 4, 0), solid%tets%list(0), solid%tets%of_cell(2, 0))
+    allocate (solid%tets%first(1), source=1)
     n = 0
     if (present(n_bodies)) n = n_bodies
-    allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%body_tet(n + 1), source=1)
-    allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0), &
-              solid%cell_tet(2, 0))
+    allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%tets%of_body(n + 1), source=1)
+    allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
-    allocate (solid%leg(4, 0), solid%closed_cell(3, 0))
+    allocate (solid%leg(4, 0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
 end module solid_geometry_m

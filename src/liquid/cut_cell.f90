@@ -47,9 +47,9 @@ contains
     self%n = 0
     self%open = 1.0_wp
     if (m == 0) return
-    do t = solid%first(m), solid%first(m + 1) - 1
+    do t = solid%tets%first(m), solid%tets%first(m + 1) - 1
       do v = 1, 4
-        x(:, v) = (solid%corner(:, v, solid%tet(t)) - low)/h
+        x(:, v) = (solid%tets%corner(:, v, solid%tets%list(t)) - low)/h
       end do
       if (any(minval(x, 2) >= 1.0_wp) .or. any(maxval(x, 2) <= 0.0_wp)) cycle
       if (tet_volume(x) >= 0.0_wp) then

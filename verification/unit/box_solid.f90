@@ -90,16 +90,16 @@ contains
       integer :: m, t
 
       m = solid%n_cut + 1
-      if (m + 1 > size(solid%first)) solid%first = [solid%first, spread(0, 1, m + 1)]
-      solid%first(1) = 1
-      if (solid%first(m) + 6*size(low, 2) > size(solid%tet)) then
-        solid%tet = [solid%tet, spread(0, 1, size(solid%tet) + 6*size(low, 2))]
+      if (m + 1 > size(solid%tets%first)) solid%tets%first = [solid%tets%first, spread(0, 1, m + 1)]
+      solid%tets%first(1) = 1
+      if (solid%tets%first(m) + 6*size(low, 2) > size(solid%tets%list)) then
+        solid%tets%list = [solid%tets%list, spread(0, 1, size(solid%tets%list) + 6*size(low, 2))]
       end if
-      solid%first(m + 1) = solid%first(m)
+      solid%tets%first(m + 1) = solid%tets%first(m)
       do t = 1, 6*size(low, 2)
         if (any(inside(c, (t + 5)/6) <= 0.0_wp)) cycle
-        solid%tet(solid%first(m + 1)) = t
-        solid%first(m + 1) = solid%first(m + 1) + 1
+        solid%tets%list(solid%tets%first(m + 1)) = t
+        solid%tets%first(m + 1) = solid%tets%first(m + 1) + 1
       end do
       solid%n_cut = m
       solid%cut(c(1), c(2), c(3)) = m
@@ -113,23 +113,23 @@ contains
     integer :: b, t, v, m
     real(wp) :: x(3)
 
-    solid%n_tet = 6*size(low, 2)
-    if (size(solid%corner, 3) < solid%n_tet) then
-      deallocate (solid%corner)
-      allocate (solid%corner(3, 4, solid%n_tet))
+    solid%tets%n = 6*size(low, 2)
+    if (size(solid%tets%corner, 3) < solid%tets%n) then
+      deallocate (solid%tets%corner)
+      allocate (solid%tets%corner(3, 4, solid%tets%n))
     end if
     m = 0
     do b = 1, size(low, 2)
       do t = 1, 6
         m = m + 1
         x = low(:, b)
-        solid%corner(:, 1, m) = x
+        solid%tets%corner(:, 1, m) = x
         do v = 1, 3
           x(path(v, t)) = high(path(v, t), b)
-          solid%corner(:, v + 1, m) = x
+          solid%tets%corner(:, v + 1, m) = x
         end do
         ! every other way along the edges turns the other way round; volumes are positive
-        if (t > 3) solid%corner(:, 2:3, m) = solid%corner(:, [3, 2], m)
+        if (t > 3) solid%tets%corner(:, 2:3, m) = solid%tets%corner(:, [3, 2], m)
       end do
     end do
   end subroutine set_tetrahedra

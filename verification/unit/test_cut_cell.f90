@@ -31,18 +31,18 @@ contains
     integer :: t, v
     real(wp) :: x(3)
 
-    solid%n_tet = 6
-    allocate (solid%corner(3, 4, 6), solid%first(2), solid%tet(6))
-    solid%first = [1, 7]
+    solid%tets%n = 6
+    allocate (solid%tets%corner(3, 4, 6), solid%tets%first(2), solid%tets%list(6))
+    solid%tets%first = [1, 7]
     do t = 1, 6
       x = a
-      solid%tet(t) = t
-      solid%corner(:, 1, t) = low + h*x
+      solid%tets%list(t) = t
+      solid%tets%corner(:, 1, t) = low + h*x
       do v = 1, 3
         x(path(v, t)) = b(path(v, t))
-        solid%corner(:, v + 1, t) = low + h*x
+        solid%tets%corner(:, v + 1, t) = low + h*x
       end do
-      if (t > 3) solid%corner(:, [1, 2], t) = solid%corner(:, [2, 1], t)   ! positive volume
+      if (t > 3) solid%tets%corner(:, [1, 2], t) = solid%tets%corner(:, [2, 1], t)   ! volume > 0
     end do
   end subroutine set_box
 

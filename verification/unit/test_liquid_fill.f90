@@ -174,8 +174,8 @@ contains
     call update_solid(fraction, grid, blocks, after)
     call fill_liquid(grid, fluid, [water_t ::], after, flow)
     displaced = 0.0_wp
-    do t = 1, after%n_tet
-      displaced = displaced + tet_volume_below(after%corner(:, :, t), up, 0.1413_wp)
+    do t = 1, after%tets%n
+      displaced = displaced + tet_volume_below(after%tets%corner(:, :, t), up, 0.1413_wp)
     end do
     call check('hexapod: liquid around it', flow%liquid_initial, &
                tank(1)*tank(2)*0.1413_wp - displaced, 1.0e-13_wp*flow%liquid_initial)

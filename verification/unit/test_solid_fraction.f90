@@ -691,8 +691,8 @@ contains
 
     share = 0.0_wp
     low = grid%face(solid%cut_cell(:, m), [1, 2, 3])
-    do t = solid%first(m), solid%first(m + 1) - 1
-      call polyhedron_of_tet(solid%corner(:, :, solid%tet(t)), p)
+    do t = solid%tets%first(m), solid%tets%first(m + 1) - 1
+      call polyhedron_of_tet(solid%tets%corner(:, :, solid%tets%list(t)), p)
       call cut_polyhedron_by_box(p, low, low + grid%h)
       call polyhedron_moments(p, v, moment)
       share = share + v/grid%volume
