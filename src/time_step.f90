@@ -33,7 +33,8 @@ module time_step_m
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
-  use buoyancy_m, only: displaced_force, displaced_fluid
+  use buoyancy_m, only: displaced_force
+  use added_mass_m, only: know_added_mass
   use coupling_m, only: advance_velocity, note_start
   use clock_m, only: clock_t, clock_init
   use surface_tension_m, only: capillary_step
@@ -163,7 +164,8 @@ contains
                dt => sim%clock%dt)
       if (sim%wet) then
         call copy_motion(blocks, sim%stage%bodies)
-        call know_added_mass(sim)
+        call know_added_mass(grid, case%fluid, sim%solid, sim%stage%bodies, flow%c, &
+                             sim%stage%buoyancy, blocks)
         call note_start(case, grid, sim%solid, flow, sim%stage)
       end if
       call tic(sim%timer_blocks)
@@ -251,32 +253,6 @@ contains
       sim%felt(b) = .true.
     end do
   end subroutine first_force
-
-  !> Fluid that moves along with each body in an impact: of what it displaces, as much as with a
-  !! sphere that touches a wall and moves normal to it.
-  !!
-  !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
-  !! no part. Too large a mass would swing from step to step, hence the limit.
-  subroutine know_added_mass(sim)
-    type(simulation_t), intent(inout) :: sim
-    real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
-    real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
-    real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
-    real(wp) :: push, displaced, moment(3)
-    integer :: b
-
-    associate (blocks => sim%blocks)
-      blocks%added_mass = 0.0_wp
-      do b = 1, blocks%n
-        if (.not. blocks%present(b)) cycle
-        push = norm2(blocks%contact_force(:, b))
-        if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(sim%case%fluid%gravity)) cycle
-        call displaced_fluid(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, b, &
-                             sim%stage%buoyancy, displaced, moment)
-        blocks%added_mass(b) = min(coefficient*displaced, largest*blocks%mass(b))
-      end do
-    end associate
-  end subroutine know_added_mass
 
   !> The present solids become those of the start of the step.
   subroutine swap_solids(sim)

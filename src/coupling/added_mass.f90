@@ -1,0 +1,46 @@
+!> Fluid that moves along with a body in an impact.
+module added_mass_m
+  use kinds_m, only: wp
+  use case_types_m, only: fluid_t
+  use grid_m, only: grid_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t
+  use buoyancy_m, only: buoyancy_t, displaced_fluid
+  use rigid_body_m, only: blocks_t
+  implicit none
+  private
+  public :: know_added_mass
+
+contains
+
+  !> Fluid that moves along with each body in an impact: of what it displaces, as much as with a
+  !! sphere that touches a wall and moves normal to it.
+  !!
+  !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
+  !! no part. Too large a mass would swing from step to step, hence the limit.
+  subroutine know_added_mass(grid, fluid, solid, bodies, c, buoyancy, blocks)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! liquid share of the fluid [-]
+    type(buoyancy_t), intent(inout) :: buoyancy
+    type(blocks_t), intent(inout) :: blocks
+    real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
+    real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
+    real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
+    real(wp) :: push, displaced, moment(3)
+    integer :: b
+
+    blocks%added_mass = 0.0_wp
+    do b = 1, blocks%n
+      if (.not. blocks%present(b)) cycle
+      push = norm2(blocks%contact_force(:, b))
+      if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity)) cycle
+      call displaced_fluid(grid, fluid, solid, bodies, c, b, buoyancy, displaced, moment)
+      blocks%added_mass(b) = min(coefficient*displaced, largest*blocks%mass(b))
+    end do
+  end subroutine know_added_mass
+
+end module added_mass_m
