@@ -5,7 +5,7 @@ module added_mass_m
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use buoyancy_m, only: buoyancy_t, displaced_fluid
+  use buoyancy_m, only: buoyancy_t, displaced_t, displaced_fluid
   use rigid_body_m, only: blocks_t
   implicit none
   private
@@ -30,7 +30,8 @@ contains
     real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
-    real(wp) :: push, displaced, moment(3)
+    type(displaced_t) :: displaced
+    real(wp) :: push
     integer :: b
 
     blocks%added_mass = 0.0_wp
@@ -38,8 +39,8 @@ contains
       if (.not. blocks%present(b)) cycle
       push = norm2(blocks%contact_force(:, b))
       if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity)) cycle
-      call displaced_fluid(grid, fluid, solid, bodies, c, b, buoyancy, displaced, moment)
-      blocks%added_mass(b) = min(coefficient*displaced, largest*blocks%mass(b))
+      displaced = displaced_fluid(grid, fluid, solid, bodies, c, b, buoyancy)
+      blocks%added_mass(b) = min(coefficient*displaced%mass, largest*blocks%mass(b))
     end do
   end subroutine know_added_mass
 

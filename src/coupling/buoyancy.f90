@@ -22,17 +22,25 @@ module buoyancy_m
   use rigid_flux_m, only: rigid_flux_t, nearest_arm
   use mixture_m, only: face_mean, pure_share
   use plic_m, only: unit_constant
+  use fields_m, only: flow_t
   use surface_normal_m, only: surface_normal, vertical_of
   use polyhedron_m, only: polyhedron_t, polyhedron_of_box, polyhedron_moments_below, &
                           box_clip_moments_below
   use exact_sum_m, only: exact_sums
   implicit none
   private
-  public :: buoyancy_t, buoyancy_init, displaced_force, displaced_fluid, uncounted_fluid
+  public :: buoyancy_t, displaced_t, buoyancy_init
+  public :: displaced_force, displaced_fluid, uncounted_fluid
 
   type :: buoyancy_t
     real(wp), allocatable :: work(:, :)   !! (*, 12) terms of the sums
   end type buoyancy_t
+
+  !> Fluid in the true place of a body.
+  type :: displaced_t
+    real(wp) :: mass = 0.0_wp        !! [kg]
+    real(wp) :: moment(3) = 0.0_wp   !! first moment about the centre of mass of the body [kg m]
+  end type displaced_t
 
 contains
 
@@ -53,15 +61,15 @@ contains
       !! liquid share of the fluid [-]
     type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
-    real(wp) :: mass, moment(3)
+    type(displaced_t) :: displaced
     integer :: b
 
     force = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      call displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
-      force(1:3, b) = -mass*fluid%gravity
-      force(4:6, b) = -cross(moment, fluid%gravity)
+      displaced = displaced_fluid(grid, fluid, solid, bodies, c, b, self)
+      force(1:3, b) = -displaced%mass*fluid%gravity
+      force(4:6, b) = -cross(displaced%moment, fluid%gravity)
     end do
   end subroutine displaced_force
 
@@ -69,35 +77,36 @@ contains
   !!
   !! Column d belongs to an acceleration along d: to the pressures at the faces, which it makes,
   !! `lack(:, d)` times it is to be added for the force and torque on the true body.
-  subroutine uncounted_fluid(grid, fluid, solid, bodies, flux, c, rho, self, lack)
+  function uncounted_fluid(grid, fluid, solid, bodies, flux, flow, self) result(lack)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: c, rho                 !! liquid share [-] and density [kg/m3] of the fluid
+    type(flow_t), intent(in) :: flow
     type(buoyancy_t), intent(inout) :: self
-    real(wp), intent(out) :: lack(:, :, :)   !! (6, 3, bodies) [kg, kg m]
-    real(wp) :: mass, moment(3), counted(12)
+    real(wp) :: lack(6, 3, bodies%n)   !! [kg, kg m]
+    type(displaced_t) :: displaced
+    real(wp) :: counted(12)
     integer :: b, d, n
 
     lack = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      call displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
+      displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, b, self)
       call ensure_rows(solid%body_face(b + 1) - solid%body_face(b), self%work)
-      n = mass_at_faces(grid, solid, flux, rho, b, self%work)
+      n = mass_at_faces(grid, solid, flux, flow%rho, b, self%work)
       counted = exact_sums(self%work(1:n, :))
       do d = 1, 3
-        lack(1:3, d, b) = (mass - counted(d))*unit_step(:, d)
-        lack(4:6, d, b) = cross(moment, real(unit_step(:, d), wp)) - counted(3*d + 1:3*d + 3)
+        lack(1:3, d, b) = (displaced%mass - counted(d))*unit_step(:, d)
+        lack(4:6, d, b) = cross(displaced%moment, real(unit_step(:, d), wp)) &
+                          - counted(3*d + 1:3*d + 3)
       end do
     end do
-  end subroutine uncounted_fluid
+  end function uncounted_fluid
 
-  !> Fluid in the true place of body b: its mass, and its first moment about the centre of mass.
-  subroutine displaced_fluid(grid, fluid, solid, bodies, c, b, self, mass, moment)
+  !> Fluid in the true place of body b.
+  function displaced_fluid(grid, fluid, solid, bodies, c, b, self) result(displaced)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
@@ -106,7 +115,7 @@ contains
       !! liquid share of the fluid [-]
     integer, intent(in) :: b
     type(buoyancy_t), intent(inout) :: self
-    real(wp), intent(out) :: mass, moment(3)   !! [kg, kg m]
+    type(displaced_t) :: displaced
     real(wp) :: liquid, liquid_moment(3), share, total(4)
     integer :: m, n, i(3)
 
@@ -123,7 +132,8 @@ contains
         if (share > pure_share .and. share < 1.0_wp - pure_share) then
           call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
                                                        c, i(1), i(2), i(3)), &
-                           share, bodies%x(:, b), m, liquid, liquid_moment)
+                           share, m, liquid, liquid_moment)
+          liquid_moment = liquid_moment - liquid*(solid%cell_centroid(:, m) - arm)   ! about x
         else
           liquid = share*volume
           liquid_moment = liquid*arm
@@ -133,19 +143,16 @@ contains
       end associate
     end do
     total = exact_sums(self%work(1:n, 1:4))
-    mass = total(1)
-    moment = total(2:4)
-  end subroutine displaced_fluid
+    displaced = displaced_t(total(1), total(2:4))
+  end function displaced_fluid
 
-  !> Volume and first moment, about the centre of mass x of the body, of what lies below the liquid
-  !! plane in entry m of the list of its cells: of the tetrahedra that reach into a cut cell, of the
-  !! whole cell where the body fills it.
-  pure subroutine liquid_part(grid, solid, normal_of_cube, share, x, m, volume, moment)
+  !> Volume and first moment in space of what lies below the liquid plane in entry m of the cells by
+  !! body: of the tetrahedra that reach into a cut cell, of the whole cell where the body fills it.
+  pure subroutine liquid_part(grid, solid, normal_of_cube, share, m, volume, moment)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: normal_of_cube(3)  !! of the surface, on the unit cube
     real(wp), intent(in) :: share              !! liquid share of the full cell [-]
-    real(wp), intent(in) :: x(3)               !! [m]
     integer, intent(in) :: m
     real(wp), intent(out) :: volume, moment(3) !! [m3, m4]
     real(wp) :: lower(3), upper(3), normal(3), d, part, part_moment(3)
@@ -170,8 +177,6 @@ contains
       volume = volume*solid%cell_alpha(m)   ! less than one where bodies share a full cell
       moment = moment*solid%cell_alpha(m)
     end if
-    lower = solid%cell_centroid(:, m)
-    moment = moment - volume*(lower - nearest_arm(grid, lower, x))   ! about the nearest image of x
   end subroutine liquid_part
 
   !> What the faces count of the fluid in the place of body b, rho_f h times the flux of the unit

@@ -124,8 +124,7 @@ contains
       call rigid_flux_init(block%grid, 1, flux)
       call build_rigid_flux(block%grid, solid, block%bodies, active, flux)
       call force_from_faces(block%grid, solid, block%bodies, flux, block%flow%p, by_faces)
-      call uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow%c, &
-                           block%flow%rho, buoyancy, lack)
+      lack = uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow, buoyancy)
       force(:, 1) = -matmul(lack(:, :, 1), fluid%gravity)
       call check('faces and correction: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
                  1.0e-10_wp*weight)
