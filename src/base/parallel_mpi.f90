@@ -3,19 +3,21 @@
 !! `parallel_serial.f90` holds the same module with the same names for one process; the Makefile
 !! picks one of them. Only plain arrays pass through here.
 module parallel_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_ptr, c_f_pointer
+  use, intrinsic :: iso_c_binding, only: c_int, c_int8_t, c_ptr, c_f_pointer
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_Init_thread, MPI_Finalize, MPI_Abort, MPI_Comm_size, MPI_Comm_rank
   use mpi_f08, only: MPI_Type_contiguous, MPI_Type_commit, MPI_Type_free, MPI_Op_create, MPI_Op_free
   use mpi_f08, only: MPI_Isend, MPI_Irecv, MPI_Waitall, MPI_Allreduce, MPI_Allgather
   use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request, operator(==)
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
+  use mpi_f08, only: MPI_Alloc_mem, MPI_Free_mem, MPI_ADDRESS_KIND
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
   use mpi_f08, only: MPI_INFO_NULL, MPI_Iallreduce, MPI_Test, MPI_Wtime, MPI_STATUS_IGNORE
-  use mpi_f08, only: MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
+  use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use kinds_m, only: wp, sp, i8
+  use decomposition_m, only: best_pieces, last_cell, least_cells
   use exact_bins_m, only: bin_size, merge_bins
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
@@ -27,22 +29,17 @@ module parallel_m
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
   public :: set_file_access, set_collective, share_trouble
 
-  integer, parameter :: least_cells = 4   !! every process has so many in each direction that is cut
-
   integer :: n_processes = 1, rank = 0
   integer :: neighbour(2, 3) = MPI_PROC_NULL  !! rank below and above in each direction
   logical :: wraps(3) = .false.   !! periodic and not cut
   type(MPI_Datatype) :: bins_type !! one set of bins of an order-free sum
   type(MPI_Op) :: bins_sum
 
-  !> Buffers of the layers going out and coming in, lower and upper side; they only grow.
-  type :: layers_t
-    real(wp), allocatable :: reals(:, :)
-    real(sp), allocatable :: singles(:, :)
-    integer, allocatable :: integers(:, :)
-  end type layers_t
-
-  type(layers_t), asynchronous :: going, coming
+  !> Memory of the layers going out and coming in, lower and upper side. MPI hands it out, so every
+  !! kind of number may see it as its own and one set of messages serves them all; it only grows.
+  type(c_ptr) :: going(2), coming(2)
+  integer :: room = 0             !! of each [bytes]
+  type(MPI_Request) :: request(4) !! two to receive, two to send
 
   !> Fill the halos of a block with `width` halo cells on every side.
   !!
@@ -88,6 +85,7 @@ contains
 
   !> End in good order; call once, at the end.
   subroutine parallel_final()
+    call free_buffers()
     call MPI_Op_free(bins_sum)
     call MPI_Type_free(bins_type)
     call MPI_Finalize()
@@ -182,94 +180,6 @@ contains
     call parallel_abort(exit_input)
   end subroutine no_room
 
-  !> Number of pieces in each direction with the least work for the busiest process; zero if none.
-  pure function best_pieces(n, n_pieces) result(best)
-    integer, intent(in) :: n(3), n_pieces
-    integer :: best(3)
-    real(wp) :: cost, least
-    integer :: pieces(3), px, py
-
-    best = 0
-    least = huge(1.0_wp)
-    do px = 1, n_pieces
-      do py = 1, n_pieces/px
-        pieces = [px, py, n_pieces/(px*py)]
-        if (product(pieces) /= n_pieces) cycle
-        if (any(grain(n, pieces) == 0)) cycle
-        cost = work(n, pieces)
-        if (cost < least) then
-          least = cost
-          best = pieces
-        end if
-      end do
-    end do
-  end function best_pieces
-
-  !> Cells of the largest piece, and its halo cells with a weight that keeps lines in x whole.
-  pure function work(n, pieces) result(cost)
-    integer, intent(in) :: n(3), pieces(3)
-    real(wp) :: cost
-    real(wp), parameter :: weight(3) = [18.0_wp, 9.0_wp, 6.0_wp]   !! halo layers, dearer in x
-    integer :: d, longest(3)
-
-    longest = longest_piece(n, pieces, grain(n, pieces))
-    cost = 1.0_wp
-    do d = 1, 3
-      if (pieces(d) > 1) cost = cost + weight(d)/real(longest(d), wp)
-    end do
-    cost = cost*product(real(longest, wp))
-  end function work
-
-  !> Largest power of two, up to 16, whose multiples cut n cells about evenly; zero if no cut works.
-  !!
-  !! 4 is taken when it is possible at all; 8 and 16 when no piece gets longer by them.
-  elemental function grain(n, pieces) result(g)
-    integer, intent(in) :: n, pieces
-    integer :: g
-    integer :: power
-
-    g = 0
-    do power = 0, 4
-      if (shortest_piece(n, pieces, 2**power) < least_cells .and. pieces > 1) cycle
-      if (power > 2 .and. g > 0) then
-        if (longest_piece(n, pieces, 2**power) > longest_piece(n, pieces, g)) cycle
-      end if
-      g = 2**power
-    end do
-  end function grain
-
-  !> Last cell of piece number `place`, counted from 1, when the cuts are multiples of g.
-  elemental function cut(n, pieces, g, place) result(cell)
-    integer, intent(in) :: n, pieces, g, place
-    integer :: cell
-
-    cell = g*nint(real(n, wp)*real(place, wp)/(real(pieces, wp)*real(g, wp)))
-    if (place == pieces) cell = n
-  end function cut
-
-  elemental function last_cell(n, pieces, place) result(cell)
-    integer, intent(in) :: n, pieces, place
-    integer :: cell
-
-    cell = cut(n, pieces, grain(n, pieces), place)
-  end function last_cell
-
-  elemental function longest_piece(n, pieces, g) result(length)
-    integer, intent(in) :: n, pieces, g
-    integer :: length
-    integer :: i
-
-    length = maxval([(cut(n, pieces, g, i) - cut(n, pieces, g, i - 1), i=1, pieces)])
-  end function longest_piece
-
-  elemental function shortest_piece(n, pieces, g) result(length)
-    integer, intent(in) :: n, pieces, g
-    integer :: length
-    integer :: i
-
-    length = minval([(cut(n, pieces, g, i) - cut(n, pieces, g, i - 1), i=1, pieces)])
-  end function shortest_piece
-
   !> Rank of the process one step away in direction d; itself or none where nothing is sent.
   pure function rank_beside(place, pieces, periodic, d, step) result(beside)
     integer, intent(in) :: place(3), pieces(3), d, step
@@ -328,13 +238,13 @@ contains
   end subroutine halo_integer_3
 
   !> Layers of the neighbours, or periodic images, into the halos of an array of up to four
-  !! directions. Message s leaves through side s (1 lower, 2 upper) and comes in through the other.
+  !! directions.
   subroutine fill_wp(a, extent, width, d)
     real(wp), intent(inout) :: a(*)
     integer, intent(in) :: extent(4), width
     integer, intent(in), optional :: d
-    type(MPI_Request) :: request(4)
-    integer :: e, s, before, m, after, n
+    real(wp), pointer, contiguous :: layers(:)
+    integer :: e, s, before, m, after, n, bytes
 
     do e = 1, 3
       if (.not. chosen(e, d)) cycle
@@ -345,41 +255,28 @@ contains
       if (wraps(e)) call wrap_wp(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call grow_wp(n)
+      bytes = n*storage_size(layers)/8
+      call expect_layers(e, bytes)
       do s = 1, 2
-        call MPI_Irecv(coming%reals(:, s), n, MPI_DOUBLE_PRECISION, neighbour(s, e), 3 - s, &
-          MPI_COMM_WORLD, request(s))
-      end do
-      do s = 1, 2
-        call pack_wp(a, before, m, after, inner(s, m, width), width, going%reals(:, s))
-        call MPI_Isend(going%reals(:, s), n, MPI_DOUBLE_PRECISION, neighbour(s, e), s, &
-          MPI_COMM_WORLD, request(2 + s))
+        call c_f_pointer(going(s), layers, [n])
+        call pack_wp(a, before, m, after, inner(s, m, width), width, layers)
+        call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call unpack_wp(coming%reals(:, s), before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), layers, [n])
+        call unpack_wp(layers, before, m, after, outer(s, m, width), width, a)
       end do
     end do
   end subroutine fill_wp
-
-  !> Make room for n numbers in each buffer.
-  subroutine grow_wp(n)
-    integer, intent(in) :: n
-
-    if (allocated(going%reals)) then
-      if (size(going%reals, 1) >= n) return
-      deallocate (going%reals, coming%reals)
-    end if
-    allocate (going%reals(2*n, 2), coming%reals(2*n, 2))
-  end subroutine grow_wp
 
   subroutine fill_sp(a, extent, width, d)
     real(sp), intent(inout) :: a(*)
     integer, intent(in) :: extent(4), width
     integer, intent(in), optional :: d
-    type(MPI_Request) :: request(4)
-    integer :: e, s, before, m, after, n
+    real(sp), pointer, contiguous :: layers(:)
+    integer :: e, s, before, m, after, n, bytes
 
     do e = 1, 3
       if (.not. chosen(e, d)) cycle
@@ -390,40 +287,28 @@ contains
       if (wraps(e)) call wrap_sp(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call grow_sp(n)
+      bytes = n*storage_size(layers)/8
+      call expect_layers(e, bytes)
       do s = 1, 2
-        call MPI_Irecv(coming%singles(:, s), n, MPI_REAL, neighbour(s, e), 3 - s, &
-          MPI_COMM_WORLD, request(s))
-      end do
-      do s = 1, 2
-        call pack_sp(a, before, m, after, inner(s, m, width), width, going%singles(:, s))
-        call MPI_Isend(going%singles(:, s), n, MPI_REAL, neighbour(s, e), s, &
-          MPI_COMM_WORLD, request(2 + s))
+        call c_f_pointer(going(s), layers, [n])
+        call pack_sp(a, before, m, after, inner(s, m, width), width, layers)
+        call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call unpack_sp(coming%singles(:, s), before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), layers, [n])
+        call unpack_sp(layers, before, m, after, outer(s, m, width), width, a)
       end do
     end do
   end subroutine fill_sp
-
-  subroutine grow_sp(n)
-    integer, intent(in) :: n
-
-    if (allocated(going%singles)) then
-      if (size(going%singles, 1) >= n) return
-      deallocate (going%singles, coming%singles)
-    end if
-    allocate (going%singles(2*n, 2), coming%singles(2*n, 2))
-  end subroutine grow_sp
 
   subroutine fill_integer(a, extent, width, d)
     integer, intent(inout) :: a(*)
     integer, intent(in) :: extent(4), width
     integer, intent(in), optional :: d
-    type(MPI_Request) :: request(4)
-    integer :: e, s, before, m, after, n
+    integer, pointer, contiguous :: layers(:)
+    integer :: e, s, before, m, after, n, bytes
 
     do e = 1, 3
       if (.not. chosen(e, d)) cycle
@@ -434,33 +319,73 @@ contains
       if (wraps(e)) call wrap_integer(a, before, m, after, width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      call grow_integer(n)
+      bytes = n*storage_size(layers)/8
+      call expect_layers(e, bytes)
       do s = 1, 2
-        call MPI_Irecv(coming%integers(:, s), n, MPI_INTEGER, neighbour(s, e), 3 - s, &
-          MPI_COMM_WORLD, request(s))
-      end do
-      do s = 1, 2
-        call pack_integer(a, before, m, after, inner(s, m, width), width, going%integers(:, s))
-        call MPI_Isend(going%integers(:, s), n, MPI_INTEGER, neighbour(s, e), s, &
-          MPI_COMM_WORLD, request(2 + s))
+        call c_f_pointer(going(s), layers, [n])
+        call pack_integer(a, before, m, after, inner(s, m, width), width, layers)
+        call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call unpack_integer(coming%integers(:, s), before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), layers, [n])
+        call unpack_integer(layers, before, m, after, outer(s, m, width), width, a)
       end do
     end do
   end subroutine fill_integer
 
-  subroutine grow_integer(n)
-    integer, intent(in) :: n
+  !> Get ready for layers of so many bytes through the two sides of direction e.
+  !!
+  !! Message s leaves through side s (1 lower, 2 upper) and comes in through the other.
+  subroutine expect_layers(e, n)
+    integer, intent(in) :: e, n
+    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
+    integer :: s
 
-    if (allocated(going%integers)) then
-      if (size(going%integers, 1) >= n) return
-      deallocate (going%integers, coming%integers)
-    end if
-    allocate (going%integers(2*n, 2), coming%integers(2*n, 2))
-  end subroutine grow_integer
+    call grow(n)
+    do s = 1, 2
+      call c_f_pointer(coming(s), bytes, [n])
+      call MPI_Irecv(bytes, n, MPI_BYTE, neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
+    end do
+  end subroutine expect_layers
+
+  !> Send the n bytes in `going(s)` through side s of direction e.
+  subroutine send_layers(e, s, n)
+    integer, intent(in) :: e, s, n
+    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
+
+    call c_f_pointer(going(s), bytes, [n])
+    call MPI_Isend(bytes, n, MPI_BYTE, neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
+  end subroutine send_layers
+
+  !> Make room for n bytes in each buffer.
+  subroutine grow(n)
+    integer, intent(in) :: n
+    integer :: s
+
+    if (room >= n) return
+    call free_buffers()
+    room = 2*n
+    do s = 1, 2
+      call MPI_Alloc_mem(int(room, MPI_ADDRESS_KIND), MPI_INFO_NULL, going(s))
+      call MPI_Alloc_mem(int(room, MPI_ADDRESS_KIND), MPI_INFO_NULL, coming(s))
+    end do
+  end subroutine grow
+
+  subroutine free_buffers()
+    integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
+    integer :: s
+
+    if (room == 0) return
+    do s = 1, 2
+      call c_f_pointer(going(s), bytes, [room])
+      call MPI_Free_mem(bytes)
+      call c_f_pointer(coming(s), bytes, [room])
+      call MPI_Free_mem(bytes)
+    end do
+    room = 0
+  end subroutine free_buffers
 
   !> First of the layers that side s sends.
   pure integer function inner(s, m, width)
@@ -480,17 +405,18 @@ contains
     real(wp), intent(in), contiguous :: local(:, :, :)   !! cells lo:hi
     integer, intent(in) :: lo(3), hi(3)
     real(wp), intent(inout), contiguous :: whole(:, :, :)  !! all cells of the domain
+    real(wp), allocatable :: cells(:)   !! block after block
     integer :: box(3, 2, n_processes), length(n_processes), start(n_processes), p, a(3), b(3)
 
     call gather_boxes(lo, hi, box, length, start)
-    call grow_wp(size(whole))
-    call MPI_Allgatherv(local, size(local), MPI_DOUBLE_PRECISION, coming%reals(:, 1), length, &
+    allocate (cells(size(whole)))
+    call MPI_Allgatherv(local, size(local), MPI_DOUBLE_PRECISION, cells, length, &
       start, MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
     do p = 1, n_processes
       a = box(:, 1, p)
       b = box(:, 2, p)
       whole(a(1):b(1), a(2):b(2), a(3):b(3)) = &
-        reshape(coming%reals(start(p) + 1:start(p) + length(p), 1), b - a + 1)
+        reshape(cells(start(p) + 1:start(p) + length(p)), b - a + 1)
     end do
   end subroutine gather_wp
 
@@ -498,17 +424,18 @@ contains
     real(sp), intent(in), contiguous :: local(:, :, :)   !! cells lo:hi
     integer, intent(in) :: lo(3), hi(3)
     real(sp), intent(inout), contiguous :: whole(:, :, :)  !! all cells of the domain
+    real(sp), allocatable :: cells(:)   !! block after block
     integer :: box(3, 2, n_processes), length(n_processes), start(n_processes), p, a(3), b(3)
 
     call gather_boxes(lo, hi, box, length, start)
-    call grow_sp(size(whole))
-    call MPI_Allgatherv(local, size(local), MPI_REAL, coming%singles(:, 1), length, start, &
-      MPI_REAL, MPI_COMM_WORLD)
+    allocate (cells(size(whole)))
+    call MPI_Allgatherv(local, size(local), MPI_REAL, cells, length, start, MPI_REAL, &
+      MPI_COMM_WORLD)
     do p = 1, n_processes
       a = box(:, 1, p)
       b = box(:, 2, p)
       whole(a(1):b(1), a(2):b(2), a(3):b(3)) = &
-        reshape(coming%singles(start(p) + 1:start(p) + length(p), 1), b - a + 1)
+        reshape(cells(start(p) + 1:start(p) + length(p)), b - a + 1)
     end do
   end subroutine gather_sp
 
