@@ -5,6 +5,7 @@ module contact_partners_m
   use mass_properties_m, only: surface_area
   use rigid_body_m, only: blocks_t, space_tensor
   use walls_m, only: walls_t
+  use bed_m, only: bed_partner
   implicit none
   private
   public :: partners_t, inertia_t, motion_t, wrench_t
@@ -12,13 +13,13 @@ module contact_partners_m
   public :: inertia_of, inverse_effective_mass, act
   public :: motion_between, relative_velocity, largest_speed
 
-  !> What may touch: bed (-7), walls (-6..-1) and bodies (1..n) alike.
+  !> What may touch: bodies (1..n), walls (-6..-1) and the bed (`bed_partner`) alike.
   type :: partners_t
     real(wp) :: gravity = 0.0_wp                         !! [m/s2]
-    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, -7:n) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)                     !! (-7:n) depth at which touches harden [m]
-    real(wp), allocatable :: inverse_mass(:)             !! (-7:n) 0 for walls, fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, -7:n) likewise [1/(kg m2)]
+    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, partners) [m/s], [rad/s]
+    real(wp), allocatable :: hard(:)                     !! (partners) depth at which touches harden [m]
+    real(wp), allocatable :: inverse_mass(:)             !! (partners) 0 for walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, partners) likewise [1/(kg m2)]
   end type partners_t
 
   !> One of two partners that touch: what it sets against a force.
@@ -49,14 +50,15 @@ contains
     integer :: n, b
 
     n = blocks%n
-    allocate (partners%hard(-7:n), source=huge(1.0_wp))
+    allocate (partners%hard(bed_partner:n), source=huge(1.0_wp))
     do b = 1, n
       associate (shape => blocks%shapes(blocks%shape(b)))
         partners%hard(b) = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
       end associate
     end do
-    allocate (partners%v(3, -7:n), partners%omega(3, -7:n), source=0.0_wp)
-    allocate (partners%inverse_mass(-7:n), partners%inverse_inertia(3, 3, -7:n), source=0.0_wp)
+    allocate (partners%v(3, bed_partner:n), partners%omega(3, bed_partner:n), source=0.0_wp)
+    allocate (partners%inverse_mass(bed_partner:n), source=0.0_wp)
+    allocate (partners%inverse_inertia(3, 3, bed_partner:n), source=0.0_wp)
   end subroutine partners_init
 
   !> Masses of all partners, their gravity and the velocity of the walls.

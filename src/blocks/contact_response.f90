@@ -27,7 +27,7 @@ module contact_response_m
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (-7:n) sum over the pairs of a free body [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (partners) sum over the pairs of a free body [1/s2]
   end type response_t
 
 contains

@@ -63,8 +63,8 @@ module contacts_m
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
     type(partners_t) :: partners
-    real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, -7:n) of this substep [N], [N m]
-    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, -7:n) of the step [N s], [N m s]
+    real(wp), allocatable :: force(:, :), torque(:, :)   !! (3, partners) of this substep [N], [N m]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! (3, partners) of the step [N s], [N m s]
     !> The place to go back to: (3, n), (4, n), (3, n), (3, n).
     real(wp), allocatable :: x(:, :), q(:, :), l(:, :), spin(:, :)
     integer :: n_met = 0
@@ -108,9 +108,10 @@ contains
     end if
     n = blocks%n
     call partners_init(blocks, contacts%partners)
-    allocate (contacts%force(3, -7:n), contacts%torque(3, -7:n), source=0.0_wp)
-    allocate (contacts%impulse(3, -7:n), contacts%twist(3, -7:n), source=0.0_wp)
-    allocate (contacts%response%frequency2(-7:n), contacts%response_soon%frequency2(-7:n))
+    allocate (contacts%force(3, bed_partner:n), contacts%torque(3, bed_partner:n), source=0.0_wp)
+    allocate (contacts%impulse(3, bed_partner:n), contacts%twist(3, bed_partner:n), source=0.0_wp)
+    allocate (contacts%response%frequency2(bed_partner:n))
+    allocate (contacts%response_soon%frequency2(bed_partner:n))
     allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
     call reserve_touches(1, contacts%touches)

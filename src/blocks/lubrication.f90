@@ -50,7 +50,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! (3, -7:n) of all partners [N]
+    real(wp), intent(inout) :: force(:, bed_partner:) !! (3, partners) of all partners [N]
     real(wp) :: d(3), n(3), f(3), gap, distance, radius
     integer :: a, b, w
 

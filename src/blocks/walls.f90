@@ -12,7 +12,7 @@ module walls_m
   !> Sides that blocks can touch (`no_slip` and `slip`), and the periods of the others.
   !!
   !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max; the bed
-  !! is -7 (see `bed_m`).
+  !! is `bed_partner`.
   type :: walls_t
     integer :: n = 0
     integer :: number(6) = 0                !! -6..-1, ascending
