@@ -15,11 +15,11 @@ module contact_partners_m
 
   !> What may touch: bodies (1..n), walls (-6..-1) and the bed (`bed_partner`) alike.
   type :: partners_t
-    real(wp) :: gravity = 0.0_wp                         !! [m/s2]
-    real(wp), allocatable :: v(:, :), omega(:, :)        !! (3, partners) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)                     !! (partners) depth at which touches harden [m]
-    real(wp), allocatable :: inverse_mass(:)             !! (partners) 0 for walls, fixed bodies [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)    !! (3, 3, partners) likewise [1/(kg m2)]
+    real(wp) :: gravity = 0.0_wp                       !! [m/s2]
+    real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, partners) [m/s], [rad/s]
+    real(wp), allocatable :: hard(:)                   !! (partners) depth at which touches harden [m]
+    real(wp), allocatable :: inverse_mass(:)           !! (partners) 0: walls, fixed bodies [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)  !! (3, 3, partners) likewise [1/(kg m2)]
   end type partners_t
 
   !> One of two partners that touch: what it sets against a force.

@@ -4,7 +4,7 @@ module contact_response_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use vectors_m, only: norm
-  use touches_m, only: touch_t
+  use touches_m, only: touch_t, touches_t
   use springs_m, only: comes_before
   use contact_law_m, only: contact_law_t, normal_constant, steepness, hardness, elastic_force, &
     energy_of_force
@@ -27,14 +27,14 @@ module contact_response_m
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (partners) sum over the pairs of a free body [1/s2]
+    real(wp), allocatable :: frequency2(:)       !! (partners) sum over pairs of a free body [1/s2]
   end type response_t
 
 contains
 
   !> Stiffness and damping of all touches of a list.
   subroutine respond(touches, law, partners, response)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     type(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
@@ -57,13 +57,13 @@ contains
 
   !> Last touch of the pair of bodies whose first touch is given.
   pure function last_of_pair(touches, first) result(last)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     integer, intent(in) :: first
     integer :: last
 
     do last = first, touches%n - 1
-      if (touches%a(last + 1) /= touches%a(first)) return
-      if (touches%b(last + 1) /= touches%b(first)) return
+      if (touches%item(last + 1)%a /= touches%item(first)%a) return
+      if (touches%item(last + 1)%b /= touches%item(first)%b) return
     end do
     last = touches%n
   end function last_of_pair
@@ -78,7 +78,7 @@ contains
   !! It is no impact where the bodies move against one another no faster than weight, or a share of
   !! their load, makes them move within a swing.
   pure subroutine respond_pair(touches, first, last, law, partners, response)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     integer, intent(in) :: first, last
     type(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
@@ -89,8 +89,8 @@ contains
     real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep, calm, speed
     integer :: a, b, t, i
 
-    a = touches%a(first)
-    b = touches%b(first)
+    a = touches%item(first)%a
+    b = touches%item(first)%b
     of_a = inertia_of(partners, a)
     of_b = inertia_of(partners, b)
     weights = 0.0_wp
@@ -98,44 +98,48 @@ contains
     k = normal_constant(law, 1.0_wp/(of_a%inverse_mass + of_b%inverse_mass))
     hard = min(partners%hard(a), partners%hard(b))
     do t = first, last
-      response%k(t) = touches%weight(t)*k
-      call elastic_force(law, k, touches%weight(t), touches%depth(t), hard, response%elastic(t), &
-        response%energy(t))
-      response%eta(t) = touches%weight(t)*hardness(law, touches%weight(t), touches%depth(t), hard)
-      nn = response%eta(t)*square(touches%normal(:, t))
-      weights = weights + nn
-      do i = 1, 6
-        points(:, i) = points(:, i) + nn(i)*touches%arm_a(:, t)
-      end do
+      associate (touch => touches%item(t))
+        response%k(t) = touch%weight*k
+        call elastic_force(law, k, touch%weight, touch%depth, hard, response%elastic(t), &
+          response%energy(t))
+        response%eta(t) = touch%weight*hardness(law, touch%weight, touch%depth, hard)
+        nn = response%eta(t)*square(touch%normal)
+        weights = weights + nn
+        do i = 1, 6
+          points(:, i) = points(:, i) + nn(i)*touch%arm_a
+        end do
+      end associate
     end do
     highest = 0.0_wp
     steep = 0.0_wp
     load = 0.0_wp
     do t = first, last
-      load = load + response%elastic(t)*touches%normal(:, t)
-      nn = square(touches%normal(:, t))*[1, 1, 1, 2, 2, 2]
-      total = dot_product(nn, weights)
-      arm = matmul(points, nn)/total
-      inverse = inverse_effective_mass(of_a, arm, touches%normal(:, t))
-      arm = arm + (touches%arm_b(:, t) - touches%arm_a(:, t))
-      inverse = inverse + inverse_effective_mass(of_b, arm, touches%normal(:, t))
-      steep = max(steep, steepness(law, touches%weight(t), touches%depth(t), hard))
-      omega2 = k*total*inverse
-      if (law%constants) then
-        response%eta(t) = touches%weight(t)*law%eta_n
-        response%decay(t) = 0.5_wp*law%eta_n*total*inverse
-      else
-        response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
-        response%decay(t) = law%damping_ratio*sqrt(omega2)
-      end if
+      associate (touch => touches%item(t))
+        load = load + response%elastic(t)*touch%normal
+        nn = square(touch%normal)*[1, 1, 1, 2, 2, 2]
+        total = dot_product(nn, weights)
+        arm = matmul(points, nn)/total
+        inverse = inverse_effective_mass(of_a, arm, touch%normal)
+        arm = arm + (touch%arm_b - touch%arm_a)
+        inverse = inverse + inverse_effective_mass(of_b, arm, touch%normal)
+        steep = max(steep, steepness(law, touch%weight, touch%depth, hard))
+        omega2 = k*total*inverse
+        if (law%constants) then
+          response%eta(t) = touch%weight*law%eta_n
+          response%decay(t) = 0.5_wp*law%eta_n*total*inverse
+        else
+          response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
+          response%decay(t) = law%damping_ratio*sqrt(omega2)
+        end if
+      end associate
       highest = max(highest, omega2)
     end do
     if (.not. law%constants) call damp_as_one(touches, first, last, law, of_a, of_b, response, &
                                              highest)
     highest = steep*highest
     calm = max(partners%gravity, calm_share*norm(load)*(of_a%inverse_mass + of_b%inverse_mass))
-    speed = largest_speed(motion_between(partners, a, b), touches%arm_a(:, first), &
-      touches%arm_b(:, first))
+    speed = largest_speed(motion_between(partners, a, b), touches%item(first)%arm_a, &
+      touches%item(first)%arm_b)
     if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
     if (of_a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
@@ -149,7 +153,7 @@ contains
   !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
   !! part sideways, and weights that change with position make W other than each normal tells.
   pure subroutine damp_as_one(touches, first, last, law, of_a, of_b, response, highest)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     integer, intent(in) :: first, last
     type(contact_law_t), intent(in) :: law
     type(inertia_t), intent(in) :: of_a, of_b
@@ -162,15 +166,17 @@ contains
 
     energy = 0.0_wp
     do t = first, last
-      if (touches%depth(t) <= 0.0_wp) cycle
-      push = -response%elastic(t)*touches%normal(:, t)
-      if (touches%weight(t) < 1.0_wp) then
-        by_weight = energy_of_force(response%elastic(t), law%gamma_n, touches%depth(t))
-        push = push - by_weight*touches%weight_shift(:, t)
-        wrench%torque_a = wrench%torque_a - by_weight*touches%weight_turn(:, t)
-        wrench%torque_b = wrench%torque_b + by_weight*touches%weight_turn(:, t)
-      end if
-      call act(push, touches%arm_a(:, t), touches%arm_b(:, t), wrench)
+      associate (touch => touches%item(t))
+        if (touch%depth <= 0.0_wp) cycle
+        push = -response%elastic(t)*touch%normal
+        if (touch%weight < 1.0_wp) then
+          by_weight = energy_of_force(response%elastic(t), law%gamma_n, touch%depth)
+          push = push - by_weight*touch%weight_shift
+          wrench%torque_a = wrench%torque_a - by_weight*touch%weight_turn
+          wrench%torque_b = wrench%torque_b + by_weight*touch%weight_turn
+        end if
+        call act(push, touch%arm_a, touch%arm_b, wrench)
+      end associate
       energy = energy + response%energy(t)
     end do
     motion%v = -(of_a%inverse_mass + of_b%inverse_mass)*wrench%force
@@ -180,8 +186,8 @@ contains
       + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
     drag = 0.0_wp
     do t = first, last
-      if (touches%depth(t) <= 0.0_wp) cycle
-      drag = drag + response%eta(t)*opening_speed(touches, t, law%gamma_n, motion)**2
+      if (touches%item(t)%depth <= 0.0_wp) cycle
+      drag = drag + response%eta(t)*opening_speed(touches%item(t), law%gamma_n, motion)**2
     end do
     if (.not. (energy > 0.0_wp .and. drag > 0.0_wp)) return
     omega2 = 0.5_wp*mass/energy
@@ -202,7 +208,7 @@ contains
   !> Add the frequencies of what may touch soon to those of what touches, of each pair and of each
   !! body: springs together swing no faster than the squares of both frequencies together.
   pure subroutine add_frequencies(touches, soon, response, response_soon)
-    type(touch_t), intent(in) :: touches, soon
+    type(touches_t), intent(in) :: touches, soon
     type(response_t), intent(inout) :: response, response_soon
     real(wp) :: both
     integer :: first, last, m, m_last
@@ -214,11 +220,13 @@ contains
     do while (first <= soon%n)
       last = last_of_pair(soon, first)
       do while (m <= touches%n)
-        if (.not. comes_before(touches%a(m), touches%b(m), 0, soon%a(first), soon%b(first), 0)) exit
+        if (.not. comes_before(touches%item(m)%a, touches%item(m)%b, 0, soon%item(first)%a, &
+                               soon%item(first)%b, 0)) exit
         m = m + 1
       end do
       if (m > touches%n) return
-      if (touches%a(m) == soon%a(first) .and. touches%b(m) == soon%b(first)) then
+      if (touches%item(m)%a == soon%item(first)%a &
+        .and. touches%item(m)%b == soon%item(first)%b) then
         m_last = last_of_pair(touches, m)
         both = response%pair_frequency2(m) + response_soon%pair_frequency2(first)
         response%pair_frequency2(m:m_last) = both
@@ -234,7 +242,7 @@ contains
   !! A pile swings no faster than all the pairs of two touching bodies taken together. It only has
   !! to be stable, so it may turn further in a substep than a single pair.
   pure function highest_frequency2(touches, response) result(highest)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     type(response_t), intent(in) :: response
     real(wp) :: highest
     real(wp), parameter :: share = (impact_turn/pile_turn)**2
@@ -245,43 +253,41 @@ contains
     do t = 1, touches%n
       pair = response%pair_frequency2(t)
       highest = max(highest, pair, share*(pair &
-        + max(0.0_wp, response%frequency2(touches%a(t)) - pair) &
-        + max(0.0_wp, response%frequency2(touches%b(t)) - pair)))
+        + max(0.0_wp, response%frequency2(touches%item(t)%a) - pair) &
+        + max(0.0_wp, response%frequency2(touches%item(t)%b) - pair)))
     end do
   end function highest_frequency2
 
   !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
   !! where the weight changes with position, of the weight [m/s].
-  pure function opening_speed(touches, t, gamma, motion) result(speed)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: t
+  pure function opening_speed(touch, gamma, motion) result(speed)
+    type(touch_t), intent(in) :: touch
     real(wp), intent(in) :: gamma             !! power of the spring; 1 where it hardens [-]
     type(motion_t), intent(in) :: motion
     real(wp) :: speed
     real(wp) :: v(3)
 
-    v = relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t))
-    speed = dot_product(v, touches%normal(:, t))
-    if (touches%weight(t) < 1.0_wp) speed = speed &
-      + energy_of_force(1.0_wp, gamma, touches%depth(t))*( &
-        dot_product(v, touches%weight_shift(:, t)) &
-        + dot_product(motion%omega_b - motion%omega_a, touches%weight_turn(:, t)))
+    v = relative_velocity(motion, touch%arm_a, touch%arm_b)
+    speed = dot_product(v, touch%normal)
+    if (touch%weight < 1.0_wp) speed = speed &
+      + energy_of_force(1.0_wp, gamma, touch%depth)*( &
+        dot_product(v, touch%weight_shift) &
+        + dot_product(motion%omega_b - motion%omega_a, touch%weight_turn))
   end function opening_speed
 
-  !> The part of the force of touch t by which its weight changes with position: the energy of the
+  !> The part of the force of a touch by which its weight changes with position: the energy of the
   !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
-  pure subroutine push_to_weight(touches, t, gamma, force_n, wrench)
-    type(touch_t), intent(in) :: touches
-    integer, intent(in) :: t
+  pure subroutine push_to_weight(touch, gamma, force_n, wrench)
+    type(touch_t), intent(in) :: touch
     real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
     real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
     type(wrench_t), intent(inout) :: wrench
     real(wp) :: energy
 
-    energy = energy_of_force(force_n, gamma, touches%depth(t))
-    call act(-energy*touches%weight_shift(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
-    wrench%torque_a = wrench%torque_a - energy*touches%weight_turn(:, t)
-    wrench%torque_b = wrench%torque_b + energy*touches%weight_turn(:, t)
+    energy = energy_of_force(force_n, gamma, touch%depth)
+    call act(-energy*touch%weight_shift, touch%arm_a, touch%arm_b, wrench)
+    wrench%torque_a = wrench%torque_a - energy*touch%weight_turn
+    wrench%torque_b = wrench%torque_b + energy*touch%weight_turn
   end subroutine push_to_weight
 
 end module contact_response_m

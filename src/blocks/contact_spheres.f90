@@ -12,7 +12,7 @@ module contact_spheres_m
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
   use surface_features_m, only: near_list_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
-  use touches_m, only: touch_t, reserve_touches
+  use touches_m, only: touch_t, touches_t, add_touch
   implicit none
   private
   public :: contact_spheres_t, contact_spheres_init, find_sphere_touches
@@ -96,7 +96,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_spheres_t), intent(inout) :: self
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     integer :: p, s, b
 
     do b = 1, blocks%n
@@ -111,7 +111,6 @@ contains
       end associate
     end do
     touches%n = 0
-    call reserve_touches(self%n_candidates, touches)
     do p = 1, self%n_pairs
       if (blocks%still(self%pair_a(p))) then
         if (self%pair_b(p) < 0) cycle
@@ -370,29 +369,24 @@ contains
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
     real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touch_t), intent(inout) :: touches
-    real(wp) :: depth
-    integer :: c, s, w, t
+    type(touches_t), intent(inout) :: touches
+    type(touch_t) :: touch
+    integer :: c, s, w
 
     w = findloc_wall(walls, self%pair_b(p))
+    touch%a = self%pair_a(p)
+    touch%b = self%pair_b(p)
+    touch%normal = walls%normal(:, w)
     do c = self%first(p), self%first(p + 1) - 1
       s = self%i(c)
-      depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) + self%radius(s)
-      if (depth <= -gap) cycle
-      t = touches%n + 1
-      touches%n = t
-      touches%a(t) = self%pair_a(p)
-      touches%b(t) = self%pair_b(p)
-      touches%key(t) = self%sphere(s)
-      touches%normal(:, t) = walls%normal(:, w)
-      touches%arm_a(:, t) = self%centre(:, s) - blocks%x(:, self%pair_a(p)) &
-        + (self%radius(s) - depth)*walls%normal(:, w)
-      touches%arm_b(:, t) = 0.0_wp
-      touches%depth(t) = depth
-      touches%weight(t) = 1.0_wp
-      touches%length(t) = 2*self%radius(s)
-      touches%weight_shift(:, t) = 0.0_wp
-      touches%weight_turn(:, t) = 0.0_wp
+      touch%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
+        + self%radius(s)
+      if (touch%depth <= -gap) cycle
+      touch%key = self%sphere(s)
+      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) &
+        + (self%radius(s) - touch%depth)*walls%normal(:, w)
+      touch%length = 2*self%radius(s)
+      call add_touch(touch, touches)
     end do
   end subroutine touch_wall
 
@@ -403,28 +397,24 @@ contains
     type(contact_spheres_t), intent(inout) :: self
     integer, intent(in) :: p
     real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
+    type(touch_t) :: touch
     real(wp) :: distance, outward(3)
-    integer :: c, s, t
+    integer :: c, s
 
+    touch%a = self%pair_a(p)
+    touch%b = bed_partner
     do c = self%first(p), self%first(p + 1) - 1
       s = self%i(c)
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
         2*self%radius(s) + gap, self%facets, self%edges, distance, outward)
       if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
-      t = touches%n + 1
-      touches%n = t
-      touches%a(t) = self%pair_a(p)
-      touches%b(t) = bed_partner
-      touches%key(t) = self%sphere(s)
-      touches%normal(:, t) = -outward
-      touches%arm_a(:, t) = self%centre(:, s) - blocks%x(:, self%pair_a(p)) - distance*outward
-      touches%arm_b(:, t) = 0.0_wp
-      touches%depth(t) = self%radius(s) - distance
-      touches%weight(t) = 1.0_wp
-      touches%length(t) = 2*self%radius(s)
-      touches%weight_shift(:, t) = 0.0_wp
-      touches%weight_turn(:, t) = 0.0_wp
+      touch%key = self%sphere(s)
+      touch%normal = -outward
+      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) - distance*outward
+      touch%depth = self%radius(s) - distance
+      touch%length = 2*self%radius(s)
+      call add_touch(touch, touches)
     end do
   end subroutine touch_bed
 
@@ -445,10 +435,13 @@ contains
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
     real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
+    type(touch_t) :: touch
     real(wp) :: d(3), shift(3), square, distance, reach
-    integer :: c, i, j, t
+    integer :: c, i, j
 
+    touch%a = self%pair_a(p)
+    touch%b = self%pair_b(p)
     shift = self%shift(:, p)
     do c = self%first(p), self%first(p + 1) - 1
       i = self%i(c)
@@ -458,20 +451,14 @@ contains
       square = dot_product(d, d)
       if (square >= (reach + gap)**2) cycle
       distance = sqrt(square)
-      t = touches%n + 1
-      touches%n = t
-      touches%a(t) = self%pair_a(p)
-      touches%b(t) = self%pair_b(p)
-      touches%key(t) = self%sphere(i)
-      touches%normal(:, t) = d/max(distance, tiny(1.0_wp))
-      touches%depth(t) = reach - distance
-      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*touches%depth(t))*touches%normal(:, t)
-      touches%arm_a(:, t) = d - blocks%x(:, self%pair_a(p))
-      touches%arm_b(:, t) = d - (blocks%x(:, self%pair_b(p)) + shift)
-      touches%weight(t) = 1.0_wp
-      touches%length(t) = 2*min(self%radius(i), self%radius(j))
-      touches%weight_shift(:, t) = 0.0_wp
-      touches%weight_turn(:, t) = 0.0_wp
+      touch%key = self%sphere(i)
+      touch%normal = d/max(distance, tiny(1.0_wp))
+      touch%depth = reach - distance
+      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*touch%depth)*touch%normal
+      touch%arm_a = d - blocks%x(:, touch%a)
+      touch%arm_b = d - (blocks%x(:, touch%b) + shift)
+      touch%length = 2*min(self%radius(i), self%radius(j))
+      call add_touch(touch, touches)
     end do
   end subroutine touch_body
 

@@ -16,7 +16,7 @@ module contact_surface_m
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
   use neighbours_m, only: pair_list_t, near_pairs
-  use touches_m, only: touch_t, reserve_touches
+  use touches_m, only: touch_t, touches_t, ensure_touches, add_touch
   use surface_features_m, only: surface_t, surface_init, near_list_t, gather_probes, gather_edges, &
     gather_facets, nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, turn_before, way_apart, &
@@ -135,7 +135,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     integer :: a, b, p, w
 
     do b = 1, blocks%n
@@ -273,7 +273,7 @@ contains
     integer, intent(in) :: a, w
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(in) :: self
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     real(wp) :: above, gap, n(3), depth, arm(3)
     integer :: i
 
@@ -283,19 +283,19 @@ contains
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
       if (above > self%reach(a) + gap) return
       n = matmul(walls%normal(:, w), turn)
-      call reserve_touches(touches%n + max(1, surface%n_corners), touches)
+      call ensure_touches(touches%n + max(1, surface%n_corners), touches)
       if (surface%ball > 0.0_wp) then
         arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
-        call add_touch(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], walls%normal(:, w), &
-          surface%ball - above, 1.0_wp, surface%length, touches)
+        call add_touch(touch_t(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), surface%ball - above, 1.0_wp, surface%length), touches)
         return
       end if
       do i = 1, surface%n_corners
         depth = dot_product(n, surface%probe(:, i)) - above
         if (depth <= -gap) cycle
         arm = matmul(turn, surface%probe(:, i))
-        call add_touch(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], walls%normal(:, w), &
-          depth, surface%weight(i), surface%length, touches)
+        call add_touch(touch_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), depth, surface%weight(i), surface%length), touches)
       end do
     end associate
   end subroutine touch_wall
@@ -308,7 +308,7 @@ contains
     integer, intent(in) :: a
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(poses_t) :: now
@@ -357,30 +357,6 @@ contains
     call end_lists(pair%of_a)
   end subroutine list_bed
 
-  !> Append a touch; there is room.
-  subroutine add_touch(a, b, key, arm_a, arm_b, normal, depth, weight, length, touches)
-    integer, intent(in) :: a, b, key
-    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres [m]
-    real(wp), intent(in) :: normal(3)            !! from a to b
-    real(wp), intent(in) :: depth, weight, length   !! [m, -, m]
-    type(touch_t), intent(inout) :: touches
-    integer :: t
-
-    t = touches%n + 1
-    touches%n = t
-    touches%a(t) = a
-    touches%b(t) = b
-    touches%key(t) = key
-    touches%arm_a(:, t) = arm_a
-    touches%arm_b(:, t) = arm_b
-    touches%normal(:, t) = normal
-    touches%depth(t) = depth
-    touches%weight(t) = weight
-    touches%length(t) = length
-    touches%weight_shift(:, t) = 0.0_wp
-    touches%weight_turn(:, t) = 0.0_wp
-  end subroutine add_touch
-
   !> Touches of a pair of bodies: probes of b, probes of a, crossing edges.
   subroutine touch_pair(blocks, ahead, reach, turns, surface, search, pair, touches)
     type(blocks_t), intent(in) :: blocks
@@ -390,7 +366,7 @@ contains
     type(surface_t), intent(in) :: surface(:)    !! (shapes)
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     type(poses_t) :: now
     real(wp) :: to_b(3), speed
     integer :: a, b
@@ -424,7 +400,7 @@ contains
     type(surface_t), intent(in) :: surface_a, surface_b
     type(search_t), intent(inout) :: search
     type(pair_t), intent(inout) :: pair
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     type(bed_t), intent(in), optional :: bed  !! where it is b
     real(wp) :: turn(3, 3), x(3)              ! axes of a to those of b: turn.p + x
     real(wp) :: gap, way
@@ -449,7 +425,7 @@ contains
       call know_close(turn, x, to_b, turn_a, now, gap, way, search%skin, surface_a, surface_b, pair)
       if (n_close(pair) == 0) return
     end if
-    call reserve_touches(touches%n + n_close(pair), touches)
+    call ensure_touches(touches%n + n_close(pair), touches)
     call touch_probes(.false., pair%a, pair%b, turn_a, to_b, transpose(turn), &
       matmul(to_b, turn_a), gap, surface_b, surface_a, pair%n_close_b, pair%close, touches)
     call touch_probes(.true., pair%a, pair%b, turn_b, to_b, turn, x, gap, surface_a, surface_b, &
@@ -646,7 +622,7 @@ contains
     integer, intent(in) :: a, b
     real(wp), intent(in) :: to_b(3), gap   !! from the centre of a to that of b; [m]
     type(surface_t), intent(in) :: surface_a, surface_b
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     real(wp) :: distance, depth, normal(3), arm(3)
 
     distance = norm(to_b)
@@ -654,9 +630,9 @@ contains
     if (depth <= -gap) return
     normal = to_b/max(distance, tiny(1.0_wp))
     arm = (surface_a%ball - 0.5_wp*depth)*normal
-    call reserve_touches(touches%n + 1, touches)
-    call add_touch(a, b, 1, arm, arm - to_b, normal, depth, 1.0_wp, &
-      min(surface_a%length, surface_b%length), touches)
+    call ensure_touches(touches%n + 1, touches)
+    call add_touch(touch_t(a, b, 1, arm, arm - to_b, normal, depth, 1.0_wp, &
+      min(surface_a%length, surface_b%length)), touches)
   end subroutine touch_balls
 
   !> Touches of the listed probes of one body (the guest) with the surface of the other (the host).
@@ -671,7 +647,7 @@ contains
     type(surface_t), intent(in) :: guest, host
     integer, intent(in) :: n                  !! probes
     integer, intent(in) :: list(:)            !! their part of the short list, see `pair_t`
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     real(wp) :: place(3), distance, depth, outward(3), arm(3)
     integer :: c, m, i, edges, next
 
@@ -690,11 +666,11 @@ contains
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*depth)*outward)
       outward = matmul(turn_host, outward)
       if (guest_is_a) then
-        call add_touch(a, b, i, arm + to_b, arm, -outward, depth, guest%weight(i), &
-          min(guest%length, host%length), touches)
+        call add_touch(touch_t(a, b, i, arm + to_b, arm, -outward, depth, guest%weight(i), &
+          min(guest%length, host%length)), touches)
       else
-        call add_touch(a, b, i - size(guest%weight) - 1, arm, arm - to_b, outward, depth, &
-          guest%weight(i), min(guest%length, host%length), touches)
+        call add_touch(touch_t(a, b, i - size(guest%weight) - 1, arm, arm - to_b, outward, depth, &
+          guest%weight(i), min(guest%length, host%length)), touches)
       end if
     end do
   end subroutine touch_probes
@@ -707,7 +683,7 @@ contains
     real(wp), intent(in) :: gap               !! still taken as a touch [m]
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
-    type(touch_t), intent(inout) :: touches
+    type(touches_t), intent(inout) :: touches
     type(edge_t) :: guest
     type(crossing_t) :: crossing
     real(wp) :: length, arm(3), with_shift(3), with_turn(3)
@@ -723,12 +699,12 @@ contains
       call cross_edges(guest, surface_b%edge(j), -gap, length, crossing)
       if (crossing%weight <= 0.0_wp) cycle
       arm = matmul(turn_b, crossing%place)
-      call add_touch(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, &
-        matmul(turn_b, crossing%normal), crossing%depth, crossing%weight, length, touches)
+      call add_touch(touch_t(pair%a, pair%b, size(surface_a%weight) + i, arm + to_b, arm, &
+        matmul(turn_b, crossing%normal), crossing%depth, crossing%weight, length), touches)
       if (crossing%weight >= 1.0_wp .or. crossing%depth <= 0.0_wp) cycle
       call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
-      touches%weight_shift(:, touches%n) = matmul(turn_b, with_shift)
-      touches%weight_turn(:, touches%n) = matmul(turn_b, with_turn)
+      touches%item(touches%n)%weight_shift = matmul(turn_b, with_shift)
+      touches%item(touches%n)%weight_turn = matmul(turn_b, with_turn)
     end do
   end subroutine touch_edges
 

@@ -11,7 +11,7 @@ module contacts_m
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_is_near, bed_partner
   use neighbours_m, only: pair_list_t
-  use touches_m, only: touch_t, reserve_touches, set_apart
+  use touches_m, only: touch_t, touches_t, ensure_touches, set_apart
   use springs_m, only: springs_t, reserve_springs, comes_before, move_springs
   use sleep_m, only: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, &
     is_tired, balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
@@ -57,8 +57,8 @@ module contacts_m
     real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
-    type(touch_t) :: touches
-    type(touch_t) :: soon                        !! those that may come before the substep ends
+    type(touches_t) :: touches
+    type(touches_t) :: soon                        !! those that may come before the substep ends
     type(groups_t) :: groups
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
@@ -114,8 +114,8 @@ contains
     allocate (contacts%response_soon%frequency2(bed_partner:n))
     allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
     allocate (contacts%x(3, n), contacts%q(4, n), contacts%l(3, n), contacts%spin(3, n))
-    call reserve_touches(1, contacts%touches)
-    call reserve_touches(1, contacts%soon)
+    call ensure_touches(1, contacts%touches)
+    call ensure_touches(1, contacts%soon)
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
     call sleep_init(input%sleep, contacts%reach, contacts%sleep)
@@ -218,7 +218,9 @@ contains
     type(contact_report_t), intent(inout) :: report
     integer :: b
 
-    call note_partners(contacts%touches%n, contacts%touches%a, contacts%touches%b, contacts)
+    associate (touching => contacts%touches%item(:contacts%touches%n))
+      call note_partners(size(touching), touching%a, touching%b, contacts)
+    end associate
     call match_springs(contacts)
     call stretch_springs(0.5_wp*dt_b, contacts)
     call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
@@ -536,10 +538,10 @@ contains
 
   !> Gather the touches of each key and partner; mean normal and point weighted by overlap.
   subroutine form_groups(touches, groups)
-    type(touch_t), intent(in) :: touches
+    type(touches_t), intent(in) :: touches
     type(groups_t), intent(inout) :: groups
     real(wp) :: w, total
-    integer :: t, g, last
+    integer :: t, g, i, last
 
     groups%n = 0
     call ensure_room(touches%n + 1, groups%first)
@@ -553,30 +555,42 @@ contains
       groups%n = g
       groups%first(g) = t
       do last = t, touches%n - 1
-        if (touches%key(last + 1) /= touches%key(t) .or. touches%b(last + 1) /= touches%b(t) &
-          .or. touches%a(last + 1) /= touches%a(t)) exit
+        if (.not. same_spring(touches%item(t), touches%item(last + 1))) exit
       end do
-      groups%normal(:, g) = touches%normal(:, t)
-      groups%arm_a(:, g) = touches%arm_a(:, t)
-      groups%arm_b(:, g) = touches%arm_b(:, t)
+      groups%normal(:, g) = touches%item(t)%normal
+      groups%arm_a(:, g) = touches%item(t)%arm_a
+      groups%arm_b(:, g) = touches%item(t)%arm_b
       if (last > t) then
-        total = sum(touches%weight(t:last)*touches%depth(t:last))
-        groups%arm_a(:, g) = matmul(touches%arm_a(:, t:last), &
-          touches%weight(t:last)*touches%depth(t:last))/total
-        groups%arm_b(:, g) = groups%arm_a(:, g) + (touches%arm_b(:, t) - touches%arm_a(:, t))
-        groups%normal(:, g) = matmul(touches%normal(:, t:last), &
-          touches%weight(t:last)*touches%depth(t:last))
+        total = 0.0_wp
+        groups%normal(:, g) = 0.0_wp
+        groups%arm_a(:, g) = 0.0_wp
+        do i = t, last
+          w = touches%item(i)%weight*touches%item(i)%depth
+          total = total + w
+          groups%normal(:, g) = groups%normal(:, g) + w*touches%item(i)%normal
+          groups%arm_a(:, g) = groups%arm_a(:, g) + w*touches%item(i)%arm_a
+        end do
+        groups%arm_a(:, g) = groups%arm_a(:, g)/total
+        groups%arm_b(:, g) = groups%arm_a(:, g) + (touches%item(t)%arm_b - touches%item(t)%arm_a)
         w = norm(groups%normal(:, g))
         if (w > epsilon(w)*total) then
           groups%normal(:, g) = groups%normal(:, g)/w
         else
-          groups%normal(:, g) = touches%normal(:, t)
+          groups%normal(:, g) = touches%item(t)%normal
         end if
       end if
       t = last + 1
     end do
     groups%first(groups%n + 1) = touches%n + 1
   end subroutine form_groups
+
+  !> Whether two touches act on one tangential spring.
+  pure function same_spring(one, two) result(yes)
+    type(touch_t), intent(in) :: one, two
+    logical :: yes
+
+    yes = one%key == two%key .and. one%b == two%b .and. one%a == two%a
+  end function same_spring
 
   !> Give each group its spring: that in memory turned into the present plane, or a new one.
   subroutine match_springs(contacts)
@@ -596,9 +610,9 @@ contains
       m = 1
       do g = 1, groups%n
         t = groups%first(g)
-        new%a(g) = touches%a(t)
-        new%b(g) = touches%b(t)
-        new%key(g) = touches%key(t)
+        new%a(g) = touches%item(t)%a
+        new%b(g) = touches%item(t)%b
+        new%key(g) = touches%item(t)%key
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
@@ -703,20 +717,21 @@ contains
       decay = 0.0_wp
       eta = 0.0_wp
       do t = groups%first(g), groups%first(g + 1) - 1
-        v_n = dot_product(relative_velocity(motion, touches%arm_a(:, t), touches%arm_b(:, t)), &
-          touches%normal(:, t))
-        part = 1.0_wp
-        if (groups%new(g)) part = damped_part(touches%depth(t), v_n, dt)
-        opening = opening_speed(touches, t, contacts%law%gamma_n, motion)
-        force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
-        call act(-force_n*touches%normal(:, t), touches%arm_a(:, t), touches%arm_b(:, t), wrench)
-        if (touches%weight(t) < 1.0_wp) call push_to_weight(touches, t, contacts%law%gamma_n, &
-          force_n, wrench)
+        associate (touch => touches%item(t))
+          v_n = dot_product(relative_velocity(motion, touch%arm_a, touch%arm_b), touch%normal)
+          part = 1.0_wp
+          if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
+          opening = opening_speed(touch, contacts%law%gamma_n, motion)
+          force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
+          call act(-force_n*touch%normal, touch%arm_a, touch%arm_b, wrench)
+          if (touch%weight < 1.0_wp) call push_to_weight(touch, contacts%law%gamma_n, force_n, &
+            wrench)
+          report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
+          report%overlap_max = max(report%overlap_max, touch%depth)
+        end associate
         sum_n = sum_n + force_n
         decay = max(decay, r%decay(t))
         eta = max(eta, r%eta(t))
-        report%courant_max = max(report%courant_max, abs(v_n)*dt/touches%length(t))
-        report%overlap_max = max(report%overlap_max, touches%depth(t))
       end do
       call rub(g, sum_n, eta, 1.0_wp + decay*dt, motion, contacts, wrench)
     end associate
@@ -752,9 +767,9 @@ contains
     associate (groups => contacts%groups, springs => contacts%springs, law => contacts%law)
       t = groups%first(g)
       k_n = contacts%response%k(t)
-      k = tangential_constant(law, k_n, contacts%touches%weight(t))
+      k = tangential_constant(law, k_n, contacts%touches%item(t)%weight)
       springs%k(g) = k
-      eta = contacts%touches%weight(t)*law%eta_t
+      eta = contacts%touches%item(t)%weight*law%eta_t
       if (.not. law%constants) eta = eta_n*(k/k_n)
       bound = force_n*merge(law%wall_friction, law%friction, springs%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))

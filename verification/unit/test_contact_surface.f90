@@ -9,7 +9,7 @@ program test_contact_surface
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: blocks_t, blocks_init, release_body
   use walls_m, only: walls_t, walls_init
-  use touches_m, only: touch_t
+  use touches_m, only: touches_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   implicit none
 
@@ -19,7 +19,7 @@ program test_contact_surface
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_surface_t) :: surface
-    type(touch_t) :: touches
+    type(touches_t) :: touches
   end type world_t
 
   real(wp), parameter :: d = 0.02_wp         !! edge of the cubes, diameter of the ball [m]
@@ -101,7 +101,7 @@ contains
         world%blocks%x(3, 1) = height(pose) - sunk
         call find(world)
         call check('corners that stand', world%touches%n, corners(pose))
-        call check('sunk', maxval(world%touches%depth(:world%touches%n)), sunk, 1.0e-15_wp)
+        call check('sunk', maxval(world%touches%item(:world%touches%n)%depth), sunk, 1.0e-15_wp)
       end do
     end do
   end subroutine check_rest_heights
@@ -121,12 +121,12 @@ contains
       world%blocks%x(3, upper) = 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth
       call find(world)
       call check('one corner in a face', world%touches%n, 1)
-      call check('its depth', world%touches%depth(1), depth, 1.0e-15_wp)
-      call check('normal from a to b', world%touches%normal(3, 1), &
+      call check('its depth', world%touches%item(1)%depth, depth, 1.0e-15_wp)
+      call check('normal from a to b', world%touches%item(1)%normal(3), &
                  merge(1.0_wp, -1.0_wp, upper == 1), 1.0e-14_wp)
-      call check('its arm', world%touches%arm_a(:, 1) + world%blocks%x(:, 2), &
+      call check('its arm', world%touches%item(1)%arm_a + world%blocks%x(:, 2), &
                  [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
-      call check('both arms meet', world%touches%arm_b(:, 1) + world%blocks%x(:, 1), &
+      call check('both arms meet', world%touches%item(1)%arm_b + world%blocks%x(:, 1), &
                  [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
     end do
   end subroutine check_corner_in_face
@@ -142,10 +142,11 @@ contains
     world%blocks%x(:, 2) = [0.503_wp, 0.496_wp, 0.5_wp + sqrt(2.0_wp)*d - depth]
     call find(world)
     call check('two edges cross', world%touches%n, 1)
-    call check('depth between the edges', world%touches%depth(1), depth, 1.0e-15_wp)
-    call check('they count', world%touches%weight(1), 1.0_wp, 1.0e-15_wp)
-    call check('normal to both', world%touches%normal(:, 1), [0.0_wp, 0.0_wp, -1.0_wp], 1.0e-14_wp)
-    call check('where they cross', world%touches%arm_b(1:2, 1), [0.003_wp, 0.0_wp], 1.0e-15_wp)
+    call check('depth between the edges', world%touches%item(1)%depth, depth, 1.0e-15_wp)
+    call check('they count', world%touches%item(1)%weight, 1.0_wp, 1.0e-15_wp)
+    call check('normal to both', world%touches%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], &
+      1.0e-14_wp)
+    call check('where they cross', world%touches%item(1)%arm_b(1:2), [0.003_wp, 0.0_wp], 1.0e-15_wp)
     world%blocks%x(3, 2) = world%blocks%x(3, 2) + 2*depth
     call find(world)
     call check('apart', world%touches%n, 0)
@@ -169,10 +170,10 @@ contains
       force = 0.0_wp
       torque = 0.0_wp
       do t = 1, world%touches%n
-        if (abs(world%touches%normal(3, t)) < 0.5_wp) cycle
-        force = force + world%touches%weight(t)*world%touches%depth(t)
-        torque = torque + cross(world%touches%arm_b(:, t), world%touches%normal(:, t)) &
-          *world%touches%weight(t)*world%touches%depth(t)
+        if (abs(world%touches%item(t)%normal(3)) < 0.5_wp) cycle
+        force = force + world%touches%item(t)%weight*world%touches%item(t)%depth
+        torque = torque + cross(world%touches%item(t)%arm_b, world%touches%item(t)%normal) &
+          *world%touches%item(t)%weight*world%touches%item(t)%depth
       end do
       call check('a face carries', force > 0.9_wp*depth)
       if (cross_laid == 0) call check('without tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
@@ -205,8 +206,8 @@ contains
       end if
       call find(world)
       call check('a ball touches once', world%touches%n, 1)
-      call check('its depth', world%touches%depth(1), depth, 1.0e-15_wp)
-      call check('its normal', world%touches%normal(:, 1), -way, 1.0e-12_wp)
+      call check('its depth', world%touches%item(1)%depth, depth, 1.0e-15_wp)
+      call check('its normal', world%touches%item(1)%normal, -way, 1.0e-12_wp)
     end do
   end subroutine check_balls
 
@@ -218,7 +219,7 @@ contains
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'cube']
     real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work
     real(wp) :: worst, scale
-    integer :: i, m, found, faded, touching, kinks
+    integer :: i, m, found, faded, touching, kinks, t
 
     kinks = 0
     found = 0
@@ -236,8 +237,10 @@ contains
         if (touching == 0) cycle
         found = found + 1
         call forces(world, force, torque)
-        scale = sum(world%touches%weight(:world%touches%n)*world%touches%depth(:world%touches%n))
-        if (any(abs(world%touches%weight_shift(:, :world%touches%n)) > 0.0_wp)) faded = faded + 1
+        associate (touch => world%touches%item(:world%touches%n))
+          scale = sum(touch%weight*touch%depth)
+          if (any([(any(abs(touch(t)%weight_shift) > 0.0_wp), t=1, size(touch))])) faded = faded + 1
+        end associate
         direction = [uniform(4, i, 1), uniform(4, i, 2), uniform(4, i, 3)] - 0.5_wp
         axis = ([uniform(4, i, 4), uniform(4, i, 5), uniform(4, i, 6)] - 0.5_wp)/d
         here = energy(world)
@@ -277,7 +280,7 @@ contains
       call find(world)
       if (world%touches%n == 0) then
         far = middle
-      else if (maxval(world%touches%depth(:world%touches%n)) < depth) then
+      else if (maxval(world%touches%item(:world%touches%n)%depth) < depth) then
         far = middle
       else
         near = middle
@@ -296,11 +299,11 @@ contains
     force = 0.0_wp
     torque = 0.0_wp
     do t = 1, world%touches%n
-      associate (w => world%touches%weight(t), depth => world%touches%depth(t))
-        f = -w*depth*world%touches%normal(:, t) - 0.5_wp*w*depth**2*world%touches%weight_shift(:, t)
+      associate (touch => world%touches%item(t), w => world%touches%item(t)%weight, &
+        depth => world%touches%item(t)%depth)
+        f = -w*depth*touch%normal - 0.5_wp*w*depth**2*touch%weight_shift
         force = force + f
-        torque = torque + cross(world%touches%arm_a(:, t), f) &
-          - 0.5_wp*w*depth**2*world%touches%weight_turn(:, t)
+        torque = torque + cross(touch%arm_a, f) - 0.5_wp*w*depth**2*touch%weight_turn
       end associate
     end do
   end subroutine forces
@@ -311,8 +314,8 @@ contains
     real(wp) :: energy
 
     call find(world)
-    energy = sum(0.5_wp*world%touches%weight(:world%touches%n) &
-                 *world%touches%depth(:world%touches%n)**2)
+    energy = sum(0.5_wp*world%touches%item(:world%touches%n)%weight &
+                 *world%touches%item(:world%touches%n)%depth**2)
   end function energy
 
   !> Shift and turn body 2.
@@ -363,8 +366,8 @@ contains
     n = one%touches%n
     same = n == two%touches%n
     if (.not. same .or. n == 0) return
-    same = all(one%touches%key(:n) == two%touches%key(:n)) &
-      .and. .not. any(abs(one%touches%depth(:n) - two%touches%depth(:n)) > 0.0_wp)
+    same = all(one%touches%item(:n)%key == two%touches%item(:n)%key) &
+      .and. .not. any(abs(one%touches%item(:n)%depth - two%touches%item(:n)%depth) > 0.0_wp)
   end function same_touches
 
 end program test_contact_surface
