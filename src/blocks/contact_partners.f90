@@ -17,7 +17,7 @@ module contact_partners_m
   type :: partners_t
     real(wp) :: gravity = 0.0_wp                       !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, partners) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)                   !! (partners) depth at which touches harden [m]
+    real(wp), allocatable :: hard(:)                   !! (partners) depth where touches harden [m]
     real(wp), allocatable :: inverse_mass(:)           !! (partners) 0: walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)  !! (3, 3, partners) likewise [1/(kg m2)]
   end type partners_t

@@ -1,0 +1,325 @@
+!> What may touch of two bodies before they have moved against one another by a skin: probes of each
+!! with the facets and edges of the other that may be nearest to them, and edges that may cross.
+module near_features_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use vectors_m, only: norm
+  use bed_m, only: bed_t, bed_is_near, bed_distance
+  use surface_features_m, only: surface_t, near_list_t, gather_probes, gather_edges, &
+    gather_facets, search_surface, least_distance, segment_distance2, nowhere
+  use edge_crossing_m, only: edge_t, turn_before, way_apart
+  use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view
+  implicit none
+  private
+  public :: near_features_t, probes_near_t, search_t, list_features, list_bed
+  public :: append_facets, append_edges, edge_in_view, way_to_crossing
+
+  !> Probes of one body near the other, and the features of the other they may touch.
+  type :: probes_near_t
+    integer :: n = 0
+    integer, allocatable :: probe(:)
+    real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
+    integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
+    integer :: n_facets = 0, n_edges = 0
+    integer, allocatable :: facet(:), edge(:)
+  end type probes_near_t
+
+  !> The lists of a pair of bodies.
+  type :: near_features_t
+    type(poses_t) :: when                        !! poses at which they were made
+    real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
+    type(probes_near_t) :: of_a, of_b
+    integer :: n_crossings = 0
+    integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
+    real(wp), allocatable :: away(:)             !! way before the two may cross [m]
+  end type near_features_t
+
+  !> How far to look for features, and the lists of the search.
+  type :: search_t
+    real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
+    real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
+    real(wp) :: ahead = 0.0_wp                   !! longest way of a touch that comes soon [m]
+    type(near_list_t) :: guests, hosts, facets, edges
+  end type search_t
+
+  real(wp), parameter :: most_skin = 4.0_wp      !! largest skin over the least
+
+contains
+
+  !> Lists of a pair of bodies, wider for fast ones.
+  subroutine list_features(now, a, b, search, near)
+    type(meeting_t), intent(in) :: now
+    type(surface_t), intent(in) :: a, b
+    type(search_t), intent(inout) :: search
+    type(near_features_t), intent(inout) :: near
+    real(wp) :: apart, skin
+
+    call begin_lists(now%poses, near)
+    apart = norm(now%to_b) - a%reach - b%reach - search%ahead
+    skin = skin_for(now%speed, search)
+    near%valid = max(apart, skin)
+    if (apart > skin) return
+    call list_probes(now%b_in_a, skin, b, a, search, near%of_b)
+    call list_probes(now%a_in_b, skin, a, b, search, near%of_a)
+    call list_crossings(now%a_in_b, a, b, search, near)
+  end subroutine list_features
+
+  !> Lists of a body and the bed.
+  subroutine list_bed(bed, now, surface, search, near)
+    type(bed_t), intent(in) :: bed
+    type(meeting_t), intent(in) :: now
+    type(surface_t), intent(in) :: surface       !! of the body
+    type(search_t), intent(inout) :: search
+    type(near_features_t), intent(inout) :: near
+    real(wp) :: margin, place(3), distance, outward(3)
+    integer :: i
+
+    call begin_lists(now%poses, near)
+    near%valid = skin_for(now%speed, search)
+    margin = near%valid + search%ahead
+    associate (x => now%poses%x_a, reach => surface%reach + margin)
+      if (.not. bed_is_near(bed, x - reach, x + reach)) return
+    end associate
+    call list_probes(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
+    call list_crossings(now%a_in_b, surface, bed%surface, search, near)
+    near%of_a%n_facets = 0
+    near%of_a%n_edges = 0
+    margin = margin + surface%ball
+    do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
+      place = now%poses%x_a + matmul(now%turn_a, surface%probe(:, i))
+      call bed_distance(bed, place, margin, max(margin, surface%reach), search%facets, &
+        search%edges, distance, outward)
+      if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
+      call append_near(bed%surface, i, place, abs(distance) + 2*(near%valid + search%ahead), &
+        search, near%of_a)
+      near%of_a%away(near%of_a%n) = distance - surface%ball
+    end do
+    call end_lists(near%of_a)
+  end subroutine list_bed
+
+  !> Empty lists for the present poses.
+  pure subroutine begin_lists(poses, near)
+    type(poses_t), intent(in) :: poses
+    type(near_features_t), intent(inout) :: near
+
+    near%when = poses
+    near%of_a%n = 0
+    near%of_b%n = 0
+    near%n_crossings = 0
+  end subroutine begin_lists
+
+  !> Way by which bodies may move before their lists are renewed: wider for fast bodies [m].
+  pure function skin_for(speed, search) result(skin)
+    real(wp), intent(in) :: speed                 !! of any two points, at most [m/s]
+    type(search_t), intent(in) :: search
+    real(wp) :: skin
+
+    skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
+  end function skin_for
+
+  !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
+  !! may be nearest to it before the bodies have moved by the skin.
+  subroutine list_probes(guest_in_host, skin, guest, host, search, list)
+    type(view_t), intent(in) :: guest_in_host
+    real(wp), intent(in) :: skin               !! [m]
+    type(surface_t), intent(in) :: guest, host
+    type(search_t), intent(inout) :: search
+    type(probes_near_t), intent(inout) :: list
+    real(wp) :: margin, place(3), distance, outward(3), low(3), high(3)
+    integer :: m
+
+    list%n_facets = 0
+    list%n_edges = 0
+    if (host%ball > 0.0_wp) return   ! its own centre is the probe
+    margin = skin + search%ahead + guest%ball
+    call box_in_view(inverse_view(guest_in_host), host%low - margin, host%high + margin, low, high)
+    call gather_probes(guest, low, high, search%guests)
+    do m = 1, search%guests%n
+      place = seen_from(guest_in_host, guest%probe(:, search%guests%item(m)))
+      if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
+      if (least_distance(host, place) > margin) cycle
+      call search_surface(host, place, margin, search%facets, search%edges, distance, outward)
+      if (distance > margin) cycle
+      call append_near(host, search%guests%item(m), place, &
+        abs(distance) + 2*(skin + search%ahead), search, list)
+      list%away(list%n) = distance - guest%ball
+    end do
+    call end_lists(list)
+  end subroutine list_probes
+
+  !> Append a probe with the facets and edges of the host within reach; `away` is not set.
+  subroutine append_near(host, probe, place, reach, search, list)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: probe
+    real(wp), intent(in) :: place(3), reach      !! of the probe, host axes [m]
+    type(search_t), intent(inout) :: search
+    type(probes_near_t), intent(inout) :: list
+
+    call gather_facets(host, place - reach, place + reach, search%facets)
+    call gather_edges(host, place - reach, place + reach, search%edges)
+    list%n = list%n + 1
+    call ensure_room(list%n, list%probe)
+    call ensure_room(list%n, list%away)
+    call ensure_room(list%n, list%facet_first)
+    call ensure_room(list%n, list%edge_first)
+    list%probe(list%n) = probe
+    list%facet_first(list%n) = list%n_facets + 1
+    list%edge_first(list%n) = list%n_edges + 1
+    call append_facets(host, search%facets%item(:search%facets%n), place, reach, list%n_facets, &
+      list%facet)
+    call append_edges(host, search%edges%item(:search%edges%n), place, reach, list%n_edges, &
+      list%edge)
+  end subroutine append_near
+
+  !> Close the lists of facets and edges of the last probe.
+  subroutine end_lists(list)
+    type(probes_near_t), intent(inout) :: list
+
+    call ensure_room(list%n + 1, list%facet_first)
+    call ensure_room(list%n + 1, list%edge_first)
+    list%facet_first(list%n + 1) = list%n_facets + 1
+    list%edge_first(list%n + 1) = list%n_edges + 1
+  end subroutine end_lists
+
+  !> Append those of some facets that are within reach of a place to a list of n numbers.
+  subroutine append_facets(host, facets, place, reach, n, list)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: facets(:)
+    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    integer, intent(inout) :: n
+    integer, allocatable, intent(inout) :: list(:)
+    integer :: k
+
+    call ensure_room(n + size(facets), list)
+    do k = 1, size(facets)
+      if (.not. facet_is_near(host, facets(k), place, reach)) cycle
+      n = n + 1
+      list(n) = facets(k)
+    end do
+  end subroutine append_facets
+
+  !> Append those of some edges that are within reach of a place to a list of n numbers.
+  subroutine append_edges(host, edges, place, reach, n, list)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: edges(:)
+    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    integer, intent(inout) :: n
+    integer, allocatable, intent(inout) :: list(:)
+    integer :: k
+
+    call ensure_room(n + size(edges), list)
+    do k = 1, size(edges)
+      if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
+      n = n + 1
+      list(n) = edges(k)
+    end do
+  end subroutine append_edges
+
+  !> Whether a facet may be the nearest to a place, within reach of it.
+  pure function facet_is_near(host, f, place, reach) result(yes)
+    type(surface_t), intent(in) :: host
+    integer, intent(in) :: f
+    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    logical :: yes
+    integer :: c
+
+    yes = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= reach
+    if (.not. yes) return
+    do c = host%side(f), host%side(f + 1) - 1
+      yes = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - reach
+      if (.not. yes) return
+    end do
+  end function facet_is_near
+
+  !> Whether an edge is within reach of a place.
+  pure function edge_is_near(edge, place, reach) result(yes)
+    type(edge_t), intent(in) :: edge
+    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    logical :: yes
+    real(wp) :: d(3)
+
+    d = place - edge%start
+    d = d - min(max(dot_product(d, edge%along), 0.0_wp), edge%extent)*edge%along
+    yes = dot_product(d, d) <= reach**2
+  end function edge_is_near
+
+  !> Pairs of convex edges that may cross before the bodies have moved by the skin.
+  subroutine list_crossings(a_in_b, surface_a, surface_b, search, near)
+    type(view_t), intent(in) :: a_in_b
+    type(surface_t), intent(in) :: surface_a, surface_b
+    type(search_t), intent(inout) :: search
+    type(near_features_t), intent(inout) :: near
+    type(edge_t) :: guest
+    real(wp) :: reach, away, low(3), high(3)
+    integer :: m, k, i, j
+
+    if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
+    reach = near%valid + search%ahead + min(surface_a%length, surface_b%length)
+    call box_in_view(inverse_view(a_in_b), surface_b%low - reach, surface_b%high + reach, low, high)
+    call gather_edges(surface_a, low, high, search%guests)
+    do m = 1, search%guests%n
+      i = search%guests%item(m)
+      if (i > surface_a%n_convex) exit
+      guest = edge_in_view(a_in_b, surface_a%edge(i))
+      low = min(guest%start, guest%start + guest%extent*guest%along) - reach
+      high = max(guest%start, guest%start + guest%extent*guest%along) + reach
+      if (any(low > surface_b%high) .or. any(high < surface_b%low)) cycle
+      call gather_edges(surface_b, low, high, search%hosts)
+      do k = 1, search%hosts%n
+        j = search%hosts%item(k)
+        if (j > surface_b%n_convex) exit
+        away = way_to_crossing(guest, surface_b%edge(j), near%valid, reach, &
+          min(surface_a%reach, surface_b%reach))
+        if (away < nowhere) call add_crossing(i, j, away, near)
+      end do
+    end do
+  end subroutine list_crossings
+
+  !> Append a pair of edges that may cross.
+  subroutine add_crossing(i, j, away, near)
+    integer, intent(in) :: i, j            !! edges of a and of b
+    real(wp), intent(in) :: away           !! [m]
+    type(near_features_t), intent(inout) :: near
+    integer :: n
+
+    n = near%n_crossings + 1
+    near%n_crossings = n
+    call ensure_room(n, near%edge_a)
+    call ensure_room(n, near%edge_b)
+    call ensure_room(n, near%away)
+    near%edge_a(n) = i
+    near%edge_b(n) = j
+    near%away(n) = away
+  end subroutine add_crossing
+
+  !> An edge seen from the other body.
+  pure function edge_in_view(view, edge) result(seen)
+    type(view_t), intent(in) :: view
+    type(edge_t), intent(in) :: edge
+    type(edge_t) :: seen
+
+    seen%start = seen_from(view, edge%start)
+    seen%along = matmul(view%turn, edge%along)
+    seen%extent = edge%extent
+    seen%into = matmul(view%turn, edge%into)
+  end function edge_in_view
+
+  !> Way that two bodies may move before two edges of theirs may cross; `nowhere` where they cannot
+  !! before the bodies have moved by a margin [m].
+  pure function way_to_crossing(guest, host, margin, reach, arm) result(way)
+    type(edge_t), intent(in) :: guest, host   !! in the same axes
+    real(wp), intent(in) :: margin            !! [m]
+    real(wp), intent(in) :: reach             !! distance from which edges cannot come to cross [m]
+    real(wp), intent(in) :: arm               !! reach of the smaller body: it turns by way/arm [m]
+    real(wp) :: way
+    real(wp) :: angle
+
+    way = nowhere
+    if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
+                          host%extent) > reach**2) return
+    angle = turn_before(guest, host)
+    if (angle >= margin/arm) return
+    way = max(way_apart(guest, host, margin/arm), angle*arm)
+  end function way_to_crossing
+
+end module near_features_m
