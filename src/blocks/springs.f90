@@ -4,9 +4,10 @@ module springs_m
   use growing_m, only: ensure_room
   implicit none
   private
-  public :: springs_t, reserve_springs, comes_before, move_springs
+  public :: springs_t, reserve_springs, comes_before, begins_pair, move_springs
 
-  !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches.
+  !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches;
+  !! arrays side by side, as the state of a run is written.
   !!
   !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere
   !! slides from a sphere of the partner to the next, so that resting blocks do not creep.
@@ -19,6 +20,14 @@ module springs_m
     real(wp), allocatable :: force(:, :), torque_a(:, :), torque_b(:, :)   !! (3, n) [N], [N m]
     real(wp), allocatable :: energy(:)           !! (n) [J]
   end type springs_t
+
+  !> One of them, to move it.
+  type :: spring_t
+    integer :: a = 0, b = 0, key = 0
+    real(wp) :: xi(3) = 0.0_wp, k = 0.0_wp
+    real(wp) :: force(3) = 0.0_wp, torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp
+    real(wp) :: energy = 0.0_wp
+  end type spring_t
 
 contains
 
@@ -52,6 +61,16 @@ contains
     end if
   end function comes_before
 
+  !> Whether spring g is the first of its pair of partners.
+  pure function begins_pair(springs, g) result(yes)
+    type(springs_t), intent(in) :: springs
+    integer, intent(in) :: g
+    logical :: yes
+
+    yes = g == 1
+    if (.not. yes) yes = springs%a(g) /= springs%a(g - 1) .or. springs%b(g) /= springs%b(g - 1)
+  end function begins_pair
+
   !> Move the chosen springs of a list to another; both stay sorted.
   subroutine move_springs(chosen, from, to)
     logical, intent(in) :: chosen(:)         !! (from%n)
@@ -74,10 +93,10 @@ contains
       if (own_is_next) own_is_next = .not. comes_before(to%a(i), to%b(i), to%key(i), from%a(j), &
                                                         from%b(j), from%key(j))
       if (own_is_next) then
-        call move_spring(i, m, to)
+        call put_spring(spring_at(to, i), m, to)
         i = i - 1
       else
-        call copy_spring(from, j, to, m)
+        call put_spring(spring_at(from, j), m, to)
         j = j - 1
       end if
       m = m - 1
@@ -86,42 +105,43 @@ contains
     do j = 1, from%n
       if (chosen(j)) cycle
       kept = kept + 1
-      if (kept < j) call move_spring(j, kept, from)
+      if (kept < j) call put_spring(spring_at(from, j), kept, from)
     end do
     from%n = kept
   end subroutine move_springs
 
-  !> Copy a spring from one list to another, where there is room.
-  pure subroutine copy_spring(from, i, to, m)
-    type(springs_t), intent(in) :: from
-    integer, intent(in) :: i, m
-    type(springs_t), intent(inout) :: to
+  !> Spring i of a list.
+  pure function spring_at(springs, i) result(spring)
+    type(springs_t), intent(in) :: springs
+    integer, intent(in) :: i
+    type(spring_t) :: spring
 
-    to%a(m) = from%a(i)
-    to%b(m) = from%b(i)
-    to%key(m) = from%key(i)
-    to%xi(:, m) = from%xi(:, i)
-    to%k(m) = from%k(i)
-    to%force(:, m) = from%force(:, i)
-    to%torque_a(:, m) = from%torque_a(:, i)
-    to%torque_b(:, m) = from%torque_b(:, i)
-    to%energy(m) = from%energy(i)
-  end subroutine copy_spring
+    spring%a = springs%a(i)
+    spring%b = springs%b(i)
+    spring%key = springs%key(i)
+    spring%xi = springs%xi(:, i)
+    spring%k = springs%k(i)
+    spring%force = springs%force(:, i)
+    spring%torque_a = springs%torque_a(:, i)
+    spring%torque_b = springs%torque_b(:, i)
+    spring%energy = springs%energy(i)
+  end function spring_at
 
-  !> Move a spring within a list.
-  pure subroutine move_spring(i, m, springs)
-    integer, intent(in) :: i, m
+  !> Put a spring at place i of a list, where there is room.
+  pure subroutine put_spring(spring, i, springs)
+    type(spring_t), intent(in) :: spring
+    integer, intent(in) :: i
     type(springs_t), intent(inout) :: springs
 
-    springs%a(m) = springs%a(i)
-    springs%b(m) = springs%b(i)
-    springs%key(m) = springs%key(i)
-    springs%xi(:, m) = springs%xi(:, i)
-    springs%k(m) = springs%k(i)
-    springs%force(:, m) = springs%force(:, i)
-    springs%torque_a(:, m) = springs%torque_a(:, i)
-    springs%torque_b(:, m) = springs%torque_b(:, i)
-    springs%energy(m) = springs%energy(i)
-  end subroutine move_spring
+    springs%a(i) = spring%a
+    springs%b(i) = spring%b
+    springs%key(i) = spring%key
+    springs%xi(:, i) = spring%xi
+    springs%k(i) = spring%k
+    springs%force(:, i) = spring%force
+    springs%torque_a(:, i) = spring%torque_a
+    springs%torque_b(:, i) = spring%torque_b
+    springs%energy(i) = spring%energy
+  end subroutine put_spring
 
 end module springs_m

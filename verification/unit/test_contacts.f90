@@ -688,7 +688,7 @@ contains
     two%case = one%case
     two%gravity = one%gravity
     call start(two)
-    associate (spheres => two%contacts%spheres)
+    associate (spheres => two%contacts%touching%spheres)
       spheres%skin = spheres%skin - 1.98_wp*spheres%free_way
       spheres%free_way = 0.01_wp*spheres%free_way
     end associate

@@ -1,0 +1,250 @@
+!> Forces of all touches on their partners, and the tangential springs that remember them.
+module contact_forces_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use vectors_m, only: norm
+  use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
+  use touching_m, only: touching_t
+  use contact_law_m, only: tangential_constant, stored_energy, normal_force, tangential_force, &
+    tangential_slip
+  use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
+  use contact_response_m, only: opening_speed, push_to_weight
+  implicit none
+  private
+  public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
+    elastic_energy
+
+  !> Contact forces and torques on all partners: (3, partners).
+  type :: loads_t
+    real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
+    real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
+  end type loads_t
+
+  !> What happened in the substeps of one fluid step.
+  type :: contact_report_t
+    integer :: substeps = 0
+    integer :: info = 0                 !! 1: it would take more than `most_substeps`, or NaN
+    real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
+    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m]
+  end type contact_report_t
+
+  !> What the touches of one group do along their normals.
+  type :: push_t
+    real(wp) :: force = 0.0_wp          !! sum [N]
+    real(wp) :: eta = 0.0_wp            !! largest damping [N s/m]
+    real(wp) :: implicit = 1.0_wp       !! 1 + eta dt/(2 m): damping acts in mid-substep
+  end type push_t
+
+contains
+
+  !> Give each group its spring: that in memory turned into the present plane, or a new one.
+  subroutine match_springs(touching, before, springs)
+    type(touching_t), intent(inout) :: touching
+    type(springs_t), intent(inout) :: before   !! work: springs of the substep before
+    type(springs_t), intent(inout) :: springs
+    integer :: g, m, t
+
+    associate (touches => touching%touches, groups => touching%groups, old => before, &
+      new => springs)
+      call reserve_springs(new%n, old)
+      old%n = new%n
+      old%a(:old%n) = new%a(:old%n)
+      old%b(:old%n) = new%b(:old%n)
+      old%key(:old%n) = new%key(:old%n)
+      old%xi(:, :old%n) = new%xi(:, :old%n)
+      call reserve_springs(groups%n, new)
+      new%n = groups%n
+      m = 1
+      do g = 1, groups%n
+        t = groups%first(g)
+        new%a(g) = touches%item(t)%a
+        new%b(g) = touches%item(t)%b
+        new%key(g) = touches%item(t)%key
+        new%xi(:, g) = 0.0_wp
+        groups%new(g) = .true.
+        do while (m <= old%n)
+          if (.not. comes_before(old%a(m), old%b(m), old%key(m), &
+                                 new%a(g), new%b(g), new%key(g))) exit
+          m = m + 1
+        end do
+        if (m > old%n) cycle
+        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%key(m) /= new%key(g)
+        if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
+      end do
+    end associate
+  end subroutine match_springs
+
+  !> The vector xi turned into the plane normal to n, its length kept.
+  pure function turned_into_plane(xi, n) result(turned)
+    real(wp), intent(in) :: xi(3), n(3)
+    real(wp) :: turned(3)
+    real(wp) :: length
+
+    turned = xi - dot_product(xi, n)*n
+    length = norm(turned)
+    if (length > 0.0_wp) turned = turned*(norm(xi)/length)
+  end function turned_into_plane
+
+  !> Let the springs follow the present tangential velocities for a time dt.
+  pure subroutine stretch_springs(dt, touching, springs)
+    real(wp), intent(in) :: dt   !! [s]
+    type(touching_t), intent(in) :: touching
+    type(springs_t), intent(inout) :: springs
+    type(motion_t) :: motion
+    real(wp) :: v(3)
+    integer :: g
+
+    associate (groups => touching%groups)
+      do g = 1, groups%n
+        if (begins_pair(springs, g)) motion = motion_between(touching%partners, springs%a(g), &
+                                                             springs%b(g))
+        v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
+        springs%xi(:, g) = springs%xi(:, g) &
+          + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
+      end do
+    end associate
+  end subroutine stretch_springs
+
+  !> Contact forces and torques of this substep on all bodies.
+  !!
+  !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
+  !! F = (k d - eta v_n)/(1 + eta dt/(2 m)), the implicit midpoint rule.
+  pure subroutine sum_forces(dt, touching, springs, loads, report)
+    real(wp), intent(in) :: dt   !! [s]
+    type(touching_t), intent(in) :: touching
+    type(springs_t), intent(inout) :: springs
+    type(loads_t), intent(inout) :: loads
+    type(contact_report_t), intent(inout) :: report
+    type(motion_t) :: motion
+    type(wrench_t) :: wrench
+    integer :: g
+
+    loads%force = 0.0_wp
+    loads%torque = 0.0_wp
+    associate (n => touching%groups%n)
+      do g = 1, n
+        if (begins_pair(springs, g)) then
+          motion = motion_between(touching%partners, springs%a(g), springs%b(g))
+          wrench = wrench_t()
+        end if
+        call push_group(g, dt, motion, touching, springs, wrench, report)
+        if (g < n) then
+          if (.not. begins_pair(springs, g + 1)) cycle
+        end if
+        associate (a => springs%a(g), b => springs%b(g))
+          loads%force(:, a) = loads%force(:, a) + wrench%force
+          loads%force(:, b) = loads%force(:, b) - wrench%force
+          loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
+          loads%torque(:, b) = loads%torque(:, b) + wrench%torque_b
+        end associate
+      end do
+    end associate
+  end subroutine sum_forces
+
+  !> Normal and tangential forces of one group.
+  pure subroutine push_group(g, dt, motion, touching, springs, wrench, report)
+    integer, intent(in) :: g
+    real(wp), intent(in) :: dt   !! [s]
+    type(motion_t), intent(in) :: motion
+    type(touching_t), intent(in) :: touching
+    type(springs_t), intent(inout) :: springs
+    type(wrench_t), intent(inout) :: wrench
+    type(contact_report_t), intent(inout) :: report
+    type(push_t) :: push
+    real(wp) :: v_n, opening, part, force_n, decay
+    integer :: t
+
+    associate (touches => touching%touches, groups => touching%groups, r => touching%response, &
+      law => touching%law)
+      decay = 0.0_wp
+      do t = groups%first(g), groups%first(g + 1) - 1
+        associate (touch => touches%item(t))
+          v_n = dot_product(relative_velocity(motion, touch%arm_a, touch%arm_b), touch%normal)
+          part = 1.0_wp
+          if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
+          opening = opening_speed(touch, law%gamma_n, motion)
+          force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
+          call act(-force_n*touch%normal, touch%arm_a, touch%arm_b, wrench)
+          if (touch%weight < 1.0_wp) call push_to_weight(touch, law%gamma_n, force_n, wrench)
+          report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
+          report%overlap_max = max(report%overlap_max, touch%depth)
+        end associate
+        push%force = push%force + force_n
+        decay = max(decay, r%decay(t))
+        push%eta = max(push%eta, r%eta(t))
+      end do
+    end associate
+    push%implicit = 1.0_wp + decay*dt
+    call rub(g, push, motion, touching, springs, wrench)
+  end subroutine push_group
+
+  !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
+  !!
+  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a
+  !! substep, and may have begun up to a substep before.
+  pure function damped_part(depth, v_n, dt) result(part)
+    real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
+    real(wp) :: part
+
+    part = 1.0_wp
+    if (v_n < 0.0_wp) part = 0.5_wp + min(depth, -v_n*dt)/(-v_n*dt)
+  end function damped_part
+
+  !> Tangential force of one group, no larger than friction allows.
+  !!
+  !! The force of the spring alone is limited too: while it slips, the spring holds what friction
+  !! lets it hold, and the dashpot puts no energy into it.
+  pure subroutine rub(g, push, motion, touching, springs, wrench)
+    integer, intent(in) :: g
+    type(push_t), intent(in) :: push   !! along the normal
+    type(motion_t), intent(in) :: motion
+    type(touching_t), intent(in) :: touching
+    type(springs_t), intent(inout) :: springs
+    type(wrench_t), intent(inout) :: wrench
+    real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
+    integer :: t
+
+    associate (groups => touching%groups, law => touching%law)
+      t = groups%first(g)
+      k_n = touching%response%k(t)
+      k = tangential_constant(law, k_n, touching%touches%item(t)%weight)
+      springs%k(g) = k
+      eta = touching%touches%item(t)%weight*law%eta_t
+      if (.not. law%constants) eta = push%eta*(k/k_n)
+      bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
+      v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
+      v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
+      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/push%implicit
+      size_f = norm(f)
+      if (size_f > bound) then
+        f = f*(bound/size_f)
+        f_spring = tangential_force(k, law%gamma_t, 0.0_wp, springs%xi(:, g), v)
+        size_f = norm(f_spring)
+        if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
+          f_spring*(bound/size_f), v)
+      end if
+      call act(f, groups%arm_a(:, g), groups%arm_b(:, g), wrench)
+    end associate
+  end subroutine rub
+
+  !> Energy in the normal springs at the present poses and in the tangential springs [J].
+  pure function elastic_energy(touching, springs, rest) result(energy)
+    type(touching_t), intent(in) :: touching
+    type(springs_t), intent(in) :: springs, rest   !! of touches at work, of those at rest
+    real(wp) :: energy
+    integer :: t, g
+
+    energy = 0.0_wp
+    do t = 1, touching%touches%n
+      energy = energy + touching%response%energy(t)
+    end do
+    do g = 1, springs%n
+      energy = energy + stored_energy(springs%k(g), touching%law%gamma_t, norm(springs%xi(:, g)))
+    end do
+    do g = 1, rest%n
+      energy = energy + rest%energy(g)
+    end do
+  end function elastic_energy
+
+end module contact_forces_m

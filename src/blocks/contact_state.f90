@@ -1,0 +1,62 @@
+!> All that the contacts of a run hold, and how it begins.
+module contact_state_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_partner
+  use springs_m, only: springs_t, reserve_springs
+  use sleep_m, only: sleep_t, sleep_init
+  use lubrication_m, only: lubrication_t
+  use touching_m, only: touching_t, touching_init
+  use contact_forces_m, only: loads_t
+  use substep_limits_m, only: limits_t, limits_init, longest_substep_of
+  use partners_met_m, only: met_t
+  implicit none
+  private
+  public :: contacts_t, contacts_init
+
+  !> Where bodies were when a substep began: (3, n), (4, n), (3, n), (3, n).
+  type :: start_t
+    real(wp), allocatable :: x(:, :), q(:, :), l(:, :), omega(:, :)
+  end type start_t
+
+  type :: contacts_t
+    type(touching_t) :: touching                 !! what touches now
+    type(limits_t) :: limits
+    type(springs_t) :: springs                   !! the memory: part of the state of a run
+    type(springs_t) :: before                    !! work: springs of the substep before
+    type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
+    logical, allocatable :: woken(:)             !! (n) work
+    type(lubrication_t) :: lubrication
+    real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
+    real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
+    type(loads_t) :: loads
+    type(start_t) :: start                       !! the place to go back to
+    type(met_t) :: met                           !! pairs that touched in this step
+  end type contacts_t
+
+contains
+
+  !> The contacts of a case, without any touch yet.
+  subroutine contacts_init(input, blocks, contacts)
+    type(contact_input_t), intent(in) :: input
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(out) :: contacts
+    integer :: n
+
+    call touching_init(input, longest_substep_of(input), blocks, contacts%touching)
+    call limits_init(input, contacts%touching, contacts%limits)
+    n = blocks%n
+    associate (loads => contacts%loads, start => contacts%start)
+      allocate (loads%force(3, bed_partner:n), loads%torque(3, bed_partner:n), source=0.0_wp)
+      allocate (loads%impulse(3, bed_partner:n), loads%twist(3, bed_partner:n), source=0.0_wp)
+      allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
+    end associate
+    allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
+    call reserve_springs(1, contacts%springs)
+    call reserve_springs(1, contacts%before)
+    call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)
+    allocate (contacts%woken(n), source=.false.)
+  end subroutine contacts_init
+
+end module contact_state_m

@@ -1,0 +1,75 @@
+!> Which partners each body has touched in a step.
+module partners_met_m
+  use growing_m, only: ensure_room
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: floor_wall
+  use bed_m, only: bed_partner
+  use springs_m, only: comes_before
+  implicit none
+  private
+  public :: met_t, note_partners, count_partners
+
+  !> Pairs that touched, sorted.
+  type :: met_t
+    integer :: n = 0
+    integer, allocatable :: a(:), b(:)   !! (n)
+  end type met_t
+
+contains
+
+  !> Add pairs that touch to those that touched in this step.
+  subroutine note_partners(touches_a, touches_b, met)
+    integer, intent(in) :: touches_a(:), touches_b(:)     !! (touches) sorted
+    type(met_t), intent(inout) :: met
+    integer :: t, m, a, b
+
+    a = 0
+    b = 0
+    m = 1
+    do t = 1, size(touches_a)
+      if (a == touches_a(t) .and. b == touches_b(t)) cycle
+      a = touches_a(t)
+      b = touches_b(t)
+      do while (m <= met%n)
+        if (.not. comes_before(met%a(m), met%b(m), 0, a, b, 0)) exit
+        m = m + 1
+      end do
+      if (is_met(met, m, a, b)) cycle
+      call ensure_room(met%n + 1, met%a)
+      call ensure_room(met%n + 1, met%b)
+      met%a(m + 1:met%n + 1) = met%a(m:met%n)
+      met%b(m + 1:met%n + 1) = met%b(m:met%n)
+      met%a(m) = a
+      met%b(m) = b
+      met%n = met%n + 1
+    end do
+  end subroutine note_partners
+
+  !> Whether entry m of the pairs met is the pair (a, b).
+  pure function is_met(met, m, a, b) result(yes)
+    type(met_t), intent(in) :: met
+    integer, intent(in) :: m, a, b
+    logical :: yes
+
+    yes = m <= met%n
+    if (yes) yes = met%a(m) == a .and. met%b(m) == b
+  end function is_met
+
+  !> Number of partners each body met in this step, and whether the floor was one of them.
+  pure subroutine count_partners(met, blocks)
+    type(met_t), intent(in) :: met
+    type(blocks_t), intent(inout) :: blocks
+    integer :: m, a, b
+
+    blocks%contacts = 0
+    blocks%on_floor = 0
+    do m = 1, met%n
+      a = met%a(m)
+      b = met%b(m)
+      blocks%contacts(a) = blocks%contacts(a) + 1
+      if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
+      if (b == floor_wall .or. b == bed_partner) blocks%on_floor(a) = 1
+    end do
+  end subroutine count_partners
+
+end module partners_met_m

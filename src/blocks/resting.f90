@@ -1,0 +1,210 @@
+!> Who falls asleep and who wakes, and what becomes of the springs between them.
+module resting_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use vectors_m, only: norm
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use springs_m, only: move_springs
+  use sleep_m, only: know_loads, note_quiet_end, is_tired, balanced, put_to_sleep, hold_or_wake, &
+    all_still
+  use contact_law_m, only: stored_energy
+  use contact_partners_m, only: partners_t, wrench_t, know_motion, motion_between
+  use touching_m, only: find_touches
+  use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
+  use substep_limits_m, only: substep_limit, equal_part
+  use partners_met_m, only: note_partners
+  use contact_state_m, only: contacts_t
+  implicit none
+  private
+  public :: wake_or_sleep, rouse
+
+contains
+
+  !> At the start of a step: wake those that the fluid has put out of balance where nothing moves
+  !! (else they wake in the substeps), and let those sleep that are tired and in balance.
+  subroutine wake_or_sleep(walls, gravity, dt, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: dt_b
+    logical :: changed
+    integer :: b
+
+    call know_loads(contacts%sleep)
+    if (all_still(blocks)) then
+      contacts%loads%force = 0.0_wp
+      contacts%loads%torque = 0.0_wp
+      call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
+        contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
+      changed = any(contacts%woken)
+      if (changed) call rouse(blocks, contacts)
+    else
+      call note_quiet_end(gravity, blocks, contacts%sleep)
+      changed = .false.
+      do b = 1, blocks%n
+        contacts%sleep%tired(b) = is_tired(gravity, b, blocks, contacts%sleep)
+      end do
+      if (any(contacts%sleep%tired)) then
+        dt_b = equal_part(dt, substep_limit(walls, contacts%touching, blocks, dt, contacts%limits))
+        call let_sleep(gravity, dt_b, contacts, blocks, changed)
+      end if
+    end if
+    contacts%woken = .false.
+    if (changed) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+    associate (rest => contacts%sleep%rest)
+      call note_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
+    end associate
+  end subroutine wake_or_sleep
+
+  !> Let tired blocks sleep that touch something, but nothing that is moved at a given rate, and on
+  !! which the forces of a substep balance if they do not move.
+  subroutine let_sleep(gravity, dt_b, contacts, blocks, changed)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt_b         !! the substep [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    logical, intent(out) :: changed      !! somebody fell asleep
+    real(wp), parameter :: half = 0.5_wp
+    type(contact_report_t) :: ignored
+    integer :: b
+
+    call match_springs(contacts%touching, contacts%before, contacts%springs)
+    call foresee_motion(gravity, dt_b, blocks, contacts)
+    call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
+    call know_touching(blocks, contacts)
+    changed = .false.
+    associate (sleep => contacts%sleep, loads => contacts%loads)
+      do b = 1, blocks%n
+        if (.not. (sleep%tired(b) .and. sleep%touching(b))) cycle
+        if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
+                           contacts%steady(:, b) + blocks%mass(b)*gravity, &
+                           blocks%fluid_torque(:, b), sleep%reach(b))) cycle
+        ! should it wake before the step ends, contact has taken this
+        loads%impulse(:, b) = loads%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
+        loads%twist(:, b) = loads%twist(:, b) - blocks%l(:, b)
+        call put_to_sleep(b, blocks)
+        changed = .true.
+      end do
+    end associate
+    if (changed) call lay_down(dt_b, blocks, contacts)
+  end subroutine let_sleep
+
+  !> Velocities of the partners in the middle of a substep, if the tired blocks begin it at rest.
+  subroutine foresee_motion(gravity, dt_b, blocks, contacts)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt_b         !! the substep [s]
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: b
+
+    call know_motion(blocks, contacts%touching%partners)
+    do b = 1, blocks%n
+      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
+      associate (v => contacts%touching%partners%v(:, b), &
+        omega => contacts%touching%partners%omega(:, b))
+        if (contacts%sleep%tired(b)) v = 0.0_wp
+        if (contacts%sleep%tired(b)) omega = 0.0_wp
+        v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
+        omega = omega + 0.5_wp*dt_b*matmul( &
+          contacts%touching%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+      end associate
+    end do
+  end subroutine foresee_motion
+
+  !> Which blocks touch anything; those are not tired that touch what is moved at a given rate.
+  subroutine know_touching(blocks, contacts)
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: g, a, b
+
+    associate (sleep => contacts%sleep, springs => contacts%springs)
+      sleep%touching = .false.
+      do g = 1, springs%n
+        a = springs%a(g)
+        b = springs%b(g)
+        sleep%touching(a) = .true.
+        if (is_carried(blocks, contacts%touching%partners, b)) sleep%tired(a) = .false.
+        if (b < 1) cycle
+        sleep%touching(b) = .true.
+        if (is_carried(blocks, contacts%touching%partners, a)) sleep%tired(b) = .false.
+      end do
+    end associate
+  end subroutine know_touching
+
+  !> Whether a partner is moved at a given rate.
+  pure function is_carried(blocks, partners, b) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    type(partners_t), intent(in) :: partners
+    integer, intent(in) :: b
+    logical :: yes
+
+    if (b < 0) then
+      yes = any(abs(partners%v(:, b)) > 0.0_wp)
+    else
+      yes = blocks%fixed(b) .and. .not. blocks%still(b)
+    end if
+  end function is_carried
+
+  !> Move the springs of touches between what does not move to those at rest, with their forces.
+  subroutine lay_down(dt_b, blocks, contacts)
+    real(wp), intent(in) :: dt_b         !! the substep [s]
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    type(contact_report_t) :: ignored
+    type(wrench_t) :: wrench
+    integer :: g, t, a, b
+
+    associate (sleep => contacts%sleep, springs => contacts%springs)
+      call ensure_room(springs%n, sleep%chosen)
+      do g = 1, springs%n
+        a = springs%a(g)
+        b = springs%b(g)
+        sleep%chosen(g) = at_rest(blocks, a, b)
+        if (.not. sleep%chosen(g)) cycle
+        wrench = wrench_t()
+        call push_group(g, dt_b, motion_between(contacts%touching%partners, a, b), &
+          contacts%touching, springs, wrench, ignored)
+        springs%force(:, g) = wrench%force
+        springs%torque_a(:, g) = wrench%torque_a
+        springs%torque_b(:, g) = wrench%torque_b
+        springs%energy(g) = stored_energy(springs%k(g), contacts%touching%law%gamma_t, &
+          norm(springs%xi(:, g)))
+        do t = contacts%touching%groups%first(g), contacts%touching%groups%first(g + 1) - 1
+          springs%energy(g) = springs%energy(g) + contacts%touching%response%energy(t)
+        end do
+      end do
+      call move_springs(sleep%chosen, springs, sleep%rest)
+      call know_loads(sleep)
+    end associate
+  end subroutine lay_down
+
+  !> Give the springs of touches with a body that moves now back to those at work.
+  subroutine rouse(blocks, contacts)
+    type(blocks_t), intent(in) :: blocks
+    type(contacts_t), intent(inout) :: contacts
+    integer :: i
+
+    associate (sleep => contacts%sleep)
+      call ensure_room(sleep%rest%n, sleep%chosen)
+      do i = 1, sleep%rest%n
+        sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
+      end do
+      call move_springs(sleep%chosen, sleep%rest, contacts%springs)
+      call know_loads(sleep)
+    end associate
+  end subroutine rouse
+
+  !> Whether neither body a nor its partner moves.
+  pure function at_rest(blocks, a, b) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, b
+    logical :: yes
+
+    yes = blocks%still(a)
+    if (yes .and. b > 0) yes = blocks%still(b)
+  end function at_rest
+
+end module resting_m

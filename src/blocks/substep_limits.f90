@@ -1,0 +1,147 @@
+!> How long a substep of contact may be.
+module substep_limits_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use vectors_m, only: norm
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use bed_m, only: bed_is_near
+  use neighbours_m, only: pair_list_t
+  use touching_m, only: touching_t
+  use contact_response_m, only: impact_turn
+  implicit none
+  private
+  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_part
+
+  type :: limits_t
+    real(wp) :: substep_ratio = 0.0_wp           !! [-]
+    real(wp) :: longest_substep = 0.0_wp         !! [s]
+    real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
+    real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
+    real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
+    real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
+  end type limits_t
+
+contains
+
+  !> The limits of a case.
+  pure subroutine limits_init(input, touching, limits)
+    type(contact_input_t), intent(in) :: input
+    type(touching_t), intent(in) :: touching
+    type(limits_t), intent(out) :: limits
+
+    limits%substep_ratio = input%substep_ratio
+    limits%longest_substep = longest_substep_of(input)
+    limits%courant_max = input%courant_max
+    if (touching%exact) then
+      limits%reach = touching%surface%reach
+      limits%smallest = touching%surface%smallest
+      limits%clear = touching%surface%clear
+    else
+      limits%reach = touching%spheres%reach
+      limits%smallest = touching%spheres%smallest
+      limits%clear = touching%spheres%clear
+    end if
+  end subroutine limits_init
+
+  !> Longest substep at all: a twentieth of the contact time [s].
+  pure function longest_substep_of(input) result(longest)
+    type(contact_input_t), intent(in) :: input
+    real(wp) :: longest
+
+    longest = input%contact_time/20.0_wp
+  end function longest_substep_of
+
+  !> Longest substep allowed now [s].
+  !!
+  !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness,
+  !! and the Courant limit of eq. (6) with the highest relative speed any two points can have of two
+  !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
+  pure function substep_limit(walls, touching, blocks, dt, limits) result(limit)
+    type(walls_t), intent(in) :: walls
+    type(touching_t), intent(in) :: touching
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: dt   !! fluid step [s]
+    type(limits_t), intent(in) :: limits
+    real(wp) :: limit
+    real(wp) :: speed, near, fastest(2)
+    integer :: b
+
+    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(touching))
+    if (touching%exact) then
+      near = fastest_near(blocks, limits%reach, touching%surface%near)
+    else
+      near = fastest_near(blocks, limits%reach, touching%spheres%near)
+    end if
+    fastest = 0.0_wp
+    do b = 1, blocks%n
+      if (.not. blocks%present(b)) cycle
+      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b)
+      if (.not. speed <= fastest(2)) fastest(2) = speed
+      if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
+      if (.not. speed <= near) then
+        if (near_wall(walls, blocks%x(:, b), limits%reach(b) + limits%clear)) near = speed
+      end if
+    end do
+    if (.not. near*limit <= limits%courant_max*limits%smallest) then
+      limit = limits%courant_max*limits%smallest/near
+    end if
+    speed = sum(fastest)
+    if (.not. speed*limit <= limits%clear) limit = limits%clear/speed
+  end function substep_limit
+
+  !> Highest relative speed of any two points of listed pairs of bodies [m/s].
+  pure function fastest_near(blocks, reach, near) result(fastest)
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: reach(:)         !! (bodies) [m]
+    type(pair_list_t), intent(in) :: near
+    real(wp) :: fastest
+    real(wp) :: speed
+    integer :: p
+
+    fastest = 0.0_wp
+    do p = 1, near%n
+      associate (a => near%a(p), b => near%b(p))
+        speed = norm(blocks%v(:, a) - blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
+          + norm(blocks%omega(:, b))*reach(b)
+      end associate
+      if (.not. speed <= fastest) fastest = speed
+    end do
+  end function fastest_near
+
+  !> Whether a wall or the bed is within reach of a place.
+  pure function near_wall(walls, x, reach) result(yes)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: x(3), reach   !! [m]
+    logical :: yes
+    integer :: w
+
+    yes = .true.
+    do w = 1, walls%n
+      if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
+    end do
+    yes = walls%bed%there
+    if (yes) yes = bed_is_near(walls%bed, x - reach, x + reach)
+  end function near_wall
+
+  !> Longest substep the present touches allow [s].
+  !!
+  !! For one pair of bodies a sixth of the bound of stability, which keeps the restitution within
+  !! 0.01, or a third where they are slow; for all pairs together little more than half of it.
+  pure function stiffness_limit(touching) result(limit)
+    type(touching_t), intent(in) :: touching
+    real(wp) :: limit
+
+    limit = huge(1.0_wp)
+    if (touching%frequency2 > 0.0_wp) limit = impact_turn/sqrt(touching%frequency2)
+  end function stiffness_limit
+
+  !> An equal part of the time left, no longer than allowed [s].
+  pure function equal_part(left, longest) result(dt_b)
+    real(wp), intent(in) :: left, longest   !! [s]
+    real(wp) :: dt_b
+
+    dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
+  end function equal_part
+
+end module substep_limits_m

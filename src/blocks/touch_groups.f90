@@ -1,0 +1,86 @@
+!> Touches of one sphere or point with one partner, taken together: they share a tangential spring.
+module touch_groups_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use vectors_m, only: norm
+  use touches_m, only: touch_t, touches_t
+  implicit none
+  private
+  public :: groups_t, form_groups
+
+  !> Touches with one key and one partner act on one tangential spring.
+  type :: groups_t
+    integer :: n = 0
+    logical, allocatable :: new(:)               !! (n) was not there in the substep before
+    integer, allocatable :: first(:)             !! (n + 1) touches first(g) : first(g+1)-1
+    real(wp), allocatable :: normal(:, :)        !! (3, n) mean, unit [-]
+    real(wp), allocatable :: arm_a(:, :), arm_b(:, :)   !! (3, n) mean contact point [m]
+  end type groups_t
+
+contains
+
+  !> Gather the touches of each key and partner.
+  pure subroutine form_groups(touches, groups)
+    type(touches_t), intent(in) :: touches
+    type(groups_t), intent(inout) :: groups
+    integer :: t, g, last
+
+    groups%n = 0
+    call ensure_room(touches%n + 1, groups%first)
+    call ensure_room(touches%n, groups%new)
+    call ensure_room(touches%n, groups%normal)
+    call ensure_room(touches%n, groups%arm_a)
+    call ensure_room(touches%n, groups%arm_b)
+    t = 1
+    do while (t <= touches%n)
+      g = groups%n + 1
+      groups%n = g
+      groups%first(g) = t
+      do last = t, touches%n - 1
+        if (.not. same_spring(touches%item(t), touches%item(last + 1))) exit
+      end do
+      groups%normal(:, g) = touches%item(t)%normal
+      groups%arm_a(:, g) = touches%item(t)%arm_a
+      groups%arm_b(:, g) = touches%item(t)%arm_b
+      if (last > t) call take_mean(touches%item(t:last), groups%normal(:, g), &
+        groups%arm_a(:, g), groups%arm_b(:, g))
+      t = last + 1
+    end do
+    groups%first(groups%n + 1) = touches%n + 1
+  end subroutine form_groups
+
+  !> Whether two touches act on one tangential spring.
+  pure function same_spring(one, two) result(yes)
+    type(touch_t), intent(in) :: one, two
+    logical :: yes
+
+    yes = one%key == two%key .and. one%b == two%b .and. one%a == two%a
+  end function same_spring
+
+  !> Mean normal and point of some touches, weighted by overlap.
+  pure subroutine take_mean(touch, normal, arm_a, arm_b)
+    type(touch_t), intent(in) :: touch(:)
+    real(wp), intent(out) :: normal(3), arm_a(3), arm_b(3)   !! [-], [m]
+    real(wp) :: w, total
+    integer :: i
+
+    total = 0.0_wp
+    normal = 0.0_wp
+    arm_a = 0.0_wp
+    do i = 1, size(touch)
+      w = touch(i)%weight*touch(i)%depth
+      total = total + w
+      normal = normal + w*touch(i)%normal
+      arm_a = arm_a + w*touch(i)%arm_a
+    end do
+    arm_a = arm_a/total
+    arm_b = arm_a + (touch(1)%arm_b - touch(1)%arm_a)
+    w = norm(normal)
+    if (w > epsilon(w)*total) then
+      normal = normal/w
+    else
+      normal = touch(1)%normal
+    end if
+  end subroutine take_mean
+
+end module touch_groups_m

@@ -1,0 +1,83 @@
+!> What touches now or soon, found by the model of the case, and how each touch responds.
+module touching_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use bed_m, only: bed_partner
+  use touches_m, only: touches_t, ensure_touches, set_apart
+  use touch_groups_m, only: groups_t, form_groups
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
+  use contact_law_m, only: contact_law_t, contact_law_init
+  use contact_partners_m, only: partners_t, partners_init, know_motion, know_inertia
+  use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2
+  implicit none
+  private
+  public :: touching_t, touching_init, find_touches
+
+  type :: touching_t
+    type(contact_law_t) :: law
+    logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
+    type(contact_spheres_t) :: spheres
+    type(contact_surface_t) :: surface
+    type(partners_t) :: partners
+    type(touches_t) :: touches
+    type(touches_t) :: soon                      !! those that may come before the substep ends
+    type(groups_t) :: groups
+    type(response_t) :: response, response_soon
+    real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
+  end type touching_t
+
+contains
+
+  !> The contact law and model of a case, without any touch yet.
+  subroutine touching_init(input, longest_substep, blocks, self)
+    type(contact_input_t), intent(in) :: input
+    real(wp), intent(in) :: longest_substep      !! [s]
+    type(blocks_t), intent(in) :: blocks
+    type(touching_t), intent(out) :: self
+
+    call contact_law_init(input, self%law)
+    self%exact = input%model == 'surface'
+    if (self%exact) then
+      call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)
+    else
+      call contact_spheres_init(input%courant_max, blocks, self%spheres)
+    end if
+    call partners_init(blocks, self%partners)
+    allocate (self%response%frequency2(bed_partner:blocks%n))
+    allocate (self%response_soon%frequency2(bed_partner:blocks%n))
+    call ensure_touches(1, self%touches)
+    call ensure_touches(1, self%soon)
+  end subroutine touching_init
+
+  !> Find what touches at the present poses, how each touch responds, and how stiff all is together,
+  !! counting also what may touch within a time `ahead`.
+  subroutine find_touches(walls, blocks, ahead, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
+    type(touching_t), intent(inout) :: self
+
+    if (self%exact) then
+      call find_surface_touches(walls, blocks, ahead, self%surface, self%touches)
+    else
+      call find_sphere_touches(walls, blocks, ahead, self%spheres, self%touches)
+    end if
+    call set_apart(self%touches, self%soon)
+    call form_groups(self%touches, self%groups)
+    self%frequency2 = 0.0_wp
+    call know_motion(blocks, self%partners)
+    if (self%touches%n + self%soon%n == 0) return
+    call know_inertia(blocks, self%partners)
+    call respond(self%touches, self%law, self%partners, self%response)
+    if (self%soon%n > 0) then
+      call respond(self%soon, self%law, self%partners, self%response_soon)
+      call add_frequencies(self%touches, self%soon, self%response, self%response_soon)
+      self%frequency2 = highest_frequency2(self%soon, self%response_soon)
+    end if
+    self%frequency2 = max(self%frequency2, highest_frequency2(self%touches, self%response))
+  end subroutine find_touches
+
+end module touching_m
