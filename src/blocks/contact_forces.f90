@@ -5,8 +5,7 @@ module contact_forces_m
   use vectors_m, only: norm
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
   use touching_m, only: touching_t
-  use contact_law_m, only: tangential_constant, stored_energy, normal_force, tangential_force, &
-    tangential_slip
+  use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_to_weight
   implicit none
@@ -208,10 +207,9 @@ contains
     associate (groups => touching%groups, law => touching%law)
       t = groups%first(g)
       k_n = touching%response%k(t)
-      k = tangential_constant(law, k_n, touching%touches%item(t)%weight)
+      k = law%tangential_constant(k_n, touching%touches%item(t)%weight)
       springs%k(g) = k
-      eta = touching%touches%item(t)%weight*law%eta_t
-      if (.not. law%constants) eta = push%eta*(k/k_n)
+      eta = law%tangential_damping(touching%touches%item(t)%weight, push%eta, k, k_n)
       bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)

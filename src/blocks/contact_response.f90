@@ -6,8 +6,7 @@ module contact_response_m
   use vectors_m, only: norm
   use touches_m, only: touch_t, touches_t
   use springs_m, only: comes_before
-  use contact_law_m, only: contact_law_t, normal_constant, steepness, hardness, elastic_force, &
-    energy_of_force
+  use contact_law_m, only: contact_law_t, spring_t, energy_of_force
   use contact_partners_m, only: partners_t, inertia_t, motion_t, wrench_t, inertia_of, &
     inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
   implicit none
@@ -30,12 +29,17 @@ module contact_response_m
     real(wp), allocatable :: frequency2(:)       !! (partners) sum over pairs of a free body [1/s2]
   end type response_t
 
+  !> Two partners that touch.
+  type :: couple_t
+    type(inertia_t) :: a, b
+  end type couple_t
+
 contains
 
   !> Stiffness and damping of all touches of a list.
   subroutine respond(touches, law, partners, response)
     type(touches_t), intent(in) :: touches
-    type(contact_law_t), intent(in) :: law
+    class(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
     integer :: first, last
@@ -80,29 +84,34 @@ contains
   pure subroutine respond_pair(touches, first, last, law, partners, response)
     type(touches_t), intent(in) :: touches
     integer, intent(in) :: first, last
-    type(contact_law_t), intent(in) :: law
+    class(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
     type(response_t), intent(inout) :: response
-    type(inertia_t) :: of_a, of_b
+    type(couple_t) :: of
+    type(spring_t) :: spring
     real(wp), parameter :: calm_share = 0.25_wp   !! of the load
     real(wp) :: weights(6), points(3, 6), nn(6), arm(3)
-    real(wp) :: load(3), total, inverse, k, hard, omega2, highest, steep, calm, speed
+    real(wp) :: load(3), total, inverse, k, hard, share, highest, steep, calm, speed
     integer :: a, b, t, i
 
     a = touches%item(first)%a
     b = touches%item(first)%b
-    of_a = inertia_of(partners, a)
-    of_b = inertia_of(partners, b)
+    of = couple_t(inertia_of(partners, a), inertia_of(partners, b))
     weights = 0.0_wp
     points = 0.0_wp
-    k = normal_constant(law, 1.0_wp/(of_a%inverse_mass + of_b%inverse_mass))
+    load = 0.0_wp
+    steep = 0.0_wp
+    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass))
     hard = min(partners%hard(a), partners%hard(b))
     do t = first, last
       associate (touch => touches%item(t))
         response%k(t) = touch%weight*k
-        call elastic_force(law, k, touch%weight, touch%depth, hard, response%elastic(t), &
-          response%energy(t))
-        response%eta(t) = touch%weight*hardness(law, touch%weight, touch%depth, hard)
+        call law%normal_spring(k, touch%weight, touch%depth, hard, spring)
+        response%elastic(t) = spring%force
+        response%energy(t) = spring%energy
+        response%eta(t) = touch%weight*spring%hardness
+        steep = max(steep, spring%steepness)
+        load = load + spring%force*touch%normal
         nn = response%eta(t)*square(touch%normal)
         weights = weights + nn
         do i = 1, 6
@@ -111,39 +120,29 @@ contains
       end associate
     end do
     highest = 0.0_wp
-    steep = 0.0_wp
-    load = 0.0_wp
     do t = first, last
       associate (touch => touches%item(t))
-        load = load + response%elastic(t)*touch%normal
         nn = square(touch%normal)*[1, 1, 1, 2, 2, 2]
         total = dot_product(nn, weights)
         arm = matmul(points, nn)/total
-        inverse = inverse_effective_mass(of_a, arm, touch%normal)
+        inverse = inverse_effective_mass(of%a, arm, touch%normal)
         arm = arm + (touch%arm_b - touch%arm_a)
-        inverse = inverse + inverse_effective_mass(of_b, arm, touch%normal)
-        steep = max(steep, steepness(law, touch%weight, touch%depth, hard))
-        omega2 = k*total*inverse
-        if (law%constants) then
-          response%eta(t) = touch%weight*law%eta_n
-          response%decay(t) = 0.5_wp*law%eta_n*total*inverse
-        else
-          response%eta(t) = response%eta(t)*k*2*law%damping_ratio/sqrt(omega2)
-          response%decay(t) = law%damping_ratio*sqrt(omega2)
-        end if
+        inverse = inverse + inverse_effective_mass(of%b, arm, touch%normal)
       end associate
-      highest = max(highest, omega2)
+      highest = max(highest, k*total*inverse)
+      share = response%eta(t)
+      call law%damping(share, k, total, inverse, response%eta(t), response%decay(t))
     end do
-    if (.not. law%constants) call damp_as_one(touches, first, last, law, of_a, of_b, response, &
-                                             highest)
+    if (law%damping_ratio > 0.0_wp) call damp_as_one(touches, first, last, law, of, response, &
+                                                     highest)
     highest = steep*highest
-    calm = max(partners%gravity, calm_share*norm(load)*(of_a%inverse_mass + of_b%inverse_mass))
+    calm = max(partners%gravity, calm_share*norm(load)*(of%a%inverse_mass + of%b%inverse_mass))
     speed = largest_speed(motion_between(partners, a, b), touches%item(first)%arm_a, &
       touches%item(first)%arm_b)
     if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest
-    if (of_a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
-    if (of_b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
+    if (of%a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
+    if (of%b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
 
   !> Scale the damping of the touches of a pair so that together they damp the swing they drive
@@ -152,11 +151,11 @@ contains
   !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
   !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
   !! part sideways, and weights that change with position make W other than each normal tells.
-  pure subroutine damp_as_one(touches, first, last, law, of_a, of_b, response, highest)
+  pure subroutine damp_as_one(touches, first, last, law, of, response, highest)
     type(touches_t), intent(in) :: touches
     integer, intent(in) :: first, last
-    type(contact_law_t), intent(in) :: law
-    type(inertia_t), intent(in) :: of_a, of_b
+    class(contact_law_t), intent(in) :: law
+    type(couple_t), intent(in) :: of
     type(response_t), intent(inout) :: response
     real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
     type(wrench_t) :: wrench
@@ -179,9 +178,9 @@ contains
       end associate
       energy = energy + response%energy(t)
     end do
-    motion%v = -(of_a%inverse_mass + of_b%inverse_mass)*wrench%force
-    if (of_a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of_a%inverse_inertia, wrench%torque_a)
-    if (of_b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of_b%inverse_inertia, wrench%torque_b)
+    motion%v = -(of%a%inverse_mass + of%b%inverse_mass)*wrench%force
+    if (of%a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of%a%inverse_inertia, wrench%torque_a)
+    if (of%b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of%b%inverse_inertia, wrench%torque_b)
     mass = dot_product(motion%omega_a, wrench%torque_a) &
       + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
     drag = 0.0_wp

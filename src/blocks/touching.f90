@@ -9,7 +9,8 @@ module touching_m
   use touch_groups_m, only: groups_t, form_groups
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
-  use contact_law_m, only: contact_law_t, contact_law_init
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, partners_init, know_motion, know_inertia
   use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2
   implicit none
@@ -17,7 +18,7 @@ module touching_m
   public :: touching_t, touching_init, find_touches
 
   type :: touching_t
-    type(contact_law_t) :: law
+    class(contact_law_t), allocatable :: law
     logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
@@ -38,7 +39,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(touching_t), intent(out) :: self
 
-    call contact_law_init(input, self%law)
+    call choose_law(input, self%law)
     self%exact = input%model == 'surface'
     if (self%exact) then
       call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)

@@ -3,7 +3,8 @@ module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use case_types_m, only: case_t, is_given
-  use contact_law_m, only: contact_law_t, contact_law_init, normal_constant
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
   use surface_tension_m, only: capillary_step
@@ -246,7 +247,7 @@ contains
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(contact_law_t) :: law
+    class(contact_law_t), allocatable :: law
     real(wp) :: ratio_step, time_step, courant_step, mass, k
     integer :: s
 
@@ -259,12 +260,12 @@ contains
     call entry(unit, '  contact time / 20', brief(time_step)//' s')
     call entry(unit, '  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
-    call contact_law_init(case%contact, law)
+    call choose_law(case%contact, law)
     do s = 1, size(shapes)
       mass = shapes(s)%density*shapes(s)%volume
-      k = normal_constant(law, mass)
+      k = law%normal_constant(mass)
       call entry(unit, 'stiffness on a wall', brief(k)//' N/m for '//trim(shapes(s)%name))
-      if (abs(case%contact%gamma_n - 1.0_wp) > 0.0_wp .and. law%constants) cycle
+      if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) cycle
       call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
                  //' m/s, '//brief(mass*norm2(case%fluid%gravity)/k)//' m at rest')
     end do

@@ -3,9 +3,12 @@ program test_contact_law
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, contact_law_init, restitution_of, impact_duration, &
-    damping_ratio_of, normal_constant, tangential_constant, stored_energy, &
-    hardness, elastic_force, normal_force, tangential_force, tangential_slip
+  use contact_law_m, only: contact_law_t, spring_t, stored_energy, normal_force, &
+    tangential_force, tangential_slip
+  use law_restitution_m, only: law_restitution_t, restitution_of, impact_duration, &
+    damping_ratio_of
+  use law_constants_m, only: law_constants_t
+  use contact_laws_m, only: choose_law
   implicit none
 
   call check_closed_form()
@@ -47,19 +50,23 @@ contains
       weight = 0.7_wp
     real(wp), parameter :: linear(3) = [1.0_wp, 0.603_wp, 0.368_wp]   !! depth of the linear spring
     integer, parameter :: steps = 400000
-    type(contact_law_t) :: law
-    real(wp) :: d, v, dt, force(2), energy(2), middle, eta, deepest
+    type(law_restitution_t) :: law
+    type(spring_t) :: spring, beside(2)
+    real(wp) :: d, v, dt, force, eta, deepest, slope
     integer :: i, m
 
     do m = 1, 5
       d = 0.15_wp*hard*real(m, wp)**2
-      call elastic_force(law, 3.0_wp, weight, d + [-step, step], hard, force, energy)
-      call elastic_force(law, 3.0_wp, weight, d, hard, middle, eta)
-      call check('force is the slope of energy', (energy(2) - energy(1))/(2*step), &
-        middle, 1.0e-6_wp*middle)
+      call law%normal_spring(3.0_wp, weight, d + [-step, step], hard, beside)
+      call law%normal_spring(3.0_wp, weight, d, hard, spring)
+      call check('force is the slope of energy', (beside(2)%energy - beside(1)%energy)/(2*step), &
+        spring%force, 1.0e-6_wp*spring%force)
+      slope = 3.0_wp*weight*spring%hardness*spring%steepness
+      call check('stiffness is the slope of force', (beside(2)%force - beside(1)%force)/(2*step), &
+        slope, 1.0e-6_wp*slope)
     end do
-    call elastic_force(law, 3.0_wp, weight, 0.1_wp*hard, hard, middle, eta)
-    call check('linear where shallow', middle, 0.3_wp*weight*hard, 2.0e-4_wp*middle)
+    call law%normal_spring(3.0_wp, weight, 0.1_wp*hard, hard, spring)
+    call check('linear where shallow', spring%force, 0.3_wp*weight*hard, 2.0e-4_wp*spring%force)
     do m = 1, size(zeta)
       dt = 4.0_wp/real(steps, wp)
       d = 0.0_wp
@@ -69,10 +76,10 @@ contains
         d = d + 0.5_wp*dt*v
         if (d < 0.0_wp) exit
         deepest = max(deepest, d)
-        call elastic_force(law, 1.0_wp, 1.0_wp, d, hard, force(1), energy(1))
-        eta = 2*zeta(m)*sqrt(hardness(law, 1.0_wp, d, hard))
-        force(1) = normal_force(force(1), eta, -v)
-        v = v - dt*force(1)/(1.0_wp + merge(0.5_wp*eta*dt, 0.0_wp, force(1) > 0.0_wp))
+        call law%normal_spring(1.0_wp, 1.0_wp, d, hard, spring)
+        eta = 2*zeta(m)*sqrt(spring%hardness)
+        force = normal_force(spring%force, eta, -v)
+        v = v - dt*force/(1.0_wp + merge(0.5_wp*eta*dt, 0.0_wp, force > 0.0_wp))
         d = d + 0.5_wp*dt*v
       end do
       call check('restitution of a deep impact', -v, restitution_of(zeta(m)), 1.0e-3_wp)
@@ -105,36 +112,51 @@ contains
   !> Stiffness and damping found from restitution and contact time, and constants as given.
   subroutine check_constants()
     type(contact_input_t) :: input
-    type(contact_law_t) :: law
-    real(wp) :: k
+    class(contact_law_t), allocatable :: law
+    real(wp) :: k, eta, decay
 
     input%restitution = 1.0_wp
     input%contact_time = 1.0e-3_wp
-    call contact_law_init(input, law)
-    k = normal_constant(law, 0.25_wp)
+    call choose_law(input, law)
+    k = law%normal_constant(0.25_wp)
     call check('half a period is the contact time', pi*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
     input%restitution = 0.3_wp
-    call contact_law_init(input, law)
-    k = normal_constant(law, 0.25_wp)
+    call choose_law(input, law)
+    k = law%normal_constant(0.25_wp)
     call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, &
       1.0e-15_wp)
-    call check('tangential stiffness', tangential_constant(law, k, 1.0_wp), 2*k/7, 1.0e-9_wp*k)
+    call law%damping(1.0_wp, k, 1.0_wp, 4.0_wp, eta, decay)
+    call check('damping of that ratio', eta, 2*law%damping_ratio*sqrt(k*0.25_wp), 1.0e-12_wp*eta)
+    call check('its decay', decay, 0.5_wp*eta/0.25_wp, 1.0e-12_wp*decay)
+    call law%damping(0.3_wp, k, 1.0_wp, 4.0_wp, eta, decay)
+    call check('a share of it', eta, 0.6_wp*law%damping_ratio*sqrt(k*0.25_wp), 1.0e-12_wp*eta)
+    call check('as much across as stiff', law%tangential_damping(1.0_wp, 7.0_wp, 2*k/7, k), &
+      2.0_wp, 1.0e-14_wp)
+    call check('tangential stiffness', law%tangential_constant(k, 1.0_wp), 2*k/7, 1.0e-9_wp*k)
     input%law = 'constants'
-    call contact_law_init(input, law)
-    call check('given k_n', normal_constant(law, 0.25_wp), input%k_n, 0.0_wp)
-    call check('given k_t', tangential_constant(law, 5.0_wp, 0.5_wp), 0.5_wp*input%k_t, 0.0_wp)
+    input%eta_n = 3.0_wp
+    input%eta_t = 5.0_wp
+    call choose_law(input, law)
+    call check('given k_n', law%normal_constant(0.25_wp), input%k_n, 0.0_wp)
+    call check('given k_t', law%tangential_constant(5.0_wp, 0.5_wp), 0.5_wp*input%k_t, 0.0_wp)
+    call law%damping(0.5_wp, 1.0_wp, 2.0_wp, 4.0_wp, eta, decay)
+    call check('given eta_n', eta, 1.5_wp, 0.0_wp)
+    call check('its decay in a pair of weight 2', decay, 12.0_wp, 0.0_wp)
+    call check('given eta_t', law%tangential_damping(0.5_wp, 9.0_wp, 9.0_wp, 9.0_wp), 2.5_wp, &
+      0.0_wp)
   end subroutine check_constants
 
   !> Equations (1) and (2) for one touch.
   subroutine check_forces()
-    type(contact_law_t) :: law
-    real(wp) :: f(3), xi(3), v(3), force, energy
+    type(law_constants_t) :: law
+    type(spring_t) :: spring
+    real(wp) :: f(3), xi(3), v(3)
 
-    law%constants = .true.
     law%gamma_n = 1.5_wp
-    call elastic_force(law, 2.0e5_wp, 0.5_wp, 1.0e-4_wp, 1.0e-5_wp, force, energy)
-    call check('spring alone', force, 0.1_wp, 1.0e-15_wp)
-    call check('its energy', energy, 4.0e-6_wp, 1.0e-20_wp)
+    call law%normal_spring(2.0e5_wp, 0.5_wp, 1.0e-4_wp, 1.0e-5_wp, spring)
+    call check('spring alone', spring%force, 0.1_wp, 1.0e-15_wp)
+    call check('its energy', spring%energy, 4.0e-6_wp, 1.0e-20_wp)
+    call check('its slope', 1.0e5_wp*spring%steepness, 1.5e3_wp, 1.0e-10_wp)
     call check('closing adds', normal_force(10.0_wp, 10.0_wp, -0.2_wp), 12.0_wp, 1.0e-13_wp)
     call check('never pulls', normal_force(10.0_wp, 10.0_wp, 2.0_wp), 0.0_wp, 0.0_wp)
     call check('energy of the spring', stored_energy(3.0_wp, 1.0_wp, 2.0_wp), 6.0_wp, 1.0e-15_wp)

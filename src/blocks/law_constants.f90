@@ -1,0 +1,94 @@
+!> Contact law with constants given, eqs. (1) and (2) of the paper.
+module law_constants_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use contact_law_m, only: contact_law_t, spring_t, energy_of_force, power
+  implicit none
+  private
+  public :: law_constants_t, law_constants
+
+  type, extends(contact_law_t) :: law_constants_t
+    real(wp) :: k_n = 0.0_wp, eta_n = 0.0_wp   !! [N/m^gamma_n], [N s/m]
+    real(wp) :: k_t = 0.0_wp, eta_t = 0.0_wp   !! [N/m^gamma_t], [N s/m]
+  contains
+    procedure :: normal_constant
+    procedure :: tangential_constant
+    procedure :: normal_spring
+    procedure :: damping
+    procedure :: tangential_damping
+  end type law_constants_t
+
+contains
+
+  !> The law of a case.
+  pure function law_constants(input) result(law)
+    type(contact_input_t), intent(in) :: input
+    type(law_constants_t) :: law
+
+    law%k_n = input%k_n
+    law%gamma_n = input%gamma_n
+    law%eta_n = input%eta_n
+    law%k_t = input%k_t
+    law%gamma_t = input%gamma_t
+    law%eta_t = input%eta_t
+  end function law_constants
+
+  elemental function normal_constant(law, reduced_mass) result(k)
+    class(law_constants_t), intent(in) :: law
+    real(wp), intent(in) :: reduced_mass
+    real(wp) :: k
+
+    associate (unused => reduced_mass)
+    end associate
+    k = law%k_n
+  end function normal_constant
+
+  elemental function tangential_constant(law, k_n, weight) result(k)
+    class(law_constants_t), intent(in) :: law
+    real(wp), intent(in) :: k_n, weight
+    real(wp) :: k
+
+    associate (unused => k_n)
+    end associate
+    k = weight*law%k_t
+  end function tangential_constant
+
+  !> F = w k d^gamma of eq. (1) for the weight w.
+  elemental subroutine normal_spring(law, k, weight, d, hard, spring)
+    class(law_constants_t), intent(in) :: law
+    real(wp), intent(in) :: k, weight, d, hard
+    type(spring_t), intent(out) :: spring
+
+    associate (unused => hard)   ! these springs do not harden
+    end associate
+    if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) then
+      spring%steepness = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
+    end if
+    if (.not. d > 0.0_wp) return
+    spring%force = weight*k*power(d, law%gamma_n)
+    spring%energy = energy_of_force(spring%force, law%gamma_n, d)
+  end subroutine normal_spring
+
+  !> Each touch damps by itself.
+  elemental subroutine damping(law, share, k, total, inverse, eta, decay)
+    class(law_constants_t), intent(in) :: law
+    real(wp), intent(in) :: share, k, total, inverse
+    real(wp), intent(out) :: eta, decay
+
+    associate (unused => k)
+    end associate
+    eta = share*law%eta_n
+    decay = 0.5_wp*law%eta_n*total*inverse
+  end subroutine damping
+
+  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
+    class(law_constants_t), intent(in) :: law
+    real(wp), intent(in) :: weight, eta_n, k_t, k_n
+    real(wp) :: eta
+
+    associate (unused => eta_n, unused_too => k_t, unused_as_well => k_n)
+    end associate
+    eta = weight*law%eta_t
+  end function tangential_damping
+
+end module law_constants_m

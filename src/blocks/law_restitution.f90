@@ -1,0 +1,164 @@
+!> Contact law from a coefficient of restitution and a contact time: springs that harden with depth,
+!! and damping by which an impact at any speed returns the restitution asked for.
+module law_restitution_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use contact_law_m, only: contact_law_t, spring_t
+  implicit none
+  private
+  public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
+
+  type, extends(contact_law_t) :: law_restitution_t
+    real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) of the impact [1/s]
+  contains
+    procedure :: normal_constant
+    procedure :: tangential_constant
+    procedure :: normal_spring
+    procedure :: damping
+    procedure :: tangential_damping
+  end type law_restitution_t
+
+  !> Tangential over normal stiffness: a sphere then swings along and across with one frequency.
+  real(wp), parameter :: tangential_share = 2.0_wp/7.0_wp
+
+contains
+
+  !> The law of a case.
+  pure function law_restitution(input) result(law)
+    type(contact_input_t), intent(in) :: input
+    type(law_restitution_t) :: law
+
+    law%damping_ratio = damping_ratio_of(input%restitution)
+    law%frequency = impact_duration(law%damping_ratio)/input%contact_time
+  end function law_restitution
+
+  !> Restitution of an impact on a linear spring and dashpot that never pulls.
+  !!
+  !! With m x'' + c x' + k x = 0, zeta = c/(2 sqrt(k m)) and time in units of sqrt(m/k) the force
+  !! vanishes at t = 2 acos(zeta)/sqrt(1 - zeta^2), and there -x'/v = exp(-zeta t); beyond zeta = 1
+  !! the same with acosh and sqrt(zeta^2 - 1).
+  elemental function restitution_of(zeta) result(e)
+    real(wp), intent(in) :: zeta   !! damping ratio, >= 0 [-]
+    real(wp) :: e
+
+    e = exp(-zeta*impact_duration(zeta))
+  end function restitution_of
+
+  !> Duration of that impact in units of sqrt(m/k): pi without damping, 2 at zeta = 1.
+  elemental function impact_duration(zeta) result(t)
+    real(wp), intent(in) :: zeta   !! damping ratio, >= 0 [-]
+    real(wp) :: t
+    real(wp), parameter :: small = 1.0e-8_wp   !! the series is exact to round-off below
+    real(wp) :: s
+
+    s = 1.0_wp - zeta**2
+    if (s > small) then
+      t = 2*acos(zeta)/sqrt(s)
+    else if (s < -small) then
+      t = 2*acosh(zeta)/sqrt(-s)
+    else
+      t = 2.0_wp + s/3.0_wp
+    end if
+  end function impact_duration
+
+  !> Damping ratio that realises the restitution e, by bisection of `restitution_of`.
+  elemental function damping_ratio_of(e) result(zeta)
+    real(wp), intent(in) :: e   !! 0 < e <= 1 [-]
+    real(wp) :: zeta
+    integer, parameter :: halvings = 60
+    real(wp) :: low, high
+    integer :: i
+
+    low = 0.0_wp
+    high = 1.0_wp
+    do while (restitution_of(high) > e)
+      high = 2*high
+    end do
+    do i = 1, halvings
+      zeta = 0.5_wp*(low + high)
+      if (restitution_of(zeta) > e) then
+        low = zeta
+      else
+        high = zeta
+      end if
+    end do
+    if (e >= 1.0_wp) zeta = 0.0_wp
+  end function damping_ratio_of
+
+  !> Spring on which an impact takes the contact time.
+  elemental function normal_constant(law, reduced_mass) result(k)
+    class(law_restitution_t), intent(in) :: law
+    real(wp), intent(in) :: reduced_mass
+    real(wp) :: k
+
+    k = reduced_mass*law%frequency**2
+  end function normal_constant
+
+  elemental function tangential_constant(law, k_n, weight) result(k)
+    class(law_restitution_t), intent(in) :: law
+    real(wp), intent(in) :: k_n, weight
+    real(wp) :: k
+
+    associate (unused => law, unused_too => weight)
+    end associate
+    k = tangential_share*k_n
+  end function tangential_constant
+
+  !> The spring is that of the energy
+  !!
+  !! $$ E = \frac{k}{2} s^2, \qquad s = u \Big( 1 + \frac{1}{5} (u/d_h)^4 \Big), \qquad
+  !!    u = d \sqrt{w}, \qquad F = k s \frac{ds}{dd}: $$
+  !!
+  !! linear as long as the depth is below half of d_h, so that the contact time is that asked for,
+  !! and so hard beyond that no block comes out of another one on the wrong side. With the damping
+  !! eta ds/dd an impact is that of the linear spring in the variable s and the time t ds/dd: it
+  !! returns the restitution asked for at every speed.
+  elemental subroutine normal_spring(law, k, weight, d, hard, spring)
+    class(law_restitution_t), intent(in) :: law
+    real(wp), intent(in) :: k, weight, d, hard
+    type(spring_t), intent(out) :: spring
+    real(wp) :: h
+
+    associate (unused => law)
+    end associate
+    h = beyond(weight, d, hard)
+    spring%hardness = (1.0_wp + h)**2   ! the square of ds/du
+    spring%steepness = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
+    if (.not. d > 0.0_wp) return
+    spring%force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
+    spring%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
+  end subroutine normal_spring
+
+  !> How far a touch is into the range where it hardens: (u/d_h)^4 [-].
+  elemental function beyond(weight, d, hard) result(h)
+    real(wp), intent(in) :: weight    !! [-]
+    real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
+    real(wp) :: h
+
+    h = (weight*(max(0.0_wp, d)/hard)**2)**2
+  end function beyond
+
+  !> The share of a touch in the damping of the pair, whose ratio is that of the impact.
+  elemental subroutine damping(law, share, k, total, inverse, eta, decay)
+    class(law_restitution_t), intent(in) :: law
+    real(wp), intent(in) :: share, k, total, inverse
+    real(wp), intent(out) :: eta, decay
+    real(wp) :: omega2   ! of the pair along the normal
+
+    omega2 = k*total*inverse
+    eta = share*k*2*law%damping_ratio/sqrt(omega2)
+    decay = law%damping_ratio*sqrt(omega2)
+  end subroutine damping
+
+  !> As stiffness across to stiffness along the normal.
+  elemental function tangential_damping(law, weight, eta_n, k_t, k_n) result(eta)
+    class(law_restitution_t), intent(in) :: law
+    real(wp), intent(in) :: weight, eta_n, k_t, k_n
+    real(wp) :: eta
+
+    associate (unused => law, unused_too => weight)
+    end associate
+    eta = eta_n*(k_t/k_n)
+  end function tangential_damping
+
+end module law_restitution_m
