@@ -10,7 +10,7 @@ module contact_spheres_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
-  use surface_features_m, only: near_list_t
+  use surface_features_m, only: found_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
   use touches_m, only: touch_t, touches_t, add_touch
   implicit none
@@ -24,9 +24,18 @@ module contact_spheres_m
     real(wp) :: largest = 0.0_wp   !! largest radius [m]
   end type sphere_set_t
 
+  !> Pairs of spheres that may touch: entries first(p) : first(p+1)-1 belong to body pair p.
+  type :: candidates_t
+    integer :: n_pairs = 0
+    integer, allocatable :: a(:), b(:), first(:)   !! (pairs) bodies; b < 0: wall, bed
+    real(wp), allocatable :: shift(:, :)           !! (3, pairs) to the image of b near a [m]
+    integer :: n = 0
+    integer, allocatable :: i(:), j(:)             !! (n) slots of the sphere of a and of b
+  end type candidates_t
+
   type :: contact_spheres_t
     real(wp) :: skin = 0.0_wp                  !! pairs nearer than this are listed [m]
-    real(wp) :: clear = 0.0_wp                   !! way of pairs that are not listed to touch [m]
+    real(wp) :: clear = 0.0_wp                 !! way of pairs that are not listed to touch [m]
     real(wp) :: free_way = 0.0_wp              !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
@@ -38,19 +47,14 @@ module contact_spheres_m
     integer, allocatable :: body(:), sphere(:) !! (slots)
     real(wp), allocatable :: centre(:, :)      !! (3, slots) in space [m]
     real(wp), allocatable :: radius(:)         !! (slots) [m]
-    !> Candidates: entries first(p) : first(p+1)-1 belong to body pair p.
-    integer :: n_pairs = 0
-    integer, allocatable :: pair_a(:), pair_b(:), first(:)   !! pair_b < 0: wall, bed
-    real(wp), allocatable :: shift(:, :)       !! (3, pairs) to the image of b near a [m]
-    integer :: n_candidates = 0
-    integer, allocatable :: i(:), j(:)         !! slots of the sphere of a and of b
+    type(candidates_t) :: list
     !> Poses at which the list was made.
     logical :: listed = .false.
     logical, allocatable :: present(:)
     real(wp), allocatable :: x(:, :), q(:, :)
     real(wp), allocatable :: turn(:, :, :)     !! (3, 3, bodies) body to space
     type(pair_list_t) :: near
-    type(near_list_t) :: facets, edges         !! of the bed
+    type(found_t) :: found                     !! of the bed
   end type contact_spheres_t
 
 contains
@@ -111,14 +115,14 @@ contains
       end associate
     end do
     touches%n = 0
-    do p = 1, self%n_pairs
-      if (blocks%still(self%pair_a(p))) then
-        if (self%pair_b(p) < 0) cycle
-        if (blocks%still(self%pair_b(p))) cycle
+    do p = 1, self%list%n_pairs
+      if (blocks%still(self%list%a(p))) then
+        if (self%list%b(p) < 0) cycle
+        if (blocks%still(self%list%b(p))) cycle
       end if
-      if (self%pair_b(p) == bed_partner) then
+      if (self%list%b(p) == bed_partner) then
         call touch_bed(walls%bed, blocks, self, p, way(self, blocks, p, ahead), touches)
-      else if (self%pair_b(p) < 0) then
+      else if (self%list%b(p) < 0) then
         call touch_wall(walls, blocks, self, p, way(self, blocks, p, ahead), touches)
       else
         call touch_body(blocks, self, p, way(self, blocks, p, ahead), touches)
@@ -136,8 +140,8 @@ contains
     real(wp) :: v(3)
     integer :: a, b
 
-    a = self%pair_a(p)
-    b = self%pair_b(p)
+    a = self%list%a(p)
+    b = self%list%b(p)
     v = blocks%v(:, a)
     way = norm2(blocks%omega(:, a))*self%reach(a)
     if (b > 0) then
@@ -179,8 +183,8 @@ contains
       self%slot_of(self%offset(self%body(p)) + self%sphere(p)) = 0
     end do
     self%n_slots = 0
-    self%n_pairs = 0
-    self%n_candidates = 0
+    self%list%n_pairs = 0
+    self%list%n = 0
     call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%skin, self%near)
     p = 1
     do a = 1, blocks%n
@@ -199,8 +203,8 @@ contains
         p = p + 1
       end do
     end do
-    call ensure_room(self%n_pairs + 1, self%first)
-    self%first(self%n_pairs + 1) = self%n_candidates + 1
+    call ensure_room(self%list%n_pairs + 1, self%list%first)
+    self%list%first(self%list%n_pairs + 1) = self%list%n + 1
     self%listed = .true.
     self%present = blocks%present
     self%x = blocks%x
@@ -208,32 +212,32 @@ contains
   end subroutine make_list
 
   !> Begin a pair of bodies, or of a body and a wall.
-  subroutine add_pair(a, b, shift, self)
+  subroutine add_pair(a, b, shift, list)
     integer, intent(in) :: a, b
     real(wp), intent(in) :: shift(3)   !! to the image of b near a [m]
-    type(contact_spheres_t), intent(inout) :: self
+    type(candidates_t), intent(inout) :: list
 
-    self%n_pairs = self%n_pairs + 1
-    call ensure_room(self%n_pairs, self%pair_a)
-    call ensure_room(self%n_pairs, self%pair_b)
-    call ensure_room(self%n_pairs, self%first)
-    call ensure_room(self%n_pairs, self%shift)
-    self%pair_a(self%n_pairs) = a
-    self%pair_b(self%n_pairs) = b
-    self%first(self%n_pairs) = self%n_candidates + 1
-    self%shift(:, self%n_pairs) = shift
+    list%n_pairs = list%n_pairs + 1
+    call ensure_room(list%n_pairs, list%a)
+    call ensure_room(list%n_pairs, list%b)
+    call ensure_room(list%n_pairs, list%first)
+    call ensure_room(list%n_pairs, list%shift)
+    list%a(list%n_pairs) = a
+    list%b(list%n_pairs) = b
+    list%first(list%n_pairs) = list%n + 1
+    list%shift(:, list%n_pairs) = shift
   end subroutine add_pair
 
   !> Append a candidate to the last pair.
-  subroutine add_candidate(i, j, self)
+  subroutine add_candidate(i, j, list)
     integer, intent(in) :: i, j   !! slots; j = 0 for a wall
-    type(contact_spheres_t), intent(inout) :: self
+    type(candidates_t), intent(inout) :: list
 
-    self%n_candidates = self%n_candidates + 1
-    call ensure_room(self%n_candidates, self%i)
-    call ensure_room(self%n_candidates, self%j)
-    self%i(self%n_candidates) = i
-    self%j(self%n_candidates) = j
+    list%n = list%n + 1
+    call ensure_room(list%n, list%i)
+    call ensure_room(list%n, list%j)
+    list%i(list%n) = i
+    list%j(list%n) = j
   end subroutine add_candidate
 
   !> Slot of a sphere; the sphere gets one if it has none.
@@ -269,13 +273,13 @@ contains
     beyond = dot_product(walls%normal(:, w), blocks%x(:, a)) - walls%offset(w) + self%skin
     if (beyond + self%reach(a) <= 0.0_wp) return
     n = matmul(walls%normal(:, w), self%turn(:, :, a))
-    call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self)
+    call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         height = beyond + dot_product(n, shape%sphere_centre(:, i))
         if (height + shape%sphere_radius(i) <= 0.0_wp) cycle
         call take_slot(blocks, a, i, self, slot)
-        call add_candidate(slot, 0, self)
+        call add_candidate(slot, 0, self%list)
       end do
     end associate
   end subroutine list_wall
@@ -292,16 +296,15 @@ contains
     x = bed_place(bed, blocks%x(:, a))
     reach = self%reach(a) + self%skin
     if (.not. bed_is_near(bed, x - reach, x + reach)) return
-    call add_pair(a, bed_partner, [0.0_wp, 0.0_wp, 0.0_wp], self)
+    call add_pair(a, bed_partner, [0.0_wp, 0.0_wp, 0.0_wp], self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         c = x + matmul(self%turn(:, :, a), shape%sphere_centre(:, i))
         reach = shape%sphere_radius(i) + self%skin
-        call bed_distance(bed, c, reach, reach + self%reach(a), self%facets, self%edges, distance, &
-          outward)
+        call bed_distance(bed, c, reach, reach + self%reach(a), self%found, distance, outward)
         if (distance > reach) cycle
         call take_slot(blocks, a, i, self, slot)
-        call add_candidate(slot, 0, self)
+        call add_candidate(slot, 0, self%list)
       end do
     end associate
   end subroutine list_bed
@@ -319,7 +322,7 @@ contains
     d = blocks%x(:, b) + self%near%shift(:, p) - blocks%x(:, a)
     d_a = matmul(d, self%turn(:, :, a))
     turn = matmul(transpose(self%turn(:, :, b)), self%turn(:, :, a))
-    call add_pair(a, b, self%near%shift(:, p), self)
+    call add_pair(a, b, self%near%shift(:, p), self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         c = shape%sphere_centre(:, i) - d_a
@@ -354,7 +357,7 @@ contains
               if (dot_product(d, d) >= (reach + shape%sphere_radius(j))**2) cycle
               call take_slot(blocks, a, i, self, slot_i)
               call take_slot(blocks, b, j, self, slot_j)
-              call add_candidate(slot_i, slot_j, self)
+              call add_candidate(slot_i, slot_j, self%list)
             end do
           end do
         end do
@@ -373,12 +376,12 @@ contains
     type(touch_t) :: touch
     integer :: c, s, w
 
-    w = findloc_wall(walls, self%pair_b(p))
-    touch%a = self%pair_a(p)
-    touch%b = self%pair_b(p)
+    w = findloc_wall(walls, self%list%b(p))
+    touch%a = self%list%a(p)
+    touch%b = self%list%b(p)
     touch%normal = walls%normal(:, w)
-    do c = self%first(p), self%first(p + 1) - 1
-      s = self%i(c)
+    do c = self%list%first(p), self%list%first(p + 1) - 1
+      s = self%list%i(c)
       touch%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
         + self%radius(s)
       if (touch%depth <= -gap) cycle
@@ -402,12 +405,12 @@ contains
     real(wp) :: distance, outward(3)
     integer :: c, s
 
-    touch%a = self%pair_a(p)
+    touch%a = self%list%a(p)
     touch%b = bed_partner
-    do c = self%first(p), self%first(p + 1) - 1
-      s = self%i(c)
+    do c = self%list%first(p), self%list%first(p + 1) - 1
+      s = self%list%i(c)
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
-        2*self%radius(s) + gap, self%facets, self%edges, distance, outward)
+        2*self%radius(s) + gap, self%found, distance, outward)
       if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
       touch%key = self%sphere(s)
       touch%normal = -outward
@@ -440,12 +443,12 @@ contains
     real(wp) :: d(3), shift(3), square, distance, reach
     integer :: c, i, j
 
-    touch%a = self%pair_a(p)
-    touch%b = self%pair_b(p)
-    shift = self%shift(:, p)
-    do c = self%first(p), self%first(p + 1) - 1
-      i = self%i(c)
-      j = self%j(c)
+    touch%a = self%list%a(p)
+    touch%b = self%list%b(p)
+    shift = self%list%shift(:, p)
+    do c = self%list%first(p), self%list%first(p + 1) - 1
+      i = self%list%i(c)
+      j = self%list%j(c)
       reach = self%radius(i) + self%radius(j)
       d = self%centre(:, j) + shift - self%centre(:, i)
       square = dot_product(d, d)

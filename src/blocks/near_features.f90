@@ -5,7 +5,7 @@ module near_features_m
   use growing_m, only: ensure_room
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
-  use surface_features_m, only: surface_t, near_list_t, gather_probes, gather_edges, &
+  use surface_features_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
     gather_facets, search_surface, least_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view
@@ -39,7 +39,8 @@ module near_features_m
     real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
     real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
     real(wp) :: ahead = 0.0_wp                   !! longest way of a touch that comes soon [m]
-    type(near_list_t) :: guests, hosts, facets, edges
+    type(near_list_t) :: guests, hosts
+    type(found_t) :: found
   end type search_t
 
   real(wp), parameter :: most_skin = 4.0_wp      !! largest skin over the least
@@ -87,8 +88,8 @@ contains
     margin = margin + surface%ball
     do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
       place = now%poses%x_a + matmul(now%turn_a, surface%probe(:, i))
-      call bed_distance(bed, place, margin, max(margin, surface%reach), search%facets, &
-        search%edges, distance, outward)
+      call bed_distance(bed, place, margin, max(margin, surface%reach), search%found, &
+        distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
       call append_near(bed%surface, i, place, abs(distance) + 2*(near%valid + search%ahead), &
         search, near%of_a)
@@ -138,7 +139,7 @@ contains
       place = seen_from(guest_in_host, guest%probe(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
       if (least_distance(host, place) > margin) cycle
-      call search_surface(host, place, margin, search%facets, search%edges, distance, outward)
+      call search_surface(host, place, margin, search%found, distance, outward)
       if (distance > margin) cycle
       call append_near(host, search%guests%item(m), place, &
         abs(distance) + 2*(skin + search%ahead), search, list)
@@ -155,8 +156,8 @@ contains
     type(search_t), intent(inout) :: search
     type(probes_near_t), intent(inout) :: list
 
-    call gather_facets(host, place - reach, place + reach, search%facets)
-    call gather_edges(host, place - reach, place + reach, search%edges)
+    call gather_facets(host, place - reach, place + reach, search%found%facets)
+    call gather_edges(host, place - reach, place + reach, search%found%edges)
     list%n = list%n + 1
     call ensure_room(list%n, list%probe)
     call ensure_room(list%n, list%away)
@@ -165,10 +166,10 @@ contains
     list%probe(list%n) = probe
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
-    call append_facets(host, search%facets%item(:search%facets%n), place, reach, list%n_facets, &
-      list%facet)
-    call append_edges(host, search%edges%item(:search%edges%n), place, reach, list%n_edges, &
-      list%edge)
+    associate (facets => search%found%facets, edges => search%found%edges)
+      call append_facets(host, facets%item(:facets%n), place, reach, list%n_facets, list%facet)
+      call append_edges(host, edges%item(:edges%n), place, reach, list%n_edges, list%edge)
+    end associate
   end subroutine append_near
 
   !> Close the lists of facets and edges of the last probe.

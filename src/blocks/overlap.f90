@@ -11,7 +11,7 @@ module overlap_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
-  use surface_features_m, only: near_list_t, gather_edges
+  use surface_features_m, only: found_t, gather_edges
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
   implicit none
   private
@@ -42,7 +42,7 @@ module overlap_m
     type(pair_list_t) :: pairs
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: radius(:)           !! (bodies) [m]
-    type(near_list_t) :: facets, edges           !! of the bed
+    type(found_t) :: found                       !! of the bed
   end type overlap_t
 
 contains
@@ -285,7 +285,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: c
     real(wp) :: depth
-    type(near_list_t) :: facets, edges
+    type(found_t) :: found
     real(wp) :: turn(3, 3), d(3)
     integer :: b
 
@@ -293,8 +293,7 @@ contains
     turn = rotation_matrix(blocks%q(:, c))
     associate (own => overlap%solid(blocks%shape(c)))
       call deepen_wall(own%corner, own%ball, own%radius, blocks%x(:, c), turn, walls, depth)
-      if (walls%bed%there) call deepen_bed(own, blocks%x(:, c), turn, walls%bed, facets, edges, &
-        depth)
+      if (walls%bed%there) call deepen_bed(own, blocks%x(:, c), turn, walls%bed, found, depth)
       do b = 1, blocks%n
         if (b == c .or. .not. blocks%present(b)) cycle
         d = blocks%x(:, c) - blocks%x(:, b)
@@ -325,7 +324,7 @@ contains
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           overlap%turn(:, :, a), walls, depth)
         if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), overlap%turn(:, :, a), &
-          walls%bed, overlap%facets, overlap%edges, depth)
+          walls%bed, overlap%found, depth)
       end associate
     end do
     call near_pairs(blocks%x, overlap%radius, blocks%present, walls%period, 0.0_wp, overlap%pairs)
@@ -385,12 +384,12 @@ contains
 
   !> Raise `depth` to the depth of a body in the bed, if that is larger: of its sample points below
   !! the surface of the bed, and of the sharp edges and corners of the bed below its own.
-  subroutine deepen_bed(body, position, turn, bed, facets, edges, depth)
+  subroutine deepen_bed(body, position, turn, bed, found, depth)
     type(solid_t), intent(in) :: body
     real(wp), intent(in) :: position(3)  !! centre of mass [m]
     real(wp), intent(in) :: turn(3, 3)   !! body to space
     type(bed_t), intent(in) :: bed
-    type(near_list_t), intent(inout) :: facets, edges   !! work
+    type(found_t), intent(inout) :: found   !! work
     real(wp), intent(inout) :: depth
     real(wp) :: x(3), p(3), distance, outward(3)
     integer :: c, i, m
@@ -401,7 +400,7 @@ contains
       return
     end if
     if (body%ball > 0.0_wp) then
-      call bed_distance(bed, x, body%ball, 2*body%ball, facets, edges, distance, outward)
+      call bed_distance(bed, x, body%ball, 2*body%ball, found, distance, outward)
       depth = max(depth, body%ball - distance)
       return
     end if
@@ -413,14 +412,14 @@ contains
       do i = body%cluster(c), body%cluster(c + 1) - 1
         p = x + matmul(turn, body%sample(:, i))
         if (.not. bed_covers(bed, p)) cycle
-        call bed_distance(bed, p, body%reach(c), 2*body%radius, facets, edges, distance, outward)
+        call bed_distance(bed, p, body%reach(c), 2*body%radius, found, distance, outward)
         depth = max(depth, -distance)
       end do
     end do
-    call gather_edges(bed%surface, x - body%radius, x + body%radius, edges)
-    do m = 1, edges%n
-      if (edges%item(m) > bed%surface%n_convex) exit
-      associate (edge => bed%surface%edge(edges%item(m)))
+    call gather_edges(bed%surface, x - body%radius, x + body%radius, found%edges)
+    do m = 1, found%edges%n
+      if (found%edges%item(m) > bed%surface%n_convex) exit
+      associate (edge => bed%surface%edge(found%edges%item(m)))
         do i = 0, ceiling(edge%extent/body%spacing)
           p = edge%start + min(real(i, wp)*body%spacing, edge%extent)*edge%along - x
           if (dot_product(p, p) > body%radius**2) cycle

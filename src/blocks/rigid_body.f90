@@ -19,6 +19,11 @@ module rigid_body_m
   public :: begin_step, drift, kick, hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, kinetic_energy, potential_energy
 
+  !> Given rates: (3, n) velocity [m/s], and spin, space frame [rad/s].
+  type :: given_t
+    real(wp), allocatable :: v(:, :), omega(:, :)
+  end type given_t
+
   !> All bodies of a run, in the order of the contract: `&body`, then `&drop`.
   type :: blocks_t
     integer :: n = 0
@@ -32,8 +37,7 @@ module rigid_body_m
     logical, allocatable :: asleep(:)            !! (n) at rest until woken (`sleep_m`)
     logical, allocatable :: still(:)             !! (n) asleep, or held at rest for ever
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
-    !> (3, n) at release, of fixed bodies for ever: velocity [m/s], and spin, space frame [rad/s].
-    real(wp), allocatable :: given_v(:, :), given_omega(:, :)
+    type(given_t) :: given                       !! at release; of fixed bodies for ever
     real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass, never wrapped [m]
     real(wp), allocatable :: q(:, :)             !! (4, n) attitude w, x, y, z [-]
     real(wp), allocatable :: v(:, :)             !! (3, n) velocity [m/s]
@@ -70,8 +74,8 @@ contains
       blocks%shape(b) = shape_number(shapes, case%body(b)%shape)
       blocks%fixed(b) = case%body(b)%fixed
       blocks%release_time(b) = case%body(b)%release_time
-      blocks%given_v(:, b) = case%body(b)%velocity
-      blocks%given_omega(:, b) = case%body(b)%angular_velocity
+      blocks%given%v(:, b) = case%body(b)%velocity
+      blocks%given%omega(:, b) = case%body(b)%angular_velocity
       blocks%x(:, b) = case%body(b)%position
       blocks%q(:, b) = normalised(case%body(b)%quaternion)
     end do
@@ -81,7 +85,7 @@ contains
         b = b + 1
         blocks%shape(b) = shape_number(shapes, case%drop(i)%shape)
         blocks%release_time(b) = case%drop(i)%first_time + real(k - 1, wp)*case%drop(i)%interval
-        blocks%given_v(:, b) = case%drop(i)%velocity
+        blocks%given%v(:, b) = case%drop(i)%velocity
         call draw_drop(case%drop(i), k, blocks%x(:, b), blocks%q(:, b))
       end do
     end do
@@ -107,7 +111,7 @@ contains
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), source=0.0_wp)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
       source=0.0_wp)
-    allocate (blocks%given_v(3, n), blocks%given_omega(3, n), source=0.0_wp)
+    allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
     allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
     allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
     allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
@@ -132,8 +136,8 @@ contains
 
     blocks%present(b) = .true.
     blocks%release_time(b) = time
-    blocks%v(:, b) = blocks%given_v(:, b)
-    blocks%omega(:, b) = blocks%given_omega(:, b)
+    blocks%v(:, b) = blocks%given%v(:, b)
+    blocks%omega(:, b) = blocks%given%omega(:, b)
     call set_momentum(b, blocks)
     blocks%v_start(:, b) = blocks%v(:, b)
     blocks%l_start(:, b) = blocks%l(:, b)

@@ -27,67 +27,67 @@ module short_list_m
 contains
 
   !> Number of features in a short list, and of touches at most.
-  pure function n_chosen(close) result(n)
-    type(short_list_t), intent(in) :: close
+  pure function n_chosen(short) result(n)
+    type(short_list_t), intent(in) :: short
     integer :: n
 
-    n = close%n_of_b + close%n_of_a + close%n_edges
+    n = short%n_of_b + short%n_of_a + short%n_edges
   end function n_chosen
 
   !> Whether a short list still holds.
-  pure function short_list_holds(now, reach_a, reach_b, close) result(yes)
+  pure function short_list_holds(now, reach_a, reach_b, short) result(yes)
     type(meeting_t), intent(in) :: now
     real(wp), intent(in) :: reach_a, reach_b  !! of the bodies [m]
-    type(short_list_t), intent(in) :: close
+    type(short_list_t), intent(in) :: short
     logical :: yes
     real(wp) :: way
 
-    way = way_between(close%when, now%poses, reach_a, reach_b)
-    yes = way <= close%left .and. way + now%gap <= close%until
+    way = way_between(short%when, now%poses, reach_a, reach_b)
+    yes = way <= short%left .and. way + now%gap <= short%until
   end function short_list_holds
 
   !> Choose from the lists of a pair what may touch before the bodies have moved a little.
-  subroutine choose_features(now, way, skin, surface_a, surface_b, near, close)
+  subroutine choose_features(now, way, skin, surface_a, surface_b, near, short)
     type(meeting_t), intent(in) :: now
     real(wp), intent(in) :: way               !! of the bodies since the lists were made [m]
     real(wp), intent(in) :: skin              !! least way before lists are renewed [m]
     type(surface_t), intent(in) :: surface_a, surface_b
     type(near_features_t), intent(in) :: near
-    type(short_list_t), intent(inout) :: close
+    type(short_list_t), intent(inout) :: short
     real(wp), parameter :: share = 0.02_wp    !! of a skin: way for which the short list holds,
     real(wp), parameter :: lasting = 10.0_wp  !! or such a multiple of the gap
     integer :: n
 
-    close%when = now%poses
-    close%left = near%valid - way
-    close%until = now%gap + max(share*skin, lasting*now%gap)
-    close%n = 0
-    call choose_probes(now%b_in_a, way, surface_b, surface_a, near%of_b, close, n)
-    close%n_of_b = n
-    close%of_a = close%n + 1
-    call choose_probes(now%a_in_b, way, surface_a, surface_b, near%of_a, close, n)
-    close%n_of_a = n
-    close%edges = close%n + 1
-    call choose_edges(now%a_in_b, way, surface_a, surface_b, near, close)
-    call ensure_room(close%n + 1, close%item)
+    short%when = now%poses
+    short%left = near%valid - way
+    short%until = now%gap + max(share*skin, lasting*now%gap)
+    short%n = 0
+    call choose_probes(now%b_in_a, way, surface_b, surface_a, near%of_b, short, n)
+    short%n_of_b = n
+    short%of_a = short%n + 1
+    call choose_probes(now%a_in_b, way, surface_a, surface_b, near%of_a, short, n)
+    short%n_of_a = n
+    short%edges = short%n + 1
+    call choose_edges(now%a_in_b, way, surface_a, surface_b, near, short)
+    call ensure_room(short%n + 1, short%item)
     ! without any feature in the lists nothing comes near as long as these hold
-    if (near%of_a%n + near%of_b%n + near%n_crossings == 0) close%until = huge(1.0_wp)
+    if (near%of_a%n + near%of_b%n + near%n_crossings == 0) short%until = huge(1.0_wp)
   end subroutine choose_features
 
   !> Append those probes of a guest, with the features of the host, that may touch while the short
   !! list holds.
-  subroutine choose_probes(guest_in_host, way, guest, host, list, close, n_probes)
+  subroutine choose_probes(guest_in_host, way, guest, host, list, short, n_probes)
     type(view_t), intent(in) :: guest_in_host
     real(wp), intent(in) :: way                !! since the lists were made [m]
     type(surface_t), intent(in) :: guest, host
     type(probes_near_t), intent(in) :: list
-    type(short_list_t), intent(inout) :: close
+    type(short_list_t), intent(inout) :: short
     integer, intent(out) :: n_probes           !! appended
     real(wp) :: margin, place(3), distance, outward(3), reach
     integer :: m, at
 
     n_probes = 0
-    margin = close%until
+    margin = short%until
     do m = 1, list%n
       if (list%away(m) > way + margin) cycle
       associate (facets => list%facet(list%facet_first(m):list%facet_first(m + 1) - 1), &
@@ -96,32 +96,32 @@ contains
         call nearest_on_surface(host, place, facets, edges, distance, outward)
         if (distance - guest%ball > margin .and. distance < nowhere) cycle
         reach = abs(distance) + 2*margin
-        at = close%n + 1
-        close%n = close%n + 3
-        call ensure_room(close%n, close%item)
-        close%item(at) = list%probe(m)
-        call append_facets(host, facets, place, reach, close%n, close%item)
-        close%item(at + 1) = close%n - at - 2
-        call append_edges(host, edges, place, reach, close%n, close%item)
-        close%item(at + 2) = close%n - at - 2 - close%item(at + 1)
+        at = short%n + 1
+        short%n = short%n + 3
+        call ensure_room(short%n, short%item)
+        short%item(at) = list%probe(m)
+        call append_facets(host, facets, place, reach, short%n, short%item)
+        short%item(at + 1) = short%n - at - 2
+        call append_edges(host, edges, place, reach, short%n, short%item)
+        short%item(at + 2) = short%n - at - 2 - short%item(at + 1)
         n_probes = n_probes + 1
       end associate
     end do
   end subroutine choose_probes
 
   !> Append those pairs of edges that may cross while the short list holds.
-  subroutine choose_edges(a_in_b, way, surface_a, surface_b, near, close)
+  subroutine choose_edges(a_in_b, way, surface_a, surface_b, near, short)
     type(view_t), intent(in) :: a_in_b
     real(wp), intent(in) :: way                !! since the lists were made [m]
     type(surface_t), intent(in) :: surface_a, surface_b
     type(near_features_t), intent(in) :: near
-    type(short_list_t), intent(inout) :: close
+    type(short_list_t), intent(inout) :: short
     type(edge_t) :: guest
     real(wp) :: margin
     integer :: m, last
 
-    close%n_edges = 0
-    margin = close%until
+    short%n_edges = 0
+    margin = short%until
     last = 0
     do m = 1, near%n_crossings
       if (near%away(m) > way + margin) cycle
@@ -130,10 +130,10 @@ contains
       if (way_to_crossing(guest, surface_b%edge(near%edge_b(m)), margin, &
         margin + min(surface_a%length, surface_b%length), &
         min(surface_a%reach, surface_b%reach)) > margin) cycle
-      call ensure_room(close%n + 2, close%item)
-      close%item(close%n + 1:close%n + 2) = [near%edge_a(m), near%edge_b(m)]
-      close%n = close%n + 2
-      close%n_edges = close%n_edges + 1
+      call ensure_room(short%n + 2, short%item)
+      short%item(short%n + 1:short%n + 2) = [near%edge_a(m), near%edge_b(m)]
+      short%n = short%n + 2
+      short%n_edges = short%n_edges + 1
     end do
   end subroutine choose_edges
 

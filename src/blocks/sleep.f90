@@ -55,7 +55,7 @@ contains
 
     do b = 1, blocks%n
       blocks%still(b) = blocks%asleep(b) .or. (blocks%fixed(b) .and. &
-        all(abs(blocks%given_v(:, b)) <= 0.0_wp) .and. all(abs(blocks%given_omega(:, b)) <= 0.0_wp))
+        all(abs(blocks%given%v(:, b)) <= 0.0_wp) .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp))
     end do
   end subroutine know_stillness
 

@@ -28,6 +28,13 @@ module armour_units_m
   ! shank and flukes (0.057 C) are left out.
   real(wp), parameter :: dolos_waist = 0.32_wp, dolos_tip = 0.20_wp
 
+  !> A cone along an axis through the origin, with a polygon across it.
+  type :: leg_t
+    real(wp) :: axis(3), side(3)   !! unit vector; the first corner lies towards the side
+    integer :: n                   !! corners of the polygon
+    real(wp) :: at(2), radius(2)   !! inner and outer end: place on the axis, of the corners [m]
+  end type leg_t
+
 contains
 
   !> A cylinder that stands on z.
@@ -37,6 +44,7 @@ contains
     type(shape_t), intent(inout) :: shape
     type(points_t) :: points
     type(parts_t) :: coarse, fine
+    type(leg_t) :: leg
     real(wp) :: radius
     integer :: n, layers
 
@@ -44,20 +52,11 @@ contains
     radius = 0.5_wp*diameter*area_factor(n)
     layers = max(1, nint(real(refinement, wp)*height/(diameter*real(cuts(refinement), wp))))
     points%same = same_point*max(diameter, height)
-    call add_layers(0.5_wp*height, -0.5_wp*height, radius, radius, 1, points, coarse)
-    call add_layers(0.5_wp*height, -0.5_wp*height, radius, radius, layers, points, fine)
+    leg = leg_t([0.0_wp, 0.0_wp, 1.0_wp], [1.0_wp, 0.0_wp, 0.0_wp], n, [-0.5_wp, 0.5_wp]*height, &
+      [radius, radius])
+    call add_leg(leg, 1, points, coarse)
+    call add_leg(leg, layers, points, fine)
     call assemble(points, coarse, fine, cuts(refinement), shape)
-  contains
-    pure subroutine add_layers(top, bottom, r_top, r_bottom, m, points, parts)
-      real(wp), intent(in) :: top, bottom, r_top, r_bottom
-      integer, intent(in) :: m
-      type(points_t), intent(inout) :: points
-      type(parts_t), intent(inout) :: parts
-      real(wp), parameter :: origin(3) = 0.0_wp, x(3) = [1.0_wp, 0.0_wp, 0.0_wp], &
-        z(3) = [0.0_wp, 0.0_wp, 1.0_wp]
-
-      call add_leg(origin, z, x, n, bottom, top, r_bottom, r_top, m, points, parts)
-    end subroutine add_layers
   end subroutine build_cylinder
 
   !> A tetrapod that stands on three legs, the fourth along z, another in the plane y = 0.
@@ -66,9 +65,9 @@ contains
     integer, intent(in) :: refinement
     type(shape_t), intent(inout) :: shape
     real(wp), parameter :: cosine = -1.0_wp/3.0_wp, sine = sqrt(8.0_wp)/3.0_wp   ! of two axes
-    real(wp), parameter :: origin(3) = 0.0_wp
     type(points_t) :: points
     type(parts_t) :: coarse, fine
+    type(leg_t) :: leg(4)
     real(wp) :: axis(3, 4), ring(3, 6*refinement, 4), root, tip, inner, outer, angle
     integer :: k, n, layers
 
@@ -85,15 +84,14 @@ contains
     inner = root/sqrt(2.0_wp)                  ! roots touch each other
     outer = 0.75_wp*(height - sine*tip)        ! height = outer/3 + outer + sine*tip
     do k = 1, 4
-      ring(:, :, k) = section(origin, axis(:, k), axis(:, 1 + mod(k, 4)), n, inner, root)
+      leg(k) = leg_t(axis(:, k), axis(:, 1 + mod(k, 4)), n, [inner, outer], [root, tip])
+      ring(:, :, k) = section(leg(k), 0.0_wp)
     end do
     call add_core(ring, points, coarse)
     call add_core(ring, points, fine)
     do k = 1, 4
-      call add_leg(origin, axis(:, k), axis(:, 1 + mod(k, 4)), n, inner, outer, root, tip, 1, &
-                   points, coarse)
-      call add_leg(origin, axis(:, k), axis(:, 1 + mod(k, 4)), n, inner, outer, root, tip, layers, &
-                   points, fine)
+      call add_leg(leg(k), 1, points, coarse)
+      call add_leg(leg(k), layers, points, fine)
     end do
     call assemble(points, coarse, fine, cuts(refinement), shape)
   end subroutine build_tetrapod
@@ -136,30 +134,29 @@ contains
     factor = sqrt(2.0_wp*pi/(real(n, wp)*sin(2.0_wp*pi/real(n, wp))))
   end function area_factor
 
-  !> Corners of a polygon across an axis; the first lies towards `side`.
-  pure function section(origin, axis, side, n, at, radius) result(x)
-    real(wp), intent(in) :: origin(3), axis(3), side(3)   !! axis: unit vector
-    integer, intent(in) :: n                              !! corners
-    real(wp), intent(in) :: at, radius                    !! place on the axis, of the corners [m]
-    real(wp) :: x(3, n)
-    real(wp) :: u(3), v(3), angle
+  !> Corners of a leg across its axis, at a share of its length; the first lies towards `side`.
+  pure function section(leg, share) result(x)
+    type(leg_t), intent(in) :: leg
+    real(wp), intent(in) :: share   !! 0: inner end, 1: outer end
+    real(wp) :: x(3, leg%n)
+    real(wp) :: u(3), v(3), angle, at, radius
     integer :: k
 
-    u = side - dot_product(side, axis)*axis
+    at = leg%at(1) + share*(leg%at(2) - leg%at(1))
+    radius = leg%radius(1) + share*(leg%radius(2) - leg%radius(1))
+    u = leg%side - dot_product(leg%side, leg%axis)*leg%axis
     u = u/norm(u)
-    v = cross(axis, u)
-    do k = 1, n
-      angle = 2.0_wp*pi*real(k - 1, wp)/real(n, wp)
-      x(:, k) = origin + at*axis + radius*(cos(angle)*u + sin(angle)*v)
+    v = cross(leg%axis, u)
+    do k = 1, leg%n
+      angle = 2.0_wp*pi*real(k - 1, wp)/real(leg%n, wp)
+      x(:, k) = at*leg%axis + radius*(cos(angle)*u + sin(angle)*v)
     end do
   end function section
 
   !> A cone along an axis, in layers of equal height.
-  pure subroutine add_leg(origin, axis, side, n, inner, outer, r_inner, r_outer, layers, points, &
-                          parts)
-    real(wp), intent(in) :: origin(3), axis(3), side(3)
-    integer, intent(in) :: n, layers
-    real(wp), intent(in) :: inner, outer, r_inner, r_outer   !! places on the axis, radii [m]
+  pure subroutine add_leg(leg, layers, points, parts)
+    type(leg_t), intent(in) :: leg
+    integer, intent(in) :: layers
     type(points_t), intent(inout) :: points
     type(parts_t), intent(inout) :: parts
     real(wp) :: a, b
@@ -168,10 +165,7 @@ contains
     do m = 1, layers
       a = real(m - 1, wp)/real(layers, wp)
       b = real(m, wp)/real(layers, wp)
-      call add_frustum(section(origin, axis, side, n, inner + a*(outer - inner), &
-                               r_inner + a*(r_outer - r_inner)), &
-                       section(origin, axis, side, n, inner + b*(outer - inner), &
-                               r_inner + b*(r_outer - r_inner)), points, parts)
+      call add_frustum(section(leg, a), section(leg, b), points, parts)
     end do
   end subroutine add_leg
 

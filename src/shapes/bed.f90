@@ -13,7 +13,7 @@ module bed_m
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_t, bins_build
-  use surface_features_m, only: surface_t, surface_init, near_list_t, gather_edges, gather_facets, &
+  use surface_features_m, only: surface_t, surface_init, found_t, gather_edges, gather_facets, &
     nearest_on_surface, pair_edges, nowhere
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
@@ -497,11 +497,11 @@ contains
 
   !> Signed distance of a point from the bed (positive outside), and the unit vector along which it
   !! grows: exact up to `near` outside and up to `far` inside; beyond that `nowhere` or -`far`.
-  subroutine bed_distance(bed, x, near, far, facets, edges, distance, outward)
+  subroutine bed_distance(bed, x, near, far, found, distance, outward)
     type(bed_t), intent(in) :: bed
     real(wp), intent(in) :: x(3)          !! [m]
     real(wp), intent(in) :: near, far     !! near <= far [m]
-    type(near_list_t), intent(inout) :: facets, edges   !! work
+    type(found_t), intent(inout) :: found   !! work
     real(wp), intent(out) :: distance     !! [m]
     real(wp), intent(out) :: outward(3)   !! 0 where the distance is not exact
     real(wp), parameter :: least = 0.02_wp   !! share of `far` to begin with
@@ -509,10 +509,10 @@ contains
 
     reach = near
     do
-      call gather_facets(bed%surface, x - reach, x + reach, facets)
-      call gather_edges(bed%surface, x - reach, x + reach, edges)
-      call nearest_on_surface(bed%surface, x, facets%item(:facets%n), edges%item(:edges%n), &
-        distance, outward)
+      call gather_facets(bed%surface, x - reach, x + reach, found%facets)
+      call gather_edges(bed%surface, x - reach, x + reach, found%edges)
+      call nearest_on_surface(bed%surface, x, found%facets%item(:found%facets%n), &
+        found%edges%item(:found%edges%n), distance, outward)
       if (abs(distance) <= reach) return
       outward = 0.0_wp
       if (reach <= near) then

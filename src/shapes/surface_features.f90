@@ -12,7 +12,8 @@ module surface_features_m
   use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_t, surface_init, near_list_t, gather_probes, gather_edges, gather_facets, &
+  public :: surface_t, surface_init, near_list_t, found_t, gather_probes, gather_edges, &
+    gather_facets, &
     nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere, pair_edges
 
   type :: surface_t
@@ -42,6 +43,11 @@ module surface_features_m
     integer, allocatable, private :: mark(:)     !! search in which each item was seen last
     integer, private :: search = 0
   end type near_list_t
+
+  !> Facets and edges found by a search.
+  type :: found_t
+    type(near_list_t) :: facets, edges
+  end type found_t
 
   real(wp), parameter :: nowhere = 1.0e30_wp   !! distance from nothing [m]
   real(wp), parameter :: sharp = 0.02_wp       !! sine by which facets differ at a sharp edge
@@ -516,19 +522,19 @@ contains
   end subroutine nearest_on_surface
 
   !> Signed distance of a point from the surface, searched in a growing box: exact.
-  subroutine search_surface(surface, x, begin, facets, edges, distance, outward)
+  subroutine search_surface(surface, x, begin, found, distance, outward)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: x(3), begin              !! body axes; half the first box [m]
-    type(near_list_t), intent(inout) :: facets, edges    !! work
+    type(found_t), intent(inout) :: found            !! work
     real(wp), intent(out) :: distance, outward(3)    !! [m], see `nearest_on_surface`
     real(wp) :: reach
 
     reach = begin
     do
-      call gather_facets(surface, x - reach, x + reach, facets)
-      call gather_edges(surface, x - reach, x + reach, edges)
-      call nearest_on_surface(surface, x, facets%item(:facets%n), edges%item(:edges%n), distance, &
-        outward)
+      call gather_facets(surface, x - reach, x + reach, found%facets)
+      call gather_edges(surface, x - reach, x + reach, found%edges)
+      call nearest_on_surface(surface, x, found%facets%item(:found%facets%n), &
+        found%edges%item(:found%edges%n), distance, outward)
       if (abs(distance) <= reach .or. reach > 2*surface%reach) return
       reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
     end do
@@ -538,7 +544,7 @@ contains
   subroutine make_net(surface)
     type(surface_t), intent(inout) :: surface
     integer, parameter :: most_steps = 24   ! along the longest side
-    type(near_list_t) :: facets, edges
+    type(found_t) :: found
     real(wp) :: x(3), outward(3), step
     integer :: n(3), i, j, k
 
@@ -550,7 +556,7 @@ contains
       do j = 0, n(2)
         do i = 0, n(1)
           x = surface%low + surface%net_step*real([i, j, k], wp)
-          call search_surface(surface, x, step, facets, edges, surface%net(i, j, k), outward)
+          call search_surface(surface, x, step, found, surface%net(i, j, k), outward)
         end do
       end do
     end do

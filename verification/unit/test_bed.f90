@@ -14,7 +14,7 @@ program test_bed
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, blocks_init, release_body
   use random_counter_m, only: uniform, random_rotation
-  use surface_features_m, only: near_list_t, nowhere
+  use surface_features_m, only: found_t, nowhere
   use walls_m, only: walls_t, walls_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, room_for, max_overlap
   use bed_file_m, only: bed_form_t, read_bed_file
@@ -352,7 +352,7 @@ contains
     type(case_t) :: case
     type(bed_form_t) :: form
     type(bed_t) :: bed
-    type(near_list_t) :: facets, edges
+    type(found_t) :: found
     character(:), allocatable :: message
     real(wp) :: normal(3), x(3), d, outward(3), exact, worst(3)
     integer :: i, v
@@ -366,7 +366,7 @@ contains
       x = [0.02_wp, 0.03_wp, -0.05_wp] + [(uniform(i, 2, v), v=1, 3)]*[0.06_wp, 0.04_wp, 0.16_wp]
       exact = normal(3)*(x(3) - slope(3)) + dot_product(normal(1:2), x(1:2))
       if (bed_covers(bed, x) .neqv. exact < 0.0_wp) worst(1) = 1.0_wp
-      call bed_distance(bed, x, 0.01_wp, 0.015_wp, facets, edges, d, outward)
+      call bed_distance(bed, x, 0.01_wp, 0.015_wp, found, d, outward)
       if (exact > 0.01_wp) then
         if (d < 0.01_wp) worst(2) = 1.0_wp
       else if (exact < -0.015_wp) then
@@ -386,7 +386,7 @@ contains
     type(case_t) :: case
     type(bed_form_t) :: form
     type(bed_t) :: bed
-    type(near_list_t) :: facets, edges
+    type(found_t) :: found
     character(:), allocatable :: message
     real(wp) :: d, outward(3)
 
@@ -405,7 +405,7 @@ contains
       'in the wall')
     call check_distance(bed, [0.037_wp, 0.052_wp, 0.016_wp], -0.005_wp, [0.6_wp, 0.0_wp, 0.8_wp], &
       'below the edge')
-    call bed_distance(bed, [0.05_wp, 0.052_wp, 0.08_wp], 0.02_wp, 0.05_wp, facets, edges, d, &
+    call bed_distance(bed, [0.05_wp, 0.052_wp, 0.08_wp], 0.02_wp, 0.05_wp, found, d, &
       outward)
     call check('high above', d, nowhere, 0.0_wp)
   end subroutine distance_from_trench
@@ -414,10 +414,10 @@ contains
     type(bed_t), intent(in) :: bed
     real(wp), intent(in) :: x(3), exact, direction(3)
     character(*), intent(in) :: name
-    type(near_list_t) :: facets, edges
+    type(found_t) :: found
     real(wp) :: d, outward(3)
 
-    call bed_distance(bed, x, merge(0.0055_wp, 0.0011_wp, exact > 0.0_wp), 0.05_wp, facets, edges, &
+    call bed_distance(bed, x, merge(0.0055_wp, 0.0011_wp, exact > 0.0_wp), 0.05_wp, found, &
       d, outward)
     call check('trench, '//name, d, exact, 1.0e-15_wp)
     call check('trench, direction '//name, outward, direction, 1.0e-12_wp)
