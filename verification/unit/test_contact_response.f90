@@ -1,0 +1,134 @@
+!> How touches respond: damping of a pair, forces that follow from an energy, highest frequencies.
+program test_contact_response
+  use kinds_m, only: wp
+  use check_m, only: check, finish_checks
+  use case_types_m, only: contact_input_t
+  use random_counter_m, only: uniform
+  use bed_m, only: bed_partner
+  use touches_m, only: touch_t, touches_t, add_touch
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law
+  use contact_partners_m, only: partners_t, motion_t, wrench_t, act
+  use contact_response_m, only: response_t, respond, highest_frequency2, opening_speed, &
+    push_to_weight, impact_turn
+  implicit none
+
+  real(wp), parameter :: mass(3) = [2.0_wp, 3.0_wp, 6.0_wp]   !! of three balls [kg]
+  real(wp), parameter :: z(3) = [0.0_wp, 0.0_wp, 1.0_wp]
+  class(contact_law_t), allocatable :: law
+  type(partners_t) :: partners
+
+  call make_balls()
+  call check_damping()
+  call check_frequencies()
+  call check_power()
+  call finish_checks()
+
+contains
+
+  !> Three balls that do not turn, fast enough for impacts.
+  subroutine make_balls()
+    type(contact_input_t) :: input
+
+    input%restitution = 0.3_wp
+    call choose_law(input, law)
+    allocate (partners%v(3, bed_partner:3), partners%omega(3, bed_partner:3), source=0.0_wp)
+    allocate (partners%hard(bed_partner:3), source=1.0_wp)
+    allocate (partners%inverse_mass(bed_partner:3), source=0.0_wp)
+    allocate (partners%inverse_inertia(3, 3, bed_partner:3), source=0.0_wp)
+    partners%inverse_mass(1:3) = 1/mass
+    partners%v(3, 1) = 1.0e3_wp
+    partners%v(3, 3) = -1.0e3_wp
+  end subroutine make_balls
+
+  !> Touches (weight, depth) between balls a and b along z.
+  subroutine touch_balls(a, b, weight, touches)
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: weight(:)
+    type(touches_t), intent(inout) :: touches
+    integer :: t
+
+    do t = 1, size(weight)
+      call add_touch(touch_t(a, b, t, normal=-z, depth=1.0e-6_wp, weight=weight(t)), touches)
+    end do
+  end subroutine touch_balls
+
+  !> One touch damps with the ratio of the law, and so do many together.
+  subroutine check_damping()
+    type(touches_t) :: one, many
+    type(response_t) :: response
+    real(wp) :: reduced, k, eta
+
+    allocate (response%frequency2(bed_partner:3))
+    reduced = 1/(1/mass(1) + 1/mass(2))
+    k = law%normal_constant(reduced)
+    call touch_balls(2, 1, [1.0_wp], one)
+    call respond(one, law, partners, response)
+    eta = 2*law%damping_ratio*sqrt(k*reduced)
+    call check('damping of one touch', response%eta(1), eta, 1.0e-6_wp*eta)
+    call check('its decay', response%decay(1), 0.5_wp*eta/reduced, 1.0e-6_wp*eta/reduced)
+    call check('its force', response%elastic(1), k*1.0e-6_wp, 1.0e-6_wp*k*1.0e-6_wp)
+    call touch_balls(2, 1, [0.1_wp, 0.3_wp, 0.4_wp, 0.2_wp], many)
+    call respond(many, law, partners, response)
+    call check('four that are as stiff as one', sum(response%eta(:4)), eta, 1.0e-6_wp*eta)
+    call check('each by its share', response%eta(3), 0.4_wp*eta, 1.0e-6_wp*eta)
+    call check('with one decay', response%decay(2), 0.5_wp*eta/reduced, 1.0e-6_wp*eta/reduced)
+  end subroutine check_damping
+
+  !> A pair swings with sqrt(k/m*); a ball between two swings with both pairs, which only has to be
+  !! stable.
+  subroutine check_frequencies()
+    type(touches_t) :: touches
+    type(response_t) :: response
+    real(wp) :: pair(2), together
+
+    allocate (response%frequency2(bed_partner:3))
+    call touch_balls(2, 1, [1.0_wp], touches)
+    call touch_balls(3, 2, [1.0_wp], touches)
+    call respond(touches, law, partners, response)
+    pair = law%normal_constant(1.0_wp)   ! k/m* does not depend on the mass
+    call check('frequency of a pair', response%pair_frequency2(:2), pair, 1.0e-6_wp*pair(1))
+    call check('of the ball between two', response%frequency2(2), sum(pair), 1.0e-6_wp*sum(pair))
+    call check('a wall has none', response%frequency2(-1), 0.0_wp, 0.0_wp)
+    together = max(pair(1), sum(pair)*(impact_turn/1.2_wp)**2)
+    call check('the highest', highest_frequency2(touches, response), together, 1.0e-6_wp*together)
+    pair = pair*100*[1, 100]
+    response%frequency2(1:3) = 20*pair(2)
+    together = pair(2)*39*(impact_turn/1.2_wp)**2
+    response%pair_frequency2(:2) = pair(2)
+    call check('of a pile', highest_frequency2(touches, response), together, 1.0e-6_wp*together)
+  end subroutine check_frequencies
+
+  !> What the force of a touch does to its partners is what its spring gives: F times the speed at
+  !! which it lets its energy go, also where its weight changes with position.
+  subroutine check_power()
+    type(touch_t) :: touch
+    type(motion_t) :: motion
+    type(wrench_t) :: wrench
+    real(wp) :: power, gamma
+    real(wp), parameter :: force = 7.0_wp
+    integer :: i
+
+    do i = 1, 20
+      touch = touch_t(2, 1, 1, vector(i, 1), vector(i, 2), vector(i, 3), 0.01_wp, 0.5_wp, 1.0_wp, &
+        100*vector(i, 4), 100*vector(i, 5))
+      if (i > 10) touch%weight = 1.0_wp
+      gamma = 1.0_wp + 0.05_wp*i
+      motion = motion_t(vector(i, 6), vector(i, 7), vector(i, 8))
+      wrench = wrench_t()
+      call act(-force*touch%normal, touch%arm_a, touch%arm_b, wrench)
+      if (touch%weight < 1.0_wp) call push_to_weight(touch, gamma, force, wrench)
+      power = -dot_product(wrench%force, motion%v) + dot_product(wrench%torque_a, motion%omega_a) &
+        + dot_product(wrench%torque_b, motion%omega_b)
+      call check('power of a touch', power, force*opening_speed(touch, gamma, motion), 1.0e-13_wp)
+    end do
+  end subroutine check_power
+
+  pure function vector(i, k) result(v)
+    integer, intent(in) :: i, k
+    real(wp) :: v(3)
+
+    v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
+  end function vector
+
+end program test_contact_response

@@ -1,0 +1,135 @@
+!> Lists of touches and springs: order, parting, joining, and the groups that share a spring.
+program test_springs
+  use kinds_m, only: wp
+  use check_m, only: check, finish_checks
+  use touches_m, only: touch_t, touches_t, add_touch, set_apart
+  use touch_groups_m, only: groups_t, form_groups
+  use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair, move_springs
+  use partners_met_m, only: met_t, note_partners
+  implicit none
+
+  call check_order()
+  call check_moving()
+  call check_touches()
+  call check_groups()
+  call check_met()
+  call finish_checks()
+
+contains
+
+  subroutine check_order()
+    call check('by body', comes_before(1, 9, 9, 2, 0, 0))
+    call check('then partner', comes_before(2, -7, 9, 2, -1, 0))
+    call check('then key', comes_before(2, 1, 3, 2, 1, 4))
+    call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
+  end subroutine check_order
+
+  !> A list of springs of bodies with partner 1; all else of a spring follows from its body.
+  subroutine make(bodies, springs)
+    integer, intent(in) :: bodies(:)
+    type(springs_t), intent(inout) :: springs
+    integer :: i
+
+    call reserve_springs(size(bodies), springs)
+    springs%n = size(bodies)
+    do i = 1, springs%n
+      springs%a(i) = bodies(i)
+      springs%b(i) = 1
+      springs%key(i) = 2*bodies(i)
+      springs%xi(:, i) = 3.0_wp*bodies(i)
+      springs%k(i) = 4.0_wp*bodies(i)
+      springs%force(:, i) = 5.0_wp*bodies(i)
+      springs%torque_a(:, i) = 6.0_wp*bodies(i)
+      springs%torque_b(:, i) = 7.0_wp*bodies(i)
+      springs%energy(i) = 8.0_wp*bodies(i)
+    end do
+  end subroutine make
+
+  !> Whether a list is that of some bodies.
+  function is(springs, bodies) result(yes)
+    type(springs_t), intent(in) :: springs
+    integer, intent(in) :: bodies(:)
+    logical :: yes
+    type(springs_t) :: wanted
+    integer :: n
+
+    call make(bodies, wanted)
+    n = springs%n
+    yes = n == wanted%n
+    if (.not. yes) return
+    yes = all(springs%a(:n) == bodies) .and. all(springs%b(:n) == 1) &
+      .and. all(springs%key(:n) == wanted%key(:n)) &
+      .and. all(abs(springs%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
+      .and. all(abs(springs%k(:n) - wanted%k(:n)) <= 0.0_wp) &
+      .and. all(abs(springs%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
+      .and. all(abs(springs%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
+      .and. all(abs(springs%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
+      .and. all(abs(springs%energy(:n) - wanted%energy(:n)) <= 0.0_wp)
+  end function is
+
+  !> Chosen springs go to the other list, whole and in order.
+  subroutine check_moving()
+    type(springs_t) :: from, to
+
+    call make([2, 4, 5, 7, 9], from)
+    call make([3, 6], to)
+    call check('a pair begins', begins_pair(from, 1) .and. begins_pair(from, 2))
+    call move_springs([.false., .true., .false., .true., .true.], from, to)
+    call check('those left', is(from, [2, 5]))
+    call check('those joined', is(to, [3, 4, 6, 7, 9]))
+    call move_springs([.true., .true.], from, to)
+    call check('none left', from%n, 0)
+    call check('all joined', is(to, [2, 3, 4, 5, 6, 7, 9]))
+    from%a(2) = from%a(1)
+    from%n = 2
+    call check('one pair has two springs', .not. begins_pair(from, 2))
+  end subroutine check_moving
+
+  !> Touches that do not touch yet get a list of their own.
+  subroutine check_touches()
+    type(touches_t) :: touches, soon
+    integer :: i
+
+    do i = 1, 40
+      call add_touch(touch_t(a=i, b=-i, depth=merge(1.0_wp, -1.0_wp, modulo(i, 3) == 0)), touches)
+    end do
+    call set_apart(touches, soon)
+    call check('those that touch', all(touches%item(:touches%n)%a == [(3*i, i=1, 13)]))
+    call check('the others', soon%n, 27)
+    call check('in order', all(soon%item(2:soon%n)%a > soon%item(:soon%n - 1)%a))
+    call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
+  end subroutine check_touches
+
+  !> Touches of one key and partner have a mean normal and point, weighted by overlap.
+  subroutine check_groups()
+    type(touches_t) :: touches
+    type(groups_t) :: groups
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
+
+    call add_touch(touch_t(2, 1, 5, x, x - y, x, 2.0_wp, 1.0_wp), touches)
+    call add_touch(touch_t(2, 1, 6, x, x - y, x, 2.0_wp, 1.5_wp), touches)
+    call add_touch(touch_t(2, 1, 6, 3*y, 2*y, y, 8.0_wp, 0.5_wp), touches)
+    call add_touch(touch_t(3, 1, 6, y, y, x, 1.0_wp), touches)
+    call add_touch(touch_t(3, 1, 6, y, y, -x, 1.0_wp), touches)
+    call form_groups(touches, groups)
+    call check('keys and bodies', groups%n, 3)
+    call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
+    call check('one alone', groups%normal(:, 1), x, 0.0_wp)
+    call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
+    call check('mean point', groups%arm_a(:, 2), (3*x + 12*y)/7, 1.0e-15_wp)
+    call check('seen from b', groups%arm_b(:, 2), (3*x + 12*y)/7 - y, 1.0e-15_wp)
+    call check('opposite normals', groups%normal(:, 3), x, 0.0_wp)
+  end subroutine check_groups
+
+  !> Pairs met are noted once, sorted.
+  subroutine check_met()
+    type(met_t) :: met
+
+    call note_partners([3, 3, 4], [1, 1, -5], met)
+    call note_partners([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
+    call check('each pair once', met%n, 5)
+    call check('sorted', all(met%a(:5) == [2, 3, 3, 4, 5]))
+    call check('with their partners', all(met%b(:5) == [1, -1, 1, -5, 1]))
+  end subroutine check_met
+
+end program test_springs
