@@ -17,6 +17,7 @@ program mics
   use case_input_m, only: read_case, parameters_text
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
+  use case_oddities_m, only: find_oddities
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
@@ -116,7 +117,7 @@ contains
 
   !> The case with its shapes; every problem with them is reported at once.
   subroutine read_and_check()
-    type(problems_t) :: problems
+    type(problems_t) :: problems, oddities
     character(:), allocatable :: text
 
     call read_text(options%case_file, text, problems)
@@ -129,6 +130,8 @@ contains
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) return
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
+    call find_oddities(case, shapes, oddities)
+    call oddities%report(output_unit, '  warning: ')
     call finish()
   end subroutine read_and_check
 

@@ -150,6 +150,49 @@ def test_all_problems_at_once(tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 6
 
 
+ODD = {
+    "density": ("density = 2.3", "&shape density = 2.3: of cube is in kg/m3"),
+    "mm": ("size = 20", "&shape size = 20: cube is 20 m long; lengths are in m, not in mm"),
+    "coarse": ("size = 0.4", "&shape cube is 8 cells long; below 10"),
+    "gravity": ("gravity = 0, 0, 9.81", "&fluid gravity = 9.81: in z points up"),
+    "high level": ("water_level = 41", "&fluid water_level = 41: lies above the tank"),
+    "low level": ("water_level = -1", "&fluid water_level = -1: lies below the tank"),
+    "no water": ("velocity = 0, 0, 0", "&run physics = 'coupled': without any water"),
+    "prism": ("refinement = 1 kind = 'cylinder' size = 1, 1", "&shape refinement = 1: cuts cube"),
+}
+"""Allowed, but hardly meant: what to write in the case, and the warning."""
+
+
+def odd_case(text: str) -> str:
+    """A sound case of 40 m with `text` in the group it belongs to, in place of its own value."""
+    group = {"density": "shape", "size": "shape", "refinement": "shape"}.get(
+        text.split()[0], "fluid"
+    )
+    values = {
+        "shape": ["name = 'cube'", "kind = 'cube'", "size = 1", "density = 2300"],
+        "fluid": ["water_level = 20"],
+    }
+    if text.startswith("velocity"):
+        values["fluid"] = []
+    kept = [v for v in values[group] if v.split()[0] not in text]
+    values[group] = [*kept, text]
+    return (
+        "&run t_end = 1 /\n&grid cells = 800, 800, 800  length = 40, 40, 40 /\n"
+        f"&shape {' '.join(values['shape'])} /\n&fluid {' '.join(values['fluid'])} /\n"
+    )
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_values_are_warned_of(name: str, tmp_path: Path) -> None:
+    """--check warns of what is allowed but odd, of nothing else, and ends with 0."""
+    text, warning = ODD[name]
+    done = mics(["--check"], tmp_path, odd_case(text))
+    assert done.returncode == 0
+    assert f"  warning: {warning}" in done.stdout
+    sound = mics(["--check"], tmp_path, odd_case("water_level = 19"))
+    assert "warning" not in sound.stdout
+
+
 def test_geometry_is_checked_beside_other_problems(tmp_path: Path) -> None:
     """A typing error in one group does not hide a body outside the tank."""
     done = mics([], tmp_path, TANK + "&fluid colour = 1 /\n" + BODY + "-1, 0.1, 0.1 /")

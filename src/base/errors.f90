@@ -8,7 +8,7 @@ module errors_m
   use parallel_m, only: is_root, parallel_abort, parallel_pause
   implicit none
   private
-  public :: problems_t, fatal, to_text
+  public :: problems_t, fatal, to_text, brief
   public :: exit_ok, exit_input, exit_numerics, exit_files
 
   integer, parameter :: exit_ok = 0        !! the run reached its end
@@ -111,17 +111,38 @@ contains
   end function problems_message
 
   !> Write all problems to `unit`, one on a line; only the root process writes.
-  subroutine problems_report(self, unit)
+  subroutine problems_report(self, unit, before)
     class(problems_t), intent(in) :: self
     integer, intent(in) :: unit
+    character(*), intent(in), optional :: before   !! each of them, else the program's name
+    character(:), allocatable :: start
     integer :: i
 
     if (.not. is_root()) return
+    start = 'mics: '
+    if (present(before)) start = before
     do i = 1, self%n
-      write (unit, '(a)') 'mics: '//self%list(i)%text
+      write (unit, '(a)') start//self%list(i)%text
     end do
     flush (unit)
   end subroutine problems_report
+
+  !> A number rounded to some digits, for reading.
+  pure function brief(x, digits) result(text)
+    real(wp), intent(in) :: x
+    integer, intent(in), optional :: digits   !! 1 to 9, else 4
+    character(:), allocatable :: text
+    character(20) :: buffer, form
+    real(wp) :: rounded
+    integer :: n
+
+    n = 4
+    if (present(digits)) n = digits
+    write (form, '(a, i0, a)') '(es20.', n - 1, 'e3)'
+    write (buffer, form) x
+    read (buffer, *) rounded
+    text = to_text(rounded)
+  end function brief
 
   !> Say why on standard error and end every process with the exit code `code`.
   !!

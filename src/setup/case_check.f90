@@ -5,7 +5,7 @@
 !! left out, so these problems can be listed together with those.
 module case_check_m
   use kinds_m, only: wp
-  use errors_m, only: problems_t, to_text
+  use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm
   use case_types_m, only: case_t, drop_input_t
   use case_input_m, only: side_name
@@ -104,7 +104,7 @@ contains
                                               case%grid%cells > 1))
     if (case%run%dt <= limit) return
     call problems%add('&run dt', case%run%dt, 'unstable with surface tension, must be at most ' &
-      //brief(limit)//' s here; or cfl_max > 0 lets the step shrink', case%run%line)
+      //brief(limit, 3)//' s here; or cfl_max > 0 lets the step shrink', case%run%line)
   end subroutine check_capillary_step
 
   !> No shape in use is longer than half a period.
@@ -121,7 +121,7 @@ contains
       do d = 1, 3
         if (case%boundary%kind(1, d) /= 'periodic' .or. length <= 0.5_wp*case%grid%length(d)) cycle
         call problems%add_message('&shape name = '//quoted_text(trim(shapes(s)%name))//': ' &
-          //brief(length)//' m long, must not be more than half the period ' &
+          //brief(length, 3)//' m long, must not be more than half the period ' &
           //to_text(case%grid%length(d))//' m between '//side_name(1, d) &
           //' and '//side_name(2, d), &
           case%shape(s)%line)
@@ -241,7 +241,7 @@ contains
         deepest = depth
         s = 2 - mod(-scene%walls%number(w), 2)
         d = (1 - scene%walls%number(w))/2
-        text = 'reaches '//brief(depth)//' m through the wall '//side_name(s, d)
+        text = 'reaches '//brief(depth, 3)//' m through the wall '//side_name(s, d)
       end do
       if (len(text) > 0) return
       text = 'reaches more than 1 % of its size into the bed'
@@ -254,7 +254,7 @@ contains
           beyond = scene%blocks%x(d, b) - case%grid%origin(d)
           if (s == 2) beyond = case%grid%length(d) - beyond
           if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
-            text = 'its centre lies '//brief(-beyond)//' m beyond '//side_name(s, d)
+            text = 'its centre lies '//brief(-beyond, 3)//' m beyond '//side_name(s, d)
           end if
         case default   ! a wall has been looked at, a periodic side is none
         end select
@@ -278,7 +278,7 @@ contains
         n = n + 1
         if (n > most_reported) cycle
         call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b)) &
-          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth) &
+          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth, 3) &
           //' m; bodies must lie apart at the start', scene%line(b))
       end do
     end do
@@ -404,17 +404,5 @@ contains
 
     text = to_text(x(1))//', '//to_text(x(2))//', '//to_text(x(3))
   end function vector_text
-
-  !> A length with three digits.
-  pure function brief(x) result(text)
-    real(wp), intent(in) :: x
-    character(:), allocatable :: text
-    character(16) :: buffer
-    real(wp) :: rounded
-
-    write (buffer, '(es16.2e3)') x
-    read (buffer, *) rounded
-    text = to_text(rounded)
-  end function brief
 
 end module case_check_m

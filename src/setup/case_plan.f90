@@ -1,7 +1,7 @@
 !> What `--check` prints: what a run of this case will do, before anything is done.
 module case_plan_m
   use kinds_m, only: wp, i8
-  use errors_m, only: to_text
+  use errors_m, only: to_text, brief
   use case_types_m, only: case_t, is_given
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
@@ -21,6 +21,9 @@ module case_plan_m
   real(wp), parameter :: bytes_per_piece = 1000.0_wp   !! of a tetrahedron or a sphere [B]
   real(wp), parameter :: bytes_at_rest = 3.0e7_wp      !! program and libraries [B]
   integer, parameter :: halo = 3                       !! cells beside the domain, on each side
+
+  !> Time of one step on one core, as measured with a dozen blocks [s].
+  real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
 
 contains
 
@@ -223,6 +226,7 @@ contains
     call heading(unit, 'Time steps')
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
                //count_text(case%run%t_end/case%run%dt)//' steps')
+    call entry(unit, 'time of the run', 'about '//time_text(wet, case)//' or more on one core')
     h = minval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
     if (wet .and. maxval(case%grid%cells) > 1) then
       if (case%run%cfl_max > 0.0_wp) then
@@ -241,6 +245,27 @@ contains
     end if
     if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes)
   end subroutine print_steps
+
+  !> Time for the fewest steps that the run can take.
+  pure function time_text(wet, case) result(text)
+    logical, intent(in) :: wet
+    type(case_t), intent(in) :: case
+    character(:), allocatable :: text
+    real(wp) :: seconds
+    integer, parameter :: least_substeps = 100   !! a history step of a dry run
+
+    seconds = seconds_per_block*real(size(case%body) + sum(case%drop%count), wp)
+    if (.not. wet) seconds = 0.1_wp*least_substeps*seconds
+    if (wet) seconds = seconds + seconds_per_cell*product(real(case%grid%cells, wp))
+    seconds = seconds*case%run%t_end/case%run%dt
+    if (seconds < 100.0_wp) then
+      text = brief(seconds, 2)//' s'
+    else if (seconds < 6000.0_wp) then
+      text = brief(seconds/60.0_wp, 2)//' minutes'
+    else
+      text = brief(seconds/3600.0_wp, 2)//' hours'
+    end if
+  end function time_text
 
   !> Limits of the body steps, and how far the lightest shape gives way.
   subroutine print_body_steps(unit, case, shapes)
@@ -407,18 +432,6 @@ contains
     filled = text
     filled = adjustr(filled)
   end function right
-
-  !> A number with four digits.
-  pure function brief(x) result(text)
-    real(wp), intent(in) :: x
-    character(:), allocatable :: text
-    character(20) :: buffer
-    real(wp) :: rounded
-
-    write (buffer, '(es20.3e3)') x
-    read (buffer, *) rounded
-    text = to_text(rounded)
-  end function brief
 
   !> Three numbers.
   pure function triple(x, between) result(text)

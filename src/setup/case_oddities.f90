@@ -1,0 +1,95 @@
+!> What is allowed in a case but is hardly what its author meant: warnings of `--check`.
+module case_oddities_m
+  use kinds_m, only: wp
+  use errors_m, only: problems_t, to_text, brief
+  use case_types_m, only: case_t, shape_input_t, is_given
+  use tet_mesh_m, only: shape_t
+  implicit none
+  private
+  public :: find_oddities
+
+  real(wp), parameter :: least_density = 10.0_wp     !! of a block [kg/m3]
+  real(wp), parameter :: largest_block = 10.0_wp     !! [m]
+  real(wp), parameter :: least_cells = 10.0_wp       !! along a block
+  integer, parameter :: few_tets = 50                !! of a round shape
+  integer, parameter :: many_tets = 250000           !! of one shape
+
+contains
+
+  !> Collect everything odd about a checked case; nothing of it forbids a run.
+  subroutine find_oddities(case, shapes, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(problems_t), intent(inout) :: oddities
+    integer :: s
+
+    if (case%fluid%gravity(3) > 0.0_wp) call oddities%add('&fluid gravity', &
+      case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
+    if (case%run%physics /= 'dry') call look_at_water(case, oddities)
+    if (case%run%physics == 'fluid') return
+    do s = 1, size(shapes)
+      call look_at_shape(case, case%shape(s), shapes(s), oddities)
+    end do
+  end subroutine find_oddities
+
+  !> A level outside the tank, or no water at all.
+  subroutine look_at_water(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    real(wp) :: low, high
+    logical :: below
+
+    if (case%fluid%single_phase .or. len(case%fluid%initial_state) > 0) return
+    low = case%grid%origin(3)
+    high = low + case%grid%length(3)
+    below = .true.
+    if (is_given(case%fluid%water_level)) then
+      below = case%fluid%water_level <= low
+      if (case%fluid%water_level > high) call oddities%add('&fluid water_level', &
+        case%fluid%water_level, 'lies above the tank, which ends at '//to_text(high) &
+        //' m: there is no surface', case%fluid%line)
+      if (below) call oddities%add('&fluid water_level', case%fluid%water_level, &
+        'lies below the tank, which begins at '//to_text(low)//' m', case%fluid%line)
+    end if
+    if (below .and. size(case%water) == 0) call oddities%add('&run physics', &
+      trim(case%run%physics), 'without any water; give &fluid water_level or &water', case%run%line)
+  end subroutine look_at_water
+
+  !> A block too light, too large, too coarse in the grid or in its own tetrahedra.
+  subroutine look_at_shape(case, input, shape, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(in) :: shape
+    type(problems_t), intent(inout) :: oddities
+    character(:), allocatable :: name
+    real(wp) :: extent, cells
+
+    name = trim(input%name)
+    extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
+    if (input%density < least_density) call oddities%add('&shape density', input%density, &
+      'of '//name//' is in kg/m3; concrete has about 2300', input%line)
+    if (extent > largest_block) then
+      if (input%kind == 'file') then
+        call oddities%add('&shape scale', input%scale, name//' is '//brief(extent, 3) &
+          //' m long; scale = 0.001 makes m of mm', input%line)
+      else
+        call oddities%add('&shape size', input%size(1), name//' is '//brief(extent, 3) &
+          //' m long; lengths are in m, not in mm', input%line)
+      end if
+    end if
+    if (case%run%physics == 'coupled') then
+      cells = extent/maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
+      if (cells < least_cells) call oddities%add_message('&shape '//name//' is ' &
+        //brief(cells, 3)//' cells long; below '//to_text(nint(least_cells)) &
+        //' the water around it is coarse: more &grid cells', input%line)
+    end if
+    if (size(shape%tet, 2) > many_tets) call oddities%add_message('&shape '//name//' has ' &
+      //to_text(size(shape%tet, 2))//' tetrahedra; more than '//to_text(many_tets) &
+      //' make every step slow: simplify the drawing', input%line)
+    if (any(input%kind == [character(8) :: 'sphere', 'cylinder']) .and. &
+        size(shape%tet, 2) < few_tets) call oddities%add('&shape refinement', input%refinement, &
+      'cuts '//name//' into '//to_text(size(shape%tet, 2)) &
+      //' tetrahedra, more of a prism than round; a larger value cuts it more finely', input%line)
+  end subroutine look_at_shape
+
+end module case_oddities_m
