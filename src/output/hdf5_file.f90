@@ -11,14 +11,18 @@
 !! opens it.
 !!
 !! The files keep the oldest format and no locks, and columns without compression never move a chunk
-!! once it is there: a file that was flushed opens again whatever happens to the program.
+!! once it is there: a file that was flushed opens again whatever happens to the program. Whoever
+!! changes such a file asks for the room of it first (`make_room`). A file is left as it is on the
+!! disk, without the changes that HDF5 still keeps in memory, once HDF5 has failed to write to it.
 module hdf5_file_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc, c_char, c_null_char
   use hdf5, only: hid_t, hsize_t, size_t
   use hdf5, only: h5aclose_f, h5acreate_f, h5aexists_f, h5aget_type_f, h5aopen_by_name_f
   use hdf5, only: h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dget_space_f
   use hdf5, only: h5dopen_f, h5dread_f, h5dset_extent_f, h5dwrite_f, h5fclose_f, h5fcreate_f
-  use hdf5, only: h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f
+  use hdf5, only: h5dget_create_plist_f, h5pget_chunk_f, h5pget_nfilters_f
+  use hdf5, only: h5fflush_f, h5fget_filesize_f, h5fopen_f, h5gclose_f, h5gcreate_f
+  use hdf5, only: h5ldelete_f, h5lexists_f
   use hdf5, only: h5oclose_f, h5oopen_f, h5pclose_f, h5pcreate_f, h5pset_cache_f, h5pset_chunk_f
   use hdf5, only: h5pset_alloc_time_f, h5pset_deflate_f, h5pset_fclose_degree_f, h5pset_fill_time_f
   use hdf5, only: h5pset_fill_value_f, h5pset_shuffle_f, h5sclose_f, h5screate_f
@@ -36,8 +40,10 @@ module hdf5_file_m
   use kinds_m, only: wp, sp, i8
   use errors_m, only: fatal, exit_files
   use parallel_m, only: is_root, my_rank, set_file_access, set_collective, global_max, global_min
-  use parallel_m, only: share_trouble
+  use parallel_m, only: broadcast, share_trouble
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
+  use plain_file_m, only: cut_file, delete_file
+  use file_room_m, only: lengthen_file, shorten_file, room_for_chunks
   implicit none
   private
   public :: h5_file_t, h5_column_t
@@ -53,8 +59,11 @@ module hdf5_file_m
     integer(hid_t) :: id = -1
     integer :: rank = 0                            !! with the row index
     integer(hsize_t) :: extent(max_rank) = 1       !! of a row; extent(rank) is the number of rows
+    integer(hsize_t) :: chunk(max_rank) = 1        !! shape of the pieces that are stored
     integer :: kind = 0
     logical :: compressed = .false.
+  contains
+    procedure :: room_for
   end type h5_column_t
 
   type :: h5_file_t
@@ -62,6 +71,9 @@ module hdf5_file_m
     logical :: shared = .false.
     integer :: info = 0                    !! 0: no trouble so far
     character(:), allocatable :: message   !! file, dataset and reason of the first trouble
+    logical, private :: writing = .false.
+    logical, private :: complete = .false.   !! it was whole on the disk at least once
+    logical, private :: broken = .false.     !! HDF5 failed: what it has in memory is not to be used
     integer(hid_t), private :: id = -1
     integer(hid_t), private :: collective = -1   !! transfer list of blocks of cells
   contains
@@ -69,6 +81,7 @@ module hdf5_file_m
     procedure :: open => file_open
     procedure :: close => file_close
     procedure :: flush => file_flush
+    procedure :: make_room, last_integer
     procedure :: group => file_group
     procedure :: has => file_has
     procedure :: shape_of
@@ -104,6 +117,7 @@ contains
 
     if (status >= 0 .or. self%info /= 0) return
     self%info = 1
+    self%broken = .true.
     self%message = self%path//': cannot '//what//': '//hdf5_reason()
   end subroutine check
 
@@ -117,9 +131,13 @@ contains
     logical :: trouble, answered
 
     if (.not. self%shared) return
+    if (self%info /= 0 .and. .not. self%broken) return   ! all have been told why
     trouble = self%info /= 0
     call share_trouble(patience, trouble, answered)
-    if (.not. answered) call fatal(exit_files, self%message)
+    if (.not. answered) then
+      call leave(self)
+      call fatal(exit_files, self%message)
+    end if
     if (trouble) call share_message(self)
   end subroutine agree
 
@@ -141,6 +159,7 @@ contains
     end if
     call global_max(letter)
     self%info = 1
+    self%broken = .true.
     self%message = repeat(' ', count(letter > 0.0_wp))
     do i = 1, len(self%message)
       self%message(i:i) = char(nint(letter(i)))
@@ -156,6 +175,7 @@ contains
     integer :: status
 
     call begin_file(self, path, shared, access)
+    self%writing = .true.
     if (self%info /= 0) return
     call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, status, access_prp=access)
     call self%check(status, 'create the file')
@@ -173,6 +193,8 @@ contains
     integer :: status
 
     call begin_file(self, path, shared, access)
+    self%writing = writing
+    self%complete = .true.
     if (self%info /= 0) return
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)
     call self%check(status, 'open the file')
@@ -191,6 +213,8 @@ contains
     self%path = path
     self%shared = shared
     self%info = 0
+    self%complete = .false.
+    self%broken = .false.
     self%id = -1
     access = -1
     call hdf5_start(status)
@@ -214,15 +238,50 @@ contains
   !> Write everything out and close the file, its datasets with it; done even after trouble.
   subroutine file_close(self)
     class(h5_file_t), intent(inout) :: self
+    integer(i8) :: used
     integer :: status
 
     if (self%id < 0) return
-    call h5pclose_f(self%collective, status)
-    call h5fclose_f(self%id, status)
-    call self%check(status, 'close the file')
+    if (self%writing) call self%flush()
+    if (self%writing .and. (self%broken .or. .not. self%complete)) then
+      call leave(self)
+    else
+      used = length_of(self)
+      call h5pclose_f(self%collective, status)
+      call h5fclose_f(self%id, status)
+      call self%check(status, 'close the file')
+      if (self%writing .and. .not. self%shared) call shorten_file(self%path, used)
+    end if
     self%id = -1
     call self%agree()
   end subroutine file_close
+
+  !> Bytes of a file that are in use. Of a shared file HDF5 does not tell; it cuts it to that length
+  !! when it flushes.
+  function length_of(self) result(bytes)
+    class(h5_file_t), intent(inout) :: self
+    integer(i8) :: bytes
+    integer(hsize_t) :: used
+    integer :: status
+
+    if (self%shared) then
+      inquire (file=self%path, size=bytes)
+    else
+      call h5fget_filesize_f(self%id, used, status)
+      call self%check(status, 'tell the size of the file')
+      bytes = int(used, i8)
+    end if
+  end function length_of
+
+  !> Leave a file that could not be written: to close it would write half of what is in memory.
+  !! One that was never complete is deleted; it gives its room back at once.
+  subroutine leave(self)
+    class(h5_file_t), intent(in) :: self
+
+    if (self%complete) return
+    call cut_file(self%path, 0_i8)
+    call delete_file(self%path)
+  end subroutine leave
 
   !> Hand everything written so far to the operating system.
   subroutine file_flush(self)
@@ -233,7 +292,40 @@ contains
     call h5fflush_f(self%id, H5F_SCOPE_LOCAL_F, status)
     call self%check(status, 'write')
     call self%agree()
+    if (self%info == 0) self%complete = .true.
   end subroutine file_flush
+
+  !> See to it that the next changes of a file that was just flushed find this much room at its end.
+  !! Without room nothing more is written to it but by `last_integer`.
+  subroutine make_room(self, bytes)
+    class(h5_file_t), intent(inout) :: self
+    integer(i8), intent(in) :: bytes
+    character(:), allocatable :: trouble
+
+    if (self%info /= 0) return
+    trouble = ''
+    if (is_root() .or. .not. self%shared) call lengthen_file(self%path, length_of(self) + bytes, &
+      trouble)
+    if (self%shared) call broadcast(trouble)
+    if (len(trouble) == 0) return
+    self%info = 1
+    self%message = trouble
+  end subroutine make_room
+
+  !> Overwrite an attribute that is there, also when there is no room for anything else.
+  subroutine last_integer(self, object, name, value)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: object, name
+    integer, intent(in) :: value
+    integer :: before
+
+    if (self%broken .or. self%id < 0) return
+    before = self%info
+    self%info = 0
+    call self%attribute(object, name, value)
+    call self%flush()
+    if (before /= 0) self%info = before
+  end subroutine last_integer
 
   !> Create a group; the group around it must exist.
   subroutine file_group(self, name)
@@ -798,6 +890,7 @@ contains
     chunk(:size(row)) = int(max(1, row), hsize_t)
     chunk(column%rank) = int(chunk_rows, hsize_t)
     if (present(chunk_layers)) chunk(size(row)) = int(min(chunk_layers, row(size(row))), hsize_t)
+    column%chunk(:column%rank) = chunk
     call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
     call self%check(status, 'create '//name)
     call h5pset_chunk_f(list, column%rank, chunk, status)
@@ -849,7 +942,8 @@ contains
     character(*), intent(in) :: name
     integer, intent(in) :: kind
     type(h5_column_t), intent(out) :: column
-    integer :: status
+    integer(hid_t) :: list
+    integer :: status, filters
 
     if (self%info /= 0) return
     column%name = name
@@ -858,7 +952,40 @@ contains
     call self%check(status, 'open '//name)
     if (self%info /= 0) return
     call get_extent(self, name, column%id, column%rank, column%extent)
+    call h5dget_create_plist_f(column%id, list, status)
+    call self%check(status, 'open '//name)
+    if (self%info /= 0) return
+    call h5pget_chunk_f(list, column%rank, column%chunk(:column%rank), status)
+    call self%check(status, 'open '//name)
+    call h5pget_nfilters_f(list, filters, status)
+    call self%check(status, 'open '//name)
+    column%compressed = filters > 0
+    call h5pclose_f(list, status)
   end subroutine open_column
+
+  !> Most that `n` more rows take at the end of the file [bytes].
+  pure function room_for(column, n) result(bytes)
+    class(h5_column_t), intent(in) :: column
+    integer, intent(in) :: n   !! rows
+    integer(i8) :: bytes
+    integer(i8) :: layers, before, after
+
+    bytes = 0
+    if (column%rank == 0) return   ! of a file in trouble
+    associate (r => column%rank, extent => int(column%extent, i8), chunk => int(column%chunk, i8))
+      layers = product((extent(:r - 1) + chunk(:r - 1) - 1)/chunk(:r - 1))
+      before = layers*((extent(r) + chunk(r) - 1)/chunk(r))
+      after = layers*((extent(r) + n + chunk(r) - 1)/chunk(r))
+      bytes = room_for_chunks(product(chunk(:r))*bytes_of(column%kind), column%compressed, before, &
+        after - before, r)
+    end associate
+  end function room_for
+
+  pure integer function bytes_of(kind)
+    integer, intent(in) :: kind   !! file_real64, ...
+
+    bytes_of = merge(8, 4, kind == file_real64 .or. kind == file_integer64)
+  end function bytes_of
 
   !> Shape of a dataset.
   subroutine get_extent(self, name, id, rank, extent)

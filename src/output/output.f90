@@ -1,11 +1,11 @@
 !> Everything a run writes: opened once, written when due, closed with the last state in place.
 !!
-!! After trouble `code` is not `exit_ok` and `message` says why; the caller then ends with `fatal`.
-!! In a parallel run trouble with a file of the root process is known to the root process only.
+!! After trouble `code` is not `exit_ok`, on all processes, and `message` says why, on the root
+!! process at least; the caller then closes the output and ends with `fatal`.
 module output_m
   use kinds_m, only: wp, i8
   use errors_m, only: exit_ok, exit_files
-  use parallel_m, only: broadcast
+  use parallel_m, only: broadcast, is_root
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
   use case_types_m, only: case_t
@@ -18,6 +18,7 @@ module output_m
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: prepare_folder, continue_folder, folder_of
+  use plain_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, row_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
   use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, write_field_frame
@@ -87,6 +88,7 @@ contains
       if (output%code == exit_ok) call create_files(grid, blocks, bed, output)
     end if
     call look_for_trouble(output)
+    if (output%code /= exit_ok) call close_files(output)
     call progress_start(options%quiet, fluid, clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
@@ -102,7 +104,29 @@ contains
     if (output%fields) call create_field_file(output%folder//field_name, grid, output%field_file)
     if (output%surfaces) call create_block_file(output%folder//block_name, blocks, &
       output%block_file)
+    call look_for_trouble(output)
+    if (output%code /= exit_ok) call remove_files(output)
   end subroutine create_files
+
+  !> A run that cannot begin leaves no files that would look like results.
+  subroutine remove_files(output)
+    type(output_t), intent(inout) :: output
+
+    call close_files(output)
+    if (.not. is_root()) return
+    call delete_file(output%folder//run_name)
+    call delete_file(output%folder//field_name)
+    call delete_file(output%folder//block_name)
+  end subroutine remove_files
+
+  !> Close all files as they are.
+  subroutine close_files(output)
+    type(output_t), intent(inout) :: output
+
+    call output%run_file%file%close()
+    call output%field_file%file%close()
+    call output%block_file%file%close()
+  end subroutine close_files
 
   !> Open the files of the run that goes on.
   subroutine continue_files(options, grid, clock, blocks, output)
@@ -159,13 +183,14 @@ contains
     end if
   end subroutine continue_surfaces
 
-  !> Keep the first trouble of any of the files.
+  !> Keep the first trouble of any of the files; all processes call.
   subroutine look_for_trouble(output)
     type(output_t), intent(inout) :: output
 
     call look_at(output%run_file%file)
     call look_at(output%field_file%file)
     call look_at(output%block_file%file)
+    call broadcast(output%code)   ! the root process alone knows about its own files
 
   contains
 
@@ -310,8 +335,7 @@ contains
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
     call close_run_file(output%run_file, code)
-    call output%field_file%file%close()
-    call output%block_file%file%close()
+    call close_files(output)
     call look_for_trouble(output)
     call write_summary(output%progress, clock, product(int(grid%n, i8)), code, &
                        output%folder)

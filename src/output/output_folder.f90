@@ -3,13 +3,14 @@
 !! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not
 !! empty is refused. Only the root process looks and acts; the outcome is told to all.
 module output_folder_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_char, c_ptr, c_null_char, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
+  use plain_file_m, only: plain_file_t, delete_file
   implicit none
   private
-  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file, delete_file
+  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
 
   character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
     'blocks.vtkhdf']
@@ -37,12 +38,6 @@ module output_folder_m
       implicit none
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
-
-    integer(c_int) function c_unlink(path) bind(c, name='unlink')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_unlink
 
     type(c_ptr) function c_opendir(path) bind(c, name='opendir')
       import :: c_ptr, c_char
@@ -245,42 +240,31 @@ contains
     message = from//': cannot rename it to '//to//': '//refused
   end subroutine rename_file
 
-  !> Delete a file if it is there.
-  subroutine delete_file(path)
-    character(*), intent(in) :: path
-
-    if (c_unlink(path//c_null_char) /= 0) return   ! it was not there, or nothing can be done
-  end subroutine delete_file
-
-  !> Copy a file.
+  !> Copy a file; a copy that cannot be completed is deleted.
   subroutine copy_file(from, to, code, message)
     character(*), intent(in) :: from, to
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
-    integer, parameter :: chunk = 2**20
-    character(chunk) :: buffer
-    character(256) :: reason
-    integer :: source, target, info, n
-    integer(c_long) :: left, length
+    integer, parameter :: piece = 2**20
+    character(:), allocatable :: bytes
+    type(plain_file_t) :: source, target
+    integer :: n
 
-    open (newunit=source, file=from, access='stream', status='old', action='read', iostat=info, &
-      iomsg=reason)
-    if (info == 0) then
-      inquire (unit=source, size=length)
-      open (newunit=target, file=to, access='stream', status='replace', iostat=info, iomsg=reason)
-      left = length
-      do while (left > 0 .and. info == 0)
-        n = int(min(left, int(chunk, c_long)))
-        read (source, iostat=info, iomsg=reason) buffer(:n)
-        if (info == 0) write (target, iostat=info, iomsg=reason) buffer(:n)
-        left = left - n
-      end do
-      if (info == 0) close (target, iostat=info, iomsg=reason)
-      if (info == 0) close (source, iostat=info, iomsg=reason)
-    end if
-    if (info == 0) return
+    allocate (character(piece) :: bytes)
+    call source%open(from, 'r')
+    call target%open(to, 'w')
+    do
+      call source%read(bytes, n)
+      if (n == 0 .or. target%info /= 0) exit
+      call target%write(bytes(:n))
+    end do
+    call source%close()
+    call target%close()
+    if (source%info == 0 .and. target%info == 0) return
     code = exit_files
-    message = from//': cannot copy it to '//to//': '//trim(reason)
+    message = source%message
+    if (source%info == 0) message = target%message
+    call delete_file(to)
   end subroutine copy_file
 
 end module output_folder_m

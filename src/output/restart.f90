@@ -16,7 +16,7 @@
 !! The volume flux through a face is open*area*uf + solid_flux.
 module restart_m
   use kinds_m, only: wp
-  use parallel_m, only: is_root, broadcast, halo_exchange
+  use parallel_m, only: is_root, nproc, broadcast, halo_exchange
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
@@ -25,9 +25,11 @@ module restart_m
   use contacts_m, only: contacts_t
   use clock_m, only: clock_t, clock_resume
   use hdf5_file_m, only: h5_file_t
-  use output_folder_m, only: rename_file, delete_file
+  use output_folder_m, only: rename_file
+  use plain_file_m, only: delete_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
-  use state_visitors_m, only: checksum_visitor_t
+  use state_visitors_m, only: checksum_visitor_t, size_visitor_t
+  use file_room_m, only: room_for_change
   implicit none
   private
   public :: write_restart, read_restart
@@ -68,12 +70,17 @@ contains
     character(:), allocatable, intent(out) :: message
     type(writer_t) :: writer
     type(checksum_visitor_t) :: checksum
+    type(size_visitor_t) :: needed
     character(*), parameter :: unfinished = '.part'
     integer :: g
 
     call visit_state(checksum, grid, clock, flow, solid, blocks, contacts)
     associate (file => writer%file)
       call file%create(path//unfinished, .true.)
+      if (nproc() > 1) then   ! one in trouble alone could not tell the others
+        call visit_state(needed, grid, clock, flow, solid, blocks, contacts)
+        call file%make_room(needed%bytes + len(text) + len(parameters) + room_for_change)
+      end if
       call file%attribute('/', 'format', format_name)
       call file%attribute('/', 'format_version', format_version)
       call file%attribute('/', 'version', version)

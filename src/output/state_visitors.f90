@@ -1,4 +1,5 @@
-!> What can be done with a state besides storing it: a checksum, a search for NaN, a comparison.
+!> What can be done with a state besides storing it: a checksum, its size, a search for NaN, a
+!! comparison.
 module state_visitors_m
   use, intrinsic :: iso_fortran_env, only: int32
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -10,7 +11,7 @@ module state_visitors_m
   use state_m, only: state_visitor_t, owned_part, pack_part
   implicit none
   private
-  public :: checksum_visitor_t, finite_visitor_t, image_visitor_t
+  public :: checksum_visitor_t, size_visitor_t, finite_visitor_t, image_visitor_t
   public :: checksum_of_cells
 
   !> Checksum of the whole state, the same on any number of processes.
@@ -21,6 +22,16 @@ module state_visitors_m
     procedure :: reals => checksum_reals
     procedure :: integers => checksum_integers
   end type checksum_visitor_t
+
+  !> Counts the bytes that the whole state takes in a file, at most.
+  type, extends(state_visitor_t) :: size_visitor_t
+    integer(i8) :: bytes = 0
+  contains
+    procedure :: cells => size_of_cells
+    procedure :: reals => size_of_reals
+    procedure :: integers => size_of_integers
+    procedure, private :: add => add_size
+  end type size_visitor_t
 
   !> Looks for the first number that is infinite or none at all.
   type, extends(state_visitor_t) :: finite_visitor_t
@@ -129,6 +140,48 @@ contains
     call self%sum%add_text(name)
     call self%sum%add_integers(size(a), a)
   end subroutine checksum_integers
+
+  subroutine size_of_cells(self, name, units, grid, faces, m, a)
+    class(size_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    type(grid_t), intent(in) :: grid
+    logical, intent(in) :: faces
+    integer, intent(in) :: m
+    real(wp), intent(inout) :: a(grid%first(1):grid%last(1), &
+                                 grid%first(2):grid%last(2), &
+                                 grid%first(3):grid%last(3), m)
+
+    call self%add(name//units, m*product(int(grid%n + merge(1, 0, faces), i8)), storage_size(a))
+  end subroutine size_of_cells
+
+  subroutine size_of_reals(self, name, units, extent, a)
+    class(size_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: extent(:)
+    real(wp), intent(inout) :: a(product(extent))
+
+    call self%add(name//units, size(a, kind=i8), storage_size(a))
+  end subroutine size_of_reals
+
+  subroutine size_of_integers(self, name, extent, a)
+    class(size_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: extent(:)
+    integer, intent(inout) :: a(product(extent))
+
+    call self%add(name, size(a, kind=i8), storage_size(a))
+  end subroutine size_of_integers
+
+  !> One more item.
+  subroutine add_size(self, words, elements, bits)
+    class(size_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: words       !! stored with it
+    integer(i8), intent(in) :: elements
+    integer, intent(in) :: bits             !! of an element
+    integer, parameter :: header = 1024     !! what HDF5 keeps about an item, generously [bytes]
+
+    self%bytes = self%bytes + header + len(words) + elements*(bits/8)
+  end subroutine add_size
 
   subroutine finite_cells(self, name, units, grid, faces, m, a)
     class(finite_visitor_t), intent(inout) :: self

@@ -11,8 +11,10 @@ module write_run_m
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_t
+  use errors_m, only: exit_files
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_integer32
+  use file_room_m, only: room_for_change
   use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
   implicit none
   private
@@ -220,6 +222,7 @@ contains
         call file%open_column('/series/'//trim(column_name(c)), file_real64, self%series(c))
       end do
       call file%count_rows(self%time, clock%n_rows, clock%t, self%rows, self%up_to_date)
+      call file%make_room(room_for_change + 2*(len(text) + len(parameters)))
       call resize_all(self)
       wall_time = 0.0_wp
       q = 0.0_wp
@@ -269,7 +272,9 @@ contains
     if (self%rows /= rows_before) then
       self%rows = rows_before
       call resize_all(self)
+      call self%file%flush()
     end if
+    call self%file%make_room(room_for_row(self))
     call follow_sign(blocks%q, self%q)
     values = row_values(row)
     associate (file => self%file, n => 3*blocks%n)
@@ -296,6 +301,22 @@ contains
     self%rows = self%rows + 1
   end subroutine write_row
 
+  !> Most that another row takes at the end of the file [bytes].
+  pure function room_for_row(self) result(bytes)
+    type(run_file_t), intent(in) :: self
+    integer(i8) :: bytes
+    integer :: c
+
+    bytes = room_for_change + self%time%room_for(1) + self%quaternion%room_for(1) &
+      + self%contacts%room_for(1) + self%on_floor%room_for(1)
+    do c = 1, n_vectors
+      bytes = bytes + self%vector(c)%room_for(1)
+    end do
+    do c = 1, n_columns
+      bytes = bytes + self%series(c)%room_for(1)
+    end do
+  end function room_for_row
+
   !> Of the two quaternions of each attitude take the one nearer to that of the row before.
   pure subroutine follow_sign(q, followed)
     real(wp), intent(in) :: q(:, :)            !! (4, n)
@@ -320,13 +341,15 @@ contains
       name(i) = timer_name(i)
     end do
     associate (file => self%file)
+      call file%make_room(4*room_for_change)
       if (file%has('/timers')) call file%remove('/timers')
       call file%group('/timers')
       call file%store('/timers/name', '1', name)
       call file%store('/timers/seconds', 's', [(timer_seconds(i), i=1, timer_count())])
       call file%store('/timers/calls', '1', [(timer_calls(i), i=1, timer_count())])
       call file%attribute('/provenance', 'finished', time_now())
-      call file%attribute('/provenance', 'exit_status', exit_status)
+      call file%last_integer('/provenance', 'exit_status', merge(exit_status, exit_files, &
+        file%info == 0))
       call file%close()
     end associate
   end subroutine close_run_file

@@ -16,6 +16,7 @@ module write_vtkhdf_m
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real32, file_real64, file_integer32, &
     file_integer64
+  use file_room_m, only: room_for_change
   implicit none
   private
   public :: field_file_t, create_field_file, reopen_field_file, write_field_frame
@@ -190,6 +191,7 @@ contains
       self%frames = frames_before
       call drop_field_frames(self)
     end if
+    call self%file%make_room(room_for_field_frame(self))
     n = product(grid%hi - grid%lo + 1)
     associate (file => self%file, first => grid%lo, extent => grid%hi - grid%lo + 1, &
       values => self%values)
@@ -209,6 +211,21 @@ contains
       call count_frames(file, self%frames)
     end associate
   end subroutine write_field_frame
+
+  !> Most that another frame takes at the end of the file [bytes].
+  pure function room_for_field_frame(self) result(bytes)
+    type(field_file_t), intent(in) :: self
+    integer(i8) :: bytes
+    integer :: s
+
+    bytes = room_for_change + self%velocity%room_for(1) + self%time%room_for(1)
+    do s = 1, n_scalars
+      bytes = bytes + self%scalar(s)%room_for(1)
+    end do
+    do s = 1, n_scalars + 1
+      bytes = bytes + self%offset(s)%room_for(1)
+    end do
+  end function room_for_field_frame
 
   !> Share of liquid in the fluid of each cell; in cells without fluid the extended share.
   pure subroutine liquid_share(grid, liquid, room, c, values)
@@ -470,6 +487,7 @@ contains
       self%frames = frames_before
       call drop_block_frames(self)
     end if
+    call self%file%make_room(room_for_block_frame(self))
     allocate (x(3, self%n_points), v(3, self%n_points))
     m = 0
     do b = 1, blocks%n
@@ -502,5 +520,18 @@ contains
       call count_frames(file, self%frames)
     end associate
   end subroutine write_block_frame
+
+  !> Most that another frame takes at the end of the file [bytes].
+  pure function room_for_block_frame(self) result(bytes)
+    type(block_file_t), intent(in) :: self
+    integer(i8) :: bytes
+
+    bytes = room_for_change + self%points%room_for(self%n_points) &
+      + self%velocity%room_for(self%n_points) + self%released%room_for(self%n_cells) &
+      + self%time%room_for(1) + self%fixed_offset%room_for(1) + self%released_offset%room_for(1) &
+      + self%part_offset%room_for(1) + self%parts%room_for(1) + self%point_offset%room_for(1) &
+      + self%cell_offset%room_for(1) + self%connectivity_offset%room_for(1) &
+      + self%body_offset%room_for(1) + self%velocity_offset%room_for(1)
+  end function room_for_block_frame
 
 end module write_vtkhdf_m

@@ -5,6 +5,7 @@ program test_hdf5_file
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, my_rank, broadcast
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_real32, file_integer32
+  use file_room_m, only: room_for_change
   use check_m, only: check, finish_checks
   implicit none
   character(*), parameter :: path = 'test_hdf5_file.h5'
@@ -16,6 +17,8 @@ program test_hdf5_file
   call test_read_while_open()
   call test_shared_blocks()
   call test_go_on_together()
+  call test_room()
+  call test_no_room()
   call test_trouble()
   call remove(path)
   call finish_checks()
@@ -254,6 +257,72 @@ contains
     call check('the new row stands in it', x, real(a, wp), 0.0_wp)
     call file%close()
   end subroutine test_go_on_together
+
+  !> No row takes more than it has asked for, compressed or not, however large the index grows.
+  subroutine test_room()
+    type(h5_file_t) :: file
+    type(h5_column_t) :: time, field, place
+    integer, parameter :: rows = 2500, n = 96
+    integer(i8) :: before, after, room
+    real(sp) :: noise(n)
+    integer :: i, row, too_large
+    logical :: grew
+
+    if (.not. is_root()) return
+    call file%create(path, .false.)
+    call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
+    call file%new_column('/field', 'm', file_real32, [3, n/3], 1, field, chunk_layers=9)
+    call file%new_column('/place', 'm', file_real64, [3, 400], 8, place)
+    call file%flush()
+    too_large = 0
+    grew = .false.
+    inquire (file=path, size=before)
+    do row = 1, rows
+      room = room_for_change + time%room_for(1) + field%room_for(1) + place%room_for(1)
+      noise = [(real(mod(sin(real(row*n + i, wp))*43758.5453_wp, 1.0_wp), sp), i=1, n)]
+      call file%append(time, [1.0_wp*row])
+      call file%append_block(field, [1, 1], [3, n/3], noise)
+      call file%append(place, [(1.0_wp*i, i=1, 1200)])
+      call file%flush()
+      inquire (file=path, size=after)
+      if (after > before + room) too_large = too_large + 1
+      grew = grew .or. after > before + 50000
+      before = after
+    end do
+    call file%close()
+    call check_file('many rows are written', file)
+    call check('rows that take more room than they asked for', too_large, 0)
+    call check('some rows take much room', grew)
+  end subroutine test_room
+
+  !> Without room nothing is written but the last word, and the file stays whole.
+  subroutine test_no_room()
+    type(h5_file_t) :: file
+    type(h5_column_t) :: time
+    character(*), parameter :: no_room = 'no/such/folder/run.h5'   !! nothing can grow there
+    real(wp) :: x(2)
+    integer :: n
+
+    if (.not. is_root()) return
+    call file%create(path, .false.)
+    call file%attribute('/', 'exit_status', -1)
+    call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
+    call file%append_rows(time, 2, [1.0_wp, 2.0_wp])
+    call file%flush()
+    file%path = no_room
+    call file%make_room(1000_i8)
+    call check('no room is trouble', file%info /= 0)
+    call check('and named', index(file%message, no_room//': cannot') == 1)
+    call file%append(time, [3.0_wp])
+    call file%last_integer('/', 'exit_status', 4)
+    call file%close()
+    call file%open(path, .false., .false.)
+    call file%read('/time', x)
+    call file%read_attribute('/', 'exit_status', n)
+    call file%close()
+    call check_file('the file stays whole', file)
+    call check('the last word is in it', n, 4)
+  end subroutine test_no_room
 
   subroutine test_trouble()
     type(h5_file_t) :: file

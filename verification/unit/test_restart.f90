@@ -1,18 +1,20 @@
 !> Restart files: the state comes back bit by bit, damage and a changed case are noticed.
 ! ranks: 2 3
 program test_restart
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use parallel_m, only: parallel_init, parallel_final, is_root, broadcast
   use hdf5_file_m, only: h5_file_t
   use restart_m, only: write_restart, read_restart
   use state_m, only: visit_state
-  use state_visitors_m, only: image_visitor_t
+  use state_visitors_m, only: image_visitor_t, size_visitor_t
+  use file_room_m, only: room_for_change
   use sample_state_m, only: sample_t, make_sample
   use check_m, only: check, finish_checks
   implicit none
   character(*), parameter :: path = 'test-restart-a.h5'
 
   call parallel_init()
+  call test_size()
   call test_comes_back(.false.)
   call test_comes_back(.true.)
   call test_dry()
@@ -24,6 +26,24 @@ program test_restart
   call parallel_final()
 
 contains
+
+  !> The room asked for before a restart file is written is enough, and not much too large.
+  subroutine test_size()
+    type(sample_t) :: s
+    type(size_visitor_t) :: needed
+    character(:), allocatable :: message
+    integer(i8) :: there, room
+    integer :: info
+
+    call make_sample(0.5_wp, .false., s)
+    call write_sample(s, info, message)
+    call visit_state(needed, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    if (.not. is_root()) return
+    room = needed%bytes + len(s%case%text) + len(s%parameters) + room_for_change
+    inquire (file=path, size=there)
+    call check('a restart file fits into the room asked for', there <= room)
+    call check('the room is not much too large', room <= 2*there)
+  end subroutine test_size
 
   subroutine remove(name)
     character(*), intent(in) :: name

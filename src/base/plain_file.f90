@@ -1,0 +1,242 @@
+!> Files of bytes as the C library gives them: Fortran's own units do not tell that a disk is full.
+!!
+!! The first trouble sets `info` and a `message` that names the file and the reason; from then on
+!! every procedure of that file returns at once.
+module plain_file_m
+  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_long, &
+    c_null_char, c_null_ptr, c_ptr, c_size_t, c_associated
+  use kinds_m, only: i8
+  implicit none
+  private
+  public :: plain_file_t, cut_file, delete_file, lock_taken, lock_refused, lock_unknown
+
+  integer, parameter :: lock_taken = 0, lock_refused = 1
+  integer, parameter :: lock_unknown = 2   !! the file system keeps no locks
+
+  type :: plain_file_t
+    character(:), allocatable :: path
+    integer :: info = 0                    !! 0: no trouble so far
+    character(:), allocatable :: message   !! file and reason of the first trouble
+    type(c_ptr), private :: stream = c_null_ptr
+  contains
+    procedure :: open => file_open
+    procedure :: close => file_close
+    procedure :: write => file_write
+    procedure :: rewrite => file_rewrite
+    procedure :: read => file_read
+    procedure :: lock => file_lock
+    procedure, private :: check
+  end type plain_file_t
+
+  interface
+    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
+      import :: c_char, c_ptr
+      implicit none
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+    end function c_fopen
+
+    integer(c_size_t) function c_fread(buffer, size, count, stream) bind(c, name='fread')
+      import :: c_char, c_ptr, c_size_t
+      implicit none
+      type(c_ptr), value :: buffer
+      integer(c_size_t), value :: size, count
+      type(c_ptr), value :: stream
+    end function c_fread
+
+    integer(c_size_t) function c_fwrite(buffer, size, count, stream) bind(c, name='fwrite')
+      import :: c_char, c_ptr, c_size_t
+      implicit none
+      character(kind=c_char), intent(in) :: buffer(*)
+      integer(c_size_t), value :: size, count
+      type(c_ptr), value :: stream
+    end function c_fwrite
+
+    integer(c_int) function c_ferror(stream) bind(c, name='ferror')
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+    end function c_ferror
+
+    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+    end function c_fflush
+
+    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+    end function c_fclose
+
+    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+    end function c_fileno
+
+    integer(c_int) function c_flock(fd, operation) bind(c, name='flock')
+      import :: c_int
+      implicit none
+      integer(c_int), value :: fd, operation
+    end function c_flock
+
+    integer(c_int) function c_ftruncate(fd, length) bind(c, name='ftruncate')
+      import :: c_int, c_long
+      implicit none
+      integer(c_int), value :: fd
+      integer(c_long), value :: length   ! off_t
+    end function c_ftruncate
+
+    integer(c_int) function c_unlink(path) bind(c, name='unlink')
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+    end function c_unlink
+
+    integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
+      import :: c_char, c_int, c_long
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_long), value :: length   ! off_t
+    end function c_truncate
+
+    !> The number of the last error, C's `errno`, which is a macro.
+    integer(c_int) function c_errno() bind(c, name='_gfortran_ierrno_i4')
+      import :: c_int
+      implicit none
+    end function c_errno
+
+    type(c_ptr) function c_strerror(number) bind(c, name='strerror')
+      import :: c_int, c_ptr
+      implicit none
+      integer(c_int), value :: number
+    end function c_strerror
+
+    integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
+      import :: c_ptr, c_size_t
+      implicit none
+      type(c_ptr), value :: text
+    end function c_strlen
+  end interface
+
+contains
+
+  !> Note trouble with `what`, if there is any, in the words of the system.
+  subroutine check(self, well, what)
+    class(plain_file_t), intent(inout) :: self
+    logical, intent(in) :: well
+    character(*), intent(in) :: what   !! like 'write'
+    integer(c_int) :: number
+
+    if (well .or. self%info /= 0) return
+    number = c_errno()
+    self%info = 1
+    self%message = self%path//': cannot '//what//': '//reason_of(number)
+  end subroutine check
+
+  !> What the system says of an error number.
+  function reason_of(number) result(reason)
+    integer(c_int), intent(in) :: number
+    character(:), allocatable :: reason
+    character(kind=c_char), pointer :: letter(:)
+    type(c_ptr) :: text
+    integer :: i, n
+
+    text = c_strerror(number)
+    n = int(c_strlen(text))
+    call c_f_pointer(text, letter, [n])
+    allocate (character(n) :: reason)
+    do i = 1, n
+      reason(i:i) = letter(i)
+    end do
+  end function reason_of
+
+  !> Open a file; `mode` as in C: 'r' to read, 'w' to write anew, 'a' to write at the end.
+  subroutine file_open(self, path, mode)
+    class(plain_file_t), intent(inout) :: self
+    character(*), intent(in) :: path, mode
+
+    self%path = path
+    self%info = 0
+    self%message = ''
+    self%stream = c_fopen(path//c_null_char, mode//c_null_char)
+    call self%check(c_associated(self%stream), 'open the file')
+  end subroutine file_open
+
+  !> Close the file; done even after trouble. A lock ends with it.
+  subroutine file_close(self)
+    class(plain_file_t), intent(inout) :: self
+
+    if (.not. c_associated(self%stream)) return
+    call self%check(c_fclose(self%stream) == 0, 'close the file')
+    self%stream = c_null_ptr
+  end subroutine file_close
+
+  !> Write bytes and hand them to the system at once.
+  subroutine file_write(self, bytes)
+    class(plain_file_t), intent(inout) :: self
+    character(*), intent(in) :: bytes
+    integer(c_size_t) :: n
+
+    if (self%info /= 0) return
+    n = len(bytes, kind=c_size_t)
+    call self%check(c_fwrite(bytes, 1_c_size_t, n, self%stream) == n, 'write')
+    if (self%info == 0) call self%check(c_fflush(self%stream) == 0, 'write')
+  end subroutine file_write
+
+  !> Replace all that the file holds.
+  subroutine file_rewrite(self, bytes)
+    class(plain_file_t), intent(inout) :: self
+    character(*), intent(in) :: bytes
+
+    if (self%info /= 0) return
+    call self%check(c_ftruncate(c_fileno(self%stream), 0_c_long) == 0, 'write')
+    call self%write(bytes)
+  end subroutine file_rewrite
+
+  !> Read the next bytes, at most as many as `bytes` holds.
+  subroutine file_read(self, bytes, n)
+    class(plain_file_t), intent(inout) :: self
+    character(:), allocatable, target, intent(inout) :: bytes
+    integer, intent(out) :: n   !! how many there were; 0 at the end of the file
+
+    n = 0
+    if (self%info /= 0) return
+    n = int(c_fread(c_loc(bytes), 1_c_size_t, len(bytes, kind=c_size_t), self%stream))
+    call self%check(c_ferror(self%stream) == 0, 'read')
+  end subroutine file_read
+
+  !> Try to take a lock on the open file; it ends when the file is closed or the program ends.
+  subroutine file_lock(self, alone, outcome)
+    class(plain_file_t), intent(inout) :: self
+    logical, intent(in) :: alone      !! nobody else may have a lock; otherwise many may
+    integer, intent(out) :: outcome   !! lock_taken, lock_refused or lock_unknown
+    integer(c_int), parameter :: shared = 1, exclusive = 2, at_once = 4
+    integer(c_int), parameter :: would_wait(2) = [11, 35]   ! as Linux and as BSD number it
+    integer(c_int) :: number
+
+    outcome = lock_unknown
+    if (self%info /= 0) return
+    outcome = lock_taken
+    if (c_flock(c_fileno(self%stream), merge(exclusive, shared, alone) + at_once) == 0) return
+    number = c_errno()
+    outcome = merge(lock_refused, lock_unknown, any(number == would_wait))
+  end subroutine file_lock
+
+  !> Make a file shorter, if that is possible.
+  subroutine cut_file(path, length)
+    character(*), intent(in) :: path
+    integer(i8), intent(in) :: length   !! [bytes]
+
+    if (c_truncate(path//c_null_char, int(length, c_long)) /= 0) return   ! it stays as it is
+  end subroutine cut_file
+
+  !> Delete a file if it is there.
+  subroutine delete_file(path)
+    character(*), intent(in) :: path
+
+    if (c_unlink(path//c_null_char) /= 0) return   ! it was not there, or nothing can be done
+  end subroutine delete_file
+
+end module plain_file_m

@@ -1,0 +1,28 @@
+"""A few trials of the long fault tests in soak/, which `make test` has time for."""
+
+from pathlib import Path
+
+import pytest
+
+from run_cases import ROOT, Machine
+from soak import full_disk
+
+MICS = ROOT / "mics"
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+@pytest.fixture(scope="module")
+def disk_shop(tmp_path_factory: pytest.TempPathFactory) -> full_disk.Workshop:
+    return full_disk.open_shop(Machine(MICS, 1, 1), tmp_path_factory.mktemp("disk"))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.3, 0.5, 0.65, 0.75])
+@pytest.mark.parametrize("kind", ["disk", "limit"])
+def test_full_disk(disk_shop: full_disk.Workshop, kind: str, share: float, tmp_path: Path) -> None:
+    """What was written before stays readable, and the run goes on once there is room."""
+    if kind == "disk" and not full_disk.may_mount():
+        pytest.skip("no right to mount a small disk")
+    size = int(share * disk_shop.largest(kind))
+    said, found = full_disk.check_size(disk_shop, kind, size, tmp_path)
+    assert found == [], said
+    assert said.startswith("exit 4")
