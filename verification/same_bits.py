@@ -2,7 +2,8 @@
 
 usage: python verification/same_bits.py RUN RUN
 
-Left out is only what names the machine or the clock: /provenance, /timers and wall_time.
+Left out is only what names the machine or the clock: /provenance, /timers and wall_time, and the
+lock that a killed run leaves behind.
 """
 
 import argparse
@@ -11,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+LOCK = "run.lock"
 LEFT_OUT = ("provenance", "timers", "series/wall_time")
 
 
@@ -33,7 +35,7 @@ def contents(path: Path) -> dict[str, np.ndarray]:
 
 def differences(a: Path, b: Path) -> list[str]:
     """What differs between two result folders, one line per file or dataset."""
-    files = [{p.name for p in folder.iterdir() if p.is_file()} for folder in (a, b)]
+    files = [{p.name for p in folder.iterdir() if p.is_file()} - {LOCK} for folder in (a, b)]
     found = [f"{name}: only in one folder" for name in sorted(files[0] ^ files[1])]
     for name in sorted(files[0] & files[1]):
         if name.endswith((".h5", ".vtkhdf")):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import full_disk
+from soak import full_disk, two_programs
 
 MICS = ROOT / "mics"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -26,3 +26,22 @@ def test_full_disk(disk_shop: full_disk.Workshop, kind: str, share: float, tmp_p
     said, found = full_disk.check_size(disk_shop, kind, size, tmp_path)
     assert found == [], said
     assert said.startswith("exit 4")
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> two_programs.Workshop:
+    return two_programs.open_shop(MICS, tmp_path_factory.mktemp("programs"))
+
+
+@pytest.mark.parametrize("start", two_programs.STARTS)
+def test_two_programs(shop: two_programs.Workshop, start: str, tmp_path: Path) -> None:
+    """Of three programs that start at once, one gets the folder and the others say who has it."""
+    assert two_programs.trial(shop, start, 3, tmp_path / "run") == []
+
+
+def test_late_comers(shop: two_programs.Workshop, tmp_path: Path) -> None:
+    assert two_programs.late_comer(shop, tmp_path / "run") == []
+
+
+def test_lock_of_a_killed_run(shop: two_programs.Workshop, tmp_path: Path) -> None:
+    assert two_programs.killed(shop, tmp_path / "run") == []

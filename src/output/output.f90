@@ -18,6 +18,7 @@ module output_m
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: prepare_folder, continue_folder, folder_of
+  use folder_lock_m, only: folder_lock_t
   use plain_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, row_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
@@ -50,6 +51,7 @@ module output_m
     type(run_file_t), private :: run_file
     type(field_file_t), private :: field_file
     type(block_file_t), private :: block_file
+    type(folder_lock_t), private :: lock     !! of the folder; the root process has it
     type(progress_t), private :: progress
   end type output_t
 
@@ -84,11 +86,14 @@ contains
     else
       output%folder = case%run%output
       if (len(options%output) > 0) output%folder = options%output
-      call prepare_folder(output%folder, output%code, output%message)
+      call prepare_folder(output%folder, output%lock, output%code, output%message)
       if (output%code == exit_ok) call create_files(grid, blocks, bed, output)
     end if
     call look_for_trouble(output)
-    if (output%code /= exit_ok) call close_files(output)
+    if (output%code /= exit_ok) then
+      call close_files(output)
+      call output%lock%release()
+    end if
     call progress_start(options%quiet, fluid, clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
@@ -137,8 +142,8 @@ contains
     type(output_t), intent(inout) :: output
     integer :: up_to_date(2)
 
-    call continue_folder(options%restart, options%output, output%folder, output%code, &
-      output%message)
+    call continue_folder(options%restart, options%output, output%lock, output%folder, &
+      output%code, output%message)
     if (output%code /= exit_ok) return
     call reopen_run_file(output%folder//run_name, output%text, output%parameters, clock, blocks, &
       output%run_file)
@@ -336,6 +341,7 @@ contains
     code = merge(exit_code, output%code, output%code == exit_ok)
     call close_run_file(output%run_file, code)
     call close_files(output)
+    call output%lock%release()
     call look_for_trouble(output)
     call write_summary(output%progress, clock, product(int(grid%n, i8)), code, &
                        output%folder)

@@ -1,13 +1,15 @@
 !> The folder of the results: made or found fit, never at the cost of older results.
 !!
 !! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not
-!! empty is refused. Only the root process looks and acts; the outcome is told to all.
+!! empty is refused, and so is one in which another program is at work. Only the root process looks
+!! and acts; the outcome is told to all.
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
   use plain_file_m, only: plain_file_t, delete_file
+  use folder_lock_m, only: folder_lock_t, lock_name, look_at_folder
   implicit none
   private
   public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
@@ -83,23 +85,53 @@ contains
   end subroutine check_folder
 
   !> Make an empty folder for a new run; the results of an older run are renamed away first.
-  subroutine prepare_folder(path, code, message)
+  subroutine prepare_folder(path, lock, code, message)
     character(*), intent(in) :: path
+    type(folder_lock_t), intent(inout) :: lock             !! of the root process, if all went well
     integer, intent(out) :: code                           !! exit_ok, exit_input or exit_files
     character(:), allocatable, intent(out) :: message      !! of trouble
 
     call check_folder(path, code, message)
     if (code /= exit_ok) return
-    if (is_root()) then
-      if (exists(trimmed(path)//'/run.h5')) call keep_old_results(trimmed(path), code, message)
-      if (code == exit_ok) call make_folder(trimmed(path), code, message)
-    end if
+    if (is_root()) call take_folder(trimmed(path), lock, code, message)
     call tell_all(code, message)
   end subroutine prepare_folder
 
-  !> Rename a folder to the first free DIR.bak-N.
-  subroutine keep_old_results(path, code, message)
+  !> Lock the folder and rename it away while it holds older results. The lock moves with it, and is
+  !! kept until the new folder has one, so that of many programs that start here one goes on.
+  subroutine take_folder(path, lock, code, message)
     character(*), intent(in) :: path
+    type(folder_lock_t), intent(inout) :: lock
+    integer, intent(out) :: code
+    character(:), allocatable, intent(out) :: message
+    type(folder_lock_t) :: old
+    integer, parameter :: tries = 100
+    logical :: gone, used
+    integer :: i
+
+    do i = 1, tries
+      code = exit_ok
+      message = ''
+      call make_folder(path, code, message)
+      if (code == exit_ok) call lock%take(path, code, message)
+      call old%release()
+      gone = .not. exists(path)
+      used = exists(path//'/run.h5')
+      if (code == exit_files .and. gone) cycle   ! another program has just renamed it
+      if (code /= exit_ok .or. .not. used) return
+      call keep_old_results(path, lock, code, message)
+      if (code /= exit_ok) then
+        call lock%release()
+        return
+      end if
+      old = lock
+    end do
+  end subroutine take_folder
+
+  !> Rename a folder to the first free DIR.bak-N.
+  subroutine keep_old_results(path, lock, code, message)
+    character(*), intent(in) :: path
+    type(folder_lock_t), intent(inout) :: lock             !! of this folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
     integer :: n
@@ -109,9 +141,12 @@ contains
       n = n + 1
     end do
     call rename_file(path, path//'.bak-'//to_text(n), code, message)
-    if (code /= 0) code = exit_files
-    if (code == 0) write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as ' &
-      //path//'.bak-'//to_text(n)
+    if (code /= 0) then
+      code = exit_files
+      return
+    end if
+    lock%folder = path//'.bak-'//to_text(n)
+    write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as '//lock%folder
   end subroutine keep_old_results
 
   !> Make a folder and those around it, as far as they are missing.
@@ -128,6 +163,7 @@ contains
       end if
       if (exists(path(:at))) cycle
       if (c_mkdir(path(:at)//c_null_char, int(all_may, c_int)) == 0) cycle
+      if (exists(path(:at))) cycle   ! another program was quicker
       message = path//': cannot make the folder: '//refused
       code = exit_files
       return
@@ -136,30 +172,49 @@ contains
 
   !> Where a run that goes on from `restart` writes: the folder of that file, or, if `output` is not
   !! empty, a new folder with copies of its results.
-  subroutine continue_folder(restart, output, path, code, message)
+  subroutine continue_folder(restart, output, lock, path, code, message)
     character(*), intent(in) :: restart, output
+    type(folder_lock_t), intent(inout) :: lock             !! of the root process, if all went well
     character(:), allocatable, intent(out) :: path         !! of the folder
     integer, intent(out) :: code
     character(:), allocatable, intent(out) :: message
-    integer :: i
+    character(:), allocatable :: from
 
     code = exit_ok
     message = ''
-    path = folder_of(restart)
-    if (len(output) == 0 .or. trimmed(output) == path) return
-    call prepare_folder(output, code, message)
-    if (code /= exit_ok) return
-    if (is_root()) then
-      do i = 1, size(result_file)
-        if (.not. exists(path//'/'//trim(result_file(i)))) cycle
-        call copy_file(path//'/'//trim(result_file(i)), trimmed(output)//'/' &
-          //trim(result_file(i)), code, message)
-        if (code /= exit_ok) exit
-      end do
+    from = folder_of(restart)
+    path = from
+    if (len(output) > 0) path = trimmed(output)
+    if (path == from) then
+      if (is_root()) call lock%take(path, code, message)
+    else
+      if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
+      call tell_all(code, message)
+      if (code == exit_ok) call prepare_folder(output, lock, code, message)
+      if (code == exit_ok .and. is_root()) call copy_results(from, path, lock, code, message)
     end if
     call tell_all(code, message)
-    path = trimmed(output)
   end subroutine continue_folder
+
+  !> Copy the result files of a run to a new folder, all or none.
+  subroutine copy_results(from, to, lock, code, message)
+    character(*), intent(in) :: from, to
+    type(folder_lock_t), intent(inout) :: lock             !! of the new folder
+    integer, intent(inout) :: code
+    character(:), allocatable, intent(inout) :: message
+    integer :: i
+
+    do i = 1, size(result_file)
+      if (.not. exists(from//'/'//trim(result_file(i)))) cycle
+      call copy_file(from//'/'//trim(result_file(i)), to//'/'//trim(result_file(i)), code, message)
+      if (code /= exit_ok) exit
+    end do
+    if (code == exit_ok) return
+    do i = 1, size(result_file)
+      call delete_file(to//'/'//trim(result_file(i)))
+    end do
+    call lock%release()
+  end subroutine copy_results
 
   !> The root process tells code and message.
   subroutine tell_all(code, message)
@@ -208,9 +263,11 @@ contains
 
     yes = exists(path//'/run.h5')
     if (.not. yes) yes = is_empty(path)
+    if (.not. yes) yes = exists(path//'/run.h5')   ! a run may just have begun there
   end function is_free
 
-  !> Does a folder hold nothing but itself and its parent? One that cannot be read counts as full.
+  !> Does a folder hold nothing but itself, its parent and a lock? One that cannot be read counts as
+  !! full.
   function is_empty(path) result(yes)
     character(*), intent(in) :: path
     logical :: yes
@@ -224,7 +281,7 @@ contains
     do while (c_associated(c_readdir(folder)))
       n = n + 1
     end do
-    yes = n <= 2
+    yes = n <= merge(3, 2, exists(path//lock_name))
     if (c_closedir(folder) /= 0) yes = .false.
   end function is_empty
 

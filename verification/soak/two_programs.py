@@ -1,0 +1,185 @@
+"""Two programs and one result folder: exactly one of them goes on.
+
+usage: python verification/soak/two_programs.py [N] [--program ./mics]
+
+N times, two to four runs are started at the same instant into one folder: a new one, an empty one,
+one with older results, or one to be continued from its restart file, in place or by a copy. One
+must run to its end with the bits of an undisturbed run, the others must end with code 2 and name
+the folder and the process that has it; older results stay.
+"""
+
+import argparse
+import random
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "verification"))
+
+from same_bits import LOCK, differences  # noqa: E402
+
+CASE = """! About a second, so that nobody ends before the last has begun.
+&run
+  title = 'two programs'
+  t_end = 0.08  dt = 5.0e-3
+  field_interval = 0.02  restart_interval = 0.04
+/
+&grid cells = 24, 16, 32  length = 0.15, 0.1, 0.2 /
+&fluid water_level = 0.0913 /
+&shape name = 'cube'  kind = 'cube'  size = 0.04 /
+&body shape = 'cube'  position = 0.1, 0.05, 0.1  velocity = 0.1, 0.0, -0.6 /
+"""
+STARTS = ("new", "empty", "used", "in place", "copy into used")
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """What all trials have in common."""
+
+    program: Path
+    case: Path
+    whole: Path  # results of the undisturbed run
+
+    def start(self, *options: str) -> subprocess.Popen[str]:
+        """Start a quiet run on one thread."""
+        return subprocess.Popen(
+            [str(self.program), "--quiet", "--threads", "1", *options, str(self.case)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+
+def options_of(start: str, shop: Workshop, folder: Path) -> list[str]:
+    """Make the folder what it has to be; what the program is then told."""
+    if start == "empty":
+        folder.mkdir()
+    if start in ("used", "in place", "copy into used"):
+        shutil.copytree(shop.whole, folder)
+    if start == "in place":
+        return ["--restart", str(folder / "restart-a.h5")]
+    if start == "copy into used":
+        return ["--restart", str(shop.whole / "restart-a.h5"), "--output", str(folder)]
+    return ["--output", str(folder)]
+
+
+def wrong_loser(code: int, said: str, folder: Path, others: set[int]) -> str:
+    """What is wrong with the end of a program that did not get the folder; empty if nothing."""
+    found = re.search(r"in use by pid (\d+) on (\S+);", said)
+    if code != 2 or not found or str(folder) not in said:
+        return f"exit code {code}: {said.strip()}"
+    if int(found[1]) not in others or found[2] != socket.gethostname():
+        return f"names the wrong process: {said.strip()}"
+    return ""
+
+
+def trial(shop: Workshop, start: str, programs: int, folder: Path) -> list[str]:
+    """All that does not hold when so many programs start at once."""
+    options = options_of(start, shop, folder)
+    runs = [shop.start(*options) for _ in range(programs)]
+    ends = {run.pid: (run.communicate(timeout=300)[1], run.returncode) for run in runs}
+    winners = [pid for pid, (_, code) in ends.items() if code == 0]
+    found = [] if len(winners) == 1 else [f"{len(winners)} programs ran to their end"]
+    for pid, (said, code) in ends.items():
+        wrong = "" if code == 0 else wrong_loser(code, said, folder, ends.keys() - {pid})
+        found += [wrong] if wrong else []
+    found += [line for line in differences(shop.whole, folder) if not line.startswith("restart-")]
+    older = folder.with_name(f"{folder.name}.bak-1")
+    if older.exists() != (start in ("used", "copy into used")):
+        found.append(f"{older.name} is {'' if older.exists() else 'not '}there")
+    if older.exists():
+        found += [f"{older.name}: {line}" for line in differences(shop.whole, older)]
+    return found
+
+
+def late_comer(shop: Workshop, folder: Path) -> list[str]:
+    """Programs that come when the first has rows: all are refused, results can be read."""
+    first = shop.start("--output", str(folder))
+    while not (folder / "run.h5").exists() and first.poll() is None:
+        time.sleep(0.001)
+    found = []
+    for options in (
+        ["--output", str(folder)],
+        ["--restart", str(shop.whole / "restart-a.h5"), "--output", str(folder)],
+    ):
+        late = shop.start(*options)
+        said = late.communicate(timeout=300)[1]
+        wrong = wrong_loser(late.returncode, said, folder, {first.pid})
+        found += [wrong] if wrong else []
+    first.communicate(timeout=300)
+    found += [] if first.returncode == 0 else [f"the first: exit code {first.returncode}"]
+    return found + differences(shop.whole, folder)
+
+
+def killed(shop: Workshop, folder: Path) -> list[str]:
+    """A killed run leaves its lock file, which holds nobody up."""
+    first = shop.start("--output", str(folder))
+    while not (folder / "restart-a.h5").exists() and first.poll() is None:
+        time.sleep(0.001)
+    first.kill()
+    first.communicate(timeout=300)
+    found = [] if (folder / LOCK).exists() else [f"no {LOCK} to test with"]
+    again = shop.start("--restart", str(folder / "restart-a.h5"))
+    said = again.communicate(timeout=300)[1]
+    found += [] if again.returncode == 0 else [f"after a kill: {said.strip()}"]
+    found += [f"{LOCK} is left over"] if (folder / LOCK).exists() else []
+    return found + [d for d in differences(shop.whole, folder) if not d.startswith("restart-")]
+
+
+def open_shop(program: Path, work: Path) -> Workshop:
+    """Make the undisturbed run."""
+    case = work / "case.nml"
+    case.write_text(CASE)
+    shop = Workshop(program, case, work / "whole")
+    first = shop.start("--output", str(shop.whole))
+    said = first.communicate(timeout=300)[1]
+    if first.returncode != 0:
+        raise RuntimeError(f"the undisturbed run fails: {said}")
+    return shop
+
+
+def soak(n: int, program: Path, work: Path, seed: int) -> int:
+    """Number of trials in which something does not hold."""
+    shop = open_shop(program, work)
+    draw, failed = random.Random(seed), 0
+    for i in range(n):
+        start = (*STARTS, "late", "killed")[i % (len(STARTS) + 2)]
+        programs = draw.choice((2, 2, 3, 4))
+        folder = work / f"trial-{i}" / "run"
+        folder.parent.mkdir()
+        if start == "late":
+            found = late_comer(shop, folder)
+        elif start == "killed":
+            found = killed(shop, folder)
+        else:
+            found = trial(shop, start, programs, folder)
+        print(f"{i:4d} {start:15} {programs} {'FAILS' if found else 'holds'}", flush=True)
+        print("".join(f"    {line}\n" for line in found), end="", flush=True)
+        failed += bool(found)
+        shutil.rmtree(folder.parent)
+    print(f"{failed} of {n} trials fail")
+    return failed
+
+
+def main() -> None:
+    """Print a line per trial; the exit code says whether any failed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("n", type=int, nargs="?", default=50, help="trials")
+    parser.add_argument("--program", type=Path, default=ROOT / "mics")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        program = options.program.resolve()
+        raise SystemExit(int(soak(options.n, program, Path(folder), options.seed) > 0))
+
+
+if __name__ == "__main__":
+    main()
