@@ -1,5 +1,10 @@
 # make            ./mics, one process        make MPI=1     ./mics_mpi, many processes
 # make DEBUG=1    the same with all checks   make help      all targets
+# As many jobs run at once as there are cores; make -j1 runs one after the other.
+ifeq ($(MAKELEVEL),0)
+MAKEFLAGS += -j$(shell getconf _NPROCESSORS_ONLN)
+endif
+
 VERSION := 0.1.0
 
 FC_SERIAL := h5fc
@@ -24,14 +29,19 @@ flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT) $(LTO))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
-unit_sources := $(wildcard verification/unit/*.f90 verification/drivers/*.f90)
-units := $(patsubst verification/unit/%.f90,$(B)/%,$(wildcard verification/unit/test_*.f90))
-units += $(patsubst verification/drivers/%.f90,$(B)/%,$(wildcard verification/drivers/*.f90))
+unit_sources := $(wildcard verification/unit/*.f90)
+unit_objects := $(patsubst verification/unit/%.f90,$(B)/%.o,$(unit_sources))
+tests := $(wildcard verification/unit/test_*.f90)
+drivers := $(wildcard verification/drivers/*.f90)
+unit_sources += $(drivers)
+program = $(patsubst %.f90,$(B)/%,$(notdir $(1)))
+# What verification/test_units.py and the cases run of this variant.
+run_here := $(if $(MPI),$(shell grep -l '^! ranks:' $(tests)),$(tests) $(if $(DEBUG),,$(drivers)))
 vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units deps run test verify mutate bench-contact lint clean help FORCE
+.PHONY: all units everything deps run test verify mutate bench-contact lint clean help FORCE
 
 all: $(binary)
 
@@ -55,10 +65,25 @@ $(binary): $$(OBJECTS_mics)
 	$(if $(OBJECTS_mics),,$(error src/mics.f90, the main program, is missing))
 	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
 
-units: $(units)
+units: $(call program,$(run_here))
 
-$(units): $(B)/%: $$(OBJECTS_$$*)
+# Every variant that `make test` runs, side by side.
+variants := serial-variant mpi-variant debug-variant
+.PHONY: $(variants)
+everything: $(variants)
+serial-variant:
+	@$(MAKE) --no-print-directory all units
+mpi-variant:
+	@$(MAKE) --no-print-directory MPI=1 all units
+debug-variant:
+	@$(MAKE) --no-print-directory DEBUG=1 all units
+
+$(call program,$(tests) $(drivers)): $(B)/%: $$(OBJECTS_$$*)
 	$(call say,LD $@)$(compiler) $(flags) -fno-lto -o $@ $^
+
+# The tests themselves need no speed, what they test does.
+$(unit_objects): $(B)/%.o: %.f90 $(B)/settings
+	$(call say,FC $@)$(compiler) $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),-O0) -J$(B) -c -o $@ $<
 
 $(B)/%.o: %.f90 $(B)/settings
 	$(call say,FC $@)$(compiler) $(flags) -J$(B) -c -o $@ $<
@@ -85,7 +110,8 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
 	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
 
-ifneq ($(filter-out deps lint clean help run test verify mutate bench-contact,$(or $(MAKECMDGOALS),all)),)
+no_build := deps lint clean help run test verify mutate bench-contact everything $(variants)
+ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 endif
 
@@ -99,7 +125,7 @@ run: deps
 	$(PYTHON) tools/plot_history.py $(CASE)
 
 test: deps
-	@verification/run_tests
+	+@verification/run_tests
 
 verify: deps
 	@$(MAKE) --no-print-directory
