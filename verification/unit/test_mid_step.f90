@@ -3,7 +3,7 @@
 program test_mid_step
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use mid_step_m, only: to_mid_step, from_mid_step
+  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, from_mid_step
   use mixture_m, only: mix_fluid
   use momentum_conservative_m, only: mass_through
   use solid_geometry_m, only: solid_geometry_t
@@ -21,7 +21,8 @@ program test_mid_step
   type(one_body_t) :: box
   type(solid_geometry_t) :: later
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                      1 - n_halo:cells(3) + n_halo, 3) :: before, work, given
+                      1 - n_halo:cells(3) + n_halo, 3) :: before
+  type(mid_step_t) :: mid_step
   real(wp) :: half(3), momentum(3)
   integer :: i, j, k, seed
 
@@ -45,7 +46,8 @@ program test_mid_step
     later%alpha(7, 2, 2) = 0.6_wp
     before = flow%u
     half = 0.5_wp*dt*(fluid%gravity - rise/fluid%liquid_density)
-    call to_mid_step(grid, fluid, box%solid, later, dt, flow, work, given)
+    call mid_step_init(grid, mid_step)
+    call to_mid_step(grid, fluid, box%solid, later, dt, flow, mid_step)
     call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
     call check('a cell of which less than half is solid, too', &
                box%solid%alpha(5, 3, 3) > 0.0_wp .and. box%solid%alpha(5, 3, 3) < 0.5_wp &
@@ -60,7 +62,7 @@ program test_mid_step
     flow%liquid(7, 3, 2) = flow%room(7, 3, 2)
     momentum = mass_through(fluid, flow%room(7, 3, 2), flow%liquid(7, 3, 2))*flow%u(7, 3, 2, :) &
                - fluid%liquid_density*grid%volume*half
-    call from_mid_step(grid, fluid, given, flow)
+    call from_mid_step(grid, fluid, mid_step, flow)
     call check('the momentum comes back, whatever the mass', &
                maxval(abs(0.8_wp*fluid%liquid_density*grid%volume*flow%u(7, 3, 2, :) - momentum)), &
                0.0_wp, 1.0e-13_wp)
