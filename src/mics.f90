@@ -45,25 +45,21 @@ program mics
   call simulation_init(case, shapes, bed, sim)
   if (len(options%restart) > 0) call go_on()
 
-  call open_output(case, parameters(), options, sim%wet, sim%grid, sim%clock, &
-                   sim%blocks, bed, output)
+  call open_output(case, parameters(), options, sim%run_state_t, bed, output)
   call stop_on_trouble()
-  call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
-                        report, output)
+  call write_due_output(sim%run_state_t, report, output)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
     call find_fault(sim, report, fault)
     signal = any_signal()
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
-    call write_due_output(sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
-                          report, output)
+    call write_due_output(sim%run_state_t, report, output)
   end do
   if (fault%code == exit_ok .and. sim%clock%finished()) call find_final_fault(sim, fault)
 
   code = fault%code
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
-  call close_output(code, sim%grid, sim%clock, sim%flow, sim%solid, sim%blocks, sim%contacts, &
-                    report, output)
+  call close_output(code, sim%run_state_t, report, output)
   call stop_on_trouble()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
   if (code /= exit_ok) call fatal(code, 'stopped by a signal; the run goes on with'//new_line('a') &
@@ -140,9 +136,7 @@ contains
     character(:), allocatable :: message
     integer :: info
 
-    call read_restart(options%restart, parameters(), sim%grid, sim%clock, sim%flow, &
-                      sim%solid, &
-                      sim%blocks, sim%contacts, info, message)
+    call read_restart(options%restart, parameters(), sim%run_state_t, info, message)
     if (info /= 0) call fatal(merge(exit_input, exit_files, info == 2), message)
     call resume(sim)
   end subroutine go_on

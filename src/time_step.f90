@@ -36,7 +36,8 @@ module time_step_m
   use buoyancy_m, only: displaced_force
   use added_mass_m, only: know_added_mass
   use coupling_m, only: advance_velocity, note_start
-  use clock_m, only: clock_t, clock_init
+  use clock_m, only: clock_init
+  use run_state_m, only: run_state_t
   use surface_tension_m, only: capillary_step
   use parallel_m, only: global_max
   use timers_m, only: timer, tic, toc
@@ -49,25 +50,19 @@ module time_step_m
   integer, parameter :: max_parts = 100        !! of the transport of one step
 
   !> Everything that lives as long as the run.
-  type :: simulation_t
+  type, extends(run_state_t) :: simulation_t
     type(case_t) :: case
-    type(grid_t) :: grid
-    type(flow_t) :: flow
-    type(solid_geometry_t), allocatable :: solid     !! solids at the present time
     type(solid_geometry_t), allocatable :: before    !! solids at the start of the step
     type(solid_fraction_t) :: fraction
     type(liquid_transport_t) :: transport
     type(momentum_t) :: momentum
     type(mid_step_t) :: mid_step
     type(stage_t) :: stage
-    type(blocks_t) :: blocks
     type(walls_t) :: walls
-    type(contacts_t) :: contacts
     type(overlap_t) :: overlap
     logical :: wet = .true.                !! there is a fluid
     logical, allocatable :: felt(:)        !! blocks that have felt the fluid
     logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
-    type(clock_t) :: clock
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
   end type simulation_t
 

@@ -7,7 +7,7 @@ module diagnostics_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t, kinetic_energy, potential_energy
-  use clock_m, only: clock_t
+  use run_state_m, only: run_state_t
   implicit none
   private
   public :: step_report_t, row_t, make_row, row_values, column_name, column_units, n_columns
@@ -63,28 +63,24 @@ module diagnostics_m
 contains
 
   !> The row of this moment. Without fluid its columns are NaN. All processes call.
-  subroutine make_row(gravity, clock, wall_time, grid, flow, solid, blocks, report, row)
+  subroutine make_row(gravity, wall_time, state, report, row)
     real(wp), intent(in) :: gravity(3)            !! [m/s2]
-    type(clock_t), intent(in) :: clock
     real(wp), intent(in) :: wall_time             !! [s]
-    type(grid_t), intent(in) :: grid
-    type(flow_t), intent(in) :: flow              !! not allocated in a dry run
-    type(solid_geometry_t), intent(in) :: solid   !! likewise
-    type(blocks_t), intent(in) :: blocks
+    type(run_state_t), intent(in) :: state
     type(step_report_t), intent(in) :: report
     type(row_t), intent(out) :: row
 
-    row%time = clock%t
-    row%dt = clock%dt
+    row%time = state%clock%t
+    row%dt = state%clock%dt
     row%wall_time = wall_time
-    call add_fluid(grid, flow, solid, report, row)
-    row%kinetic_energy_bodies = kinetic_energy(blocks)
-    row%potential_energy_bodies = potential_energy(gravity, blocks)
+    call add_fluid(state%grid, state%flow, state%solid, report, row)
+    row%kinetic_energy_bodies = kinetic_energy(state%blocks)
+    row%potential_energy_bodies = potential_energy(gravity, state%blocks)
     row%contact_energy = report%contact_energy
     row%max_overlap = report%max_overlap
     row%contact_courant_max = report%contact_courant_max
     row%substeps = real(report%substeps, wp)
-    row%sleeping = real(count(blocks%asleep), wp)
+    row%sleeping = real(count(state%blocks%asleep), wp)
   end subroutine make_row
 
   !> The columns of the fluid.

@@ -9,13 +9,8 @@ module output_m
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
   use case_types_m, only: case_t
-  use grid_m, only: grid_t
-  use fields_m, only: flow_t
-  use solid_geometry_m, only: solid_geometry_t
-  use rigid_body_m, only: blocks_t
   use bed_m, only: bed_t
-  use contacts_m, only: contacts_t
-  use clock_m, only: clock_t
+  use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: prepare_folder, continue_folder, folder_of
   use folder_lock_m, only: folder_lock_t
@@ -58,14 +53,11 @@ module output_m
 contains
 
   !> Make the folder fit and create its files, or open those of the run that goes on from `clock`.
-  subroutine open_output(case, parameters, options, fluid, grid, clock, blocks, bed, output)
+  subroutine open_output(case, parameters, options, state, bed, output)
     type(case_t), intent(in) :: case
     character(*), intent(in) :: parameters   !! all values of the case as text
     type(options_t), intent(in) :: options
-    logical, intent(in) :: fluid             !! there is one
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(in) :: clock
-    type(blocks_t), intent(in) :: blocks
+    type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
     type(output_t), intent(out) :: output
 
@@ -78,36 +70,36 @@ contains
     output%parameters = parameters
     output%gravity = case%fluid%gravity
     output%quiet = options%quiet
-    output%fluid = fluid
-    output%fields = fluid .and. case%run%field_interval > 0.0_wp
-    output%surfaces = blocks%n > 0 .and. case%run%field_interval > 0.0_wp
+    output%fluid = allocated(state%flow%u)
+    output%fields = output%fluid .and. case%run%field_interval > 0.0_wp
+    output%surfaces = state%blocks%n > 0 .and. case%run%field_interval > 0.0_wp
     if (len(options%restart) > 0) then
-      call continue_files(options, grid, clock, blocks, output)
+      call continue_files(options, state, output)
     else
       output%folder = case%run%output
       if (len(options%output) > 0) output%folder = options%output
       call prepare_folder(output%folder, output%lock, output%code, output%message)
-      if (output%code == exit_ok) call create_files(grid, blocks, bed, output)
+      if (output%code == exit_ok) call create_files(state, bed, output)
     end if
     call look_for_trouble(output)
     if (output%code /= exit_ok) then
       call close_files(output)
       call output%lock%release()
     end if
-    call progress_start(options%quiet, fluid, clock, output%progress)
+    call progress_start(options%quiet, output%fluid, state%clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
 
-  subroutine create_files(grid, blocks, bed, output)
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
+  subroutine create_files(state, bed, output)
+    type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
     type(output_t), intent(inout) :: output
 
-    call create_run_file(output%folder//run_name, output%text, output%parameters, grid, blocks, &
-      bed, output%run_file)
-    if (output%fields) call create_field_file(output%folder//field_name, grid, output%field_file)
-    if (output%surfaces) call create_block_file(output%folder//block_name, blocks, &
+    call create_run_file(output%folder//run_name, output%text, output%parameters, state%grid, &
+                         state%blocks, bed, output%run_file)
+    if (output%fields) call create_field_file(output%folder//field_name, state%grid, &
+                                              output%field_file)
+    if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &
       output%block_file)
     call look_for_trouble(output)
     if (output%code /= exit_ok) call remove_files(output)
@@ -134,57 +126,54 @@ contains
   end subroutine close_files
 
   !> Open the files of the run that goes on.
-  subroutine continue_files(options, grid, clock, blocks, output)
+  subroutine continue_files(options, state, output)
     type(options_t), intent(in) :: options
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(in) :: clock
-    type(blocks_t), intent(in) :: blocks
+    type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
     integer :: up_to_date(2)
 
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//run_name, output%text, output%parameters, clock, blocks, &
-      output%run_file)
-    if (output%fluid) call continue_fields(grid, clock, output)
-    if (blocks%n > 0) call continue_surfaces(blocks, clock, output)
+    call reopen_run_file(output%folder//run_name, output%text, output%parameters, state%clock, &
+                         state%blocks, output%run_file)
+    if (output%fluid) call continue_fields(state, output)
+    if (state%blocks%n > 0) call continue_surfaces(state, output)
     up_to_date = 0
     if (output%run_file%up_to_date) up_to_date(1) = 1
     if (output%field_file%up_to_date .or. output%block_file%up_to_date) up_to_date(2) = 1
     call broadcast(up_to_date)   ! only the root process knows about its own files
-    if (up_to_date(1) == 1) output%row_step = clock%step
-    if (up_to_date(2) == 1) output%frame_step = clock%step
+    if (up_to_date(1) == 1) output%row_step = state%clock%step
+    if (up_to_date(2) == 1) output%frame_step = state%clock%step
     if (folder_of(options%restart)//restart_name(1) == options%restart) output%next_restart = 2
-    output%restart_step = clock%step
+    output%restart_step = state%clock%step
   end subroutine continue_files
 
   !> Go on with the frames of the fluid; without any so far the file begins now, and where no more
   !! are wanted it only loses the later ones.
-  subroutine continue_fields(grid, clock, output)
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(in) :: clock
+  subroutine continue_fields(state, output)
+    type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (clock%n_frames > 0) then
-      call reopen_field_file(output%folder//field_name, grid, clock, output%field_file)
+    if (state%clock%n_frames > 0) then
+      call reopen_field_file(output%folder//field_name, state%grid, state%clock, output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
-      call create_field_file(output%folder//field_name, grid, output%field_file)
+      call create_field_file(output%folder//field_name, state%grid, output%field_file)
     end if
   end subroutine continue_fields
 
   !> The same for the frames of the blocks.
-  subroutine continue_surfaces(blocks, clock, output)
-    type(blocks_t), intent(in) :: blocks
-    type(clock_t), intent(in) :: clock
+  subroutine continue_surfaces(state, output)
+    type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (clock%n_frames > 0) then
-      call reopen_block_file(output%folder//block_name, blocks, clock, output%block_file)
+    if (state%clock%n_frames > 0) then
+      call reopen_block_file(output%folder//block_name, state%blocks, state%clock, &
+                             output%block_file)
       if (.not. output%surfaces) call output%block_file%file%close()
     else if (output%surfaces) then
-      call create_block_file(output%folder//block_name, blocks, output%block_file)
+      call create_block_file(output%folder//block_name, state%blocks, output%block_file)
     end if
   end subroutine continue_surfaces
 
@@ -211,13 +200,8 @@ contains
 
   !> After a step, and once before the first: write the row, the frames and the restart file that
   !! are due, and a line of the table. All processes call.
-  subroutine write_due_output(grid, clock, flow, solid, blocks, contacts, report, output)
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(inout) :: solid
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+  subroutine write_due_output(state, report, output)
+    type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     type(row_t) :: row
@@ -226,31 +210,30 @@ contains
     if (output%code /= exit_ok) return
     call tic(output%phase)
     output%progress%warnings = output%progress%warnings + report%warnings
-    row_wanted = clock%row_due() .and. output%row_step /= clock%step
-    frame_wanted = clock%frame_due() .and. output%frame_step /= clock%step
+    row_wanted = state%clock%row_due() .and. output%row_step /= state%clock%step
+    frame_wanted = state%clock%frame_due() .and. output%frame_step /= state%clock%step
     line_wanted = line_due(output%progress)
     line_wanted = line_wanted .or. frame_wanted
     if (.not. (row_wanted .or. frame_wanted)) call tell_all(output%quiet, line_wanted)
     if (row_wanted .or. line_wanted) then
-      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, &
-                    grid, flow, solid, blocks, report, row)
+      call make_row(output%gravity, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, state, report, row)
     end if
     if (row_wanted) then
-      call write_row(output%run_file, clock%n_rows, row, blocks)
-      call clock%row_done()
-      output%row_step = clock%step
+      call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
+      call state%clock%row_done()
+      output%row_step = state%clock%step
     end if
     if (frame_wanted) then
-      call write_frames(grid, clock, flow, solid, blocks, output)
-      call clock%frame_done()
+      call write_frames(state, output)
+      call state%clock%frame_done()
     end if
-    if (line_wanted) call write_line(output%progress, clock, row, blocks)
+    if (line_wanted) call write_line(output%progress, state%clock, row, state%blocks)
     call look_for_trouble(output)
     call toc(output%phase)
-    if (clock%restart_due()) then
-      call clock%restart_done()
-      call save_state(grid, clock, flow, solid, blocks, contacts, output)
+    if (state%clock%restart_due()) then
+      call state%clock%restart_done()
+      call save_state(state, output)
     end if
   end subroutine write_due_output
 
@@ -267,28 +250,21 @@ contains
   end subroutine tell_all
 
   !> Write the frames of this moment as the next ones; the caller counts them if they were due.
-  subroutine write_frames(grid, clock, flow, solid, blocks, output)
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(in) :: clock
-    type(flow_t), intent(in) :: flow
-    type(solid_geometry_t), intent(in) :: solid
-    type(blocks_t), intent(in) :: blocks
+  subroutine write_frames(state, output)
+    type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (output%fields) call write_field_frame(output%field_file, clock%n_frames, clock%t, grid, &
-      flow, solid)
-    if (output%surfaces) call write_block_frame(output%block_file, clock%n_frames, clock%t, blocks)
-    output%frame_step = clock%step
+    associate (n => state%clock%n_frames, t => state%clock%t)
+      if (output%fields) call write_field_frame(output%field_file, n, t, state%grid, state%flow, &
+                                                state%solid)
+      if (output%surfaces) call write_block_frame(output%block_file, n, t, state%blocks)
+    end associate
+    output%frame_step = state%clock%step
   end subroutine write_frames
 
   !> Write the restart file whose turn it is.
-  subroutine save_state(grid, clock, flow, solid, blocks, contacts, output)
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(inout) :: solid
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+  subroutine save_state(state, output)
+    type(run_state_t), intent(inout) :: state
     type(output_t), intent(inout) :: output
     character(:), allocatable :: message
     integer :: info
@@ -296,11 +272,10 @@ contains
     if (output%code /= exit_ok) return
     call tic(output%restart_phase)
     call write_restart(output%folder//restart_name(output%next_restart), output%text, &
-      output%parameters, grid, clock, &
-                       flow, solid, blocks, contacts, info, message)
+      output%parameters, state, info, message)
     if (info == 0) output%restart_file = output%folder//restart_name(output%next_restart)
     output%next_restart = 3 - output%next_restart
-    output%restart_step = clock%step
+    output%restart_step = state%clock%step
     call toc(output%restart_phase)
     if (info == 0) return
     output%code = exit_files
@@ -309,41 +284,34 @@ contains
 
   !> Write what a run must end with, its last row, frames and state, say how it ended, and close all
   !! files; after trouble with files only close them. All processes call.
-  subroutine close_output(exit_code, grid, clock, flow, solid, blocks, contacts, report, output)
+  subroutine close_output(exit_code, state, report, output)
     integer, intent(in) :: exit_code
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(inout) :: solid
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     type(row_t) :: row
     integer :: code
 
     if (output%code == exit_ok) then
-      call make_row(output%gravity, clock, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, &
-                    grid, flow, solid, blocks, report, row)
-      if (output%row_step /= clock%step) then
-        call write_row(output%run_file, clock%n_rows, row, blocks)
-        if (clock%row_due()) call clock%row_done()
+      call make_row(output%gravity, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, state, report, row)
+      if (output%row_step /= state%clock%step) then
+        call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
+        if (state%clock%row_due()) call state%clock%row_done()
       end if
-      if (output%frame_step /= clock%step) then
-        call write_frames(grid, clock, flow, solid, blocks, output)
-        if (clock%frame_due()) call clock%frame_done()
+      if (output%frame_step /= state%clock%step) then
+        call write_frames(state, output)
+        if (state%clock%frame_due()) call state%clock%frame_done()
       end if
-      call write_line(output%progress, clock, row, blocks)
-      if (output%restart_step /= clock%step) call save_state(grid, clock, flow, solid, blocks, &
-        contacts, output)
+      call write_line(output%progress, state%clock, row, state%blocks)
+      if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
     call close_run_file(output%run_file, code)
     call close_files(output)
     call output%lock%release()
     call look_for_trouble(output)
-    call write_summary(output%progress, clock, product(int(grid%n, i8)), code, &
+    call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
                        output%folder)
   end subroutine close_output
 

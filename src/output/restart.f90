@@ -19,11 +19,9 @@ module restart_m
   use parallel_m, only: is_root, nproc, broadcast, halo_exchange
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
-  use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_body_m, only: blocks_t
-  use contacts_m, only: contacts_t
-  use clock_m, only: clock_t, clock_resume
+  use clock_m, only: clock_resume
+  use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: rename_file
   use plain_file_m, only: delete_file
@@ -56,16 +54,10 @@ module restart_m
 contains
 
   !> Write the state to `path`, all processes together.
-  subroutine write_restart(path, text, parameters, grid, clock, flow, solid, blocks, contacts, &
-    info, message)
+  subroutine write_restart(path, text, parameters, state, info, message)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(inout) :: solid
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(run_state_t), intent(inout) :: state
     integer, intent(out) :: info                   !! 0: written
     character(:), allocatable, intent(out) :: message
     type(writer_t) :: writer
@@ -74,11 +66,11 @@ contains
     character(*), parameter :: unfinished = '.part'
     integer :: g
 
-    call visit_state(checksum, grid, clock, flow, solid, blocks, contacts)
+    call visit_state(checksum, state)
     associate (file => writer%file)
       call file%create(path//unfinished, .true.)
       if (nproc() > 1) then   ! one in trouble alone could not tell the others
-        call visit_state(needed, grid, clock, flow, solid, blocks, contacts)
+        call visit_state(needed, state)
         call file%make_room(needed%bytes + len(text) + len(parameters) + room_for_change)
       end if
       call file%attribute('/', 'format', format_name)
@@ -90,7 +82,7 @@ contains
       do g = 1, size(state_groups)
         call file%group(trim(state_groups(g)))
       end do
-      call visit_state(writer, grid, clock, flow, solid, blocks, contacts)
+      call visit_state(writer, state)
       call file%attribute('/', 'checksum', checksum%sum%text())
       call file%close()
     end associate
@@ -122,32 +114,46 @@ contains
   !!
   !! Afterwards the halos between processes are filled; those at the sides of the domain, and what
   !! follows from the state, are the caller's.
-  subroutine read_restart(path, parameters, grid, clock, flow, solid, blocks, contacts, info, &
-    message)
+  subroutine read_restart(path, parameters, state, info, message)
     character(*), intent(in) :: path
     character(*), intent(in) :: parameters   !! all values of the case that goes on
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow
-    type(solid_geometry_t), intent(in) :: solid   !! stays: it follows from the poses
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(run_state_t), intent(inout) :: state   !! its solids stay: they follow from the poses
     integer, intent(out) :: info   !! 0: read; 1: the file is no good; 2: the case has changed
+    character(:), allocatable, intent(out) :: message
+    type(solid_geometry_t), allocatable :: solid
+
+    call move_alloc(state%solid, solid)
+    allocate (state%solid)
+    if (allocated(state%flow%u)) then   ! the shares that the file holds
+      allocate (state%solid%alpha, source=solid%alpha)
+      allocate (state%solid%open, source=solid%open)
+    end if
+    call read_state(path, parameters, state, info, message)
+    call move_alloc(solid, state%solid)
+    if (info /= 0) return
+    if (state%clock%t_end < state%clock%t) then
+      info = 2
+      message = '&run t_end: the restart file is already past it'
+      return
+    end if
+    call clock_resume(state%clock)
+  end subroutine read_restart
+
+  !> Read all of a state, and check that it has its checksum.
+  subroutine read_state(path, parameters, state, info, message)
+    character(*), intent(in) :: path, parameters
+    type(run_state_t), intent(inout) :: state
+    integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
     type(reader_t) :: reader
     type(checksum_visitor_t) :: checksum
-    type(solid_geometry_t) :: stored   ! only the shares that the file holds
     character(:), allocatable :: written
 
     written = ''
-    if (allocated(flow%u)) then
-      allocate (stored%alpha, source=solid%alpha)
-      allocate (stored%open, source=solid%open)
-    end if
     associate (file => reader%file)
       call file%open(path, .true., .false.)
       call check_kind(file, parameters, info, message)
-      if (info == 0) call visit_state(reader, grid, clock, flow, stored, blocks, contacts)
+      if (info == 0) call visit_state(reader, state)
       if (info == 0) call file%read_attribute('/', 'checksum', written)
       call file%close()
       if (info /= 0) return
@@ -157,19 +163,11 @@ contains
         return
       end if
     end associate
-    call visit_state(checksum, grid, clock, flow, stored, blocks, contacts)
-    if (checksum%sum%text() /= written) then
-      info = 1
-      message = path//': damaged, its content does not have its checksum'
-      return
-    end if
-    if (clock%t_end < clock%t) then
-      info = 2
-      message = '&run t_end: the restart file is already past it'
-      return
-    end if
-    call clock_resume(clock)
-  end subroutine read_restart
+    call visit_state(checksum, state)
+    if (checksum%sum%text() == written) return
+    info = 1
+    message = path//': damaged, its content does not have its checksum'
+  end subroutine read_state
 
   !> Is this a restart file of this case?
   subroutine check_kind(file, parameters, info, message)

@@ -15,6 +15,7 @@ module state_m
   use contacts_m, only: contacts_t
   use springs_m, only: springs_t, reserve_springs
   use clock_m, only: clock_t
+  use run_state_m, only: run_state_t
   implicit none
   private
   public :: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
@@ -72,19 +73,14 @@ module state_m
 contains
 
   !> Show the whole state to a visitor, which may change it.
-  subroutine visit_state(visitor, grid, clock, flow, solid, blocks, contacts)
+  subroutine visit_state(visitor, state)
     class(state_visitor_t), intent(inout) :: visitor
-    type(grid_t), intent(in) :: grid
-    type(clock_t), intent(inout) :: clock
-    type(flow_t), intent(inout) :: flow            !! not allocated in a dry run
-    type(solid_geometry_t), intent(inout) :: solid !! likewise
-    type(blocks_t), intent(inout) :: blocks
-    type(contacts_t), intent(inout) :: contacts
+    type(run_state_t), intent(inout) :: state
 
-    call visit_clock(visitor, clock)
-    if (allocated(flow%u)) call visit_flow(visitor, grid, flow, solid)
-    call visit_blocks(visitor, blocks)
-    call visit_contacts(visitor, contacts)
+    call visit_clock(visitor, state%clock)
+    if (allocated(state%flow%u)) call visit_flow(visitor, state%grid, state%flow, state%solid)
+    call visit_blocks(visitor, state%blocks)
+    call visit_contacts(visitor, state%contacts)
   end subroutine visit_state
 
   subroutine visit_clock(visitor, clock)

@@ -3,27 +3,22 @@ module sample_state_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
   use grid_m, only: grid_t, grid_init
-  use fields_m, only: flow_t, flow_init
-  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use fields_m, only: flow_init
+  use solid_geometry_m, only: solid_geometry_init
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_init
   use contacts_m, only: contacts_t, contacts_init
   use springs_m, only: springs_t
-  use clock_m, only: clock_t, clock_init
+  use clock_m, only: clock_init
+  use run_state_m, only: run_state_t
   implicit none
   private
   public :: sample_t, make_sample, fill_cells
 
-  type :: sample_t
+  type, extends(run_state_t) :: sample_t
     type(case_t) :: case
     character(:), allocatable :: parameters
-    type(grid_t) :: grid
-    type(clock_t) :: clock
-    type(flow_t) :: flow
-    type(solid_geometry_t) :: solid
-    type(blocks_t) :: blocks
-    type(contacts_t) :: contacts
   end type sample_t
 
 contains
@@ -46,6 +41,7 @@ contains
     call grid_init(s%case%grid, s%case%boundary, s%grid)
     call clock_init(s%case%run, s%clock)
     call flow_init(s%grid, s%flow)
+    allocate (s%solid)
     call solid_geometry_init(s%grid, s%solid)
     call blocks_init(s%case, shapes, s%blocks)
     call contacts_init(s%case%contact, s%blocks, s%contacts)

@@ -79,26 +79,25 @@ contains
     s%case%run%restart_interval = 0.75_wp
     call clock_init(s%case%run, s%clock)
     if (len(options%restart) > 0) then
-      call read_restart(options%restart, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, &
-        s%contacts, info, &
+      call read_restart(options%restart, s%parameters, s%run_state_t, info, &
                         message)
       call check('the restart file is read', info, 0)
     else
       call move(s)
     end if
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+    call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
     call check('the output is opened', output%code, exit_ok)
-    call write_due_output(s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, output)
+    call write_due_output(s%run_state_t, report, output)
     do while (.not. s%clock%finished())
       call s%clock%choose_step(0.25_wp, huge(1.0_wp))
       call s%clock%advance()
       call move(s)
       report%substeps = s%clock%step
       if (s%clock%t >= t_stop) exit   ! as for a signal
-      call write_due_output(s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, output)
+      call write_due_output(s%run_state_t, report, output)
     end do
-    call close_output(exit_code, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, report, &
+    call close_output(exit_code, s%run_state_t, report, &
       output)
     call check('the output is closed', output%code, exit_ok)
     if (output%code /= exit_ok) print '(a)', output%message
@@ -231,15 +230,15 @@ contains
     call shell('mkdir '//here//'/other && touch '//here//'/other/thesis.tex')
     options%output = here//'/other'
     call make_sample(0.0_wp, .false., s)
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+    call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
     call check('a folder with other things is refused', output%code, exit_input)
     options%output = here//'/other/thesis.tex'
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+    call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
     call check('a file is no folder', output%code, exit_input)
     options%output = here//'/other/thesis.tex/below'
-    call open_output(s%case, s%parameters, options, .true., s%grid, s%clock, s%blocks, no_bed, &
+    call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
     call check('a folder that cannot be made is trouble', output%code, exit_files)
     options%output = here//'/empty'

@@ -37,7 +37,7 @@ contains
 
     call make_sample(0.5_wp, .false., s)
     call write_sample(s, info, message)
-    call visit_state(needed, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(needed, s%run_state_t)
     if (.not. is_root()) return
     room = needed%bytes + len(s%case%text) + len(s%parameters) + room_for_change
     inquire (file=path, size=there)
@@ -58,8 +58,7 @@ contains
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
 
-    call write_restart(path, s%case%text, s%parameters, s%grid, s%clock, s%flow, s%solid, &
-      s%blocks, s%contacts, &
+    call write_restart(path, s%case%text, s%parameters, s%run_state_t, &
                        info, message)
   end subroutine write_sample
 
@@ -68,7 +67,7 @@ contains
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
 
-    call read_restart(path, s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts, &
+    call read_restart(path, s%parameters, s%run_state_t, &
       info, message)
   end subroutine read_sample
 
@@ -76,7 +75,7 @@ contains
     type(image_visitor_t), intent(inout) :: image
     type(sample_t), intent(inout) :: s
 
-    call visit_state(image, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(image, s%run_state_t)
   end subroutine look
 
   subroutine test_comes_back(periodic)
@@ -227,12 +226,10 @@ contains
     character(:), allocatable :: message
 
     call make_sample(0.5_wp, .false., s)
-    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, s%grid, s%clock, &
-      s%flow, s%solid, &
-                       s%blocks, s%contacts, info, message)
+    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, &
+                       s%run_state_t, info, message)
     call check('a missing folder is trouble', info, 1)
-    call read_restart('no-such-file.h5', s%parameters, s%grid, s%clock, s%flow, s%solid, s%blocks, &
-      s%contacts, &
+    call read_restart('no-such-file.h5', s%parameters, s%run_state_t, &
                       info, message)
     call check('a missing file is trouble', info, 1)
     call check('the message names it', index(message, 'no-such-file.h5') > 0)

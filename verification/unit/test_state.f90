@@ -53,7 +53,7 @@ contains
     type(image_visitor_t), intent(inout) :: image
     type(sample_t), intent(inout) :: s
 
-    call visit_state(image, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(image, s%run_state_t)
   end subroutine look
 
   function checksum(s) result(text)
@@ -61,7 +61,7 @@ contains
     character(:), allocatable :: text
     type(checksum_visitor_t) :: visitor
 
-    call visit_state(visitor, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(visitor, s%run_state_t)
     text = visitor%sum%text()
   end function checksum
 
@@ -150,17 +150,17 @@ contains
     type(finite_visitor_t) :: visitor, again, bodies
 
     call make_sample(0.0_wp, .false., s)
-    call visit_state(visitor, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(visitor, s%run_state_t)
     call check('a finite state is finite', .not. allocated(visitor%found))
     if (all([3, 2, 17] >= s%grid%lo .and. [3, 2, 17] <= s%grid%hi)) then
       s%flow%uf(3, 2, 17, 2) = ieee_value(1.0_wp, ieee_quiet_nan)
     end if
-    call visit_state(again, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(again, s%run_state_t)
     call check('a NaN of one process is found by all', &
       again%found == '/flow/uf [m/s] at cell 3, 2, 17')
     call make_sample(0.0_wp, .false., s)
     s%blocks%v(2, 3) = ieee_value(1.0_wp, ieee_positive_inf)
-    call visit_state(bodies, s%grid, s%clock, s%flow, s%solid, s%blocks, s%contacts)
+    call visit_state(bodies, s%run_state_t)
     call check('an infinite speed is found', bodies%found == '/blocks/velocity [m/s] of number 3')
   end subroutine test_finite
 

@@ -1,0 +1,22 @@
+!> What a run is at a moment: grid, time, fluid, solids, blocks and their contacts.
+module run_state_m
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_body_m, only: blocks_t
+  use contacts_m, only: contacts_t
+  use clock_m, only: clock_t
+  implicit none
+  private
+  public :: run_state_t
+
+  type :: run_state_t
+    type(grid_t) :: grid
+    type(clock_t) :: clock
+    type(flow_t) :: flow   !! arrays not allocated in a dry run
+    type(solid_geometry_t), allocatable :: solid   !! likewise
+    type(blocks_t) :: blocks
+    type(contacts_t) :: contacts
+  end type run_state_t
+
+end module run_state_m
