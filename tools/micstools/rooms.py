@@ -1,0 +1,218 @@
+"""The rooms of the Fortran sources: which uses which, what must not be, and a picture of it.
+
+A room is a folder of `src`; files at its top are the room `top`. A file may use files of its own
+room and of rooms in lower layers. Rooms of one layer know nothing of each other, and no files use
+one another in a circle.
+"""
+
+import re
+from collections import Counter
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+
+TOP = "top"
+LAYERS = (
+    ("base",),
+    ("case",),
+    ("grid", "shapes"),
+    ("solvers", "blocks"),
+    ("liquid", "pressure"),
+    ("momentum",),
+    ("coupling",),
+    ("output",),
+    ("setup",),
+    (TOP,),
+)
+"""From the lowest to the highest."""
+HEIGHT = {room: height for height, layer in enumerate(LAYERS) for room in layer}
+
+MODULE = re.compile(r"^\s*(?:module|program)\s+(\w+)\s*$", re.MULTILINE | re.IGNORECASE)
+USE = re.compile(r"^\s*use\b(?:\s*,\s*\w+)?\s*(?:::)?\s*(\w+)", re.MULTILINE | re.IGNORECASE)
+
+Imports = dict[str, set[str]]
+"""The files that a file uses, all named from `src`, as in {'case/case_types.f90': {...}}."""
+
+
+def imports(source: Path) -> Imports:
+    """Which file uses which; modules from elsewhere, as those of HDF5, are left out.
+
+    Of the twins of one module, with and without MPI, the first by name stands for both.
+    """
+    texts = {str(p.relative_to(source)): p.read_text() for p in sorted(source.rglob("*.f90"))}
+    homes: dict[str, str] = {}
+    for file, text in texts.items():
+        for name in MODULE.findall(text):
+            homes.setdefault(name.lower(), file)
+    found: Imports = {}
+    for file, text in texts.items():
+        used = {homes[name.lower()] for name in USE.findall(text) if name.lower() in homes}
+        found[file] = used - {file}
+    return found
+
+
+def room_of(file: str) -> str:
+    """The room of a file named from `src`."""
+    return file.split("/")[0] if "/" in file else TOP
+
+
+def faults(found: Imports) -> list[str]:
+    """What is against the order of the rooms, a line each, and the first circle among files."""
+    lines = [f"{room}: no such room in LAYERS" for room in sorted(_rooms(found) - HEIGHT.keys())]
+    for file, used in sorted(found.items()):
+        for other in sorted(used):
+            above, below = room_of(file), room_of(other)
+            if above == below or not {above, below} <= HEIGHT.keys():
+                continue
+            if HEIGHT[above] <= HEIGHT[below]:
+                lines.append(f"{file} uses {other}: {below} is not below {above}")
+    try:
+        TopologicalSorter(found).prepare()
+    except CycleError as error:
+        lines.append("a circle: " + " uses ".join(reversed(error.args[1])))
+    return lines
+
+
+def arrows(found: Imports) -> Counter[tuple[str, str]]:
+    """How many times files of one room use a file of another one."""
+    pairs = ((room_of(file), room_of(other)) for file, used in found.items() for other in used)
+    return Counter(pair for pair in pairs if pair[0] != pair[1])
+
+
+def _rooms(found: Imports) -> set[str]:
+    return {room_of(file) for file in found}
+
+
+# The picture: the flow on the left, the blocks on the right, what joins them above. All rooms use
+# `base`, nearly all `case`, and `setup` and `top` use nearly all: these four are bands that tell
+# their counts in words. Boxes: middle x, height, width.
+BANDS = {"base": 0.0, "case": 1.0, "setup": 8.75, TOP: 9.75}
+BOXES = {
+    "grid": (4.8, 2.2, 7.6),
+    "shapes": (10.65, 2.2, 3.3),
+    "solvers": (5.0, 3.35, 2.0),
+    "blocks": (10.6, 3.35, 2.0),
+    "liquid": (2.55, 4.5, 2.0),
+    "pressure": (6.1, 4.5, 2.0),
+    "momentum": (2.1, 5.65, 2.0),
+    "coupling": (7.2, 6.75, 2.0),
+    "output": (11.2, 7.6, 2.2),
+}
+ENDS = {
+    ("blocks", "shapes"): (10.6, 10.6),
+    ("coupling", "blocks"): (7.95, 9.85),
+    ("coupling", "grid"): (7.5, 7.5),
+    ("coupling", "liquid"): (6.55, 3.2),
+    ("coupling", "momentum"): (6.25, 2.95),
+    ("coupling", "pressure"): (6.8, 6.5),
+    ("coupling", "shapes"): (7.75, 9.3),
+    ("liquid", "grid"): (2.55, 2.55),
+    ("momentum", "grid"): (1.28, 1.28),
+    ("momentum", "liquid"): (2.3, 2.3),
+    ("momentum", "pressure"): (3.08, 5.3),
+    ("momentum", "solvers"): (3.05, 4.75),
+    ("output", "blocks"): (11.0, 11.0),
+    ("output", "grid"): (10.3, 8.3),
+    ("output", "shapes"): (11.95, 11.95),
+    ("pressure", "grid"): (6.6, 6.6),
+    ("pressure", "solvers"): (5.55, 5.55),
+    ("solvers", "grid"): (5.0, 5.0),
+}
+"""Where an arrow leaves the user and reaches the used (x); else it joins the middles."""
+CONTENT = {
+    "base": "kinds, vectors, exact sums, processes",
+    "case": "the case file",
+    "grid": "cells, sides of the tank, what solids leave open",
+    "shapes": "forms, surfaces, the bed",
+    "solvers": "Krylov, multigrid",
+    "blocks": "motion, contact",
+    "liquid": "surface and transport",
+    "pressure": "C-HSMAC",
+    "momentum": "transport, viscosity, tension",
+    "coupling": "shares, forces, one solve",
+    "output": "results, restart",
+    "setup": "checks and plan of a case, start from a file",
+    TOP: "the program and its time step",
+}
+COLOURS = {
+    "blocks": "#8c510a",
+    "coupling": "#1b7837",
+    "output": "#762a83",
+    "momentum": "#2166ac",
+    "liquid": "#4393c3",
+    "pressure": "#4393c3",
+    "solvers": "#4393c3",
+}
+GREY = "#555555"
+TALL = 0.58
+ALONG = 0.42  # of an arrow is before its count
+
+
+def picture(found: Imports) -> Figure:
+    """The rooms in their layers; an arrow runs from the user to the used and bears its count."""
+    counts, files = arrows(found), Counter(room_of(file) for file in found)
+    figure = Figure(figsize=(10.5, 9.4))
+    axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axis.set_xlim(0.7, 12.6)
+    axis.set_ylim(-0.45, 10.2)
+    axis.axis("off")
+    for room, height in BANDS.items():
+        up = room in ("setup", TOP)
+        others = [(b if up else a, n) for (a, b), n in counts.items() if room == (a if up else b)]
+        others.sort(key=lambda pair: -HEIGHT[pair[0]])
+        words = ",  ".join(f"{other} {n}" for other, n in others)
+        title = f"{room} ({files[room]} files): {CONTENT[room]}"
+        _box(axis, room, (6.65, height, 11.3), title, f"{'uses' if up else 'used by'}  {words}")
+    for room, place in BOXES.items():
+        _box(axis, room, place, f"{room} ({files[room]} files)", CONTENT[room])
+    for (user, used), n in sorted(counts.items()):
+        if user in BOXES and used in BOXES:
+            _arrow(axis, user, used, n)
+    return figure
+
+
+def _box(axis: Axes, room: str, place: tuple[float, float, float], title: str, words: str) -> None:
+    x, y, wide = place
+    box = FancyBboxPatch(
+        (x - wide / 2, y - TALL / 2),
+        wide,
+        TALL,
+        boxstyle="round,pad=0,rounding_size=0.08",
+        facecolor="#f4f4f4",
+        edgecolor=COLOURS.get(room, GREY),
+        linewidth=1.3,
+        zorder=3,
+    )
+    axis.add_patch(box)
+    _say(axis, x, y + 0.12, title, fontsize=10, weight="bold")
+    _say(axis, x, y - 0.14, words, fontsize=8, color="#333333")
+
+
+def _say(axis: Axes, x: float, y: float, words: str, **style: Any) -> None:
+    axis.text(x, y, words, **{"ha": "center", "va": "center", "zorder": 4, **style})
+
+
+def _arrow(axis: Axes, user: str, used: str, n: int) -> None:
+    """From the lower edge of the user to the upper edge of the used, with the count on it."""
+    x_start, x_end = ENDS.get((user, used), (BOXES[user][0], BOXES[used][0]))
+    start = (x_start, BOXES[user][1] - TALL / 2)
+    end = (x_end, BOXES[used][1] + TALL / 2)
+    colour = COLOURS.get(user, GREY)
+    line = FancyArrowPatch(
+        start,
+        end,
+        arrowstyle="-|>,head_length=7,head_width=3.5",
+        shrinkA=0,
+        shrinkB=0,
+        color=colour,
+        linewidth=0.8 + 0.07 * n,
+        zorder=1,
+    )
+    axis.add_patch(line)
+    x, y = (a + ALONG * (b - a) for a, b in zip(start, end, strict=True))
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+    _say(axis, x, y, str(n), fontsize=9, color=colour, zorder=2, bbox=behind)

@@ -1,0 +1,69 @@
+"""Which file may use which: the rooms of src stand in layers, without circles."""
+
+from pathlib import Path
+
+from micstools import rooms
+
+ROOT = Path(__file__).parents[2]
+
+
+def write(folder: Path, **uses: str) -> Path:
+    """Sources whose names say where they are, as `base__kinds`, with the modules they use."""
+    for name, used in uses.items():
+        file = folder / (name.replace("__", "/") + ".f90")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        lines = [f"  use {other}, only: x" for other in used.split()]
+        file.write_text("\n".join(["!> use of it", f"module {file.stem}_m", *lines, "end"]))
+    return folder
+
+
+def test_the_sources_keep_the_order_of_the_rooms() -> None:
+    found = rooms.imports(ROOT / "src")
+    assert rooms.faults(found) == []
+    assert rooms.arrows(found)["coupling", "momentum"] > 0
+
+
+def test_uses_are_found_and_counted(tmp_path: Path) -> None:
+    source = write(tmp_path, base__kinds="", grid__grid="kinds_m hdf5", step="kinds_m grid_m")
+    found = rooms.imports(source)
+    assert found["step.f90"] == {"base/kinds.f90", "grid/grid.f90"}
+    assert found["grid/grid.f90"] == {"base/kinds.f90"}
+    assert rooms.arrows(found) == {
+        ("top", "base"): 1,
+        ("top", "grid"): 1,
+        ("grid", "base"): 1,
+    }
+    assert rooms.faults(found) == []
+
+
+def test_a_use_upward_is_named(tmp_path: Path) -> None:
+    source = write(tmp_path, base__sums="grid_m", grid__grid="")
+    assert rooms.faults(rooms.imports(source)) == [
+        "base/sums.f90 uses grid/grid.f90: grid is not below base"
+    ]
+
+
+def test_a_use_of_a_room_of_the_same_layer_is_named(tmp_path: Path) -> None:
+    source = write(tmp_path, liquid__plic="pressure_m", pressure__pressure="")
+    (line,) = rooms.faults(rooms.imports(source))
+    assert line.endswith("pressure is not below liquid")
+
+
+def test_a_circle_is_named(tmp_path: Path) -> None:
+    source = write(tmp_path, base__a="b_m", base__b="c_m", base__c="a_m")
+    (line,) = rooms.faults(rooms.imports(source))
+    assert line.startswith("a circle: base/") and line.count(" uses ") == 3
+    assert "base/a.f90 uses base/b.f90" in line or line.endswith("uses base/a.f90")
+
+
+def test_a_room_without_a_layer_is_named(tmp_path: Path) -> None:
+    source = write(tmp_path, waves__maker="")
+    assert rooms.faults(rooms.imports(source)) == ["waves: no such room in LAYERS"]
+
+
+def test_the_picture_shows_every_room() -> None:
+    words = " ".join(
+        text.get_text() for text in rooms.picture(rooms.imports(ROOT / "src")).axes[0].texts
+    )
+    for room in rooms.HEIGHT:
+        assert f"{room} (" in words
