@@ -106,7 +106,7 @@ ENDS = {
     ("blocks", "shapes"): (10.6, 10.6),
     ("coupling", "blocks"): (7.95, 9.85),
     ("coupling", "grid"): (7.5, 7.5),
-    ("coupling", "liquid"): (6.55, 3.2),
+    ("coupling", "liquid"): (6.55, 2.9),
     ("coupling", "momentum"): (6.25, 2.95),
     ("coupling", "pressure"): (6.8, 6.5),
     ("coupling", "shapes"): (7.75, 9.3),
