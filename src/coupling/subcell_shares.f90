@@ -11,7 +11,9 @@
 module subcell_shares_m
   use kinds_m, only: wp
   use grid_m, only: unit_step
-  use body_shares_m, only: body_shares_t, faces_of_tet, add_face, along, up
+  use share_moments_m, only: along, up
+  use share_lists_m, only: body_shares_t, add_face
+  use cut_tets_m, only: faces_of_tet
   implicit none
   private
   public :: subcell_work_t, count_subcells

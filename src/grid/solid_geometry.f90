@@ -1,13 +1,13 @@
 !> What the flow has to know about the solids in the grid: shares, open faces, wall distances.
 !!
-!! Data only: `coupling/solid_fraction.f90` fills it from the tetrahedra of the bodies, the flow
+!! Data: `coupling/solid_fraction.f90` fills it from the tetrahedra of the bodies, the flow
 !! reads it, and neither room knows the other.
 module solid_geometry_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t
+  use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, no_hit
+  public :: solid_geometry_t, solid_geometry_init, clear_solid, set_faces, no_hit
 
   real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
 
@@ -86,5 +86,54 @@ contains
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
     allocate (solid%leg(4, 0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
+
+  !> Take away what the lists of the last time say was there.
+  subroutine clear_solid(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n
+
+    n = size(solid%body_cell)
+    do m = 1, solid%body_cell(n) - 1
+      associate (i => solid%cell(:, m))
+        solid%alpha(i(1), i(2), i(3)) = 0.0_wp
+        solid%inside(i(1), i(2), i(3)) = 0
+        solid%cut(i(1), i(2), i(3)) = 0
+      end associate
+    end do
+    do m = 1, solid%body_face(n) - 1
+      associate (i => solid%face(:, m))
+        solid%open(i(1), i(2), i(3), i(4)) = 1.0_wp
+      end associate
+    end do
+    do m = 1, solid%n_leg
+      associate (i => solid%leg(:, m))
+        solid%leg_low(i(1), i(2), i(3), i(4)) = no_hit
+        solid%leg_high(i(1), i(2), i(3), i(4)) = no_hit
+        solid%leg_body_low(i(1), i(2), i(3), i(4)) = 0
+        solid%leg_body_high(i(1), i(2), i(3), i(4)) = 0
+      end associate
+    end do
+    do m = 1, solid%n_closed
+      call set_faces(grid, solid%closed_cell(:, m), 1.0_wp, solid)
+    end do
+    solid%n_leg = 0
+    solid%n_closed = 0
+  end subroutine clear_solid
+
+  !> Give the six faces of a cell an open share, as far as they are in the arrays.
+  pure subroutine set_faces(grid, cell, open, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: cell(3)
+    real(wp), intent(in) :: open
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: d, i(3)
+
+    do d = 1, 3
+      solid%open(cell(1), cell(2), cell(3), d) = open
+      i = cell + unit_step(:, d)
+      if (i(d) <= grid%last(d)) solid%open(i(1), i(2), i(3), d) = open
+    end do
+  end subroutine set_faces
 
 end module solid_geometry_m

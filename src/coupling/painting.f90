@@ -1,0 +1,296 @@
+!> Bodies with their images in other periods, painted into the cells kept here: shares, legs, lists.
+module painting_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use grid_m, only: grid_t
+  use solid_geometry_m, only: solid_geometry_t
+  use share_lists_m, only: body_shares_t
+  implicit none
+  private
+  public :: painting_t, painting_init, find_images, ensure_lists, place_bodies, paint_body
+  public :: shorten_leg
+
+  real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
+
+  !> What is painted where.
+  type :: painting_t
+    logical, allocatable :: near(:)               !! (n) present and in the cells kept here
+    integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by
+    !> First and last cell where the solids are kept: own cells and halo, less what is outside.
+    integer :: low(3) = 1, high(3) = 0
+    !> (2, cells listed) place in the list of the body; number of its first tetrahedron less one.
+    integer, allocatable :: source(:, :)
+  end type painting_t
+
+contains
+
+  !> Nothing is near yet.
+  subroutine painting_init(grid, n, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n   !! bodies
+    type(painting_t), intent(out) :: self
+
+    self%low = merge(grid%first, max(grid%first, 1), grid%periodic)
+    self%high = merge(grid%last, min(grid%last, grid%n), grid%periodic)
+    allocate (self%near(n), source=.false.)
+    allocate (self%first(3, n), self%last(3, n), source=0)
+    allocate (self%source(2, 0))
+  end subroutine painting_init
+
+  !> Images of body b, a ball at most, that touch the cells kept here.
+  pure subroutine find_images(grid, b, x, radius, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    real(wp), intent(in) :: x(3), radius   !! [m]
+    type(painting_t), intent(inout) :: self
+    integer :: d, low, high
+
+    do d = 1, 3
+      low = grid%cell_of(x(d) - radius, d) - 1
+      high = grid%cell_of(x(d) + radius, d) + 1
+      call images(self, grid, d, low, high, self%first(d, b), self%last(d, b))
+    end do
+    self%near(b) = all(self%first(:, b) <= self%last(:, b))
+  end subroutine find_images
+
+  !> Numbers of periods by which cells low..high may be shifted to touch the cells kept here.
+  pure subroutine images(self, grid, d, low, high, first, last)
+    type(painting_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d, low, high
+    integer, intent(out) :: first, last
+
+    if (grid%periodic(d)) then
+      first = -floor_ratio(high - self%low(d), grid%n(d))
+      last = floor_ratio(self%high(d) - low, grid%n(d))
+    else
+      first = 0
+      last = merge(0, -1, high >= self%low(d) .and. low <= self%high(d))
+    end if
+  end subroutine images
+
+  !> Largest whole number not above a/b, b > 0.
+  elemental integer function floor_ratio(a, b)
+    integer, intent(in) :: a, b
+
+    floor_ratio = (a - modulo(a, b))/b
+  end function floor_ratio
+
+  !> Lists long enough for all bodies in all their images; they grow by doubling.
+  subroutine ensure_lists(body, self, solid)
+    type(body_shares_t), intent(in) :: body(:)
+    type(painting_t), intent(inout) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b, copies, cells, faces, legs, tets, n
+
+    n = size(body) + 1
+    if (size(solid%body_cell) /= n) then
+      deallocate (solid%body_cell, solid%body_face, solid%tets%of_body)
+      allocate (solid%body_cell(n), solid%body_face(n), solid%tets%of_body(n))
+    end if
+    solid%body_cell(1) = 1
+    solid%body_face(1) = 1
+    cells = 0
+    faces = 0
+    legs = 0
+    tets = 0
+    do b = 1, n - 1
+      if (.not. self%near(b)) cycle
+      copies = product(self%last(:, b) - self%first(:, b) + 1)
+      cells = cells + copies*body(b)%n_cell
+      faces = faces + copies*body(b)%n_face
+      legs = legs + copies*(body(b)%n_hit + 6*body(b)%n_cell)
+      tets = tets + (1 + copies)*size(body(b)%corner, 3)
+    end do
+    call ensure_room(cells, solid%cell)
+    call ensure_room(cells, solid%cell_alpha)
+    call ensure_room(cells, solid%cell_centroid)
+    call ensure_room(cells, solid%cut_cell)
+    call ensure_room(cells + 1, solid%tets%first)
+    call ensure_room(cells, solid%closed_cell)
+    call ensure_room(cells, solid%tets%of_cell)
+    call ensure_room(cells, self%source)
+    call ensure_room(faces, solid%face)
+    call ensure_room(faces, solid%face_beta)
+    call ensure_room(faces, solid%face_centroid)
+    call ensure_room(legs, solid%leg)
+    if (size(solid%tets%corner, 3) < tets) then
+      tets = max(tets, 2*size(solid%tets%corner, 3))
+      deallocate (solid%tets%corner)
+      allocate (solid%tets%corner(3, 4, tets))
+    end if
+  end subroutine ensure_lists
+
+  !> Tetrahedra of the bodies where they are, in space; those of images elsewhere will follow.
+  pure subroutine place_bodies(grid, body, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(body_shares_t), intent(in) :: body(:)
+    type(painting_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: b
+
+    solid%tets%of_body(1) = 1
+    solid%tets%n = 0
+    do b = 1, size(body)
+      if (self%near(b)) call place_tets(grid, body(b), body(b)%base, solid)
+      solid%tets%of_body(b + 1) = solid%tets%n + 1
+    end do
+  end subroutine place_bodies
+
+  !> Append the tetrahedra of a body at the place of one image.
+  pure subroutine place_tets(grid, body, offset, solid)
+    type(grid_t), intent(in) :: grid
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: offset(3)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: t, v
+
+    do t = 1, size(body%corner, 3)
+      solid%tets%n = solid%tets%n + 1
+      do v = 1, 4
+        solid%tets%corner(:, v, solid%tets%n) = grid%origin + &
+                                          (real(offset, wp) + body%corner(:, v, t))*grid%h
+      end do
+    end do
+  end subroutine place_tets
+
+  !> Add one body with all its images.
+  subroutine paint_body(grid, b, body, self, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    type(body_shares_t), intent(in) :: body
+    type(painting_t), intent(inout) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: i, j, k, first_tet
+
+    solid%body_cell(b + 1) = solid%body_cell(b)
+    solid%body_face(b + 1) = solid%body_face(b)
+    if (.not. self%near(b)) return
+    do k = self%first(3, b), self%last(3, b)
+      do j = self%first(2, b), self%last(2, b)
+        do i = self%first(1, b), self%last(1, b)
+          associate (offset => body%base + [i, j, k]*grid%n)
+            first_tet = solid%tets%of_body(b)
+            if (any([i, j, k] /= 0)) then
+              first_tet = solid%tets%n + 1
+              call place_tets(grid, body, offset, solid)
+            end if
+            call paint_cells(grid, b, body, offset, first_tet, self, solid)
+            call paint_faces(grid, b, body, offset, self, solid)
+            call paint_legs(grid, b, body, offset, self, solid)
+          end associate
+        end do
+      end do
+    end do
+  end subroutine paint_body
+
+  !> Shares of cells, and the centres that are inside.
+  subroutine paint_cells(grid, b, body, offset, first_tet, self, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: offset(3), first_tet
+    type(painting_t), intent(inout) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n, i(3)
+
+    n = solid%body_cell(b + 1) - 1
+    do m = 1, body%n_cell
+      i = offset + body%cell(:, m)
+      if (any(i < self%low) .or. any(i > self%high)) cycle
+      n = n + 1
+      self%source(:, n) = [m, first_tet - 1]
+      solid%cell(:, n) = i
+      solid%cell_alpha(n) = body%alpha(m)
+      solid%cell_centroid(:, n) = grid%origin + (real(i - 1, wp) + body%centroid(:, m))*grid%h
+      solid%alpha(i(1), i(2), i(3)) = solid%alpha(i(1), i(2), i(3)) + body%alpha(m)
+      if (body%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) then
+        solid%inside(i(1), i(2), i(3)) = b
+      end if
+    end do
+    solid%body_cell(b + 1) = n + 1
+  end subroutine paint_cells
+
+  !> Shares of faces, with those on the far sides of the domain.
+  subroutine paint_faces(grid, b, body, offset, self, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: offset(3)
+    type(painting_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, n, f(4)
+
+    n = solid%body_face(b + 1) - 1
+    do m = 1, body%n_face
+      f = body%face(:, m)
+      f(1:3) = f(1:3) + offset
+      if (.not. kept_face(self, grid, f)) cycle
+      n = n + 1
+      solid%face(:, n) = f
+      solid%face_beta(n) = body%beta(m)
+      solid%face_centroid(:, n) = grid%origin + &
+                                  (real(f(1:3) - 1, wp) + body%face_centroid(:, m))*grid%h
+      solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body%beta(m)
+    end do
+    solid%body_face(b + 1) = n + 1
+  end subroutine paint_faces
+
+  !> Is the lower face f of a cell kept? Those on the far sides of the domain are.
+  pure logical function kept_face(self, grid, f)
+    type(painting_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: f(4)   !! cell and direction
+    integer :: high(3)
+
+    high = self%high
+    if (.not. grid%periodic(f(4))) high(f(4)) = min(high(f(4)) + 1, grid%last(f(4)))
+    kept_face = all(f(1:3) >= self%low) .and. all(f(1:3) <= high)
+  end function kept_face
+
+  !> Nearest hits from both ends of the legs; what lies behind a side of the domain does not count.
+  subroutine paint_legs(grid, b, body, offset, self, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: b
+    type(body_shares_t), intent(in) :: body
+    integer, intent(in) :: offset(3)
+    type(painting_t), intent(in) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m, f(4)
+
+    do m = 1, body%n_hit
+      f = body%hit(:, m)
+      f(1:3) = f(1:3) + offset
+      if (.not. kept_face(self, grid, f)) cycle
+      if (.not. grid%periodic(f(4))) then
+        if (f(f(4)) == 1 .and. body%at(m) < 0.5_wp) cycle
+        if (f(f(4)) == grid%n(f(4)) + 1 .and. body%at(m) > 0.5_wp) cycle
+      end if
+      call shorten_leg(f, body%at(m), b, solid)
+    end do
+  end subroutine paint_legs
+
+  !> Body b meets a leg at a place between 0 (lower centre) and 1.
+  subroutine shorten_leg(f, at, b, solid)
+    integer, intent(in) :: f(4), b
+    real(wp), intent(in) :: at
+    type(solid_geometry_t), intent(inout) :: solid
+
+    associate (low => solid%leg_low(f(1), f(2), f(3), f(4)), &
+               high => solid%leg_high(f(1), f(2), f(3), f(4)))
+      if (low > 1.0_wp) then
+        solid%n_leg = solid%n_leg + 1
+        solid%leg(:, solid%n_leg) = f
+      end if
+      if (max(at, least_leg) < low) then
+        low = max(at, least_leg)
+        solid%leg_body_low(f(1), f(2), f(3), f(4)) = b
+      end if
+      if (max(1.0_wp - at, least_leg) < high) then
+        high = max(1.0_wp - at, least_leg)
+        solid%leg_body_high(f(1), f(2), f(3), f(4)) = b
+      end if
+    end associate
+  end subroutine shorten_leg
+
+end module painting_m

@@ -1,0 +1,176 @@
+!> Sealed pockets: cut cells from which no open faces lead to a cell without solid.
+module pockets_m
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
+  use solid_geometry_m, only: solid_geometry_t, set_faces
+  use parallel_m, only: halo_exchange, global_sum
+  implicit none
+  private
+  public :: pockets_t, pockets_init, close_pockets
+
+  type :: pockets_t
+    integer :: low(3) = 1, high(3) = 0            !! first and last cell where the solids are kept
+    logical, allocatable :: reached(:)            !! (cut cells) fluid gets there from uncut cells
+    integer, allocatable :: stack(:)
+    integer, allocatable :: flag(:, :, :)         !! the same on the grid, for the exchange
+  end type pockets_t
+
+contains
+
+  subroutine pockets_init(grid, low, high, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: low(3), high(3)   !! first and last cell where the solids are kept
+    type(pockets_t), intent(out) :: self
+
+    self%low = low
+    self%high = high
+    allocate (self%reached(0), self%stack(0))
+    allocate (self%flag(grid%first(1):grid%last(1), grid%first(2):grid%last(2), &
+                        grid%first(3):grid%last(3)), source=0)
+  end subroutine pockets_init
+
+  !> Close the faces of cut cells from which no open faces lead to a cell without solid.
+  subroutine close_pockets(grid, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(pockets_t), intent(inout) :: self
+    type(solid_geometry_t), intent(inout) :: solid
+    integer(i8) :: left(1), changed(1)
+    integer :: m
+
+    if (size(self%reached) < solid%n_cut) then
+      deallocate (self%reached, self%stack)
+      allocate (self%reached(2*solid%n_cut), self%stack(2*solid%n_cut))
+    end if
+    do m = 1, solid%n_cut
+      self%reached(m) = .false.
+    end do
+    call spread_reach(grid, self, solid)
+    left(1) = own_unreached(grid, self, solid)
+    call global_sum(left)
+    do while (left(1) > 0)
+      call exchange_reach(self, solid)
+      call spread_reach(grid, self, solid)
+      changed(1) = left(1)
+      left(1) = own_unreached(grid, self, solid)
+      call global_sum(left)
+      if (left(1) == changed(1)) exit
+    end do
+    solid%n_sealed = int(left(1))
+    if (left(1) == 0) return
+    call exchange_reach(self, solid)
+    do m = 1, solid%n_cut
+      if (self%reached(m)) cycle
+      solid%n_closed = solid%n_closed + 1
+      solid%closed_cell(:, solid%n_closed) = solid%cut_cell(:, m)
+      call set_faces(grid, solid%cut_cell(:, m), 0.0_wp, solid)
+    end do
+  end subroutine close_pockets
+
+  !> Own cut cells not yet reached.
+  pure function own_unreached(grid, self, solid) result(n)
+    type(grid_t), intent(in) :: grid
+    type(pockets_t), intent(in) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer(i8) :: n
+    integer :: m
+
+    n = 0
+    do m = 1, solid%n_cut
+      if (self%reached(m)) cycle
+      if (any(solid%cut_cell(:, m) < grid%lo) .or. any(solid%cut_cell(:, m) > grid%hi)) cycle
+      n = n + 1_i8
+    end do
+  end function own_unreached
+
+  !> Learn from the owners which cut cells of the halo are reached.
+  subroutine exchange_reach(self, solid)
+    type(pockets_t), intent(inout) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: m
+
+    self%flag = 0
+    do m = 1, solid%n_cut
+      associate (i => solid%cut_cell(:, m))
+        self%flag(i(1), i(2), i(3)) = merge(1, 0, self%reached(m))
+      end associate
+    end do
+    call halo_exchange(self%flag, n_halo)
+    do m = 1, solid%n_cut
+      associate (i => solid%cut_cell(:, m))
+        self%reached(m) = self%flag(i(1), i(2), i(3)) == 1
+      end associate
+    end do
+  end subroutine exchange_reach
+
+  !> Spread the reach through the open faces of the cells kept here.
+  subroutine spread_reach(grid, self, solid)
+    type(grid_t), intent(in) :: grid
+    type(pockets_t), intent(inout) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: m, n_stack, d, s, i(3), n(3), f(3)
+
+    n_stack = 0
+    do m = 1, solid%n_cut
+      if (.not. self%reached(m)) then
+        self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
+      end if
+      if (.not. self%reached(m)) cycle
+      n_stack = n_stack + 1
+      self%stack(n_stack) = m
+    end do
+    do while (n_stack > 0)
+      i = solid%cut_cell(:, self%stack(n_stack))
+      n_stack = n_stack - 1
+      do d = 1, 3
+        do s = 1, 2
+          n = i + (2*s - 3)*unit_step(:, d)
+          if (any(n < self%low) .or. any(n > self%high)) cycle
+          f = merge(i, n, s == 1)
+          if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
+          m = solid%cut(n(1), n(2), n(3))
+          if (m == 0) cycle
+          if (self%reached(m)) cycle
+          self%reached(m) = .true.
+          n_stack = n_stack + 1
+          self%stack(n_stack) = m
+        end do
+      end do
+    end do
+  end subroutine spread_reach
+
+  !> Does a cell share an open face with a cell without solid, or with an open side of the domain?
+  pure logical function touches_free_cell(self, grid, solid, i)
+    type(pockets_t), intent(in) :: self
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: i(3)
+    integer :: d, s, n(3), f(3)
+
+    touches_free_cell = .true.
+    do d = 1, 3
+      do s = 1, 2
+        n = i + (2*s - 3)*unit_step(:, d)
+        f = merge(i, n, s == 1)
+        if (f(d) > grid%last(d)) cycle
+        if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
+        if (n(d) < self%low(d) .or. n(d) > self%high(d)) then
+          if (leads_out(grid, d, s, n(d))) return
+        else if (solid%alpha(n(1), n(2), n(3)) <= 0.0_wp) then
+          return
+        end if
+      end do
+    end do
+    touches_free_cell = .false.
+  end function touches_free_cell
+
+  !> Is a cell index beyond a side of the domain through which fluid may pass?
+  pure logical function leads_out(grid, d, s, index)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d, s, index
+
+    leads_out = .false.
+    if (grid%periodic(d) .or. (index >= 1 .and. index <= grid%n(d))) return
+    leads_out = grid%side(s, d) /= side_no_slip .and. grid%side(s, d) /= side_slip
+  end function leads_out
+
+end module pockets_m
