@@ -1,0 +1,86 @@
+!> Faces and cells that two bodies share, and legs that round-off left open, made by hand.
+program test_finish_solid
+  use kinds_m, only: wp
+  use grid_m, only: grid_t
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_solid, no_hit
+  use painting_m, only: painting_t, painting_init
+  use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs
+  use box_solid_m, only: simple_grid
+  use check_m, only: check, finish_checks
+  implicit none
+  integer, parameter :: c(3) = [3, 2, 2]   !! the cell looked at
+  type(grid_t) :: grid
+  type(solid_geometry_t) :: solid
+  type(painting_t) :: painting
+
+  call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
+  call painting_init(grid, 2, painting)
+
+  call shared_face(0.7_wp, 0.6_wp)
+  call finish_faces(solid)
+  call check('scaled to one', solid%face_beta, [7/13.0_wp, 6/13.0_wp], 1.0e-15_wp)
+  call check('closed', open_share(), 0.0_wp, 0.0_wp)
+  call shared_face(0.7_wp, 0.6_wp)
+  call make_way(2, solid)
+  call check('the bed makes way', solid%face_beta, [0.7_wp, 0.3_wp], 1.0e-15_wp)
+  call check('none is left open', open_share(), 0.0_wp, 1.0e-15_wp)
+  call shared_face(0.3_wp, 0.2_wp)
+  call make_way(2, solid)
+  call finish_faces(solid)
+  call check('shares that fit stay', solid%face_beta, [0.3_wp, 0.2_wp], 0.0_wp)
+  call check('open by the rest', open_share(), 0.5_wp, 1.0e-15_wp)
+
+  call shared_cell(0.6_wp, 0.6_wp)
+  call finish_cells(grid, solid)
+  call check('full', solid%alpha(c(1), c(2), c(3)), 1.0_wp, 0.0_wp)
+  call check('closed all round', sum(solid%open(c(1), c(2), c(3), :)) &
+             + solid%open(c(1) + 1, c(2), c(3), 1) + solid%open(c(1), c(2) + 1, c(3), 2) &
+             + solid%open(c(1), c(2), c(3) + 1, 3), 0.0_wp, 0.0_wp)
+  call check('not cut', solid%n_cut, 0)
+  call clear_solid(grid, solid)
+  call check('nothing is left of it', all(solid%open >= 1.0_wp) .and. all(solid%alpha <= 0.0_wp))
+  call shared_cell(0.6_wp, 0.2_wp)
+  call finish_cells(grid, solid)
+  call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
+
+  call guard_legs(painting, solid)
+  call check('the wall is at the centre inside, below', solid%leg_high(c(1), c(2), c(3), 1), &
+             1.0e-3_wp, 0.0_wp)
+  call check('and above', solid%leg_low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
+  call check('six legs, of the body', solid%n_leg == 6 &
+             .and. solid%leg_body_low(c(1), c(2), c(3), 2) == 1)
+  call check('no others', count(solid%leg_low < no_hit), 6)
+  call finish_checks()
+
+contains
+
+  !> A face that two bodies cover by so much.
+  subroutine shared_face(first, second)
+    real(wp), intent(in) :: first, second
+
+    call solid_geometry_init(grid, solid, 2)
+    solid%body_face = [1, 2, 3]
+    solid%face = reshape([c, 1, c, 1], [4, 2])
+    solid%face_beta = [first, second]
+    solid%open(c(1), c(2), c(3), 1) = 1.0_wp - first - second
+  end subroutine shared_face
+
+  !> A cell that two bodies fill by so much, its centre inside the first.
+  subroutine shared_cell(first, second)
+    real(wp), intent(in) :: first, second
+
+    call solid_geometry_init(grid, solid, 2)
+    solid%body_cell = [1, 2, 3]
+    solid%cell = reshape([c, c], [3, 2])
+    solid%cell_alpha = [first, second]
+    deallocate (solid%cut_cell, solid%closed_cell, solid%leg)
+    allocate (solid%cut_cell(3, 2), solid%closed_cell(3, 2), solid%leg(4, 12))
+    solid%alpha(c(1), c(2), c(3)) = first + second
+    solid%inside(c(1), c(2), c(3)) = 1
+  end subroutine shared_cell
+
+  real(wp) function open_share()
+    open_share = solid%open(c(1), c(2), c(3), 1)
+  end function open_share
+
+end program test_finish_solid
