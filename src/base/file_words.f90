@@ -1,13 +1,13 @@
 !> Text files that are read word by word: words between blanks and line ends, `#` begins a remark.
 module file_words_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, &
     quoted_text, printable
   implicit none
   private
-  public :: words_t, read_whole, next_word, get_integer, get_real, get_count, expected, complain
-  public :: place_of
+  public :: words_t, read_whole, next_word, skip_line, get_integer, get_real, get_count
+  public :: expected, complain, place_of
 
   integer, parameter :: longest_text = 500000000   !! bytes
 
@@ -24,7 +24,8 @@ contains
   subroutine read_whole(file, words)
     character(*), intent(in) :: file
     type(words_t), intent(out) :: words
-    integer :: unit, length, status
+    integer(i8) :: length
+    integer :: unit, status
     logical :: there
 
     words%problem = ''
@@ -40,7 +41,7 @@ contains
     if (length > longest_text .or. length < 0) then
       words%problem = 'longer than 500 MB'
     else
-      words%text = repeat(' ', length)
+      words%text = repeat(' ', int(length))
       read (unit, iostat=status) words%text
       if (status /= 0) words%problem = 'could not be read'
     end if
@@ -90,6 +91,16 @@ contains
     word = words%text(first:words%at - 1)
   end function next_word
 
+  !> Pass over the rest of the line.
+  subroutine skip_line(words)
+    type(words_t), intent(inout) :: words
+    integer :: rest
+
+    if (len(words%problem) > 0 .or. words%at > len(words%text)) return
+    rest = index(words%text(words%at:), achar(10))
+    words%at = merge(words%at + rest - 1, len(words%text) + 1, rest > 0)
+  end subroutine skip_line
+
   subroutine get_integer(words, n)
     type(words_t), intent(inout) :: words
     integer, intent(out) :: n
@@ -100,7 +111,11 @@ contains
     word = next_word(words)
     if (len(words%problem) > 0) return
     call parse_integer(word, n, info)
-    if (info /= value_ok) call expected(words, 'a whole number', word)
+    if (info == value_too_large) then
+      call complain(words, quoted_text(printable(word))//' is too large for a whole number')
+    else if (info /= value_ok) then
+      call expected(words, 'a whole number', word)
+    end if
   end subroutine get_integer
 
   subroutine get_real(words, x)
@@ -116,7 +131,11 @@ contains
     if (info == value_too_large .and. scan(word, 'eEdD') > 0) then
       if (index(word, '-', back=.true.) > scan(word, 'eEdD')) info = value_ok   ! as good as zero
     end if
-    if (info /= value_ok) call expected(words, 'a number', word)
+    if (info == value_too_large) then
+      call complain(words, quoted_text(printable(word))//' is too large a number')
+    else if (info /= value_ok) then
+      call expected(words, 'a number', word)
+    end if
   end subroutine get_real
 
   subroutine expected(words, what, word)
@@ -130,17 +149,18 @@ contains
     end if
   end subroutine expected
 
-  !> A count that the rest of the text has room for.
-  subroutine get_count(words, what, n)
+  !> A count of things that the rest of the text has room for, and zero after a problem.
+  subroutine get_count(words, what, words_each, n)
     type(words_t), intent(inout) :: words
     character(*), intent(in) :: what
+    integer, intent(in) :: words_each   !! words of one of them at least
     integer, intent(out) :: n
+    integer :: most
 
     call get_integer(words, n)
-    if (n < 0 .or. n > len(words%text) - words%at) then
-      call complain(words, 'the file does not hold '//to_text(n)//' '//what)
-      n = 0
-    end if
+    most = (len(words%text) - words%at + 1)/words_each   ! a word has a character at least
+    if (n < 0 .or. n > most) call complain(words, 'the file does not hold '//to_text(n)//' '//what)
+    if (len(words%problem) > 0) n = 0
   end subroutine get_count
 
   !> The line of the problem, to stand before it; empty where there is none.

@@ -369,7 +369,7 @@ contains
     call self%check(status, 'open '//name)
     call get_extent(self, name, id, rank, extent)
     if (self%info /= 0) return
-    found = int(extent(:rank))
+    found = int(min(extent(:rank), int(huge(rank), hsize_t)))
     call h5dclose_f(id, status)
   end subroutine shape_of
 

@@ -15,14 +15,16 @@ module bed_file_m
   use growing_m, only: ensure_room
   use errors_m, only: to_text
   use checksum_m, only: checksum_t
-  use file_words_m, only: words_t, read_whole, next_word, get_integer, get_real, expected, &
-    complain, place_of
+  use value_text_m, only: quoted_text
+  use file_words_m, only: words_t, read_whole, next_word, skip_line, get_integer, get_real, &
+    expected, complain, place_of
   implicit none
   private
   public :: bed_form_t, read_bed_file
 
   integer, parameter :: most_points = 20000000
   integer, parameter :: stl_head = 84, stl_facet = 50   !! bytes of a binary STL file
+  real(real32), parameter :: farthest = 1.0e20_real32   !! coordinate, as in text files [m]
 
   !> Triangles as the file gives them, counter-clockwise from outside.
   type :: bed_form_t
@@ -60,8 +62,6 @@ contains
       end if
     end if
     message = place_of(words)//words%problem
-    if (len(message) > 0) return
-    if (.not. all(ieee_is_finite(form%point))) message = 'a coordinate is not a finite number'
   end subroutine read_bed_file
 
   !> A map of heights.
@@ -90,6 +90,8 @@ contains
     if (.not. all(spacing > 0.0_wp)) call complain(words, 'the spacing must be positive')
     if (real(n(1), wp)*real(n(2), wp) > real(most_points, wp)) then
       call complain(words, 'more than '//to_text(most_points)//' points')
+    else if (n(1)*n(2) > len(words%text) - words%at + 1) then   ! a character each at least
+      call complain(words, 'the file does not hold '//to_text(n(1)*n(2))//' heights')
     end if
     if (len(words%problem) > 0) return
     deallocate (form%point, form%triangle)
@@ -118,28 +120,63 @@ contains
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(inout) :: form
     character(:), allocatable :: word
-    integer :: n, c, k
+    integer :: n, k, in_facet
+    logical :: open_facet
 
     word = next_word(words)
-    if (word /= 'solid') call expected(words, '''solid'', the start of an STL file,', word)
+    if (word /= 'solid') then
+      call expected(words, '''solid'', the start of an STL file,', word)
+      return
+    end if
+    call skip_line(words)
     n = 0
+    in_facet = 0
+    open_facet = .false.
     do
       word = next_word(words)
-      if (len(word) == 0) exit
-      if (word /= 'vertex') cycle
-      n = n + 1
-      call ensure_room(n, form%point)
-      do c = 1, 3
-        call get_real(words, form%point(c, n))
-      end do
+      select case (word)
+      case ('')
+        exit
+      case ('solid', 'endsolid')
+        if (open_facet) call complain(words, quoted_text(word)//' stands inside a facet')
+        call skip_line(words)   ! the name
+      case ('facet')
+        if (open_facet) call complain(words, 'a facet begins before the last one ends')
+        open_facet = .true.
+        in_facet = 0
+      case ('vertex')
+        if (.not. open_facet) call complain(words, 'a vertex stands outside of a facet')
+        in_facet = in_facet + 1
+        n = n + 1
+        call read_corner(words, n, form)
+      case ('endfacet')
+        if (.not. open_facet .or. in_facet /= 3) then
+          call complain(words, 'a facet of the file does not have three corners')
+        end if
+        open_facet = .false.
+      case default   ! the loop and the normal
+        if (.not. open_facet) call expected(words, '''facet'' or ''endsolid''', word)
+      end select
     end do
-    if (len(words%problem) > 0) return
-    words%line = 0
+    if (open_facet) call complain(words, 'the file ends inside a facet')
     if (n == 0) call complain(words, 'the file holds no facets')
-    if (mod(n, 3) /= 0) call complain(words, 'a facet of the file does not have three corners')
+    if (len(words%problem) > 0) return
     form%point = form%point(:, :n)
     form%triangle = reshape([(k, k=1, n)], [3, n/3])
   end subroutine read_ascii_stl
+
+  !> The three coordinates of corner n, at the end of the list.
+  subroutine read_corner(words, n, form)
+    type(words_t), intent(inout) :: words
+    integer, intent(in) :: n
+    type(bed_form_t), intent(inout) :: form
+    integer :: c
+
+    call ensure_room(n, form%point)
+    do c = 1, 3
+      call get_real(words, form%point(c, n))
+    end do
+  end subroutine read_corner
 
   !> Has a text the length of a binary STL file? Some of those begin with `solid` too.
   pure function is_binary_stl(text) result(yes)
@@ -166,6 +203,7 @@ contains
   subroutine read_binary_stl(words, form)
     type(words_t), intent(inout) :: words
     type(bed_form_t), intent(inout) :: form
+    real(real32) :: x(3)
     integer :: n, f, c, at, k
 
     n = (len(words%text) - stl_head)/stl_facet
@@ -176,7 +214,13 @@ contains
     do f = 1, n
       do c = 1, 3
         at = stl_head + stl_facet*(f - 1) + 12*c
-        form%point(:, 3*(f - 1) + c) = real(transfer(words%text(at + 1:at + 12), [0.0_real32]), wp)
+        x = transfer(words%text(at + 1:at + 12), x)
+        if (.not. all(ieee_is_finite(x))) x = huge(x)   ! no comparison with NaN
+        if (any(abs(x) > farthest)) then
+          call complain(words, 'facet '//to_text(f)//': a coordinate is no number up to 1e20')
+          return
+        end if
+        form%point(:, 3*(f - 1) + c) = real(x, wp)
       end do
     end do
     form%triangle = reshape([(k, k=1, 3*n)], [3, n])

@@ -30,14 +30,16 @@ module shape_file_m
 
   !> What a .msh file holds: points by their tags, tetrahedra by tags, other solid elements.
   type :: gmsh_t
-    integer :: n_point = 0, n_tet = 0, n_other = 0, n_high = 0
+    integer :: n_tet = 0, n_other = 0, n_high = 0
     integer, allocatable :: tag(:), tet(:, :)
+    integer, allocatable :: point_line(:), tet_line(:)   !! where they stand in the file
     real(wp), allocatable :: x(:, :)
   end type gmsh_t
 
 contains
 
-  !> Points and tetrahedra of a file; `message` is empty, or says what is wrong with it.
+  !> Points and tetrahedra of a file; `message` is empty, or says what is wrong with it: then there
+  !! are none of either. Every corner of a tetrahedron is a point.
   subroutine read_shape_file(file, point, tet, message)
     character(*), intent(in) :: file
     real(wp), allocatable, intent(out) :: point(:, :)   !! (3, n) as in the file
@@ -46,7 +48,6 @@ contains
     type(words_t) :: words
     character(:), allocatable :: word
 
-    allocate (point(3, 0), tet(4, 0))
     call read_whole(file, words)
     word = next_word(words)
     select case (word)
@@ -58,15 +59,19 @@ contains
       words%line = 0
     end select
     message = place_of(words)//words%problem
+    if (len(message) == 0 .and. allocated(point) .and. allocated(tet)) return
+    if (allocated(point)) deallocate (point)
+    if (allocated(tet)) deallocate (tet)
+    allocate (point(3, 0), tet(4, 0))
   end subroutine read_shape_file
 
-  !> The program's own form, after its first word.
+  !> The program's own form, after its first word: points, then tetrahedra, each once.
   subroutine read_own(words, point, tet)
     type(words_t), intent(inout) :: words
     real(wp), allocatable, intent(inout) :: point(:, :)
     integer, allocatable, intent(inout) :: tet(:, :)
     character(:), allocatable :: word
-    integer :: n, i, k
+    integer :: n
 
     call get_integer(words, n)
     if (n /= 1) call complain(words, 'mics-shape '//to_text(n)//' is unknown, this program reads 1')
@@ -74,33 +79,57 @@ contains
       word = next_word(words)
       select case (word)
       case ('points')
-        call get_count(words, 'points', n)
-        deallocate (point)
-        allocate (point(3, n))
-        do i = 1, n
-          do k = 1, 3
-            call get_real(words, point(k, i))
-          end do
-        end do
+        if (allocated(point)) call complain(words, '''points'' stands a second time')
+        call read_points(words, point)
       case ('tets')
-        call get_count(words, 'tetrahedra', n)
-        deallocate (tet)
-        allocate (tet(4, n))
-        do i = 1, n
-          do k = 1, 4
-            call get_integer(words, tet(k, i))
-            if (tet(k, i) < 1 .or. tet(k, i) > size(point, 2)) then
-              call complain(words, 'there is no point '//to_text(tet(k, i)))
-            end if
-          end do
-        end do
+        if (.not. allocated(point)) call complain(words, '''tets'' stands before any ''points''')
+        if (allocated(tet)) call complain(words, '''tets'' stands a second time')
+        call read_tets(words, point, tet)
       case ('')
-        exit
+        return
       case default
         call expected(words, '''points'' or ''tets''', word)
       end select
     end do
   end subroutine read_own
+
+  !> Count and coordinates of the points; none are kept after a problem.
+  subroutine read_points(words, point)
+    type(words_t), intent(inout) :: words
+    real(wp), allocatable, intent(inout) :: point(:, :)   !! (3, n)
+    integer :: n, i, k
+
+    call get_count(words, 'points', 3, n)
+    if (len(words%problem) > 0) return
+    allocate (point(3, n))
+    do i = 1, n
+      do k = 1, 3
+        call get_real(words, point(k, i))
+      end do
+      if (len(words%problem) > 0) return
+    end do
+  end subroutine read_points
+
+  !> Count and corners of the tetrahedra.
+  subroutine read_tets(words, point, tet)
+    type(words_t), intent(inout) :: words
+    real(wp), allocatable, intent(in) :: point(:, :)
+    integer, allocatable, intent(inout) :: tet(:, :)   !! (4, n)
+    integer :: n, i, k
+
+    call get_count(words, 'tetrahedra', 4, n)
+    if (len(words%problem) > 0) return
+    allocate (tet(4, n))
+    do i = 1, n
+      do k = 1, 4
+        call get_integer(words, tet(k, i))
+        if (tet(k, i) < 1 .or. tet(k, i) > size(point, 2)) then
+          call complain(words, 'there is no point '//to_text(tet(k, i)))
+        end if
+        if (len(words%problem) > 0) return
+      end do
+    end do
+  end subroutine read_tets
 
   !> A .msh file after its first word.
   subroutine read_gmsh(words, point, tet)
@@ -110,17 +139,15 @@ contains
     type(gmsh_t) :: mesh
     character(:), allocatable :: word
     real(wp) :: version
-    integer :: form, i, highest
-    integer, allocatable :: place(:)
+    integer :: form
 
     call get_real(words, version)
     call get_integer(words, form)
-    if (nint(10*version) /= 22 .and. nint(10*version) /= 41) then
+    if (.not. (is_version(version, 2.2_wp) .or. is_version(version, 4.1_wp))) then
       call complain(words, 'this version of the .msh form is not read, 2.2 and 4.1 are')
     else if (form /= 0) then
       call complain(words, 'binary .msh files are not read, save it as ASCII')
     end if
-    allocate (mesh%tag(0), mesh%x(3, 0), mesh%tet(4, 0))
     do
       word = next_word(words)
       select case (word)
@@ -136,137 +163,231 @@ contains
     else if (mesh%n_other > 0) then
       call complain(words, 'holds '//to_text(mesh%n_other) &
                     //' solid elements that are not tetrahedra')
+    else if (.not. allocated(mesh%tag)) then
+      call complain(words, 'the file ends without points, the section $Nodes')
     end if
-    if (len(words%problem) > 0) return
-    words%line = 0
-    point = mesh%x(:, :mesh%n_point)
-    tet = mesh%tet(:, :mesh%n_tet)
-    if (mesh%n_point == 0 .or. mesh%n_tet == 0) return
-    highest = maxval(mesh%tag(:mesh%n_point))
-    if (minval(mesh%tag(:mesh%n_point)) < 1 .or. highest > highest_tag) then
-      call complain(words, 'points must be numbered from 1 to at most '//to_text(highest_tag))
-      return
-    end if
-    allocate (place(highest), source=0)
-    place(mesh%tag(:mesh%n_point)) = [(i, i=1, mesh%n_point)]
-    do i = 1, mesh%n_tet
-      if (any(tet(:, i) < 1 .or. tet(:, i) > highest)) then
-        call complain(words, 'a tetrahedron has a corner that is no point of the file')
-        return
-      end if
-      tet(:, i) = place(tet(:, i))
-      if (any(tet(:, i) == 0)) then
-        call complain(words, 'a tetrahedron has a corner that is no point of the file')
-        return
-      end if
-    end do
+    if (len(words%problem) == 0) call number_from_one(words, mesh, point, tet)
   end subroutine read_gmsh
+
+  !> Is a version as written the one wanted?
+  pure logical function is_version(version, wanted)
+    real(wp), intent(in) :: version, wanted
+
+    is_version = abs(version - wanted) < 0.05_wp
+  end function is_version
+
+  !> Points in the order of the file, tetrahedra by the places of their corners in it.
+  subroutine number_from_one(words, mesh, point, tet)
+    type(words_t), intent(inout) :: words
+    type(gmsh_t), intent(in) :: mesh
+    real(wp), allocatable, intent(inout) :: point(:, :)
+    integer, allocatable, intent(inout) :: tet(:, :)
+    integer, allocatable :: place(:)
+    integer :: i, k, tag
+
+    allocate (place(max(0, maxval(mesh%tag))), source=0)
+    do i = 1, size(mesh%tag)
+      if (place(mesh%tag(i)) /= 0) then
+        words%line = mesh%point_line(i)
+        call complain(words, 'there are two points '//to_text(mesh%tag(i)))
+        return
+      end if
+      place(mesh%tag(i)) = i
+    end do
+    point = mesh%x
+    allocate (tet(4, mesh%n_tet))
+    do i = 1, mesh%n_tet
+      do k = 1, 4
+        tag = mesh%tet(k, i)
+        tet(k, i) = 0
+        if (tag >= 1 .and. tag <= size(place)) tet(k, i) = place(tag)
+        if (tet(k, i) > 0) cycle
+        words%line = mesh%tet_line(i)
+        call complain(words, 'a tetrahedron has the corner '//to_text(tag) &
+                      //', which is no point of the file')
+        return
+      end do
+    end do
+  end subroutine number_from_one
 
   !> The section $Nodes: one list (2.2), or blocks of tags followed by coordinates (4.1).
   subroutine read_nodes(words, blocks, mesh)
     type(words_t), intent(inout) :: words
     logical, intent(in) :: blocks
     type(gmsh_t), intent(inout) :: mesh
-    integer :: n_block, n, b, i, k, dimension, parametric, in_block, skip
-    real(wp) :: parameter
+    integer :: n_block, n, b, in_block, found, parameters
 
+    if (allocated(mesh%tag)) call complain(words, '$Nodes stands a second time')
     n_block = 1
-    if (blocks) call get_count(words, 'blocks', n_block)
-    call get_count(words, 'points', n)
-    if (blocks) then
-      call get_integer(words, skip)
-      call get_integer(words, skip)
-    end if
-    deallocate (mesh%tag, mesh%x)
-    allocate (mesh%tag(n), mesh%x(3, n))
-    mesh%n_point = 0
-    parametric = 0
-    dimension = 0
+    if (blocks) call get_count(words, 'blocks', 4, n_block)
+    call get_count(words, 'points', 4, n)
+    if (blocks) call skip_integers(words, 2)
+    if (len(words%problem) > 0) return
+    allocate (mesh%tag(n), mesh%x(3, n), mesh%point_line(n))
+    in_block = n
+    parameters = 0
+    found = 0
     do b = 1, n_block
-      in_block = n
-      if (blocks) then
-        call get_integer(words, dimension)
-        call get_integer(words, skip)
-        call get_integer(words, parametric)
-        call get_count(words, 'points', in_block)
-        if (mesh%n_point + in_block > n) call complain(words, 'more points than announced')
-        if (len(words%problem) > 0) return
-        do i = 1, in_block
-          call get_integer(words, mesh%tag(mesh%n_point + i))
-        end do
-      end if
-      do i = mesh%n_point + 1, mesh%n_point + in_block
-        if (.not. blocks) call get_integer(words, mesh%tag(i))
-        do k = 1, 3
-          call get_real(words, mesh%x(k, i))
-        end do
-        do k = 1, merge(dimension, 0, parametric == 1)
-          call get_real(words, parameter)
-        end do
-        if (len(words%problem) > 0) return
-      end do
-      mesh%n_point = mesh%n_point + in_block
+      if (blocks) call begin_block(words, parameters)
+      if (blocks) call get_count(words, 'points', 4, in_block)
+      if (in_block > n - found) call complain(words, 'more points than announced')
+      if (len(words%problem) > 0) return
+      call read_node_block(words, blocks, parameters, mesh%tag(found + 1:found + in_block), &
+        mesh%x(:, found + 1:found + in_block), mesh%point_line(found + 1:found + in_block))
+      if (len(words%problem) > 0) return
+      found = found + in_block
     end do
+    if (found < n) call complain(words, 'fewer points than announced')
+    call end_section(words, '$EndNodes')
   end subroutine read_nodes
+
+  !> Dimension and number of an entity, and how many parameters each of its points carries.
+  subroutine begin_block(words, parameters)
+    type(words_t), intent(inout) :: words
+    integer, intent(out) :: parameters
+    integer :: dimension, parametric
+
+    call get_integer(words, dimension)
+    if (dimension < 0 .or. dimension > 3) then
+      call complain(words, to_text(dimension)//' stands where a dimension, 0 to 3, should')
+    end if
+    call skip_integers(words, 1)
+    call get_integer(words, parametric)
+    parameters = merge(dimension, 0, parametric == 1)
+  end subroutine begin_block
+
+  !> Points of one block: all tags first (4.1), or each before its coordinates (2.2).
+  subroutine read_node_block(words, tags_first, parameters, tag, x, line)
+    type(words_t), intent(inout) :: words
+    logical, intent(in) :: tags_first
+    integer, intent(in) :: parameters       !! words after the coordinates
+    integer, intent(out) :: tag(:)
+    real(wp), intent(out) :: x(:, :)        !! (3, n)
+    integer, intent(out) :: line(:)         !! where they stand in the file
+    real(wp) :: parameter
+    integer :: i, k
+
+    do i = 1, size(tag)
+      if (tags_first) call get_tag(words, tag(i))
+      if (len(words%problem) > 0) return
+    end do
+    do i = 1, size(tag)
+      if (.not. tags_first) call get_tag(words, tag(i))
+      do k = 1, 3
+        call get_real(words, x(k, i))
+      end do
+      line(i) = words%line
+      do k = 1, parameters
+        call get_real(words, parameter)
+      end do
+      if (len(words%problem) > 0) return
+    end do
+  end subroutine read_node_block
+
+  !> Number of a point.
+  subroutine get_tag(words, tag)
+    type(words_t), intent(inout) :: words
+    integer, intent(out) :: tag
+
+    call get_integer(words, tag)
+    if (tag >= 1 .and. tag <= highest_tag) return
+    call complain(words, 'a point has the number '//to_text(tag)//', allowed are 1 to ' &
+                  //to_text(highest_tag))
+  end subroutine get_tag
 
   !> The section $Elements: one list (2.2), or blocks of one type (4.1). Only tetrahedra are kept.
   subroutine read_elements(words, blocks, mesh)
     type(words_t), intent(inout) :: words
     logical, intent(in) :: blocks
     type(gmsh_t), intent(inout) :: mesh
-    integer :: n_block, n, b, i, k, m, in_block, skip, kind, tags
+    integer :: n_block, n, b, i, in_block, found, kind
 
+    if (allocated(mesh%tet)) call complain(words, '$Elements stands a second time')
     n_block = 1
-    if (blocks) call get_count(words, 'blocks', n_block)
-    call get_count(words, 'elements', n)
-    if (blocks) then
-      call get_integer(words, skip)
-      call get_integer(words, skip)
-    end if
-    deallocate (mesh%tet)
-    allocate (mesh%tet(4, n))
-    mesh%n_tet = 0
+    if (blocks) call get_count(words, 'blocks', 4, n_block)
+    call get_count(words, 'elements', 2, n)
+    if (blocks) call skip_integers(words, 2)
+    if (len(words%problem) > 0) return
+    allocate (mesh%tet(4, n), mesh%tet_line(n))
+    in_block = n
     kind = 0
+    found = 0
     do b = 1, n_block
-      in_block = n
-      if (blocks) then
-        call get_integer(words, skip)
-        call get_integer(words, skip)
-        call get_integer(words, kind)
-        call get_count(words, 'elements', in_block)
-      end if
+      if (blocks) call skip_integers(words, 2)
+      if (blocks) call get_integer(words, kind)
+      if (blocks) call get_count(words, 'elements', 2, in_block)
+      if (in_block > n - found) call complain(words, 'more elements than announced')
       do i = 1, in_block
-        call get_integer(words, skip)
-        if (.not. blocks) then
-          call get_integer(words, kind)
-          call get_count(words, 'tags', tags)
-          do k = 1, tags
-            call get_integer(words, skip)
-          end do
-        end if
-        if (kind < 1 .or. kind > size(nodes_of)) then
-          call complain(words, 'element type '//to_text(kind)//' is unknown')
-        else if (mesh%n_tet == n) then
-          call complain(words, 'more elements than announced')
-        end if
+        call skip_integers(words, 1)
+        if (.not. blocks) call get_kind_and_skip_tags(words, kind)
+        call read_element(words, kind, mesh)
         if (len(words%problem) > 0) return
-        m = mesh%n_tet + 1
-        do k = 1, nodes_of(kind)
-          if (kind == tet_type) then
-            call get_integer(words, mesh%tet(k, m))
-          else
-            call get_integer(words, skip)
-          end if
-        end do
-        if (kind == tet_type) mesh%n_tet = m
-        if (dimension_of(kind) /= 3 .or. kind == tet_type) cycle
-        if (any(kind == [5, 6, 7])) then
-          mesh%n_other = mesh%n_other + 1
-        else
-          mesh%n_high = mesh%n_high + 1
-        end if
       end do
+      found = found + in_block
     end do
+    if (found < n) call complain(words, 'fewer elements than announced')
+    call end_section(words, '$EndElements')
   end subroutine read_elements
+
+  !> Type and tags of an element of version 2.2.
+  subroutine get_kind_and_skip_tags(words, kind)
+    type(words_t), intent(inout) :: words
+    integer, intent(out) :: kind
+    integer :: tags
+
+    call get_integer(words, kind)
+    call get_count(words, 'tags', 1, tags)
+    call skip_integers(words, tags)
+  end subroutine get_kind_and_skip_tags
+
+  !> The corners of one element, kept if it is a tetrahedron.
+  subroutine read_element(words, kind, mesh)
+    type(words_t), intent(inout) :: words
+    integer, intent(in) :: kind
+    type(gmsh_t), intent(inout) :: mesh
+    integer :: k
+
+    if (kind < 1 .or. kind > size(nodes_of)) then
+      call complain(words, 'element type '//to_text(kind)//' is unknown')
+    end if
+    if (len(words%problem) > 0) return
+    if (kind == tet_type) then
+      mesh%n_tet = mesh%n_tet + 1
+      do k = 1, 4
+        call get_integer(words, mesh%tet(k, mesh%n_tet))
+      end do
+      mesh%tet_line(mesh%n_tet) = words%line
+      return
+    end if
+    call skip_integers(words, nodes_of(kind))
+    if (dimension_of(kind) /= 3) return
+    if (any(kind == [5, 6, 7])) then
+      mesh%n_other = mesh%n_other + 1
+    else
+      mesh%n_high = mesh%n_high + 1
+    end if
+  end subroutine read_element
+
+  !> Pass over n whole numbers.
+  subroutine skip_integers(words, n)
+    type(words_t), intent(inout) :: words
+    integer, intent(in) :: n
+    integer :: k, skip
+
+    do k = 1, n
+      if (len(words%problem) > 0) return
+      call get_integer(words, skip)
+    end do
+  end subroutine skip_integers
+
+  !> The mark at the end of a section; the end of the file will do.
+  subroutine end_section(words, mark)
+    type(words_t), intent(inout) :: words
+    character(*), intent(in) :: mark
+    character(:), allocatable :: word
+
+    word = next_word(words)
+    if (len(word) > 0 .and. word /= mark) call expected(words, mark, word)
+  end subroutine end_section
 
 end module shape_file_m

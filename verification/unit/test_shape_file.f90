@@ -23,6 +23,7 @@ program test_shape_file
   call round_trip('reef_cube', 86)   ! 72 would do; neighbours are joined in turn
   call small_files()
   call faults_of_form()
+  call faults_of_order()
   call faults_of_mesh()
   call merged_net()
   call finish_checks()
@@ -285,7 +286,7 @@ contains
     call expect(nodes_22//'1'//lf//'1 4 0 1 7 9', &
                 'line 13: the file ends where a whole number should stand')
     call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 5'//lf, &
-                'a tetrahedron has a corner that is no point of the file')
+                'line 13: a tetrahedron has the corner 5, which is no point of the file')
     call expect(nodes_22//'2'//lf//'1 4 0 1 7 9 4'//lf//'2 5 0 1 7 9 4 1 7 9 4'//lf, &
                 'line 15: holds 1 solid elements that are not tetrahedra')
     call expect(nodes_22//'1'//lf//'1 11 0 1 7 9 4 1 7 9 4 1 7'//lf, &
@@ -294,6 +295,44 @@ contains
     call expect(nodes_22//'1'//lf//'1 2 0 1 7 9'//lf, 'holds no tetrahedra; a surface alone has ' &
                 //'to be meshed first (tools/make_shape.py)')
   end subroutine faults_of_form
+
+  !> Sections that are missing, stand twice or do not hold what they announce.
+  subroutine faults_of_order()
+    character(*), parameter :: head = '$MeshFormat'//lf//'2.2 0 8'//lf//'$EndMeshFormat'//lf
+    character(*), parameter :: elements = '$Elements'//lf//'1'//lf//'1 4 0 1 2 3 4'//lf
+    character(*), parameter :: head_41 = '$MeshFormat 4.1 0 8 $Nodes '
+
+    call expect(head//elements//'$EndElements'//lf, &
+                'line 8: the file ends without points, the section $Nodes')
+    call expect(one_tet//'points 1'//lf//'0 0 0'//lf, 'line 6: ''points'' stands a second time')
+    call expect(one_tet//'tets 1'//lf//'1 2 3 4', 'line 6: ''tets'' stands a second time')
+    call expect('mics-shape 1'//lf//'tets 1'//lf//'1 2 3 4', &
+                'line 2: ''tets'' stands before any ''points''')
+    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$Nodes'//lf//'1'//lf//'1 0 0 0'//lf, &
+                'line 14: ''$Nodes'' stands where $EndElements should')
+    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$EndElements'//lf//'$Nodes'//lf//'1', &
+                'line 15: $Nodes stands a second time')
+    call expect(nodes_22//'1'//lf//'1 4 0 1 7 9 4'//lf//'$EndElements'//lf//'$Elements'//lf//'1', &
+                'line 15: $Elements stands a second time')
+    call expect(head//'$Nodes'//lf//'2'//lf//'1 0 0 0'//lf//'1 1 0 0'//lf//'$EndNodes'//lf &
+                //elements, 'line 7: there are two points 1')
+    call expect(head//'$Nodes'//lf//'1'//lf//'1 0 0 0'//lf//'2 1 0 0'//lf//'$EndNodes'//lf, &
+                'line 7: ''2'' stands where $EndNodes should')
+    call expect(head//'$Nodes'//lf//'1'//lf//'-1 0 0 0'//lf, &
+                'line 6: a point has the number -1, allowed are 1 to 100000000')
+    call expect(head_41//'1 2 1 2 2000000000 1 1 2 1 2 0 0 0 1 1 1 $EndNodes', &
+                'line 1: 2000000000 stands where a dimension, 0 to 3, should')
+    call expect(head_41//'1 2 1 2 3 1 0 1 1 0 0 0 $EndNodes', &
+                'line 1: fewer points than announced')
+    call expect(head_41//'1 1 1 1 3 1 0 2 1 2 0 0 0 1 1 1 $EndNodes', &
+                'line 1: more points than announced')
+    call expect('mics-shape 1'//lf//'points 1'//lf//'0 0 1e30', &
+                'line 3: ''1e30'' is too large a number')
+    call expect('mics-shape 1'//lf//'points 99999999999', &
+                'line 2: ''99999999999'' is too large for a whole number')
+    call expect('mics-shape 1 '//repeat('x', 100000), 'line 1: '''//repeat('x', 57) &
+                //'...'' stands where ''points'' or ''tets'' should')
+  end subroutine faults_of_order
 
   subroutine faults_of_mesh()
     character(*), parameter :: five = 'mics-shape 1 points 5 0 0 0 1 0 0 0 1 0 0 0 1 '
