@@ -5,7 +5,7 @@
 !! edges and on the faces. Balls and walls are exact. Every result is a maximum over points, which
 !! no order of the work can change.
 module overlap_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use vectors_m, only: cross, norm, inverse3, rotation_matrix
   use tet_mesh_m, only: shape_t, surface_of_tets
   use rigid_body_m, only: blocks_t
@@ -16,8 +16,10 @@ module overlap_m
   implicit none
   private
   public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for
+  public :: expected_samples
 
   real(wp), parameter :: per_edge_sharp = 16.0_wp   !! points on a sharp edge per smallest edge
+  real(wp), parameter :: per_edge_flat = 4.0_wp     !! on the rest of the surface, each way
 
   !> What is worked out once per shape; body axes.
   type :: solid_t
@@ -99,6 +101,23 @@ contains
     call cluster_samples(0.5_wp*shape%smallest_edge, solid)
   end subroutine prepare
 
+  !> About how many points on its surface a shape takes, no fewer than it does: they grow with the
+  !! square of length over thickness, and so do memory and time.
+  pure function expected_samples(shape) result(n)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: n
+    integer, allocatable :: triangle(:, :), triangle_tet(:)
+    real(wp) :: longest   ! edge of a triangle [smallest edge]
+    integer :: t
+
+    call surface_of_tets(size(shape%point, 2), shape%flow_tet, triangle, triangle_tet)
+    n = 0.0_wp
+    do t = 1, size(triangle, 2)
+      longest = longest_edge(shape%point(:, triangle(:, t)))/shape%smallest_edge
+      n = n + 0.5_wp*(per_edge_flat*longest)**2 + 1.5_wp*per_edge_sharp*longest + 2.0_wp
+    end do
+  end function expected_samples
+
   !> Points on the surface: its corners, along its edges, and inside its triangles; and the centre
   !! of mass, since of two equal blocks in one place no surface point lies below the other's
   !! surface.
@@ -109,14 +128,14 @@ contains
     type(shape_t), intent(in) :: shape
     integer, intent(in) :: triangle(:, :)        !! (3, n) surface of the shape
     type(solid_t), intent(inout) :: solid
-    real(wp), parameter :: per_edge_flat = 4.0_wp
     real(wp), parameter :: flat = 1.0e-6_wp      !! 1 - cosine between coplanar triangles
     real(wp), parameter :: centre(3) = 0.0_wp    !! body axes
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: normal(:, :)
     logical, allocatable :: on_surface(:)
     real(wp) :: p(3, 3), spacing
-    integer :: t, e, i, j, m, n_edges, total, pass
+    integer :: t, e, i, j, m, n_edges, pass
+    integer(i8) :: total
 
     allocate (normal(3, size(triangle, 2)), edge(4, 3*size(triangle, 2)))
     allocate (on_surface(size(shape%point, 2)), source=.false.)

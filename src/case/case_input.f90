@@ -8,7 +8,7 @@ module case_input_m
   use vectors_m, only: quaternion_from_axis
   use case_types_m, only: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, &
     numerics_t, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, absent, &
-    is_given
+    is_given, size_count
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use group_visitor_m, only: group_visitor_t
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text
@@ -469,19 +469,6 @@ contains
     call require_range(v, 'refinement', shape%refinement, 1, finest_shape)
     call require_not_negative(v, 'sphere_spacing', shape%sphere_spacing, '[m]')
   end subroutine visit_shape
-
-  !> How many lengths the size of a kind of shape has; 0 where it comes from a file.
-  pure function size_count(kind) result(n)
-    character(*), intent(in) :: kind
-    integer :: n
-
-    select case (kind)
-    case ('box'); n = 3
-    case ('cylinder'); n = 2
-    case ('file'); n = 0
-    case default; n = 1
-    end select
-  end function size_count
 
   !> What the size of a kind of shape means.
   pure function size_meaning(kind) result(meaning)

@@ -8,7 +8,7 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: absent, is_given
+  public :: absent, is_given, size_count
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
 
@@ -160,5 +160,18 @@ contains
 
     yes = x > absent
   end function is_given
+
+  !> How many lengths the size of a kind of shape has; 0 where it comes from a file.
+  pure function size_count(kind) result(n)
+    character(*), intent(in) :: kind
+    integer :: n
+
+    select case (kind)
+    case ('box'); n = 3
+    case ('cylinder'); n = 2
+    case ('file'); n = 0
+    case default; n = 1
+    end select
+  end function size_count
 
 end module case_types_m

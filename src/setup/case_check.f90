@@ -11,19 +11,21 @@ module case_check_m
   use case_input_m, only: side_name
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
-  use shapes_builtin_m, only: make_shape
+  use shapes_builtin_m, only: make_shape, given_size
   use rigid_body_m, only: blocks_t, blocks_init
   use drops_m, only: draw_drop
   use surface_tension_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use neighbours_m, only: nearest_shift
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for, &
+    expected_samples
   implicit none
   private
   public :: make_shapes, check_case
 
   integer, parameter :: most_reported = 20   !! pairs of overlapping bodies named one by one
+  real(wp), parameter :: most_samples = 1.0e7_wp   !! points on a shape that measure its overlap
 
   !> The bodies of a case in their starting places, and one place more to try drops in.
   type :: scene_t
@@ -43,14 +45,24 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), allocatable, intent(out) :: shapes(:)
     type(problems_t), intent(inout) :: problems
+    type(shape_t) :: empty
     character(:), allocatable :: message
+    real(wp) :: samples
     integer :: s
 
     allocate (shapes(size(case%shape)))
     do s = 1, size(case%shape)
       if (case%shape(s)%faulty) cycle
       call make_shape(case%shape(s), shapes(s), message)
-      if (len(message) > 0) call problems%add_message('&shape '//message, case%shape(s)%line)
+      if (len(message) == 0) then
+        samples = expected_samples(shapes(s))
+        if (samples > most_samples) message = given_size(case%shape(s))//': so slender a ' &
+          //'block would need '//brief(samples)//' points on its surface, at most ' &
+          //brief(most_samples)//', as of a box 400 times as long as it is thick'
+      end if
+      if (len(message) == 0) cycle
+      shapes(s) = empty
+      call problems%add_message('&shape '//message, case%shape(s)%line)
     end do
   end subroutine make_shapes
 
@@ -115,8 +127,10 @@ contains
     real(wp) :: length
     integer :: s, d
 
+    if (.not. any(case%boundary%kind(1, :) == 'periodic')) return
     do s = 1, size(shapes)
       if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s)%name)) cycle
+      if (2*shapes(s)%radius <= 0.5_wp*minval(case%grid%length)) cycle   ! no need to look closer
       length = longest_line(shapes(s))
       do d = 1, 3
         if (case%boundary%kind(1, d) /= 'periodic' .or. length <= 0.5_wp*case%grid%length(d)) cycle
@@ -138,21 +152,24 @@ contains
     yes = any(case%body%shape == name) .or. any(case%drop%shape == name)
   end function in_use
 
-  !> Largest distance between two points of a shape [m].
+  !> Largest distance between two points of a shape, which are corners of its facets [m].
   pure function longest_line(shape) result(length)
     type(shape_t), intent(in) :: shape
     real(wp) :: length
-    integer :: i
+    integer :: i, k
 
     if (shape%kind == 'sphere') then
       length = 2*shape%sphere_radius(1)
       return
     end if
     length = 0.0_wp
-    do i = 1, size(shape%point, 2)
-      length = max(length, maxval(sum((shape%point(:, i:) - spread(shape%point(:, i), 2, &
-        size(shape%point, 2) - i + 1))**2, 1)))
-    end do
+    associate (corner => shape%facet_point)
+      do i = 1, size(corner)
+        do k = i + 1, size(corner)
+          length = max(length, sum((shape%point(:, corner(k)) - shape%point(:, corner(i)))**2))
+        end do
+      end do
+    end associate
     length = sqrt(length)
   end function longest_line
 

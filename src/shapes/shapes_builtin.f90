@@ -5,7 +5,7 @@
 !! symmetry of the cube, with an odd one those of the regular tetrahedron.
 module shapes_builtin_m
   use kinds_m, only: wp, pi
-  use case_types_m, only: shape_input_t
+  use case_types_m, only: shape_input_t, size_count
   use tet_mesh_m, only: shape_t, surface_of_tets
   use vectors_m, only: cross
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
@@ -19,10 +19,12 @@ module shapes_builtin_m
   use errors_m, only: to_text
   implicit none
   private
-  public :: make_shape, max_refinement
+  public :: make_shape, given_size, max_refinement
 
   integer, parameter :: max_refinement = 8
   real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
+  real(wp), parameter :: most_slender = 300.0_wp   !! height over diameter, refinement 1
+  real(wp), parameter :: shortest = 1.0e-6_wp, longest = 1.0e6_wp   !! block from a file [m]
   real(wp), parameter :: most_spheres = 2.0e4_wp, dense_spacing = 0.1_wp   !! [-], [smallest edge]
   integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
 
@@ -87,13 +89,19 @@ contains
     case ('dense')
       spacing = input%sphere_spacing
       if (spacing <= 0.0_wp) spacing = dense_spacing*shape%smallest_edge
-      expected = surface_area(shape%point, shape%triangle)/spacing**2
+      expected = max(surface_area(shape%point, shape%triangle)/spacing**2, &
+                     real(size(shape%facet), wp))
       if (expected > most_spheres) then
         message = 'sphere_spacing = '//to_text(spacing)//': about '//to_text(nint(min(expected, &
           1.0e9_wp)))//' contact spheres, at most '//to_text(nint(most_spheres))
-        return
+      else if (spacing > shape%smallest_edge) then
+        message = 'sphere_spacing = '//to_text(spacing)//': leaves gaps as wide as the block, ' &
+          //'must be at most its smallest edge, '//to_text(shape%smallest_edge)//' m'
       end if
+      if (len(message) > 0) return
       call place_densely(spacing, shape)
+      if (size(shape%sphere_radius) == 0) message = 'sphere_spacing = '//to_text(spacing) &
+        //': no contact sphere finds room, it must be smaller'
     case ('inscribed')
       call place_inscribed(shape)
     case default
@@ -107,7 +115,7 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(inout) :: shape
     character(:), allocatable, intent(out) :: message
-    real(wp) :: volume, centroid(3)
+    real(wp) :: volume, centroid(3), extent
     integer :: m
 
     call read_shape_file(input%file, shape%point, shape%tet, message)
@@ -117,6 +125,13 @@ contains
       return
     end if
     shape%point = input%scale*shape%point
+    extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
+    if (extent < shortest .or. extent > longest) then
+      message = 'scale = '//to_text(input%scale)//': the block of '//quoted_text(input%file) &
+        //' is '//to_text(extent)//' m long, it must be between '//to_text(shortest)//' and ' &
+        //to_text(longest)//' m'
+      return
+    end if
     shape%flow_tet = shape%tet
     call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
     shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
@@ -183,35 +198,60 @@ contains
   pure function problem_with(input) result(message)
     type(shape_input_t), intent(in) :: input
     character(:), allocatable :: message
-    integer :: n_size
 
     message = ''
-    n_size = 1
     select case (trim(input%kind))
-    case ('hexapod', 'cube', 'sphere', 'tetrapod', 'dolos', 'reef_cube')
-    case ('box')
-      n_size = 3
-    case ('cylinder')
-      n_size = 2
-    case ('file')
-      n_size = 0
+    case ('hexapod', 'cube', 'sphere', 'tetrapod', 'dolos', 'reef_cube', 'box', 'cylinder', 'file')
     case default
       message = 'kind = '''//trim(input%kind)//''' is unknown'
       return
     end select
-    if (any(input%size(:n_size) <= 0.0_wp)) message = 'size must be positive [m]'
+    if (any(input%size(:size_count(input%kind)) <= 0.0_wp)) message = 'size must be positive [m]'
     if (input%density <= 0.0_wp) message = 'density must be positive [kg/m3]'
     if (input%refinement < 1 .or. input%refinement > max_refinement) then
       message = 'refinement must be 1 to 8'
     end if
-    if (len(message) > 0) return
-    if (trim(input%kind) == 'box') then
-      if (product(anint(input%size/minval(input%size))) &
-          > most_parts/real(input%refinement, wp)**3) then
-        message = 'size: so slender a box would be cut too finely; build it of several boxes'
-      end if
-    end if
+    if (len(message) == 0) message = too_slender(input)
   end function problem_with
+
+  !> What is wrong with the proportions of a box or a cylinder, which say how finely it is cut.
+  pure function too_slender(input) result(message)
+    type(shape_input_t), intent(in) :: input
+    character(:), allocatable :: message
+    real(wp) :: parts, most
+
+    message = ''
+    select case (trim(input%kind))
+    case ('box')
+      parts = product(anint(input%size/minval(input%size)))
+      most = most_parts/real(input%refinement, wp)**3
+      if (parts > most) message = given_size(input)//': so slender a box would be cut into ' &
+        //to_text(parts)//' cubes, at most '//to_text(nint(most))//' with refinement = ' &
+        //to_text(input%refinement)
+    case ('cylinder')
+      most = aint(most_slender/sqrt(real(input%refinement, wp)))
+      if (input%size(2) > most*input%size(1)) message = given_size(input)//': so slender a ' &
+        //'cylinder would be cut too finely, its height must be at most '//to_text(nint(most)) &
+        //' diameters with refinement = '//to_text(input%refinement)
+    case default   ! of given proportions, or measured when it is made
+    end select
+  end function too_slender
+
+  !> What says how large a block is, as the case may have it: `size = 1, 2`, `file = 'stone'`.
+  pure function given_size(input) result(text)
+    type(shape_input_t), intent(in) :: input
+    character(:), allocatable :: text
+    integer :: d
+
+    if (trim(input%kind) == 'file') then
+      text = 'file = '//quoted_text(input%file)
+      return
+    end if
+    text = 'size = '//to_text(input%size(1))
+    do d = 2, size_count(input%kind)
+      text = text//', '//to_text(input%size(d))
+    end do
+  end function given_size
 
   !> Occupied places of a hexapod in a block of 3 x 3 x 3 cubes.
   pure function hexapod_cubes() result(full)
