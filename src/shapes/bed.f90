@@ -69,14 +69,8 @@ contains
     call check_extent()
     if (problems%n > n_before) return
     call set_bed(case, form, bed, message)
-    if (len(message) > 0) then
-      call note(message)
-      return
-    end if
-    call check_border(case, bed, message)
-    if (len(message) > 0) call note(message)
-    if (len(message) > 0) return
-    call check_layers(case, bed, message)
+    if (len(message) == 0) call check_border(case, bed, message)
+    if (len(message) == 0) call check_layers(case, bed, message)
     if (len(message) > 0) call note(message)
   contains
     subroutine note(what)
@@ -102,6 +96,11 @@ contains
         call note('it is '//to_text(maxval(high(1:2) - low(1:2)))//' m long, more than ' &
           //to_text(nint(far_too_large))//' times the tank; are its coordinates in mm? ' &
           //'They must be in m')
+        return
+      end if
+      if (high(3) - low(3) > far_too_large*maxval(case%grid%length)) then
+        call note('it is '//to_text(high(3) - low(3))//' m high, more than ' &
+          //to_text(nint(far_too_large))//' times the tank; its coordinates must be in m')
         return
       end if
       do d = 1, 2
@@ -141,7 +140,7 @@ contains
     bed%period = merge(case%grid%length, 0.0_wp, case%boundary%kind(1, :) == 'periodic')
     bed%checksum = form%checksum
     call repeat_form(case, form, bed)
-    call join_points(bed)
+    call join_points(case, bed)
     area = 0.0_wp
     n = size(bed%triangle, 2)
     allocate (low(3, n), high(3, n))
@@ -163,15 +162,18 @@ contains
     net%facet = [(3*m - 2, m=1, n + 1)]
     net%facet_point = reshape(bed%triangle, [3*n])
     net%smallest_edge = 2*spacing   ! sets the bins only
-    call surface_init(net, bed%surface)
+    call surface_init(net, bed%surface, with_net=.false.)
     ! a place on the edge between two flat facets must not slip between them
     bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
     bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
     bed%surface%probe = bed%surface%probe(:, :bed%surface%n_corners)
     bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
     call bins_build(bed%surface%probe, bed%surface%probe, spacing, bed%surface%probes)
+    low = near_tank(case, low)
+    high = near_tank(case, high)
     low(3, :) = 0.0_wp
     high(3, :) = 0.0_wp
+    spacing = mean_spacing(maxval(high, 2) - minval(low, 2), n)
     call bins_build(low, high, spacing, bed%columns)
     bed%there = .true.
   end subroutine set_bed
@@ -205,15 +207,20 @@ contains
   end subroutine repeat_form
 
   !> Let corners at one place be one point; facets that shrink to a line are dropped.
-  subroutine join_points(bed)
+  subroutine join_points(case, bed)
+    type(case_t), intent(in) :: case
     type(bed_t), intent(inout) :: bed
     type(bins_t) :: bins
     integer, allocatable :: number(:)
+    real(wp), allocatable :: low(:, :), high(:, :)
     real(wp) :: near
     integer :: i, m, n, bin, p
 
     near = same_place*maxval(maxval(bed%point, 2) - minval(bed%point, 2))
-    call bins_build(bed%point - near, bed%point + near, mean_spacing(bed), bins)
+    low = near_tank(case, bed%point - near)
+    high = near_tank(case, bed%point + near)
+    call bins_build(low, high, mean_spacing(maxval(high, 2) - minval(low, 2), &
+                                            size(bed%triangle, 2)), bins)
     allocate (number(size(bed%point, 2)), source=0)
     n = 0
     do i = 1, size(number)
@@ -253,15 +260,29 @@ contains
     bed%triangle = bed%triangle(:, :m)
   end subroutine renumber
 
-  !> Side of a square that has the mean area of a facet seen from the largest side [m].
-  pure function mean_spacing(bed) result(spacing)
-    type(bed_t), intent(in) :: bed
-    real(wp) :: spacing
-    real(wp) :: extent(3)
+  !> Points far from the tank moved to it: bins of the places beside it stay small where a bed has
+  !! points far away. Order along each axis is kept, so bins still find all they should.
+  pure function near_tank(case, x) result(moved)
+    type(case_t), intent(in) :: case
+    real(wp), intent(in) :: x(:, :)   !! (3, n) [m]
+    real(wp) :: moved(3, size(x, 2))
+    integer :: i
 
-    extent = maxval(bed%point, 2) - minval(bed%point, 2)
+    associate (from => case%grid%origin, length => case%grid%length)
+      do i = 1, size(x, 2)
+        moved(:, i) = min(max(x(:, i), from - maxval(length)), from + length + maxval(length))
+      end do
+    end associate
+  end function near_tank
+
+  !> Side of a square that has the mean area of n facets seen from the largest side [m].
+  pure function mean_spacing(extent, n) result(spacing)
+    real(wp), intent(in) :: extent(3)   !! of the bed [m]
+    integer, intent(in) :: n
+    real(wp) :: spacing
+
     spacing = sqrt(max(extent(1)*extent(2), extent(2)*extent(3), extent(3)*extent(1)) &
-                   /real(max(1, size(bed%triangle, 2)), wp))
+                   /real(max(1, n), wp))
   end function mean_spacing
 
   !> An open edge of the surface inside the tank: the solid would end there without a surface.
@@ -362,7 +383,6 @@ contains
 
     layers%n = 0
     bin = column_of(bed, at)
-    if (bin == 0) return
     do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
       f = bed%columns%item(m)
       way = way_of(bed, f, at)
@@ -384,17 +404,13 @@ contains
     end do
   end subroutine find_layers
 
-  !> Bin of the facets above and below a place, 0 if there are none.
+  !> Bin of the facets above and below a place.
   pure function column_of(bed, at) result(bin)
     type(bed_t), intent(in) :: bed
     real(wp), intent(in) :: at(3)
     integer :: bin
 
-    bin = 0
-    associate (columns => bed%columns)
-      if (any(at(1:2) < columns%low(1:2)) .or. any(at(1:2) > columns%high(1:2))) return
-      bin = columns%number(columns%place([at(1:2), 0.0_wp]))
-    end associate
+    bin = bed%columns%number(bed%columns%place([at(1:2), 0.0_wp]))
   end function column_of
 
   !> How facet f lies over or under a place: 1 it looks up, -1 down, 0 not at all.
@@ -448,14 +464,12 @@ contains
 
     above = 0
     bin = column_of(bed, x)
-    if (bin > 0) then
-      do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
-        f = bed%columns%item(m)
-        way = way_of(bed, f, x)
-        if (way == 0) cycle
-        if (height_of(bed, f, x) > x(3)) above = above + way
-      end do
-    end if
+    do m = bed%columns%first(bin), bed%columns%first(bin + 1) - 1
+      f = bed%columns%item(m)
+      way = way_of(bed, f, x)
+      if (way == 0) cycle
+      if (height_of(bed, f, x) > x(3)) above = above + way
+    end do
     yes = above > 0
   end function bed_covers
 

@@ -1,6 +1,6 @@
 !> Who is near whom: boxes sorted into bins, and pairs of bodies whose bounding spheres come close.
 module neighbours_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use growing_m, only: ensure_room
   implicit none
   private
@@ -32,15 +32,16 @@ contains
 
   !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
   !!
-  !! The size grows where the block would hold more than `most_bins`.
+  !! The size grows where the block would hold more than `most_bins`, or where large boxes would be
+  !! listed in too many bins.
   subroutine bins_build(low, high, size_wanted, bins)
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
     real(wp), intent(in) :: size_wanted             !! [m]
     type(bins_t), intent(out) :: bins
     integer, parameter :: most_bins = 200000
-    integer :: i, j, k, c, m, pass, a(3), b(3)
+    integer(i8), parameter :: often = 100_i8             !! entries of a box on average
+    integer(i8), parameter :: few = 10000000_i8, most = 1000000000_i8   !! entries in all
     real(wp) :: extent(3), edge
-    integer, allocatable :: next(:)
 
     if (size(low, 2) == 0) then
       bins%n = 1
@@ -51,12 +52,48 @@ contains
     bins%low = minval(low, 2)
     bins%high = maxval(high, 2)
     extent = bins%high - bins%low
-    edge = size_wanted
+    edge = max(size_wanted, maxval(extent)/real(most_bins, wp))
+    if (.not. edge > 0.0_wp) edge = 1.0_wp   ! all in one place
     do while (product(extent/edge + 1.0_wp) > real(most_bins, wp))
       edge = 1.25_wp*edge
     end do
+    call set_size(extent, edge, bins)
+    do while (entries(low, high, bins) > min(max(few, often*int(size(low, 2), i8)), most))
+      edge = 2*edge
+      call set_size(extent, edge, bins)
+    end do
+    call fill_bins(low, high, bins)
+  end subroutine bins_build
+
+  !> Number of the bins and their size, about a given one.
+  pure subroutine set_size(extent, edge, bins)
+    real(wp), intent(in) :: extent(3), edge   !! [m]
+    type(bins_t), intent(inout) :: bins
+
     bins%n = max(1, ceiling(extent/edge))
     bins%size = merge(extent/real(bins%n, wp), edge, extent > 0.0_wp)
+  end subroutine set_size
+
+  !> In how many bins the boxes would be listed, all together.
+  pure function entries(low, high, bins) result(n)
+    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
+    type(bins_t), intent(in) :: bins
+    integer(i8) :: n
+    integer :: m
+
+    n = 0
+    do m = 1, size(low, 2)
+      n = n + product(int(bins%place(high(:, m)) - bins%place(low(:, m)) + 1, i8))
+    end do
+  end function entries
+
+  !> List every box in the bins it meets.
+  subroutine fill_bins(low, high, bins)
+    real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
+    type(bins_t), intent(inout) :: bins
+    integer :: i, j, k, c, m, pass, a(3), b(3)
+    integer, allocatable :: next(:)
+
     allocate (bins%first(product(bins%n) + 1), next(product(bins%n)), source=0)
     do pass = 1, 2   ! count, then fill
       do m = 1, size(low, 2)
@@ -80,7 +117,7 @@ contains
       allocate (bins%item(bins%first(size(bins%first)) - 1))
       next = bins%first(:size(next))
     end do
-  end subroutine bins_build
+  end subroutine fill_bins
 
   !> Bin that holds the point x, 1..n in each direction; points outside go to the nearest bin.
   pure function bins_place(self, x) result(p)

@@ -58,10 +58,11 @@ module surface_features_m
 
 contains
 
-  !> Features of a shape.
-  subroutine surface_init(shape, surface)
+  !> Features of a shape. `least_distance` needs the net of distances; a bed does without.
+  subroutine surface_init(shape, surface, with_net)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(out) :: surface
+    logical, intent(in), optional :: with_net   !! default: yes
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: juts(:)
@@ -83,6 +84,9 @@ contains
     call make_edges(shape, edge, point_normal, surface)
     call make_probes(shape, juts, surface)
     call sort_into_bins(shape, surface)
+    if (present(with_net)) then
+      if (.not. with_net) return
+    end if
     call make_net(surface)
   end subroutine surface_init
 
