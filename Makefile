@@ -13,7 +13,9 @@ OPT := -O3 -march=native
 LTO := -flto=auto -ffat-lto-objects
 OPT_DEBUG := -O0 -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \
   -ffpe-trap=invalid,zero,overflow
-FFLAGS := -std=f2008 -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
+OPT_SAN := -O1 -g -fcheck=all,no-array-temps -fsanitize=address,undefined \
+  -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+FFLAGS := -std=f2008 -ffpe-summary=none -Wall -Wextra -Wimplicit-interface -Wconversion -fopenmp
 # Without fused multiply-add the results do not depend on what the compiler happens to fuse.
 FFLAGS += -ffp-contract=off
 FFLAGS += $(if $(CI),-Werror)
@@ -21,11 +23,11 @@ PYTHON := .venv/bin/python
 CASE := input/blocks.nml
 
 parallel := $(if $(MPI),mpi,serial)
-variant := $(parallel)$(if $(DEBUG),-debug)
+variant := $(parallel)$(if $(DEBUG),-debug)$(if $(SAN),-san)
 B := build/$(variant)
-binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)
+binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)$(if $(SAN),_san)
 compiler := $(if $(MPI),$(FC_MPI),$(FC_SERIAL))
-flags := $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),$(OPT) $(LTO))
+flags := $(FFLAGS) $(if $(SAN),$(OPT_SAN),$(if $(DEBUG),$(OPT_DEBUG),$(OPT) $(LTO)))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
@@ -49,6 +51,7 @@ help:
 	@echo 'make deps     install what is missing: compiler, HDF5, MPI, Python packages in .venv'
 	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
+	@echo 'make SAN=1    ./mics_san, under the address and undefined behaviour sanitizers'
 	@echo 'make run      deps, build, run $(CASE), draw the pictures'
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
@@ -144,4 +147,4 @@ lint: deps
 	@tools/lint.sh
 
 clean:
-	rm -rf build mics mics_mpi mics_debug mics_mpi_debug
+	rm -rf build mics mics_mpi mics_debug mics_mpi_debug mics_san

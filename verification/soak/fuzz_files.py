@@ -1,0 +1,418 @@
+"""Damaged input files: each must be refused with a message, or taken, soon and in little memory.
+
+usage: python verification/soak/fuzz_files.py [KIND ...] [--count N] [--seed S]
+                                              [--program ./mics_san] [--keep DIR]
+
+Every file starts as a good one of its kind and is damaged one to three times. The program reads it
+with --check; where it takes the file, it also makes a few steps with it. A failure is an end by a
+signal, an exit code that is none of the program's, a message that is not its own, 20 s, or 4 GB.
+The last two hold for a single file of at most a few kB.
+
+The exit code is 0 when nothing failed; the files that failed are kept. `make SAN=1` builds the
+program that finds most: ./mics_san.
+"""
+
+import argparse
+import os
+import random
+import re
+import resource
+import struct
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+SECONDS = 20.0
+MEMORY = 4 << 30  # bytes
+TAKEN, REFUSED, NUMERICS, FILES = 0, 2, 3, 4  # exit codes of the program
+
+NASTY = [
+    *("0", "-1", "1", "2", "3", "7", "100000000", "2147483647", "2147483648", "-2147483648"),
+    *("99999999999999999999", "1000000000", "1e8", "-1e8", "1e19", "1e21", "1e308", "1e999"),
+    *("1e-320", "nan", "inf", "-inf", "1.5", "1e", "0x10", "1,5", "''", "#", "$Nodes", "tets"),
+    *("points", "vertex", "endfacet", "\0", "\xff\xfe", "1.7976931348623157e308"),
+]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How to make a good file of a kind, and the case that reads it."""
+
+    name: str
+    good: Callable[[random.Random], bytes]
+    group: str
+    number: str = ""  # struct format of the numbers of a binary file
+    more: str = ""
+    odd: Callable[[random.Random], bytes] | None = None  # files that are whole but wrong
+
+    def case(self) -> str:
+        """A small case in a tank of 1 m with the file."""
+        return (
+            "&run t_end = 0.002 dt = 0.001 field_interval = 0 " + self.more + " /\n"
+            "&grid cells = 6, 4, 5  length = 1, 1, 1 /\n"
+            "&shape name = 'cube'  kind = 'cube'  size = 0.1 /\n"
+            "&body shape = 'cube'  position = 0.2, 0.2, 0.85 /\n" + self.group + "\n"
+        )
+
+
+def tets_of_grid(n: int) -> tuple[list[tuple[float, float, float]], list[list[int]]]:
+    """Points and tetrahedra (from 1) of a bar of n unit cubes, each cut into six."""
+    points = [(float(i), float(j), float(k)) for i in range(n + 1) for j in (0, 1) for k in (0, 1)]
+    paths = [(4, 2, 1), (4, 1, 2), (2, 4, 1), (2, 1, 4), (1, 4, 2), (1, 2, 4)]
+    tets = []
+    for i in range(n):
+        for path in paths:
+            corner = [4 * i + 1]
+            for step in path:
+                corner.append(corner[-1] + step)
+            tets.append(corner)
+    return points, tets
+
+
+def own_form(rng: random.Random) -> bytes:
+    """The program's own shape file."""
+    points, tets = tets_of_grid(rng.randint(1, 4))
+    rows = ["mics-shape 1", f"points {len(points)}", *(" ".join(map(repr, p)) for p in points)]
+    rows += [f"tets {len(tets)}", *(" ".join(map(str, t)) for t in tets)]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def gmsh(rng: random.Random) -> bytes:
+    """A Gmsh file of version 2.2 or 4.1."""
+    points, tets = tets_of_grid(rng.randint(1, 4))
+    place = [" ".join(map(repr, p)) for p in points]
+    corners = [" ".join(map(str, t)) for t in tets]
+    if rng.random() < 0.5:
+        rows = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$Nodes", str(len(points))]
+        rows += [f"{i} {p}" for i, p in enumerate(place, 1)]
+        rows += ["$EndNodes", "$Elements", str(len(tets) + 1), "1 2 2 0 1 1 2 3"]
+        rows += [f"{i} 4 2 0 1 {c}" for i, c in enumerate(corners, 2)]
+    else:
+        half, n = len(points) // 2, len(points)
+        rows = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$Entities", "0 0 0 1"]
+        rows += ["1 0 0 0 1 1 1 0 0", "$EndEntities", "$Nodes", f"2 {n} 1 {n}"]
+        for begin, end in ((0, half), (half, n)):
+            rows += [f"3 {begin + 1} 0 {end - begin}", *map(str, range(begin + 1, end + 1))]
+            rows += place[begin:end]
+        rows += ["$EndNodes", "$Elements", f"2 {len(tets) + 1} 1 {len(tets) + 1}", "2 1 2 1"]
+        rows += ["1 1 2 3", f"3 1 4 {len(tets)}"]
+        rows += [f"{i} {c}" for i, c in enumerate(corners, 2)]
+    return ("\n".join([*rows, "$EndElements"]) + "\n").encode()
+
+
+def heightmap(rng: random.Random) -> bytes:
+    """A map of heights that covers the tank."""
+    n = rng.randint(2, 6), rng.randint(2, 6)
+    rows = ["# a bed", f"{n[0]} {n[1]} 0 0 {1 / (n[0] - 1)!r} {1 / (n[1] - 1)!r}"]
+    rows += [" ".join(f"{rng.uniform(0, 0.3):.3f}" for _ in range(n[0])) for _ in range(n[1])]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def stone(rng: random.Random) -> np.ndarray:
+    """The facets (4, 3 corners, xyz) of a tetrahedron in the tank."""
+    edge = rng.uniform(0.1, 0.3)
+    corner = np.array([[0, 0, 0], [edge, 0, 0], [0, edge, 0], [0, 0, edge]])
+    shift = [rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.6), 0.1]
+    facets: np.ndarray = (corner + shift)[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
+    return facets
+
+
+def ascii_stl(rng: random.Random) -> bytes:
+    """An STL file as text."""
+    rows = ["solid stone"]
+    for facet in stone(rng).tolist():
+        rows += ["facet normal 0 0 0", "outer loop"]
+        rows += ["vertex " + " ".join(map(repr, corner)) for corner in facet]
+        rows += ["endloop", "endfacet"]
+    return ("\n".join([*rows, "endsolid stone"]) + "\n").encode()
+
+
+def binary_stl(rng: random.Random) -> bytes:
+    """An STL file as bytes."""
+    facets = stone(rng)
+    head = rng.choice([b"solid stone", b"stone"]).ljust(80) + struct.pack("<I", len(facets))
+    return head + b"".join(
+        np.concatenate([np.zeros(3), f.ravel()]).astype("<f4").tobytes() + b"\0\0" for f in facets
+    )
+
+
+def initial_state(rng: random.Random, odd: bool = False) -> bytes:
+    """An HDF5 file of an initial state; an odd one is wrong in some way h5py can write."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "state.h5"
+        with h5py.File(path, "w", libver=rng.choice(["earliest", "latest"])) as h5:
+            write_state(h5, rng)
+            if odd:
+                odd_state(h5, rng)
+        return path.read_bytes()
+
+
+def write_state(h5: h5py.File, rng: random.Random) -> None:
+    """A good state, plain, in chunks or compressed."""
+    options: dict[str, object] = rng.choice([{}, {"chunks": True}, {"compression": "gzip"}])
+    shares = np.random.default_rng(rng.randrange(1 << 30)).random((5, 4, 6))
+    h5.create_dataset("liquid", data=shares, **options)
+    if rng.random() < 0.5:
+        h5.create_dataset("velocity", data=0.01 * np.ones((5, 4, 6, 3)), **options)
+
+
+def odd_state(h5: h5py.File, rng: random.Random) -> None:
+    """Replace the liquid by something that is not what should stand there."""
+    del h5["liquid"]
+    shape = (5, 4, 6)
+    match rng.randrange(14):
+        case 0:
+            h5["liquid"] = np.full(shape, rng.choice([np.nan, np.inf, -1.0, 2.0, 1e308]))
+        case 1:
+            h5["liquid"] = np.ones(rng.choice([(5, 4), (5, 4, 6, 1), (6, 4, 5), (0, 4, 6), ()]))
+        case 2:
+            h5.create_dataset("liquid", (10**6, 10**6, 10**6), "f8", chunks=(1, 1, 1000))
+        case 3:
+            h5.create_group("liquid")
+        case 4:
+            h5["liquid"] = np.full(shape, b"text", dtype=h5py.string_dtype(length=8))
+        case 5:
+            h5["liquid"] = np.full(shape, "text", dtype=h5py.string_dtype())
+        case 6:
+            h5["liquid"] = np.ones(shape, rng.choice(["i1", "u8", ">f4", "f2", ">f8", "i8"]))
+        case 7:
+            h5["liquid"] = np.zeros(shape, [("a", "f8"), ("b", "i4")])
+        case 8:
+            h5["liquid"] = h5py.SoftLink("/liquid")
+        case 9:
+            h5["liquid"] = h5py.ExternalLink("missing.h5", "/liquid")
+        case 10:
+            h5["liquid"] = h5py.Empty("f8")
+        case 11:
+            h5.create_dataset("liquid", shape, "f8")  # nothing written
+        case 12:
+            h5["liquid"] = np.ones(shape, dtype=complex)
+        case 13:
+            pass
+
+
+def stl(rng: random.Random) -> bytes:
+    """An STL file of either form."""
+    return rng.choice([ascii_stl, binary_stl])(rng)
+
+
+SHAPE = "&shape name = 'file'  kind = 'file'  file = 'file'  scale = 0.1  {} /\n"
+PLACE = "&body shape = 'file'  position = 0.5, 0.5, 0.7 /"
+BED = "&bed file = 'file'  kind = '{}' /"
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("msh", gmsh, SHAPE.format("") + PLACE, more="physics = 'dry'"),
+        Kind("shape", own_form, SHAPE.format("spheres = 'dense'") + PLACE, more="physics = 'dry'"),
+        Kind("heightmap", heightmap, BED.format("heightmap"), more="physics = 'dry'"),
+        Kind("stl", stl, BED.format("stl"), "<f", more="physics = 'dry'"),
+        Kind(
+            "initial_state",
+            initial_state,
+            "&fluid initial_state = 'file' /",
+            number="<d",
+            odd=lambda rng: initial_state(rng, odd=True),
+        ),
+    )
+}
+
+
+def damaged_text(data: bytes, rng: random.Random) -> bytes:
+    """One fault in a text: of its lines, its sections, its words."""
+    rows = data.split(b"\n")
+    a, b = sorted(rng.randrange(len(rows) + 1) for _ in range(2))
+    heads = [i for i, row in enumerate(rows) if re.match(rb"\s*[$A-Za-z]", row)] or [0]
+    match rng.randrange(11):
+        case 0:
+            return b"\n".join(rows[:a] + rows[b:])  # lines are missing
+        case 1:
+            return b"\n".join(rows[:b] + rows[a:])  # or stand twice
+        case 2:
+            i, j = rng.randrange(len(rows)), rng.randrange(len(rows))
+            rows[i], rows[j] = rows[j], rows[i]
+        case 3:  # a section is missing, or comes again, cut
+            begin = rng.choice(heads)
+            end = min((h for h in heads if h > begin), default=len(rows))
+            if rng.random() < 0.5:
+                return b"\n".join(rows[:begin] + rows[end:])
+            again = rows[begin : end - rng.randint(0, (end - begin) // 2)]
+            if again:
+                again[0] = re.sub(rb"\d+", lambda m: b"%d" % (int(m[0]) // 2), again[0])
+            return b"\n".join([*rows, *again]) + b"\n"
+        case 4:
+            return b"\r\n".join(rows) if rng.random() < 0.7 else b"\r".join(rows)
+        case 5:  # a long line, a long word
+            rows.insert(a, (b"1 " if rng.random() < 0.5 else b"x") * 100000)
+        case 6:
+            return b" ".join(rows)
+        case _:
+            return with_other_word(data, rng)
+    return b"\n".join(rows)
+
+
+def with_other_word(data: bytes, rng: random.Random) -> bytes:
+    """One word, a number if possible, becomes another."""
+    words = list(re.finditer(rb"[^\s]+", data))
+    numbers = [w for w in words if re.fullmatch(rb"[-+.\deE]+", w[0])]
+    if not words:
+        return data
+    word = rng.choice(numbers if numbers and rng.random() < 0.9 else words)
+    new = rng.choice(NASTY).encode("latin-1")
+    if rng.random() < 0.2:
+        new = rng.choice(words)[0]
+    if rng.random() < 0.2 and re.fullmatch(rb"\d+", word[0]):
+        new = b"%d" % max(0, int(word[0]) + rng.choice([-1, 1]))
+    return data[: word.start()] + new + data[word.end() :]
+
+
+def damaged_bytes(data: bytes, rng: random.Random, number: str) -> bytes:
+    """One fault in the bytes of a file."""
+    block = bytearray(data)
+    at = rng.randrange(len(block) + 1)
+    match rng.randrange(6 if number else 4):
+        case 0:
+            return bytes(block[:at])
+        case 1:
+            for _ in range(rng.randint(1, 20)):
+                block[rng.randrange(len(block))] = rng.randrange(256)
+        case 2:
+            end = min(len(block), at + rng.randint(1, 200))
+            del block[at:end]
+        case 3:
+            block[at:at] = block[at : at + rng.randint(1, 200)]
+        case 4:  # another number
+            value = rng.choice([np.nan, np.inf, -np.inf, 1e30, -1e30, 1e8, -1e8, 1e-40, 0.0])
+            at -= at % 2
+            block[at : at + struct.calcsize(number)] = struct.pack(number, value)
+        case 5:  # another count
+            count = rng.choice([0, 1, 3, 5, 1 << 20, (1 << 31) - 1, (1 << 32) - 1])
+            at = rng.choice([80, at])
+            block[at : at + 4] = struct.pack("<I", count)
+    return bytes(block)
+
+
+def damaged(kind: Kind, rng: random.Random) -> bytes:
+    """A file of the kind with one to three faults; few are empty."""
+    if kind.odd and rng.random() < 0.3:
+        return kind.odd(rng)
+    data = kind.good(rng)
+    for _ in range(rng.randint(1, 3)):
+        if not data or rng.random() < 0.01:
+            return b""
+        text = b"\0" not in data[:200]
+        if text and rng.random() < 0.8:
+            data = damaged_text(data, rng)
+        else:
+            data = damaged_bytes(data, rng, kind.number if not text else "")
+    return data
+
+
+def run(program: Path, arguments: list[str], folder: Path) -> tuple[int, str]:
+    """Exit code and messages of the program; the code is -1 when it takes too long."""
+    sanitized = program.name.endswith("_san")
+
+    def limit() -> None:
+        if not sanitized:  # those need terabytes of address space; their own limit is set below
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    settings = {
+        "OMP_NUM_THREADS": "1",
+        "ASAN_OPTIONS": f"detect_leaks=0:hard_rss_limit_mb={MEMORY >> 20}",
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+    }
+    try:
+        done = subprocess.run(
+            [program, *arguments, "case.nml"],
+            cwd=folder,
+            env={**os.environ, **settings},
+            capture_output=True,
+            timeout=SECONDS * (5 if sanitized else 1),
+            preexec_fn=limit,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return -1, "takes too long"
+    return done.returncode, done.stderr.decode("utf-8", "replace")
+
+
+def fault_of(code: int, errors: str, allowed: tuple[int, ...]) -> str:
+    """What is wrong with the way the program ended; empty if nothing is."""
+    rows = errors.splitlines()
+    if code not in allowed:
+        return f"ended with {code}: {errors[:2000]}"
+    foreign = [row for row in rows if not row.startswith("mics: ") or not row.isprintable()]
+    if foreign:
+        return f"not a message of the program: {foreign[0][:300]!r}"
+    if code != TAKEN and not rows:
+        return f"ended with {code} without a message"
+    if any(len(row) > 500 for row in rows):
+        return "a message longer than 500 characters"
+    return ""
+
+
+def try_file(kind: Kind, data: bytes, program: Path) -> tuple[int, str]:
+    """Exit code of --check with a file, and what is wrong with its end, or that of a few steps."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "file").write_bytes(data)
+        (folder / "case.nml").write_text(kind.case())
+        code, errors = run(program, ["--check"], folder)
+        fault = fault_of(code, errors, (TAKEN, REFUSED, FILES))
+        if not fault and code != TAKEN and len(list(folder.iterdir())) > 2:
+            fault = "refused, but something was written"
+        if code == TAKEN and not fault:
+            ended, errors = run(program, ["--quiet"], folder)
+            fault = fault_of(ended, errors, (TAKEN, REFUSED, NUMERICS, FILES))
+    return code, fault
+
+
+def fuzz(kind: Kind, numbers: range, seed: int, program: Path, keep: Path) -> Counter[str]:
+    """Try damaged files; how they ended. Files that fail are kept and reported."""
+    ends: Counter[str] = Counter()
+    for i in numbers:
+        data = damaged(kind, random.Random(f"{kind.name} {seed} {i}"))
+        code, fault = try_file(kind, data, program)
+        how = {TAKEN: "taken", REFUSED: "refused", FILES: "unreadable"}
+        ends["failed" if fault else how[code]] += 1
+        if fault:
+            keep.mkdir(parents=True, exist_ok=True)
+            (keep / f"{kind.name}-{seed}-{i}").write_bytes(data)
+            print(f"{kind.name} {seed} {i}: {fault}", flush=True)
+    return ends
+
+
+def main() -> int:
+    """Command line; 1 if any file failed."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)}")
+    parser.add_argument("--count", type=int, default=300, help="files of each kind")
+    parser.add_argument("--first", type=int, default=0, help="number of the first one")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--program", type=Path, default=ROOT / "mics")
+    parser.add_argument("--keep", type=Path, default=ROOT / "build" / "fuzz")
+    chosen = parser.parse_args()
+    failed = 0
+    for name in chosen.kinds or KINDS:
+        ends = fuzz(
+            KINDS[name],
+            range(chosen.first, chosen.first + chosen.count),
+            chosen.seed,
+            chosen.program.resolve(),
+            chosen.keep,
+        )
+        failed += ends["failed"]
+        print(name, dict(sorted(ends.items())), flush=True)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
