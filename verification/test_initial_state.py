@@ -44,6 +44,7 @@ def test_state_is_taken(tmp_path: Path) -> None:
         (ONES[1:], None, "/", "liquid does not have the cells of &grid"),
         (None, ONES, "/", "velocity has another number of dimensions than (nz, ny, nx, 3)"),
         (None, np.nan * wave(), "/", "velocity must hold finite numbers"),
+        (None, 1e21 * wave(), "/", "velocity must hold finite numbers up to 1e20"),
         (None, None, "/", "the file holds neither 'liquid' nor 'velocity'"),
         (ONES, None, "water_level = 0.1 /", "'liquid' of the file takes the place of"),
         (ONES, None, "/ &water min = 0,0,0 max = 1,1,1 /", "'liquid' of the file takes the"),

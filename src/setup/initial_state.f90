@@ -12,7 +12,7 @@
 module initial_state_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
-  use errors_m, only: problems_t, fatal, exit_files
+  use errors_m, only: problems_t, fatal, to_text, exit_files
   use case_types_m, only: case_t, fluid_t, is_given
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
@@ -25,6 +25,7 @@ module initial_state_m
   public :: check_initial_state, read_initial_liquid, read_initial_velocity
 
   character(*), parameter :: liquid_name = 'liquid', velocity_name = 'velocity'
+  real(wp), parameter :: fastest = 1.0e20_wp   !! as in a case [m/s]
 
 contains
 
@@ -54,8 +55,8 @@ contains
       end if
     end if
     if (velocity) then
-      call check_values(velocity_name, [3, case%grid%cells], -huge(1.0_wp), huge(1.0_wp), &
-                        'finite numbers')
+      call check_values(velocity_name, [3, case%grid%cells], -fastest, fastest, &
+                        'finite numbers up to '//to_text(fastest))
       if (any(abs(case%fluid%velocity) > 0.0_wp)) then
         call note('''velocity'' of the file takes the place of &fluid velocity, give one only')
       end if

@@ -298,7 +298,8 @@ contains
     !$omp parallel private(team) if (self%level(1)%many)
     team%me = omp_get_thread_num()
     team%n = omp_get_num_threads()
-    call run_cycle(self, team, r, exponent(r_max), z)
+    ! no infinite power of two in a run that is lost: its fault is found after the step
+    call run_cycle(self, team, r, exponent(min(r_max, huge(r_max))), z)
     !$omp end parallel
   end subroutine apply_cycle
 
