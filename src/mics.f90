@@ -12,7 +12,7 @@ program mics
   use patience_m, only: spin_briefly
   use signals_m, only: catch_signals, signal_caught
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
-  use namelist_text_m, only: read_text
+  use case_file_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case, parameters_text
   use case_check_m, only: make_shapes, check_case

@@ -12,13 +12,13 @@
 !! Separators are blanks, line ends and single commas (one more after the last value is fine); a
 !! comment runs from '!' to the end of the line; strings stand between ' or ", doubled inside.
 module namelist_text_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
-    c_associated, c_loc
   use errors_m, only: problems_t, to_text
+  use text_cursor_m, only: cursor_t, start_of, next, at_end, skip_blanks, skip_line, past_blanks, &
+    take_run, take_until, line_feed, letters, name_characters, word_ends
   use value_text_m, only: lower_case, printable, quoted_text, parse_integer, value_ok
   implicit none
   private
-  public :: read_text, cut_groups
+  public :: cut_groups
   public :: namelist_text_t, group_text_t, assignment_t, value_t
 
   !> One value as it stands in the text, without its quotes.
@@ -52,122 +52,9 @@ module namelist_text_m
     type(group_text_t), allocatable :: group(:)
   end type namelist_text_t
 
-  !> Where the reader stands in the text.
-  type :: cursor_t
-    character(:), allocatable :: text      !! each line ends in a single line feed
-    integer :: at = 1                      !! next character
-    integer :: line = 1
-  end type cursor_t
-
-  character(*), parameter :: line_feed = achar(10), carriage_return = achar(13), tab = achar(9)
-  character(*), parameter :: blanks = ' '//tab//line_feed
-  character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ'
-  character(*), parameter :: name_characters = letters//'0123456789_%'
-  character(*), parameter :: word_ends = blanks//',;!=&/"'''
-  integer, parameter :: longest_text = 2**24   !! bytes of a case file
   integer, parameter :: most_values = 1000     !! values of one variable
 
-  interface
-    function c_fopen(path, mode) bind(c, name='fopen') result(stream)
-      import :: c_char, c_ptr
-      implicit none
-      character(kind=c_char), intent(in) :: path(*), mode(*)
-      type(c_ptr) :: stream
-    end function c_fopen
-    function c_fdopen(fd, mode) bind(c, name='fdopen') result(stream)
-      import :: c_char, c_int, c_ptr
-      implicit none
-      integer(c_int), value :: fd
-      character(kind=c_char), intent(in) :: mode(*)
-      type(c_ptr) :: stream
-    end function c_fdopen
-    function c_fread(buffer, size, count, stream) bind(c, name='fread') result(n)
-      import :: c_size_t, c_ptr
-      implicit none
-      type(c_ptr), value :: buffer
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-      integer(c_size_t) :: n
-    end function c_fread
-    function c_ferror(stream) bind(c, name='ferror') result(status)
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-      integer(c_int) :: status
-    end function c_ferror
-    function c_fclose(stream) bind(c, name='fclose') result(status)
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-      integer(c_int) :: status
-    end function c_fclose
-    function c_isatty(fd) bind(c, name='isatty') result(yes)
-      import :: c_int
-      implicit none
-      integer(c_int), value :: fd
-      integer(c_int) :: yes
-    end function c_isatty
-  end interface
-
 contains
-
-  !> Read a whole file, or standard input if `file` is empty, byte for byte.
-  !!
-  !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound.
-  subroutine read_text(file, text, problems)
-    character(*), intent(in) :: file
-    character(:), allocatable, intent(out) :: text
-    type(problems_t), intent(inout) :: problems
-    character(kind=c_char), target :: piece(65536)
-    character(65536) :: part
-    character(:), allocatable :: source
-    type(c_ptr) :: stream
-    integer :: n, i, status
-
-    text = ''
-    source = file
-    if (len(file) == 0) then
-      source = 'standard input'
-      if (c_isatty(0_c_int) /= 0) then
-        call problems%add_message('no case given: name a file, or use ./mics < input/blocks.nml')
-        return
-      end if
-      stream = c_fdopen(0_c_int, 'r'//c_null_char)
-    else
-      stream = c_fopen(file//c_null_char, 'r'//c_null_char)
-    end if
-    if (.not. c_associated(stream)) then
-      call problems%add_message(source//': there is no such file, or it may not be read')
-      return
-    end if
-    do
-      n = int(c_fread(c_loc(piece), 1_c_size_t, size(piece, kind=c_size_t), stream))
-      if (n == 0 .or. len(text) > longest_text) exit
-      do i = 1, n
-        part(i:i) = piece(i)
-      end do
-      text = text//part(:n)
-    end do
-    if (c_ferror(stream) /= 0) call problems%add_message(source//': could not be read')
-    status = c_fclose(stream)
-    call check_text(source, text, problems)
-  end subroutine read_text
-
-  !> Refuse what cannot be a case: nothing at all, binary data, another encoding than UTF-8.
-  subroutine check_text(source, text, problems)
-    character(*), intent(in) :: source
-    character(*), intent(in) :: text
-    type(problems_t), intent(inout) :: problems
-
-    if (problems%n > 0) return
-    if (len(text) == 0) then
-      call problems%add_message(source//': the case is empty')
-    else if (len(text) > longest_text) then
-      call problems%add_message(source//': longer than 16 MiB, this cannot be a case')
-    else if (index(text, achar(0)) > 0) then
-      call problems%add_message(source//': holds zero bytes; a case is plain UTF-8 text')
-    end if
-  end subroutine check_text
 
   !> Cut the text of a case into its groups.
   subroutine cut_groups(text, list, problems)
@@ -178,7 +65,7 @@ contains
     type(group_text_t) :: group
     logical :: stray_reported
 
-    cursor%text = plain_lines(text)
+    cursor = start_of(text)
     allocate (list%group(8))
     stray_reported = .false.
     do
@@ -195,28 +82,6 @@ contains
       end if
     end do
   end subroutine cut_groups
-
-  !> Line ends of every system as one line feed; a byte-order mark dropped; the last line ended.
-  pure function plain_lines(text) result(plain)
-    character(*), intent(in) :: text
-    character(:), allocatable :: plain
-    character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
-    integer :: i, n, first
-
-    first = 1
-    if (index(text, byte_order_mark) == 1) first = 4
-    allocate (character(len(text) + 1) :: plain)
-    n = 0
-    do i = first, len(text)
-      if (text(i:i) == line_feed .and. i > 1) then
-        if (text(i - 1:i - 1) == carriage_return) cycle
-      end if
-      n = n + 1
-      plain(n:n) = text(i:i)
-      if (text(i:i) == carriage_return) plain(n:n) = line_feed
-    end do
-    plain = plain(:n)//line_feed
-  end function plain_lines
 
   !> Text where only a group may stand.
   subroutine report_stray(cursor, list, problems)
@@ -593,81 +458,5 @@ contains
     yes = .false.
     if (group%n > 0) yes = group%assignment(group%n)%n > 0 .or. group%assignment(group%n)%faulty
   end function has_value
-
-  !> The next character; only to be asked before the end.
-  pure function next(cursor) result(c)
-    type(cursor_t), intent(in) :: cursor
-    character(1) :: c
-
-    c = cursor%text(cursor%at:cursor%at)
-  end function next
-
-  pure function at_end(cursor) result(yes)
-    type(cursor_t), intent(in) :: cursor
-    logical :: yes
-
-    yes = cursor%at > len(cursor%text)
-  end function at_end
-
-  !> Go on past blanks, line ends and comments.
-  pure subroutine skip_blanks(cursor)
-    type(cursor_t), intent(inout) :: cursor
-
-    do while (.not. at_end(cursor))
-      if (next(cursor) == '!') then
-        call skip_line(cursor)
-      else if (scan(next(cursor), blanks) == 1) then
-        if (next(cursor) == line_feed) cursor%line = cursor%line + 1
-        cursor%at = cursor%at + 1
-      else
-        exit
-      end if
-    end do
-  end subroutine skip_blanks
-
-  !> Go on to the start of the next line.
-  pure subroutine skip_line(cursor)
-    type(cursor_t), intent(inout) :: cursor
-
-    cursor%at = cursor%at + index(cursor%text(cursor%at:), line_feed)
-    cursor%line = cursor%line + 1
-  end subroutine skip_line
-
-  !> First place at or after i that is no blank and no line end.
-  pure function past_blanks(text, i) result(j)
-    character(*), intent(in) :: text
-    integer, intent(in) :: i
-    integer :: j
-
-    j = i
-    do while (j <= len(text))
-      if (scan(text(j:j), blanks) == 0) exit
-      j = j + 1
-    end do
-  end function past_blanks
-
-  !> Take the longest run of characters from `set`.
-  function take_run(cursor, set) result(word)
-    type(cursor_t), intent(inout) :: cursor
-    character(*), intent(in) :: set
-    character(:), allocatable :: word
-    integer :: length
-
-    length = verify(cursor%text(cursor%at:), set) - 1
-    word = cursor%text(cursor%at:cursor%at + length - 1)
-    cursor%at = cursor%at + length
-  end function take_run
-
-  !> Take everything up to the first character from `set`; the line feed at the end is always one.
-  function take_until(cursor, set) result(word)
-    type(cursor_t), intent(inout) :: cursor
-    character(*), intent(in) :: set
-    character(:), allocatable :: word
-    integer :: length
-
-    length = scan(cursor%text(cursor%at:), set) - 1
-    word = cursor%text(cursor%at:cursor%at + length - 1)
-    cursor%at = cursor%at + length
-  end function take_until
 
 end module namelist_text_m

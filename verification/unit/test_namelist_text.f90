@@ -2,7 +2,8 @@
 program test_namelist_text
   use check_m, only: check, finish_checks
   use errors_m, only: problems_t
-  use namelist_text_m, only: namelist_text_t, cut_groups, read_text
+  use case_file_m, only: read_text
+  use namelist_text_m, only: namelist_text_t, cut_groups
   use value_text_m, only: parse_real, parse_integer, parse_logical, edit_distance, nearest_name, &
     printable, quoted_text, fixed_text, value_ok, value_malformed, value_not_finite, &
     value_too_large, value_not_whole

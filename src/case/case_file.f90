@@ -1,0 +1,116 @@
+!> The bytes of a case file, from a file or from standard input.
+!!
+!! Read through the C library: pipes work, nothing is rewound, and bytes stay as they are.
+module case_file_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
+    c_associated, c_loc
+  use errors_m, only: problems_t
+  implicit none
+  private
+  public :: read_text
+
+  integer, parameter :: longest_text = 2**24   !! bytes of a case file
+
+  interface
+    function c_fopen(path, mode) bind(c, name='fopen') result(stream)
+      import :: c_char, c_ptr
+      implicit none
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+      type(c_ptr) :: stream
+    end function c_fopen
+    function c_fdopen(fd, mode) bind(c, name='fdopen') result(stream)
+      import :: c_char, c_int, c_ptr
+      implicit none
+      integer(c_int), value :: fd
+      character(kind=c_char), intent(in) :: mode(*)
+      type(c_ptr) :: stream
+    end function c_fdopen
+    function c_fread(buffer, size, count, stream) bind(c, name='fread') result(n)
+      import :: c_size_t, c_ptr
+      implicit none
+      type(c_ptr), value :: buffer
+      integer(c_size_t), value :: size, count
+      type(c_ptr), value :: stream
+      integer(c_size_t) :: n
+    end function c_fread
+    function c_ferror(stream) bind(c, name='ferror') result(status)
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+      integer(c_int) :: status
+    end function c_ferror
+    function c_fclose(stream) bind(c, name='fclose') result(status)
+      import :: c_int, c_ptr
+      implicit none
+      type(c_ptr), value :: stream
+      integer(c_int) :: status
+    end function c_fclose
+    function c_isatty(fd) bind(c, name='isatty') result(yes)
+      import :: c_int
+      implicit none
+      integer(c_int), value :: fd
+      integer(c_int) :: yes
+    end function c_isatty
+  end interface
+
+contains
+
+  !> Read a whole file, or standard input if `file` is empty, byte for byte.
+  !!
+  !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound.
+  subroutine read_text(file, text, problems)
+    character(*), intent(in) :: file
+    character(:), allocatable, intent(out) :: text
+    type(problems_t), intent(inout) :: problems
+    character(kind=c_char), target :: piece(65536)
+    character(65536) :: part
+    character(:), allocatable :: source
+    type(c_ptr) :: stream
+    integer :: n, i, status
+
+    text = ''
+    source = file
+    if (len(file) == 0) then
+      source = 'standard input'
+      if (c_isatty(0_c_int) /= 0) then
+        call problems%add_message('no case given: name a file, or use ./mics < input/blocks.nml')
+        return
+      end if
+      stream = c_fdopen(0_c_int, 'r'//c_null_char)
+    else
+      stream = c_fopen(file//c_null_char, 'r'//c_null_char)
+    end if
+    if (.not. c_associated(stream)) then
+      call problems%add_message(source//': there is no such file, or it may not be read')
+      return
+    end if
+    do
+      n = int(c_fread(c_loc(piece), 1_c_size_t, size(piece, kind=c_size_t), stream))
+      if (n == 0 .or. len(text) > longest_text) exit
+      do i = 1, n
+        part(i:i) = piece(i)
+      end do
+      text = text//part(:n)
+    end do
+    if (c_ferror(stream) /= 0) call problems%add_message(source//': could not be read')
+    status = c_fclose(stream)
+    call check_text(source, text, problems)
+  end subroutine read_text
+
+  !> Refuse what cannot be a case: nothing at all, binary data, another encoding than UTF-8.
+  subroutine check_text(source, text, problems)
+    character(*), intent(in) :: source
+    character(*), intent(in) :: text
+    type(problems_t), intent(inout) :: problems
+
+    if (problems%n > 0) return
+    if (len(text) == 0) then
+      call problems%add_message(source//': the case is empty')
+    else if (len(text) > longest_text) then
+      call problems%add_message(source//': longer than 16 MiB, this cannot be a case')
+    else if (index(text, achar(0)) > 0) then
+      call problems%add_message(source//': holds zero bytes; a case is plain UTF-8 text')
+    end if
+  end subroutine check_text
+
+end module case_file_m
