@@ -102,14 +102,20 @@ contains
   pure function quoted_text(raw) result(text)
     character(*), intent(in) :: raw
     character(:), allocatable :: text
-    integer :: i
+    integer :: i, n
 
-    text = "'"
+    allocate (character(2*len(raw) + 2) :: text)
+    text(1:1) = "'"
+    n = 1
     do i = 1, len(raw)
-      text = text//raw(i:i)
-      if (raw(i:i) == "'") text = text//"'"
+      n = n + 1
+      text(n:n) = raw(i:i)
+      if (raw(i:i) == "'") then
+        n = n + 1
+        text(n:n) = "'"
+      end if
     end do
-    text = text//"'"
+    text = text(:n)//"'"
   end function quoted_text
 
   !> A number with a fixed number of decimals and a digit before the point: 0.20000.

@@ -36,8 +36,10 @@ contains
     type(problems_t), intent(inout) :: problems
     type(namelist_text_t) :: list
     type(group_visitor_t) :: v
+    character(name_length), allocatable :: shapes(:)
     integer :: i
-    integer :: n(size(groups))   ! how many of each group came by
+    integer :: n(size(groups))            ! how many of each group came by
+    integer :: first_line(size(groups))   ! where the first of each begins
 
     call set_empty(case)
     case%text = text
@@ -45,9 +47,10 @@ contains
     call cut_groups(text, list, v%problems)
     allocate (case%water(count_groups(list, 'water')), case%shape(count_groups(list, 'shape')))
     allocate (case%body(count_groups(list, 'body')), case%drop(count_groups(list, 'drop')))
+    shapes = shape_names(list)
     n = 0
     do i = 1, list%n
-      call read_group(list, i, n, v, case)
+      call read_group(list%group(i), shapes, n, first_line, v, case)
     end do
     call read_missing_groups(n, v, case)
     call check_together(list, case, v)
@@ -77,31 +80,30 @@ contains
     end do
   end function count_groups
 
-  !> Hand group number i to its procedure.
-  subroutine read_group(list, i, n, v, case)
-    type(namelist_text_t), intent(inout) :: list
-    integer, intent(in) :: i
-    integer, intent(inout) :: n(:)
+  !> Hand a group to its procedure.
+  subroutine read_group(group, shapes, n, first_line, v, case)
+    type(group_text_t), intent(inout) :: group
+    character(name_length), intent(in) :: shapes(:)   !! names of all shapes
+    integer, intent(inout) :: n(:), first_line(:)     !! of each name: groups so far, line
     type(group_visitor_t), intent(inout) :: v
     type(case_t), intent(inout) :: case
     integer :: g
 
-    call v%start_reading(list%group(i))
+    call v%start_reading(group)
     do g = 1, size(groups)
-      if (groups(g) == list%group(i)%name) exit
+      if (groups(g) == group%name) exit
     end do
     if (g > size(groups)) then
-      call v%note(': unknown group, nearest known: &' &
-                  //nearest_name(printable(list%group(i)%name), groups))
+      call v%note(': unknown group, nearest known: &'//nearest_name(printable(group%name), groups))
       return
     else if (n(g) > 0 .and. g < first_repeated) then
-      call v%note(': the group is given twice, first on line ' &
-                  //to_text(first_line(list, list%group(i)%name)))
+      call v%note(': the group is given twice, first on line '//to_text(first_line(g)))
       return
     end if
+    if (n(g) == 0) first_line(g) = group%line
     n(g) = n(g) + 1
-    call visit_group(v, case, groups(g), n(g), shape_names(list))
-    list%group(i) = v%group   ! remembers which variables are faulty
+    call visit_group(v, case, groups(g), n(g), shapes)
+    group = v%group   ! remembers which variables are faulty
   end subroutine read_group
 
   !> Read or write one group: the n-th of its name.
@@ -172,19 +174,6 @@ contains
       call visit_group(v, case, groups(g), 1, no_shapes)
     end do
   end subroutine read_missing_groups
-
-  !> Line of the first group of a name.
-  pure function first_line(list, name) result(line)
-    type(namelist_text_t), intent(in) :: list
-    character(*), intent(in) :: name
-    integer :: line
-    integer :: i
-
-    line = 0
-    do i = list%n, 1, -1
-      if (list%group(i)%name == name) line = list%group(i)%line
-    end do
-  end function first_line
 
   !> The names the shapes of the case were given, right or wrong.
   pure function shape_names(list) result(names)

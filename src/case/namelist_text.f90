@@ -53,6 +53,7 @@ module namelist_text_m
   end type namelist_text_t
 
   integer, parameter :: most_values = 1000     !! values of one variable
+  integer, parameter :: most_variables = 1000  !! assignments in one group
 
 contains
 
@@ -204,6 +205,11 @@ contains
     new%name = lower_case(take_run(cursor, name_characters))
     allocate (new%value(4))
     same = group%find(new%name)
+    if (group%n == most_variables .and. .not. group%faulty) then
+      call problems%add_message('&'//group%name//': more than '//to_text(most_variables) &
+                                //' variables in one group', new%line)
+      group%faulty = .true.
+    end if
     call append_assignment(group, new)
     call skip_blanks(cursor)
     if (next(cursor) == '(') then
@@ -294,7 +300,6 @@ contains
     integer :: i
 
     quote = next(cursor)
-    value%text = ''
     value%quoted = .true.
     i = cursor%at + 1
     do
@@ -302,31 +307,51 @@ contains
         call report(cursor, group, 'the string '//printable(cursor%text(cursor%at:i - 1)) &
                     //' is not closed on its line', problems)
         group%faulty = .true.
-        deallocate (value%text)
         exit
       else if (cursor%text(i:i) == quote) then
         i = i + 1
-        if (cursor%text(i:i) /= quote) exit
+        if (cursor%text(i:i) /= quote) then
+          value%text = undoubled(cursor%text(cursor%at + 1:i - 2), quote)
+          exit
+        end if
       end if
-      value%text = value%text//cursor%text(i:i)
       i = i + 1
     end do
     cursor%at = i
   end subroutine take_string
+
+  !> The inside of a quoted string, each doubled quote once.
+  pure function undoubled(inside, quote) result(text)
+    character(*), intent(in) :: inside
+    character(1), intent(in) :: quote
+    character(:), allocatable :: text
+    integer :: i, n
+
+    allocate (character(len(inside)) :: text)
+    i = 1
+    n = 0
+    do while (i <= len(inside))
+      n = n + 1
+      text(n:n) = inside(i:i)
+      i = i + merge(2, 1, inside(i:i) == quote)
+    end do
+    text = text(:n)
+  end function undoubled
 
   !> An unquoted path: a '/' between characters of a word that is no number belongs to the word, so
   !! that one missing pair of quotes is one problem and does not end the group.
   subroutine take_path(cursor, word)
     type(cursor_t), intent(inout) :: cursor
     character(:), allocatable, intent(inout) :: word
+    integer :: first
 
     if (scan(word, letters//'~') == 0 .or. verify(word(1:1), '0123456789+-') == 0) return
+    first = cursor%at
     do while (next(cursor) == '/')
       if (scan(cursor%text(cursor%at + 1:cursor%at + 1), word_ends) > 0) exit
-      word = word//'/'
-      cursor%at = cursor%at + 1
-      word = word//take_until(cursor, word_ends)
+      cursor%at = cursor%at + scan(cursor%text(cursor%at + 1:), word_ends)
     end do
+    word = word//cursor%text(first:cursor%at - 1)
   end subroutine take_path
 
   !> Add a value, `count` times, to the last assignment.
@@ -411,6 +436,11 @@ contains
     type(assignment_t), intent(in) :: new
     type(assignment_t), allocatable :: longer(:)
 
+    if (group%n == most_variables) then   ! told once; what follows is read over, in the last place
+      group%assignment(group%n) = new
+      group%assignment(group%n)%faulty = .true.
+      return
+    end if
     if (group%n == size(group%assignment)) then
       allocate (longer(2*group%n))
       longer(:group%n) = group%assignment
