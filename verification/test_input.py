@@ -1,6 +1,7 @@
 """Good cases are accepted and bad ones refused: exit code, messages, and nothing written."""
 
 import os
+import resource
 import subprocess
 from pathlib import Path
 
@@ -199,6 +200,47 @@ def test_geometry_is_checked_beside_other_problems(tmp_path: Path) -> None:
     assert "&fluid colour = 1: unknown variable" in done.stderr
     assert "through the wall x_min" in done.stderr
     assert done.returncode == 2
+
+
+def bodies_apart(count: int) -> str:
+    """A dry tank with that many cubes in rows, none touching another."""
+    row = 28
+    places = [(i % row, i // row % row, i // row**2) for i in range(count)]
+    lines = [BODY + ", ".join(f"{0.03 * (k + 1):.2f}" for k in place) + " /\n" for place in places]
+    tank = TANK.replace("t_end = 1", "t_end = 1  physics = 'dry'")
+    return tank.replace("0.3, 0.2, 0.2", "0.9, 0.9, 0.9") + "".join(lines)
+
+
+LARGE = {
+    "bodies": (bodies_apart(20000), "free                    20000"),
+    "long title": (TANK.replace("= 1 /", f"= 1  title = '{'a' * 1000000}' /"), "Memory"),
+    "groups": (TANK + "&fluid /\n" * 100000, "&fluid: the group is given twice, first on line 4"),
+    "variables": (
+        TANK + "&fluid " + "".join(f"v{i} = 1\n" for i in range(100000)) + "/",
+        "&fluid: more than 1000 variables in one group (line 1004)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_large_case_is_read_in_seconds(name: str, tmp_path: Path) -> None:
+    """The time to read and check a case grows with its length, not with the square of it."""
+    text, expected = LARGE[name]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    done = mics(["--check"], tmp_path, text)
+    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    assert expected in done.stdout + done.stderr
+    assert seconds < 3  # each takes less than one
+
+
+def test_overlaps_are_counted_up_to_a_limit(tmp_path: Path) -> None:
+    """Twenty pairs are named, the others counted, but not without end."""
+    body = BODY + "0.1, 0.1, 0.1 /\n"
+    errors = mics(["--check"], tmp_path, TANK + 50 * body).stderr.splitlines()
+    assert len(errors) == 21
+    assert errors[-1] == "mics: &body: at least 980 more pairs of bodies overlap"
+    errors = mics(["--check"], tmp_path, TANK + 8 * body).stderr.splitlines()
+    assert errors[-1] == "mics: &body: 8 more pairs of bodies overlap"
 
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"], ids=["unix", "windows", "old mac"])

@@ -17,19 +17,21 @@ module case_check_m
   use surface_tension_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
-  use neighbours_m, only: nearest_shift
+  use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for, &
     expected_samples
   implicit none
   private
   public :: make_shapes, check_case
 
-  integer, parameter :: most_reported = 20   !! pairs of overlapping bodies named one by one
+  integer, parameter :: most_reported = 20     !! pairs of overlapping bodies named one by one
+  integer, parameter :: most_counted = 1000    !! pairs of overlapping bodies looked for
   real(wp), parameter :: most_samples = 1.0e7_wp   !! points on a shape that measure its overlap
 
   !> The bodies of a case in their starting places, and one place more to try drops in.
   type :: scene_t
     type(blocks_t) :: blocks            !! bodies 1..n of the case, and n+1
+    type(blocks_t) :: two               !! the two bodies looked at, far from all others
     type(walls_t) :: walls, no_walls    !! the latter with the periods only, no bed either
     type(overlap_t) :: overlap
     integer :: n = 0
@@ -202,17 +204,21 @@ contains
     good%body(scene%n + 1)%shape = made(1)%name
     good%body(scene%n + 1)%position = 0.0_wp
     call blocks_init(good, made, scene%blocks)
-    call overlap_init(made, scene%n + 1, scene%overlap)
+    good%body = [good%body(scene%n + 1), good%body(scene%n + 1)]
+    call blocks_init(good, made, scene%two)
+    call overlap_init(made, 2, scene%overlap)
     call walls_init(case%grid, case%boundary, scene%walls)
     scene%walls%bed = bed
     scene%no_walls%period = scene%walls%period
-    allocate (scene%line(scene%n), scene%held(scene%n), scene%outside(scene%n))
-    scene%line = good%body(:scene%n)%line
+    allocate (scene%held(scene%n), scene%outside(scene%n))
+    scene%line = pack(case%body%line, use_it)
     scene%outside = .false.
-    do n = 1, scene%n
-      scene%held(n) = good%body(n)%fixed .and. all(abs(good%body(n)%velocity) <= 0.0_wp) &
-        .and. all(abs(good%body(n)%angular_velocity) <= 0.0_wp)
-    end do
+    associate (blocks => scene%blocks)
+      do n = 1, scene%n
+        scene%held(n) = blocks%fixed(n) .and. all(abs(blocks%given%v(:, n)) <= 0.0_wp) &
+          .and. all(abs(blocks%given%omega(:, n)) <= 0.0_wp)
+      end do
+    end associate
   end subroutine set_scene
 
   !> Every body lies inside the tank; through an open top it may stick out.
@@ -223,7 +229,6 @@ contains
     character(:), allocatable :: where_to
     integer :: b
 
-    scene%blocks%present = .false.
     do b = 1, scene%n
       where_to = way_out(case, scene, b)
       scene%outside(b) = len(where_to) > 0
@@ -238,7 +243,7 @@ contains
   !! other than the top. Empty if it does not.
   function way_out(case, scene, b) result(text)
     type(case_t), intent(in) :: case
-    type(scene_t), intent(in) :: scene
+    type(scene_t), intent(inout) :: scene
     integer, intent(in) :: b
     character(:), allocatable :: text
     type(walls_t) :: one
@@ -246,7 +251,9 @@ contains
     integer :: w, s, d
 
     text = ''
-    if (.not. room_for(scene%walls, scene%blocks, b, scene%overlap)) then
+    call place(scene, b, 1)
+    scene%two%present = .false.
+    if (.not. room_for(scene%walls, scene%two, 1, scene%overlap)) then
       deepest = 0.0_wp
       do w = 1, scene%walls%n
         one%n = 1
@@ -283,13 +290,30 @@ contains
   subroutine check_pairs(scene, problems)
     type(scene_t), intent(inout) :: scene
     type(problems_t), intent(inout) :: problems
-    integer :: a, b, n
+    type(pair_list_t) :: pairs
+    real(wp), allocatable :: x(:, :), radius(:)
+    character(:), allocatable :: more
+    integer :: a, b, n, p, cells(3)
     real(wp) :: depth
 
+    if (count(.not. scene%outside) < 2) return
+    allocate (x(3, scene%n), radius(scene%n))
+    associate (blocks => scene%blocks, period => scene%walls%period)
+      do b = 1, scene%n
+        x(:, b) = blocks%x(:, b)
+        where (period > 0.0_wp) x(:, b) = modulo(x(:, b), period)
+        radius(b) = blocks%shapes(blocks%shape(b))%radius
+      end do
+      call sort_bodies(x, radius, .not. scene%outside, period, 0.0_wp, cells, pairs)
+    end associate
     n = 0
     do b = 2, scene%n
-      do a = 1, b - 1
-        if (.not. together(scene, a, b)) cycle
+      if (scene%outside(b)) cycle
+      pairs%n = 0
+      call add_partners(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
+      do p = 1, pairs%n
+        a = pairs%b(p)
+        if (n == most_counted .or. .not. together(scene, a, b)) cycle
         depth = pair_depth(scene, a, b)
         if (depth <= 0.0_wp) cycle
         n = n + 1
@@ -298,10 +322,12 @@ contains
           //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth, 3) &
           //' m; bodies must lie apart at the start', scene%line(b))
       end do
+      if (n == most_counted) exit
     end do
     if (n > most_reported) then
-      call problems%add_message('&body: '//to_text(n - most_reported) &
-                                //' more pairs of bodies overlap')
+      more = to_text(n - most_reported)//' more pairs of bodies overlap'
+      if (n == most_counted) more = 'at least '//more
+      call problems%add_message('&body: '//more)
     end if
   end subroutine check_pairs
 
@@ -315,7 +341,6 @@ contains
       yes = (time(a) <= 0.0_wp .and. time(b) <= 0.0_wp) &
         .or. (scene%held(a) .and. time(a) <= time(b)) .or. (scene%held(b) .and. time(b) <= time(a))
     end associate
-    yes = yes .and. .not. (scene%outside(a) .or. scene%outside(b))
   end function together
 
   !> Depth of bodies a and b in one another if it is more than a release allows, else zero [m].
@@ -323,25 +348,62 @@ contains
     type(scene_t), intent(inout) :: scene
     integer, intent(in) :: a, b
     real(wp) :: depth
-    real(wp) :: d(3), reach
+    real(wp) :: d(3)
 
     depth = 0.0_wp
+    if (.not. near(scene, a, b)) return
+    if (room_beside(scene, a, b)) then
+      if (room_beside(scene, b, a)) return
+    end if
     associate (blocks => scene%blocks)
-      d = blocks%x(:, a) - blocks%x(:, b)
-      d = d + nearest_shift(scene%walls%period, d)
-      reach = blocks%shapes(blocks%shape(a))%radius + blocks%shapes(blocks%shape(b))%radius
-      if (norm(d) >= reach) return
-      blocks%present = .false.
-      blocks%present(a) = .true.
-      if (room_for(scene%no_walls, blocks, b, scene%overlap)) then
-        blocks%present(a) = .false.
-        blocks%present(b) = .true.
-        if (room_for(scene%no_walls, blocks, a, scene%overlap)) return
-      end if
+      d = distance(scene, a, b)
       depth = overlap_depth(blocks%shapes(blocks%shape(a)), blocks%x(:, b) + d, blocks%q(:, a), &
                             blocks%shapes(blocks%shape(b)), blocks%x(:, b), blocks%q(:, b))
     end associate
   end function pair_depth
+
+  !> From body b to the nearest image of body a [m].
+  pure function distance(scene, a, b) result(d)
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: a, b
+    real(wp) :: d(3)
+
+    d = scene%blocks%x(:, a) - scene%blocks%x(:, b)
+    d = d + nearest_shift(scene%walls%period, d)
+  end function distance
+
+  !> Do the bounding spheres of bodies a and b meet?
+  pure function near(scene, a, b) result(yes)
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: a, b
+    logical :: yes
+
+    associate (shapes => scene%blocks%shapes, shape => scene%blocks%shape)
+      yes = norm(distance(scene, a, b)) < shapes(shape(a))%radius + shapes(shape(b))%radius
+    end associate
+  end function near
+
+  !> Is there room for body b if body a is the only other one, and no wall?
+  function room_beside(scene, a, b) result(free)
+    type(scene_t), intent(inout) :: scene
+    integer, intent(in) :: a, b
+    logical :: free
+
+    call place(scene, a, 1)
+    call place(scene, b, 2)
+    scene%two%present = .true.
+    free = room_for(scene%no_walls, scene%two, 2, scene%overlap)
+  end function room_beside
+
+  !> Put body b in place 1 or 2 of the two bodies looked at.
+  subroutine place(scene, b, k)
+    type(scene_t), intent(inout) :: scene
+    integer, intent(in) :: b, k
+
+    scene%two%shape(k) = scene%blocks%shape(b)
+    scene%two%x(:, k) = scene%blocks%x(:, b)
+    scene%two%q(:, k) = scene%blocks%q(:, b)
+  end subroutine place
 
   !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose
   !! place lies in a wall or a held body could wait for ever, so it is a problem now.
@@ -385,19 +447,13 @@ contains
     character(:), allocatable :: text
     integer :: a
 
-    scene%blocks%present = .false.
     text = way_out(case, scene, b)
     if (len(text) > 0) return
     do a = 1, scene%n
-      scene%blocks%present(a) = scene%held(a) .and. .not. scene%outside(a) &
-        .and. scene%blocks%release_time(a) <= scene%blocks%release_time(b)
-    end do
-    if (room_for(scene%no_walls, scene%blocks, b, scene%overlap)) return
-    text = 'lies inside a fixed body'
-    do a = 1, scene%n
       if (.not. scene%held(a) .or. scene%outside(a)) cycle
       if (scene%blocks%release_time(a) > scene%blocks%release_time(b)) cycle
-      if (pair_depth(scene, a, b) <= 0.0_wp) cycle
+      if (.not. near(scene, a, b)) cycle
+      if (room_beside(scene, a, b)) cycle
       text = 'lies inside the fixed &body on line '//to_text(scene%line(a))
       exit
     end do

@@ -5,6 +5,7 @@ module neighbours_m
   implicit none
   private
   public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
+  public :: sort_bodies, add_partners
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
   type :: bins_t
@@ -148,43 +149,53 @@ contains
     real(wp), intent(in) :: period(3)   !! length of the domain, 0 where it is not periodic [m]
     real(wp), intent(in) :: skin        !! [m]
     type(pair_list_t), intent(inout) :: pairs
-    integer :: a, b, i, j, k, c(3), reach(2, 3), cells(3), begin
-    real(wp) :: d(3), shift(3)
+    integer :: a, cells(3)
 
     pairs%n = 0
     if (count(active) < 2) return
     call sort_bodies(x, radius, active, period, skin, cells, pairs)
     do a = 1, size(radius)
-      if (.not. active(a)) cycle
-      begin = pairs%n + 1
-      reach(1, :) = -1
-      reach(2, :) = 1
-      where (period > 0.0_wp .and. cells < 3) reach(1, :) = 1 - cells
-      where (period > 0.0_wp .and. cells < 3) reach(2, :) = 0
-      do k = reach(1, 3), reach(2, 3)
-        do j = reach(1, 2), reach(2, 2)
-          do i = reach(1, 1), reach(2, 1)
-            c = pairs%cell(:, a) + [i, j, k]
-            where (period > 0.0_wp) c = modulo(c, cells)
-            if (any(c < 0) .or. any(c >= cells)) cycle
-            b = pairs%head(1 + c(1) + cells(1)*(c(2) + cells(2)*c(3)))
-            do while (b > 0)
-              if (b < a) then
-                d = x(:, b) - x(:, a)
-                shift = nearest_shift(period, d)
-                d = d + shift
-                if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) then
-                  call add_pair(a, b, shift, pairs)
-                end if
+      if (active(a)) call add_partners(a, x, radius, period, skin, cells, pairs)
+    end do
+  end subroutine near_pairs
+
+  !> Append the pairs of body a with the active bodies before it, after `sort_bodies`.
+  subroutine add_partners(a, x, radius, period, skin, cells, pairs)
+    integer, intent(in) :: a
+    real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
+    integer, intent(in) :: cells(3)   !! from `sort_bodies`
+    type(pair_list_t), intent(inout) :: pairs
+    integer :: b, i, j, k, c(3), reach(2, 3), begin
+    real(wp) :: d(3), shift(3)
+
+    begin = pairs%n + 1
+    reach(1, :) = -1
+    reach(2, :) = 1
+    where (period > 0.0_wp .and. cells < 3) reach(1, :) = 1 - cells
+    where (period > 0.0_wp .and. cells < 3) reach(2, :) = 0
+    do k = reach(1, 3), reach(2, 3)
+      do j = reach(1, 2), reach(2, 2)
+        do i = reach(1, 1), reach(2, 1)
+          c = pairs%cell(:, a) + [i, j, k]
+          where (period > 0.0_wp) c = modulo(c, cells)
+          if (any(c < 0) .or. any(c >= cells)) cycle
+          b = pairs%head(1 + c(1) + cells(1)*(c(2) + cells(2)*c(3)))
+          do while (b > 0)
+            if (b < a) then
+              d = x(:, b) - x(:, a)
+              shift = nearest_shift(period, d)
+              d = d + shift
+              if (dot_product(d, d) < (radius(a) + radius(b) + skin)**2) then
+                call add_pair(a, b, shift, pairs)
               end if
-              b = pairs%chain(b)
-            end do
+            end if
+            b = pairs%chain(b)
           end do
         end do
       end do
-      call sort_partners(begin, pairs)
     end do
-  end subroutine near_pairs
+    call sort_partners(begin, pairs)
+  end subroutine add_partners
 
   !> What to add to the distance d so that it points to the nearest periodic image [m].
   pure function nearest_shift(period, d) result(shift)
@@ -201,7 +212,7 @@ contains
 
   !> Put the bodies into cells no smaller than the reach of the largest pair.
   subroutine sort_bodies(x, radius, active, period, skin, cells, pairs)
-    real(wp), intent(in) :: x(:, :), radius(:), period(3), skin
+    real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     logical, intent(in) :: active(:)
     integer, intent(out) :: cells(3)   !! cells in each direction
     type(pair_list_t), intent(inout) :: pairs
