@@ -1,39 +1,47 @@
-!> One description of a namelist group for both ways: reading its values and writing them out.
+!> One description of a namelist group for three ends: reading its values, writing them out, and
+!! telling the user what the group is made of.
 !!
-!! A `visit_...` procedure names each variable of a group once, `call v%item('dt', run%dt)`. A
-!! reading visitor then fills the variable from the text if the user gave it and notes what is wrong
-!! with it; a writing visitor appends `dt = 0.01` to its text. The names asked for are the known
-!! names, so an unknown variable and its nearest neighbour need no second list.
+!! A `visit_...` procedure names each variable of a group once, what it may be and what it means:
+!!
+!!     call v%real('dt', run%dt, positive('s'), 'largest time step', example='0.005')
+!!
+!! A reading visitor fills the variable from the text if the user gave it and notes what is wrong
+!! with it; a writing visitor appends `dt = 0.01` to its text; a describing visitor lists what it
+!! was told, the value at hand as the default. The names asked for are the known names, so an
+!! unknown variable and its nearest neighbour need no second list.
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
+  use long_text_m, only: long_text_t
+  use allowed_values_m, only: allowed_t
+  use description_m, only: variable_t, group_description_t, described
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
     quoted_text, printable, value_ok, value_not_finite, value_too_large, value_not_whole
   implicit none
   private
-  public :: group_visitor_t
+  public :: group_visitor_t, choices
 
   integer, parameter :: most_variables = 64   !! of one group
 
   type :: group_visitor_t
-    logical :: writing = .false.
-    character(:), allocatable :: text      !! what a writing visitor has written
+    logical :: reading = .false., writing = .false., describing = .false.   !! one of them
+    type(long_text_t) :: written           !! what a writing visitor has written
+    type(group_description_t) :: told      !! what a describing visitor was told
     type(problems_t) :: problems           !! what a reading visitor has found
     type(group_text_t) :: group            !! the group being read
     integer, private :: n_known = 0
     integer, private :: n_before = 0       !! problems before this group
     character(name_length), private :: known(most_variables) = ''
   contains
-    procedure :: start_reading, start_writing, finish
+    procedure :: start_reading, start_writing, start_describing, about, finish
     procedure :: given, good, all_good, needed, require, note
-    procedure :: option, name, list
-    procedure, private :: item_real, item_reals, item_integer, item_integers
-    procedure, private :: item_logical, item_text
-    generic :: item => item_real, item_reals, item_integer, item_integers, item_logical, item_text
-    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text
-    procedure, private :: write_line
+    procedure :: name, option, text => text_value, logical => logical_value
+    generic :: real => real_value, real_values
+    generic :: integer => integer_value, integer_values
+    procedure, private :: real_value, real_values, integer_value, integer_values
+    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, tell
   end type group_visitor_t
 
 contains
@@ -43,7 +51,7 @@ contains
     class(group_visitor_t), intent(inout) :: self
     type(group_text_t), intent(in) :: group
 
-    self%writing = .false.
+    self%reading = .true.
     self%group = group
     self%n_known = 0
     self%n_before = self%problems%n
@@ -55,19 +63,34 @@ contains
     character(*), intent(in) :: group
 
     self%writing = .true.
-    if (.not. allocated(self%text)) self%text = ''
-    self%text = self%text//'&'//group//new_line('a')
+    call self%written%add_line('&'//group)
   end subroutine start_writing
+
+  !> Begin to describe a group.
+  subroutine start_describing(self, group)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: group
+
+    self%describing = .true.
+    self%told = group_description_t(name=group)
+    allocate (self%told%variable(most_variables))
+  end subroutine start_describing
+
+  !> What the group is about, in a line.
+  subroutine about(self, meaning)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: meaning
+
+    if (self%describing) self%told%meaning = meaning
+  end subroutine about
 
   !> End a group: report the variables nobody asked for, or close the group written.
   subroutine finish(self)
     class(group_visitor_t), intent(inout) :: self
     integer :: i
 
-    if (self%writing) then
-      self%text = self%text//'/'//new_line('a')
-      return
-    end if
+    if (self%writing) call self%written%add_line('/')
+    if (.not. self%reading) return
     do i = 1, self%group%n
       associate (name => self%group%assignment(i)%name)
         if (any(self%known(:self%n_known) == name)) cycle
@@ -84,7 +107,7 @@ contains
     logical :: yes
 
     yes = .false.
-    if (.not. self%writing) yes = self%group%find(variable) > 0
+    if (self%reading) yes = self%group%find(variable) > 0
   end function given
 
   !> Is nothing wrong with this variable so far? A default is good.
@@ -117,7 +140,7 @@ contains
     character(*), intent(in) :: variable
     character(*), intent(in) :: meaning   !! what it stands for, with its unit
 
-    if (self%writing .or. self%group%faulty) return
+    if (.not. self%reading .or. self%group%faulty) return
     if (self%group%find(variable) > 0) return
     if (self%group%line > 0) then
       call self%note(' '//variable//': missing, required: '//meaning)
@@ -135,7 +158,7 @@ contains
     character(*), intent(in) :: allowed   !! what is wrong and what is allowed
     integer :: i
 
-    if (ok .or. self%writing) return
+    if (ok .or. .not. self%reading) return
     i = self%group%find(variable)
     if (i > 0) then
       call self%fault(i, allowed)
@@ -149,7 +172,7 @@ contains
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: what
 
-    if (self%writing) return
+    if (.not. self%reading) return
     if (self%group%line > 0) then
       call self%problems%add_message('&'//self%group%name//what, self%group%line)
     else
@@ -158,80 +181,94 @@ contains
   end subroutine note
 
   !> A real number.
-  subroutine item_real(self, variable, x)
+  subroutine real_value(self, variable, x, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     real(wp), intent(inout) :: x
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
     real(wp) :: values(1)
 
     values = x
-    call self%list(variable, values, 1, 1)
+    call self%real_values(variable, values, allowed, meaning, example, required)
     x = values(1)
-  end subroutine item_real
+  end subroutine real_value
 
-  !> Exactly as many real numbers as `x` has elements.
-  subroutine item_reals(self, variable, x)
+  !> As many real numbers as `x` has elements, or from `allowed%fewest` on; those not given stay.
+  subroutine real_values(self, variable, x, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     real(wp), intent(inout) :: x(:)
-
-    call self%list(variable, x, size(x), size(x))
-  end subroutine item_reals
-
-  !> Between `least` and `most` real numbers; the elements not given stay as they are.
-  subroutine list(self, variable, x, least, most)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable
-    real(wp), intent(inout) :: x(:)
-    integer, intent(in) :: least, most
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
+    type(variable_t) :: told
+    character(:), allocatable :: problem
     real(wp) :: values(size(x))
-    integer :: i, j
+    integer :: i, j, fewest
 
-    if (self%writing) then
-      if (is_given(x(1))) call self%write_line(variable, reals_text(pack(x, is_given(x))))
+    if (.not. self%reading) then
+      told = described(variable, 'number', reals_text(pack(x, is_given(x))), meaning, example, &
+        required)
+      told%allowed = allowed
+      told%most = size(x)
+      call self%tell(told)
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning//' ['//allowed%unit//']', required)
     if (i == 0) return
-    if (.not. self%count_is(i, least, most)) return
+    fewest = merge(allowed%fewest, size(x), allowed%fewest > 0)
+    if (.not. self%count_is(i, fewest, size(x))) return
     values = x
     do j = 1, self%group%assignment(i)%n
       call self%read_real(i, j, values(j))
     end do
     if (.not. self%good(variable)) return
-    x = values
-  end subroutine list
+    problem = allowed%problem(pack(values, is_given(values)))
+    if (len(problem) > 0) then
+      call self%fault(i, problem)
+    else
+      x = values
+    end if
+  end subroutine real_values
 
   !> A whole number.
-  subroutine item_integer(self, variable, n)
+  subroutine integer_value(self, variable, n, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     integer, intent(inout) :: n
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
     integer :: values(1)
 
     values = n
-    call self%item_integers(variable, values)
+    call self%integer_values(variable, values, allowed, meaning, example, required)
     n = values(1)
-  end subroutine item_integer
+  end subroutine integer_value
 
-  !> Exactly as many whole numbers as `n` has elements.
-  subroutine item_integers(self, variable, n)
+  !> As many whole numbers as `n` has elements.
+  subroutine integer_values(self, variable, n, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     integer, intent(inout) :: n(:)
-    character(:), allocatable :: text
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
+    type(variable_t) :: told
+    character(:), allocatable :: problem
     integer :: values(size(n))
     integer :: i, j
 
-    if (self%writing) then
-      text = to_text(n(1))
-      do j = 2, size(n)
-        text = text//', '//to_text(n(j))
-      end do
-      call self%write_line(variable, text)
+    if (.not. self%reading) then
+      told = described(variable, 'number', integers_text(n), meaning, example, required)
+      told%allowed = allowed
+      told%most = size(n)
+      call self%tell(told)
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning, required)
     if (i == 0) return
     if (.not. self%count_is(i, size(n), size(n))) return
     values = n
@@ -239,21 +276,27 @@ contains
       call self%read_integer(i, j, values(j))
     end do
     if (.not. self%good(variable)) return
-    n = values
-  end subroutine item_integers
+    problem = allowed%problem(real(values, wp))
+    if (len(problem) > 0) then
+      call self%fault(i, problem)
+    else
+      n = values
+    end if
+  end subroutine integer_values
 
-  !> A logical.
-  subroutine item_logical(self, variable, flag)
+  !> A logical; its example is what it is not by default.
+  subroutine logical_value(self, variable, flag, meaning)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     logical, intent(inout) :: flag
+    character(*), intent(in) :: meaning
     integer :: i, info
 
-    if (self%writing) then
-      call self%write_line(variable, to_text(flag))
+    if (.not. self%reading) then
+      call self%tell(described(variable, 'logical', to_text(flag), meaning, to_text(.not. flag)))
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning)
     if (i == 0) return
     if (.not. self%count_is(i, 1, 1)) return
     associate (value => self%group%assignment(i)%value(1))
@@ -261,42 +304,45 @@ contains
       if (value%quoted) info = value_not_whole
     end associate
     if (info /= value_ok) call self%fault(i, 'must be .true. or .false.')
-  end subroutine item_logical
+  end subroutine logical_value
 
   !> Text of any length.
-  subroutine item_text(self, variable, text)
+  subroutine text_value(self, variable, text, meaning, example)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     character(:), allocatable, intent(inout) :: text
+    character(*), intent(in) :: meaning, example
     integer :: i
     logical :: ok
 
-    if (self%writing) then
-      call self%write_line(variable, quoted_text(text))
+    if (.not. self%reading) then
+      call self%tell(described(variable, 'text', quoted_text(text), meaning, example))
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning)
     if (i == 0) return
     call self%read_text(i, ok)
     if (.not. ok) return
     text = self%group%assignment(i)%value(1)%text
-  end subroutine item_text
+  end subroutine text_value
 
   !> The name of something the user made up: letters, digits and `_ - .`, at most `name_length`.
-  subroutine name(self, variable, word)
+  subroutine name(self, variable, word, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     character(name_length), intent(inout) :: word
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
     character(*), parameter :: allowed = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
     integer :: i
     logical :: ok
 
-    if (self%writing) then
-      call self%write_line(variable, quoted_text(trim(word)))
+    if (.not. self%reading) then
+      call self%tell(described(variable, 'name', word_text(word), meaning, example, required))
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning, required)
     if (i == 0) return
     call self%read_text(i, ok)
     if (.not. ok) return
@@ -312,19 +358,24 @@ contains
   end subroutine name
 
   !> One of the words in `allowed`; those this version cannot do are refused as such.
-  subroutine option(self, variable, word, allowed)
+  subroutine option(self, variable, word, allowed, meaning, example, required)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
     character(name_length), intent(inout) :: word
     character(*), intent(in) :: allowed   !! the words, one blank between them
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
+    type(variable_t) :: told
     integer :: i
     logical :: ok
 
-    if (self%writing) then
-      call self%write_line(variable, quoted_text(trim(word)))
+    if (.not. self%reading) then
+      told = described(variable, 'choice', word_text(word), meaning, example, required)
+      told%choices = allowed
+      call self%tell(told)
       return
     end if
-    i = self%lookup(variable)
+    i = self%lookup(variable, meaning, required)
     if (i == 0) return
     call self%read_text(i, ok)
     if (.not. ok) return
@@ -337,6 +388,20 @@ contains
       end if
     end associate
   end subroutine option
+
+  !> Write a variable that has a value, or list what was told of it.
+  subroutine tell(self, variable)
+    class(group_visitor_t), intent(inout) :: self
+    type(variable_t), intent(in) :: variable
+
+    if (self%writing) then
+      if (len(variable%value) == 0) return
+      call self%written%add_line('  '//variable%name//' = '//variable%value)
+    else
+      self%told%n = self%told%n + 1
+      self%told%variable(self%told%n) = variable
+    end if
+  end subroutine tell
 
   !> The words of a list, as a message shows them.
   pure function choices(allowed) result(text)
@@ -354,14 +419,20 @@ contains
     end do
   end function choices
 
-  !> Number of the assignment to a variable, 0 if the user gave none or it is damaged.
-  function lookup(self, variable) result(i)
+  !> Number of the assignment to a variable, 0 if the user gave none (a problem if it is required)
+  !! or it is damaged.
+  function lookup(self, variable, meaning, required) result(i)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
+    character(*), intent(in) :: meaning   !! with the unit
+    logical, intent(in), optional :: required
     integer :: i
 
     self%n_known = self%n_known + 1
     self%known(self%n_known) = variable
+    if (present(required)) then
+      if (required) call self%needed(variable, meaning)
+    end if
     i = self%group%find(variable)
     if (i == 0) return
     if (self%group%assignment(i)%faulty) i = 0
@@ -469,25 +540,40 @@ contains
     end associate
   end subroutine read_text
 
-  !> Write one variable.
-  subroutine write_line(self, variable, value)
-    class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable, value
-
-    self%text = self%text//'  '//variable//' = '//value//new_line('a')
-  end subroutine write_line
-
-  !> Real numbers between commas.
+  !> Real numbers between commas; empty for none.
   pure function reals_text(x) result(text)
     real(wp), intent(in) :: x(:)
     character(:), allocatable :: text
     integer :: j
 
-    text = to_text(x(1))
-    do j = 2, size(x)
-      text = text//', '//to_text(x(j))
+    text = ''
+    do j = 1, size(x)
+      if (j > 1) text = text//', '
+      text = text//to_text(x(j))
     end do
   end function reals_text
+
+  !> Whole numbers between commas.
+  pure function integers_text(n) result(text)
+    integer, intent(in) :: n(:)
+    character(:), allocatable :: text
+    integer :: j
+
+    text = ''
+    do j = 1, size(n)
+      if (j > 1) text = text//', '
+      text = text//to_text(n(j))
+    end do
+  end function integers_text
+
+  !> A word between quotes; empty for none.
+  pure function word_text(word) result(text)
+    character(*), intent(in) :: word
+    character(:), allocatable :: text
+
+    text = ''
+    if (word /= '') text = quoted_text(trim(word))
+  end function word_text
 
   !> Could the word be a variable whose '=' was forgotten? (A logical could not.)
   pure function looks_like_name(word) result(yes)

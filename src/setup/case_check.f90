@@ -8,7 +8,7 @@ module case_check_m
   use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm
   use case_types_m, only: case_t, drop_input_t
-  use case_input_m, only: side_name
+  use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape, given_size

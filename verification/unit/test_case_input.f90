@@ -348,8 +348,8 @@ contains
     call expect(base//'&fluid liquid_density=0 gas_density=-1 liquid_viscosity=-1 ' &
       //'gas_viscosity=-1/', &
       '&fluid liquid_density = 0: must be positive [kg/m3] (line 3)|' &
-      //'&fluid gas_density = -1: must be positive [kg/m3] (line 3)|' &
       //'&fluid liquid_viscosity = -1: must not be negative [Pa s] (line 3)|' &
+      //'&fluid gas_density = -1: must be positive [kg/m3] (line 3)|' &
       //'&fluid gas_viscosity = -1: must not be negative [Pa s] (line 3)')
     call expect(base//'&fluid gravity=0,0,inf/', &
       '&fluid gravity = 0, 0, inf: value 3 must be a finite number (line 3)')
@@ -428,7 +428,8 @@ contains
       '&shape density = 0: must be positive [kg/m3] (line 3)|' &
       //'&shape scale = 0: must be positive [-] (line 3)|' &
       //'&shape refinement = 0: must lie between 1 and 8 (line 3)|' &
-      //'&shape sphere_spacing = -1: must not be negative [m] (line 3)')
+      //'&shape sphere_spacing = -1: must not be negative [m]; 0 means a tenth of the smallest ' &
+      //'edge (line 3)')
     call expect(base//'&shape name='''' kind=''cube'' size=1/', '&shape name = '''': '//rule)
     call expect(base//'&shape name=''a/b'' kind=''cube'' size=1/', '&shape name = ''a/b'': '//rule)
     call expect(base//'&shape name=''..'' kind=''cube'' size=1/', '&shape name = ''..'': '//rule)
@@ -452,12 +453,12 @@ contains
       //'&body release_time = -1: must not be negative [s] (line 4)')
     call expect(cube//'&drop shape=''c'' position=3*0 count=0 first_time=-1 interval=-1 ' &
       //'spread=0,-1,0' &
-      //' tilt_deg=181 seed=1.5/', '&drop seed = 1.5: must be a whole number (line 4)|' &
-      //'&drop count = 0: must lie between 1 and 100000 (line 4)|' &
+      //' tilt_deg=181 seed=1.5/', '&drop count = 0: must lie between 1 and 100000 (line 4)|' &
       //'&drop first_time = -1: must not be negative [s] (line 4)|' &
       //'&drop interval = -1: must not be negative [s] (line 4)|' &
       //'&drop spread = 0, -1, 0: must not be negative [m] (line 4)|' &
-      //'&drop tilt_deg = 181: must lie between 0 and 180 degrees (line 4)')
+      //'&drop tilt_deg = 181: must lie between 0 and 180 degrees (line 4)|' &
+      //'&drop seed = 1.5: must be a whole number (line 4)')
     call expect(cube//'&drop shape=''c'' position=3*0 orientation=''any''/', &
       '&drop orientation = ''any'': unknown, must be one of ''given'', ''random'' (line 4)')
     call expect(cube//'&body shape=''c'' position=3*0 colour=''red''/', &

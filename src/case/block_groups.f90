@@ -1,0 +1,268 @@
+!> The groups of the blocks: `&contact`, `&bed`, `&shape`, `&body`, `&drop`.
+module block_groups_m
+  use kinds_m, only: wp, name_length, pi
+  use vectors_m, only: quaternion_from_axis
+  use case_types_m, only: size_count, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, &
+    absent
+  use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
+    between
+  use group_visitor_m, only: group_visitor_t
+  use run_groups_m, only: shortest
+  use fluid_groups_m, only: lightest
+  use value_text_m, only: nearest_name, quoted_text
+  implicit none
+  private
+  public :: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
+
+  integer, parameter :: most_drops = 100000, finest_shape = 8
+
+contains
+
+  !> `&contact`
+  subroutine visit_contact(v, contact)
+    type(group_visitor_t), intent(inout) :: v
+    type(contact_input_t), intent(inout) :: contact
+
+    call v%about('how blocks touch one another, the walls and the bed')
+    call v%option('model', contact%model, 'surface spheres', 'what touches: points of the ' &
+      //'surface against the exact surface, or the contact spheres of the paper', &
+      example='''spheres''')
+    call v%option('law', contact%law, 'restitution constants', 'where the forces come from: ' &
+      //'restitution and contact_time, or the constants k_n to eta_t', example='''constants''')
+    call v%real('restitution', contact%restitution, share(), &
+      'speed after over speed before a central impact without friction', example='0.5')
+    call v%real('contact_time', contact%contact_time, positive('s'), &
+      'how long such an impact lasts; shorter makes blocks stiffer', example='0.001')
+    call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
+      //'with law = ''constants'', of each pair of spheres', example='2e5')
+    call v%real('gamma_n', contact%gamma_n, positive('-'), &
+      'power of the overlap, with law = ''constants''', example='1.5')
+    call v%real('eta_n', contact%eta_n, not_negative('N s/m'), &
+      'damping normal to the surface, with law = ''constants''', example='5')
+    call v%real('k_t', contact%k_t, not_negative('N/m^gamma_t'), &
+      'stiffness along the surface, with law = ''constants''', example='2e5')
+    call v%real('gamma_t', contact%gamma_t, positive('-'), &
+      'power of the displacement along the surface, with law = ''constants''', example='1.5')
+    call v%real('eta_t', contact%eta_t, not_negative('N s/m'), &
+      'damping along the surface, with law = ''constants''', example='5')
+    call v%real('friction', contact%friction, not_negative('-'), &
+      'coefficient of Coulomb friction, block on block', example='0.5')
+    call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
+      'coefficient of Coulomb friction, block on wall and bed', example='0.5')
+    call v%real('substep_ratio', contact%substep_ratio, share(), &
+      'longest step of the blocks over the step of the fluid', example='0.02')
+    call v%real('courant_max', contact%courant_max, share(), 'way of a block in one of its ' &
+      //'steps over the size of its contact spheres, at most (eq. (6) of the paper)', &
+      example='0.05')
+    call v%logical('sleep', contact%sleep, 'blocks at rest cost nothing until something ' &
+      //'disturbs them')
+    call v%logical('lubrication', contact%lubrication, 'films of liquid thinner than a cell ' &
+      //'brake spheres that come near a wall or another sphere')
+  end subroutine visit_contact
+
+  !> `&bed`
+  subroutine visit_bed(v, bed)
+    type(group_visitor_t), intent(inout) :: v
+    type(bed_input_t), intent(inout) :: bed
+
+    bed%line = v%group%line
+    call v%about('a fixed floor of any form, for blocks and water')
+    call v%text('file', bed%file, 'the file with the form of the bed; the group needs it', &
+      example='''mound.txt''')
+    call v%option('kind', bed%kind, 'heightmap stl', 'what the file holds: a map of heights, or ' &
+      //'triangles in m', example='file = ''slope.stl''  kind = ''stl''')
+    call v%require('file', len_trim(bed%file) > 0, 'must name a file with the form of the bed')
+  end subroutine visit_bed
+
+  !> `&shape`
+  subroutine visit_shape(v, shape)
+    type(group_visitor_t), intent(inout) :: v
+    type(shape_input_t), intent(inout) :: shape
+    type(allowed_t) :: lengths
+    integer :: n, most
+
+    shape%line = v%group%line
+    if (.not. allocated(shape%file)) shape%file = ''
+    call v%about('a kind of block: its form, size and density')
+    call v%name('name', shape%name, 'what &body and &drop call the shape', &
+      example='''hexapod''', required=.true.)
+    call v%option('kind', shape%kind, &
+      'hexapod cube box sphere cylinder tetrapod dolos reef_cube file', &
+      'the form, such as ''hexapod''', example='size = 0.02  kind = ''hexapod''', &
+      required=.true.)
+    n = size_count(shape%kind)
+    if (shape%kind /= '' .and. n > 0) call v%needed('size', size_meaning(shape%kind)//' [m]')
+    if (shape%kind == '') n = 0
+    most = merge(3, n, n == 0)
+    lengths = between(shortest, 1.0_wp/shortest, 'm')
+    lengths%fewest = max(n, 1)
+    call v%real('size', shape%size(:most), lengths, 'for every kind but ''file''. box: ' &
+      //size_meaning('box')//'; cylinder: '//size_meaning('cylinder')//'; hexapod: ' &
+      //size_meaning('hexapod')//'; cube: '//size_meaning('cube')//'; sphere: ' &
+      //size_meaning('sphere')//'; others: '//size_meaning('tetrapod'), &
+      example='kind = ''box''  size = 0.02, 0.03, 0.04')
+    call v%real('density', shape%density, between(lightest, 1.0_wp/lightest, 'kg/m3'), &
+      'density of the material', example='2400')
+    if (shape%kind == 'file') call v%needed('file', 'a Gmsh .msh file or a mics-shape file')
+    call v%text('file', shape%file, 'for kind = ''file'': tetrahedra, as a Gmsh .msh file or ' &
+      //'a mics-shape file (tools/make_shape.py)', &
+      example='kind = ''file''  file = ''block.txt''')
+    call v%real('scale', shape%scale, positive('-'), 'for kind = ''file'': the coordinates ' &
+      //'are multiplied by it to be in m', &
+      example='kind = ''file''  file = ''block.txt''  scale = 0.001')
+    call v%integer('refinement', shape%refinement, between(1, finest_shape), &
+      'how finely a built-in form is cut into tetrahedra', example='3')
+    call v%option('spheres', shape%spheres, 'centroid inscribed dense', 'contact spheres of the ' &
+      //'shape: one about the centroid of each tetrahedron as in the paper, the largest in ' &
+      //'each tetrahedron, or close together along the surface', example='''dense''')
+    call v%real('sphere_spacing', shape%sphere_spacing, &
+      not_negative('m', zero='0 means a tenth of the smallest edge'), &
+      'distance of the contact spheres, for spheres = ''dense''', &
+      example='spheres = ''dense''  sphere_spacing = 0.002')
+
+    call v%require('file', shape%kind == 'file' .or. shape%file == '', &
+                   'only a shape of kind ''file'' is read from one')
+  end subroutine visit_shape
+
+  !> What the size of a kind of shape means [m].
+  pure function size_meaning(kind) result(meaning)
+    character(*), intent(in) :: kind
+    character(:), allocatable :: meaning
+
+    select case (kind)
+    case ('box'); meaning = 'the three edges'
+    case ('cylinder'); meaning = 'diameter and height'
+    case ('hexapod'); meaning = 'the edge of its seven cubes'
+    case ('cube'); meaning = 'the edge'
+    case ('sphere'); meaning = 'the diameter'
+    case default; meaning = 'the overall height'
+    end select
+  end function size_meaning
+
+  !> `&body`
+  subroutine visit_body(v, body, shapes)
+    type(group_visitor_t), intent(inout) :: v
+    type(body_input_t), intent(inout) :: body
+    character(name_length), intent(in) :: shapes(:)
+
+    body%line = v%group%line
+    call v%about('one block, there from the start or released later')
+    call visit_shape_name(v, body%shape, shapes)
+    call v%real('position', body%position, any_number('m'), 'the centre of mass', &
+      example='0.15, 0.05, 0.1', required=.true.)
+    call visit_attitude(v, body%quaternion)
+    call v%real('velocity', body%velocity, any_number('m/s'), &
+      'velocity at the release; a fixed block keeps it', example='0, 0, -0.1')
+    call v%real('angular_velocity', body%angular_velocity, any_number('rad/s'), &
+      'spin about the axes of the tank, likewise', example='0, 0, 6.28')
+    call v%logical('fixed', body%fixed, 'held in its place, or moved at its given velocity ' &
+      //'for ever')
+    call v%real('release_time', body%release_time, not_negative('s'), &
+      'when the block is let go; before, it displaces and touches nothing', example='2')
+  end subroutine visit_body
+
+  !> `&drop`
+  subroutine visit_drop(v, drop, shapes)
+    type(group_visitor_t), intent(inout) :: v
+    type(drop_input_t), intent(inout) :: drop
+    character(name_length), intent(in) :: shapes(:)
+    logical :: given_attitude
+    integer :: i
+    character(10), parameter :: attitude(4) = &
+      [character(10) :: 'quaternion', 'axis', 'angle_deg', 'tilt_deg']
+
+    drop%line = v%group%line
+    call v%about('blocks dropped one after another from one place')
+    call visit_shape_name(v, drop%shape, shapes)
+    call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
+      example='0.15, 0.05, 0.16', required=.true.)
+    call v%integer('count', drop%count, between(1, most_drops), 'how many blocks', example='6')
+    call v%real('first_time', drop%first_time, not_negative('s'), 'when the first is let go', &
+      example='0.5')
+    call v%real('interval', drop%interval, not_negative('s'), 'time from one to the next', &
+      example='2')
+    call v%real('spread', drop%spread, not_negative('m'), &
+      'each block is shifted at random by up to this to both sides, in x, y, z', &
+      example='0.005, 0.005, 0')
+    call v%option('orientation', drop%orientation, 'given random', 'attitude of the blocks: by ' &
+      //'quaternion, or axis and angle_deg; or at random, any rotation as likely as another', &
+      example='''random''')
+    given_attitude = drop%orientation == 'given'
+    if (given_attitude .or. .not. v%writing) then
+      call visit_attitude(v, drop%quaternion)
+      call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
+        'each block is tilted at random by up to this about an axis at random', example='10')
+    end if
+    call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
+      example='0, 0, -0.1')
+    call v%integer('seed', drop%seed, any_whole(), 'the random places and attitudes: ' &
+      //'another number draws others, the same number the same on every machine', example='7')
+
+    do i = 1, size(attitude)
+      call v%require(trim(attitude(i)), given_attitude .or. .not. v%given(trim(attitude(i))), &
+                     'has no meaning with orientation = ''random''')
+    end do
+  end subroutine visit_drop
+
+  !> The shape of a body or drop: one that exists.
+  subroutine visit_shape_name(v, shape, shapes)
+    type(group_visitor_t), intent(inout) :: v
+    character(name_length), intent(inout) :: shape
+    character(name_length), intent(in) :: shapes(:)
+
+    call v%name('shape', shape, 'the name of a &shape', example='''hexapod''', required=.true.)
+    if (shape == '') return
+    if (size(shapes) == 0) then
+      call v%require('shape', .false., 'the case has no &shape group')
+    else
+      call v%require('shape', any(shapes == shape), 'no &shape has this name, nearest known: ' &
+                     //quoted_text(nearest_name(trim(shape), shapes)))
+    end if
+  end subroutine visit_shape_name
+
+  !> Attitude as a unit quaternion, read from `quaternion` or from `axis` with `angle_deg`.
+  subroutine visit_attitude(v, q)
+    type(group_visitor_t), intent(inout) :: v
+    real(wp), intent(inout) :: q(4)
+    real(wp) :: axis(3), angle_deg
+
+    call v%real('quaternion', q, any_number('-'), 'attitude as a quaternion w, x, y, z of any ' &
+      //'length but 0', example='0.707, 0, 0.707, 0')
+    if (v%writing) return
+    axis = absent
+    angle_deg = absent
+    call v%real('axis', axis, any_number('-'), 'attitude, in place of quaternion: turned about ' &
+      //'this axis through the centre of mass by angle_deg', &
+      example='angle_deg = 45  axis = 1, 0, 0')
+    call v%real('angle_deg', angle_deg, any_number('degrees'), 'angle of that turn', &
+      example='axis = 1, 0, 0  angle_deg = 45')
+
+    if (v%given('quaternion')) then
+      call v%require('quaternion', .not. (v%given('axis') .or. v%given('angle_deg')), &
+                     'give the quaternion, or axis with angle_deg, not both')
+      call v%require('quaternion', any(abs(q) > 0.0_wp), 'must not be zero')
+    else
+      call v%require('axis', v%given('angle_deg') .or. .not. v%given('axis'), &
+                     'needs angle_deg as well')
+      call v%require('angle_deg', v%given('axis') .or. .not. v%given('angle_deg'), &
+                     'needs axis as well')
+      call v%require('axis', any(abs(axis) > 0.0_wp), 'must not be zero')
+      if (v%good('axis') .and. v%good('angle_deg') .and. v%given('axis')) then
+        q = quaternion_from_axis(axis, modulo(angle_deg, 720.0_wp)*pi/180.0_wp)
+      end if
+    end if
+    if (.not. v%good('quaternion')) q = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    q = unit_quaternion(q)
+  end subroutine visit_attitude
+
+  !> A quaternion of length one; one that is so already, to round-off, stays as it is, so that
+  !! writing and reading again changes nothing.
+  pure function unit_quaternion(q) result(unit)
+    real(wp), intent(in) :: q(4)
+    real(wp) :: unit(4)
+
+    unit = q
+    if (abs(dot_product(q, q) - 1.0_wp) > 4.0_wp*epsilon(1.0_wp)) unit = q/norm2(q)
+  end function unit_quaternion
+
+end module block_groups_m
