@@ -43,7 +43,7 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units everything deps run test verify mutate bench-contact lint clean help FORCE
+.PHONY: all units everything deps run test verify mutate bench-contact reference lint clean help FORCE
 
 all: $(binary)
 
@@ -57,6 +57,7 @@ help:
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
+	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
 	@echo 'make lint     style of the Fortran and Python sources'
 	@echo 'make clean    remove what make has built'
 	@echo 'Variables: OPT="-O2" for a portable binary, LTO= for a quick build, FC_SERIAL, FC_MPI, CASE'
@@ -113,7 +114,7 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
 	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
 
-no_build := deps lint clean help run test verify mutate bench-contact everything $(variants)
+no_build := deps lint clean help run test verify mutate bench-contact reference everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 endif
@@ -142,6 +143,12 @@ THREADS := 1
 bench-contact: deps
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) tools/bench_contact.py --n $(N) --threads $(THREADS)
+
+# What the program says about its own input.
+reference:
+	@$(MAKE) --no-print-directory
+	./mics --help=markdown > docs/reference.md
+	./mics --help=json > docs/mics-case.schema.json
 
 lint: deps
 	@tools/lint.sh

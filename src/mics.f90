@@ -15,6 +15,7 @@ program mics
   use case_file_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case, parameters_text
+  use reference_m, only: reference_text
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
   use case_oddities_m, only: find_oddities
@@ -99,11 +100,17 @@ contains
   !> Options that end the program at once, and the number of threads.
   subroutine read_options()
     type(problems_t) :: problems
+    character(:), allocatable :: reference
 
+    reference = ''
     call read_command_line(options, problems)
+    if (options%help) reference = reference_text(options%topic, problems)
     if (problems%n > 0) call refuse(problems)
     if (options%help .or. options%version) then
-      if (is_root() .and. options%help) call print_help(output_unit)
+      if (is_root() .and. options%help) then
+        if (len(options%topic) == 0) call print_help(output_unit)
+        write (output_unit, '(a)', advance='no') reference
+      end if
       if (is_root() .and. options%version) write (output_unit, '(4a)') 'mics ', version, ' ', &
         git_revision
       call finish()

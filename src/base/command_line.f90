@@ -12,6 +12,7 @@ module command_line_m
     logical :: quiet = .false.       !! no progress table
     logical :: version = .false.
     logical :: help = .false.
+    character(:), allocatable :: topic       !! what help is wanted on, empty: the options
     integer :: threads = 0           !! 0: not given
     character(:), allocatable :: case_file   !! empty: standard input
     character(:), allocatable :: restart     !! restart file, empty: not given
@@ -55,6 +56,7 @@ contains
     options%case_file = ''
     options%restart = ''
     options%output = ''
+    options%topic = ''
     i = 0
     do while (i < size(arguments))
       i = i + 1
@@ -69,7 +71,7 @@ contains
       if (has_value) then
         value = word(equals + 1:)
         word = word(:equals - 1)
-      else if (wants_value(word) .and. i < size(arguments)) then
+      else if ((wants_value(word) .or. word == '--help') .and. i < size(arguments)) then
         if (index(arguments(i + 1)%text, '--') /= 1) then
           i = i + 1
           value = arguments(i)%text
@@ -117,7 +119,7 @@ contains
         //nearest_name(word, known)//' (see --help)')
       return
     end if
-    if (has_value .and. .not. wants_value(word)) then
+    if (has_value .and. .not. (wants_value(word) .or. word == '--help')) then
       call problems%add_message('option '//word//" takes no value, got '"//value//"'")
       return
     end if
@@ -129,7 +131,9 @@ contains
     case ('--check'); options%check = .true.
     case ('--quiet'); options%quiet = .true.
     case ('--version'); options%version = .true.
-    case ('--help'); options%help = .true.
+    case ('--help')
+      options%help = .true.
+      options%topic = value
     case ('--restart'); options%restart = value
     case ('--output'); options%output = value
     case ('--threads'); call take_threads(value, options, problems)
@@ -224,10 +228,13 @@ contains
       '                  1 for each process under mpirun)', &
       '  --quiet         no progress table', &
       '  --version       version and how the program was built', &
-      '  --help          this text', &
+      '  --help [GROUP]  this text, or every variable of a group of the case', &
+      '  --help=markdown --help=json', &
+      '                  all groups as the page docs/reference.md, or as a JSON schema', &
       '', &
       'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
-      '            130 or 143 ended by a signal after writing a restart file.']
+      '            130 or 143 ended by a signal after writing a restart file.', &
+      '']
     integer :: i
 
     do i = 1, size(lines)

@@ -14,6 +14,15 @@ program test_command_line
   call parse('--check --quiet --version --help')
   call check('switches', all([options%check, options%quiet, options%version, options%help]) &
     .and. problems%n == 0)
+  call parse('--help')
+  call check('help', options%help .and. options%topic == '')
+  call parse('--help contact')
+  call check('help on a group', options%help .and. options%topic == 'contact' &
+    .and. options%case_file == '' .and. problems%n == 0)
+  call parse('--help=json')
+  call check('help in another form', options%topic == 'json' .and. problems%n == 0)
+  call parse('--help --check')
+  call check('help takes no option', options%topic == '' .and. options%check)
   call parse('--restart a.h5 --output=out --threads 3 case.nml')
   call check('values', options%restart == 'a.h5' .and. options%output == 'out' &
     .and. options%threads == 3 .and. options%case_file == 'case.nml' .and. problems%n == 0)

@@ -1,0 +1,310 @@
+"""The reference of the case file says what the program does: names, defaults, examples, ranges."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import f90nml
+import numpy as np
+import pytest
+
+from micstools.initial_state import write_initial_state
+from micstools.reader import Run
+from run_cases import ROOT
+from test_input import GOOD, mics
+
+PAGE = ROOT / "docs" / "reference.md"
+SCHEMA = ROOT / "docs" / "mics-case.schema.json"
+
+SIDES = [f"{axis}_{end}" for axis in "xyz" for end in ("min", "max")]
+CONTRACT = {
+    "run": "title physics t_end dt cfl_max output field_interval history_interval "
+    "restart_interval stop_when_settled rest_speed rest_time",
+    "grid": "cells length origin",
+    "boundary": " ".join([*SIDES, *(f"{side}_velocity" for side in SIDES)]),
+    "fluid": "liquid_density liquid_viscosity gas_density gas_viscosity gravity water_level "
+    "surface_tension single_phase velocity",
+    "water": "min max",
+    "numerics": "coupling coupling_passes momentum advection interface solid_fraction subcells "
+    "pressure_solver preconditioner divergence_tolerance max_pressure_passes",
+    "contact": "model law restitution contact_time k_n gamma_n eta_n k_t gamma_t eta_t friction "
+    "wall_friction substep_ratio courant_max sleep",
+    "shape": "name kind size density file scale refinement spheres sphere_spacing",
+    "body": "shape position quaternion axis angle_deg velocity angular_velocity fixed release_time",
+    "drop": "shape position count first_time interval spread orientation quaternion axis "
+    "angle_deg tilt_deg velocity seed",
+    "bed": "file kind",
+}
+"""Groups and variables that users rely on; more may come."""
+
+TANK = {
+    "run": "&run t_end = 10 /\n",
+    "grid": "&grid cells = 6, 2, 4  length = 0.3, 0.1, 0.2 /\n",
+    "shape": "&shape name = 'hexapod'  kind = 'hexapod'  size = 0.02 /\n",
+}
+"""What the other groups need beside them."""
+
+
+class Row(NamedTuple):
+    """A row of a table of the page."""
+
+    group: str
+    name: str
+    values: str
+    default: str
+    unit: str
+    meaning: str
+    example: str
+
+
+def ask(topic: str) -> str:
+    """What the program prints about a topic."""
+    done = mics([f"--help={topic}"], ROOT)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    """All variables as the program tells them."""
+    found, group = [], ""
+    for line in ask("markdown").splitlines():
+        if line.startswith("## &"):
+            group = line.removeprefix("## &")
+        elif line.startswith("| `"):
+            found.append(Row(group, *(cell.strip("` ") for cell in line[1:-1].split(" | "))))
+    return found
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    """The schema as the program prints it."""
+    found: dict[str, Any] = json.loads(ask("json"))
+    return found
+
+
+@pytest.mark.parametrize(("file", "topic"), [(PAGE, "markdown"), (SCHEMA, "json")])
+def test_files_are_fresh(file: Path, topic: str) -> None:
+    """The page and the schema are what this program would write; else: make reference."""
+    assert file.read_text() == ask(topic)
+
+
+def test_contract_is_described(rows: list[Row]) -> None:
+    """Every variable of the contract has a row, and every row a meaning and an example."""
+    described = {(row.group, row.name) for row in rows}
+    promised = {(group, name) for group, names in CONTRACT.items() for name in names.split()}
+    assert promised - described == set()
+    assert len(described) == len(rows)
+    assert [row for row in rows if not (row.meaning and row.values and row.example)] == []
+    reals = [row for row in rows if re.match(r"(\d to )?(\d )?number", row.values)]
+    assert len(reals) > 50
+    assert [row for row in reals if not row.unit] == []
+
+
+def test_help_on_a_group(rows: list[Row]) -> None:
+    """--help GROUP tells the same in paragraphs; --help lists all groups."""
+    overview = mics(["--help"], ROOT).stdout
+    for group in CONTRACT:
+        assert f"\n  {group} " in overview
+        text = " ".join(mics(["--help", group], ROOT).stdout.split())
+        for row in rows:
+            if row.group == group:
+                assert f" {row.name} " in text
+                assert " ".join(f"{row.meaning} example: {row.example}".split()) in text
+
+
+def test_unknown_group(tmp_path: Path) -> None:
+    """A group that does not exist is refused with the nearest one."""
+    done = mics(["--help", "contacts"], tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert (
+        done.stderr == "mics: unknown group 'contacts'; the nearest is contact (--help lists all)\n"
+    )
+
+
+def write_files(folder: Path) -> None:
+    """The files that examples name."""
+    (folder / "mound.txt").write_text("2 2 0 0 0.3 0.1\n" + 4 * "0.01\n")
+    corners = ["0 0 0.01", "0.3 0 0.01", "0.3 0.1 0.01", "0 0.1 0.01"]
+    facets = [
+        "facet normal 0 0 1\nouter loop\n"
+        + "".join(f"vertex {corners[k]}\n" for k in triangle)
+        + "endloop\nendfacet\n"
+        for triangle in ((0, 1, 2), (0, 2, 3))
+    ]
+    (folder / "slope.stl").write_text("solid bed\n" + "".join(facets) + "endsolid bed\n")
+    (folder / "block.txt").write_text(
+        "mics-shape 1\npoints 4\n0 0 0\n0.1 0 0\n0 0.1 0\n0 0 0.1\ntets 1\n1 2 3 4\n"
+    )
+    write_initial_state(folder / "start.h5", liquid=np.zeros((4, 2, 6)))
+
+
+def test_examples_are_accepted(rows: list[Row], tmp_path: Path) -> None:
+    """Each example, beside the examples of the required variables, makes a good case."""
+    write_files(tmp_path)
+    refused = []
+    for row in rows:
+        needed = [
+            other for other in rows if other.group == row.group and other.default == "required"
+        ]
+        lines = [f"{other.example}\n" for other in needed if f"{other.name} = " not in row.example]
+        group = f"&{row.group}\n{''.join(lines)}{row.example}\n/\n"
+        others = [text for name, text in TANK.items() if name != row.group]
+        done = mics(["--check"], tmp_path, "".join(others) + group)
+        if done.returncode != 0:
+            refused.append((row.group, row.name, done.stderr))
+    assert refused == []
+
+
+GIVEN = {
+    "run": "t_end = 0.01  physics = 'dry'",
+    "grid": "cells = 6, 2, 4  length = 0.3, 0.1, 0.2",
+    "shape": "name = 'hexapod'  kind = 'hexapod'  size = 0.02",
+    "body": "shape = 'hexapod'  position = 0.15, 0.05, 0.1",
+    "drop": "shape = 'hexapod'  position = 0.05, 0.05, 0.1",
+    "water": "min = 0, 0, 0  max = 1, 1, 1",
+    "bed": "file = 'mound.txt'",
+}
+"""A case with a group of each name that says no more than it must."""
+
+
+def used_by_program(folder: Path, defaults: dict[str, str]) -> dict[str, list[dict[str, Any]]]:
+    """All values that a run used, from its results, with more written into some groups."""
+    folder.mkdir()
+    write_files(folder)
+    case = "".join(
+        f"&{group}\n{GIVEN.get(group, '')}\n{defaults.get(group, '')}/\n" for group in CONTRACT
+    )
+    done = mics([], folder, case)
+    assert done.returncode == 0, done.stderr
+    return Run(folder / "mics-out").parameters
+
+
+def test_defaults_are_those_of_the_program(rows: list[Row], tmp_path: Path) -> None:
+    """A run without a variable uses its printed default, and is the same when it is written."""
+    used = used_by_program(tmp_path / "without", {})
+    defaults: dict[str, str] = {}
+    for row in rows:
+        if row.default == "required" or f"{row.name} = " in GIVEN.get(row.group, ""):
+            continue
+        if row.default == "no default":
+            assert row.name not in used[row.group][0]
+            continue
+        value = f90nml.reads(f"&a b = {row.default} /")["a"]["b"]
+        assert value == used[row.group][0][row.name], (row.group, row.name)
+        defaults[row.group] = f"{defaults.get(row.group, '')}{row.name} = {row.default}\n"
+    assert used_by_program(tmp_path / "with", defaults) == used
+
+
+def edges(rule: dict[str, Any]) -> Iterator[tuple[float, bool]]:
+    """Values on and just outside the bounds of a number, and whether they are good."""
+    whole = rule.get("type") == "integer"
+    if "exclusiveMinimum" in rule:
+        yield rule["exclusiveMinimum"], False
+    if "minimum" in rule:
+        yield rule["minimum"], True
+        yield rule["minimum"] - (1 if whole else 1e-9), False
+    if "maximum" in rule:
+        yield rule["maximum"], True
+        yield rule["maximum"] + (1 if whole else 1e-3), False
+
+
+def test_bounds_are_those_of_the_program(schema: dict[str, Any], tmp_path: Path) -> None:
+    """A number on a bound of the schema is taken, one just outside is refused."""
+    tried = 0
+    for group, rules in schema["$defs"].items():
+        for name, rule in rules["properties"].items():
+            one = rule["anyOf"][0] if "anyOf" in rule else rule.get("items", rule)
+            for value, good in edges(one):
+                text = f"&{group} {name} = {rule.get('minItems', 1)}*{value!r} /"
+                errors = mics(["--check"], tmp_path, text).stderr.splitlines()
+                start = f"mics: &{group} {name} = {value!r}"
+                refused = any(e.startswith(start) and " must " in e for e in errors)
+                assert refused != good, (text, errors)
+                tried += 1
+    assert tried > 60
+
+
+def faults(value: Any, rule: dict[str, Any], schema: dict[str, Any], place: str) -> list[str]:
+    """What does not fit, by the words of JSON schema that the program uses."""
+    if "$ref" in rule:
+        rule = schema["$defs"][rule["$ref"].rsplit("/", 1)[1]]
+    if "anyOf" in rule:
+        trials = [faults(value, one, schema, place) for one in rule["anyOf"]]
+        return [] if [] in trials else trials[-1]
+    if "enum" in rule:
+        return [] if value in rule["enum"] else [f"{place}: {value}"]
+    kinds: dict[str, Any] = {
+        "object": dict,
+        "array": list,
+        "string": str,
+        "boolean": bool,
+        "integer": int,
+        "number": (int, float),
+    }
+    numeric = rule["type"] in ("integer", "number")
+    if not isinstance(value, kinds[rule["type"]]) or (numeric and isinstance(value, bool)):
+        return [f"{place}: no {rule['type']}"]
+    found = []
+    if numeric:
+        good = rule.get("minimum", value) <= value <= rule.get("maximum", value)
+        if not good or value <= rule.get("exclusiveMinimum", -np.inf):
+            found.append(f"{place}: {value}")
+    if isinstance(value, dict):
+        found += [
+            f"{place} {name}: missing" for name in rule.get("required", []) if name not in value
+        ]
+        for name, inside in value.items():
+            one = rule["properties"].get(name)
+            found += faults(inside, one, schema, f"{place} {name}") if one else [f"{name}: unknown"]
+    if isinstance(value, list) and "items" in rule:
+        if not rule.get("minItems", 0) <= len(value) <= rule.get("maxItems", len(value)):
+            found.append(f"{place}: {len(value)} values")
+        found += [fault for one in value for fault in faults(one, rule["items"], schema, place)]
+    return found
+
+
+def as_json(text: str) -> dict[str, Any]:
+    """A case as the schema sees it: groups of one name in a list."""
+    case: dict[str, Any] = {}
+    for name, group in f90nml.reads(text).items():
+        groups = group if isinstance(group, list) else [group]
+        case[name] = [dict(one) for one in groups]
+    return {name: groups[0] if len(groups) == 1 else groups for name, groups in case.items()}
+
+
+@pytest.mark.parametrize("case", GOOD, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_good_cases_fit_the_schema(case: Path, schema: dict[str, Any]) -> None:
+    """Every case of the project is good by the schema, too."""
+    assert faults(as_json(case.read_text()), schema, schema, "") == []
+
+
+def test_examples_and_defaults_fit_the_schema(schema: dict[str, Any]) -> None:
+    """The values in the schema obey it."""
+    for group, rules in schema["$defs"].items():
+        for name, rule in rules["properties"].items():
+            assert rule["description"]
+            for value in [*rule["examples"], *([rule["default"]] if "default" in rule else [])]:
+                assert faults(value, rule, schema, f"{group} {name}") == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("dt = 1.0e-2", "dt = 0.0"),
+        ("dt = 1.0e-2", "tend = 0.1"),
+        ("t_end = 10.0", ""),
+        ("'no_slip'  x_max", "'sticky'  x_max"),
+        ("60, 20, 40", "60, 20"),
+        ("refinement = 1", "refinement = 1.5"),
+        ("size = 0.02", "size = 0.0"),
+        ("fixed = .true.", "fixed = 1"),
+    ],
+)
+def test_bad_cases_do_not_fit_the_schema(change: tuple[str, str], schema: dict[str, Any]) -> None:
+    """The schema finds what an editor should mark."""
+    text = (ROOT / "input" / "blocks.nml").read_text()
+    assert change[0] in text
+    assert len(faults(as_json(text.replace(*change)), schema, schema, "")) > 0
