@@ -249,12 +249,14 @@ contains
   subroutine check_names(case, problems)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: problems
+    character(name_length) :: small(size(case%shape))
     integer :: i, j
 
-    do i = 2, size(case%shape)
+    do i = 1, size(case%shape)
+      small(i) = lower_case(case%shape(i)%name)
+      if (small(i) == '') cycle
       do j = 1, i - 1
-        if (case%shape(i)%name == '') cycle
-        if (lower_case(case%shape(i)%name) /= lower_case(case%shape(j)%name)) cycle
+        if (small(i) /= small(j)) cycle
         call problems%add_message('&shape name = '//quoted_text(trim(case%shape(i)%name)) &
           //': the &shape on line '//to_text(case%shape(j)%line)//' has this name already', &
           case%shape(i)%line)
