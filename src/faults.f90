@@ -3,8 +3,8 @@ module faults_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
   use errors_m, only: exit_ok, exit_numerics, to_text
-  use grid_m, only: grid_t, side_periodic
-  use boundary_m, only: is_wall
+  use grid_m, only: grid_t
+  use boundary_kinds_m, only: is_wall
   use time_step_m, only: simulation_t
   use diagnostics_m, only: step_report_t
   use release_m, only: n_waiting
@@ -65,7 +65,7 @@ contains
     left = .false.
     do d = 1, 3
       do s = 1, 2
-        if (grid%side(s, d) == side_periodic) cycle
+        if (grid%periodic(d)) cycle
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
         if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0) then
           beyond = beyond - grid%length(d)

@@ -2,6 +2,7 @@
 module walls_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
+  use boundary_kinds_m, only: side_code, is_wall
   use bed_m, only: bed_t
   implicit none
   private
@@ -37,7 +38,7 @@ contains
     do d = 3, 1, -1
       if (boundary%kind(1, d) == 'periodic') walls%period(d) = grid%length(d)
       do s = 2, 1, -1
-        if (boundary%kind(s, d) /= 'no_slip' .and. boundary%kind(s, d) /= 'slip') cycle
+        if (.not. is_wall(side_code(boundary%kind(s, d)))) cycle
         m = walls%n + 1
         sense = real(2*s - 3, wp)
         walls%n = m

@@ -7,6 +7,7 @@ module case_input_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t, is_given
+  use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use description_m, only: group_description_t
   use group_visitor_m, only: group_visitor_t
@@ -228,7 +229,7 @@ contains
     end do
     if (i > list%n) return
     call v%start_reading(list%group(i))
-    way_out = any(case%boundary%kind == 'open' .or. case%boundary%kind == 'outflow')
+    way_out = any(gives_pressure(side_code(case%boundary%kind)))
     associate (fluid => case%fluid)
       do d = 1, 3
         do s = 1, 2

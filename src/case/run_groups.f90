@@ -3,6 +3,7 @@ module run_groups_m
   use kinds_m, only: wp
   use errors_m, only: to_text
   use case_types_m, only: run_t, grid_input_t, boundary_input_t, is_given
+  use boundary_kinds_m, only: side_code, side_names, is_wall, gives_velocity
   use allowed_values_m, only: any_number, positive, not_negative, at_least, between
   use group_visitor_m, only: group_visitor_t
   use value_text_m, only: quoted_text
@@ -96,7 +97,7 @@ contains
     do d = 1, 3
       do s = 1, 2
         call v%option(side_name(s, d), boundary%kind(s, d), &
-          'no_slip slip open periodic inflow outflow', trim(side_meaning(s, d))//': a wall to ' &
+          side_names(), trim(side_meaning(s, d))//': a wall to ' &
           //'which the fluid sticks or along which it slips, open (pressure 0), periodic (with ' &
           //'the side across), or where a stream enters or leaves', example='''slip''')
       end do
@@ -146,17 +147,16 @@ contains
     character(1), parameter :: axis(3) = ['x', 'y', 'z']
     character(8), parameter :: sign_word(2) = ['positive', 'negative']
 
-    select case (kind)
-    case ('no_slip', 'slip')
+    if (is_wall(side_code(kind))) then
       call v%require(variable, .not. abs(velocity(d)) > 0.0_wp, 'a wall moves in its own plane, ' &
                      //'the '//axis(d)//' component must be 0')
-    case ('inflow')
+    else if (gives_velocity(side_code(kind))) then
       call v%require(variable, real(3 - 2*s, wp)*velocity(d) > 0.0_wp, 'an inflow must enter the ' &
                      //'tank, the '//axis(d)//' component must be '//sign_word(s))
-    case default
+    else
       call v%require(variable, .not. any(abs(velocity) > 0.0_wp), 'only walls and inflows have a ' &
                      //'velocity, not a side that is '//quoted_text(kind))
-    end select
+    end if
   end subroutine require_side_velocity
 
   !> Name of a side of the tank: `x_min`, `x_max`, `y_min`, ...

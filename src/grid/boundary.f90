@@ -5,30 +5,14 @@
 !! right.
 module boundary_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, n_halo, side_no_slip, side_slip, side_open, &
-                    side_periodic, side_inflow, side_outflow
+  use grid_m, only: grid_t, n_halo
+  use boundary_kinds_m, only: is_wall, gives_pressure, gives_velocity, side_no_slip, side_inflow
   use parallel_m, only: halo_exchange
   implicit none
   private
   public :: fill_scalar_halo, fill_velocity_halo, set_side_velocity, is_wall, gives_pressure
 
 contains
-
-  !> A side that no fluid passes.
-  pure function is_wall(side) result(wall)
-    integer, intent(in) :: side
-    logical :: wall
-
-    wall = side == side_no_slip .or. side == side_slip
-  end function is_wall
-
-  !> A side where the pressure is given half a cell beyond the last cell, so the flow is free.
-  pure function gives_pressure(side) result(given)
-    integer, intent(in) :: side
-    logical :: given
-
-    given = side == side_open .or. side == side_outflow
-  end function gives_pressure
 
   !> Normal velocity at the sides where it is given: none through walls, that of an inflow.
   pure subroutine set_side_velocity(grid, uf)
@@ -39,12 +23,8 @@ contains
 
     do d = 1, 3
       do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
-        if (gives_pressure(grid%side(s, d))) cycle
-        a = grid%lo
-        b = grid%hi
-        a(d) = merge(1, grid%n(d) + 1, s == 1)
-        b(d) = a(d)
+        if (.not. gives_velocity(grid%side(s, d))) cycle
+        call grid%side_faces(s, d, a, b)
         uf(a(1):b(1), a(2):b(2), a(3):b(3), d) = grid%side_velocity(d, s, d)
       end do
     end do
@@ -59,7 +39,7 @@ contains
     do d = 1, 3
       call halo_exchange(a, n_halo, d)
       do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%side(s, d) == side_periodic) cycle
+        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
         do m = 1, n_halo
           call mirror_plane(a, d, ghost_layer(grid, s, d, m), mirror_layer(grid, s, d, 1), &
                             1.0_wp, 0.0_wp)
@@ -81,11 +61,11 @@ contains
     do d = 1, 3
       call halo_exchange(u, n_halo, d)
       do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%side(s, d) == side_periodic) cycle
+        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
         do c = 1, 3
           factor = 1.0_wp
           shift = 0.0_wp
-          if (grid%side(s, d) == side_no_slip .or. (grid%side(s, d) == side_slip .and. c == d)) then
+          if (grid%side(s, d) == side_no_slip .or. (is_wall(grid%side(s, d)) .and. c == d)) then
             factor = -1.0_wp
             shift = 2.0_wp*grid%side_velocity(c, s, d)
           else if (grid%side(s, d) == side_inflow) then

@@ -8,6 +8,8 @@
 module grid_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
+  use boundary_kinds_m, only: no_side, side_code, side_no_slip, side_slip, side_open, &
+                              side_periodic, side_inflow, side_outflow
   use parallel_m, only: decompose
   implicit none
   private
@@ -16,9 +18,6 @@ module grid_m
 
   integer, parameter :: n_halo = 3
     !! halo width of cell and face arrays: reach of the fifth-order scheme
-
-  integer, parameter :: side_no_slip = 1, side_slip = 2, side_open = 3, side_periodic = 4
-  integer, parameter :: side_inflow = 5, side_outflow = 6
 
   !> `unit_step(:, d)` is the index step to the next cell in direction d.
   integer, parameter :: unit_step(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
@@ -41,6 +40,13 @@ module grid_m
     procedure :: face => grid_face
     procedure :: centre => grid_centre
     procedure :: cell_of => grid_cell_of
+    procedure :: owns => grid_owns
+    procedure :: beyond => grid_beyond
+    procedure :: outside => grid_outside
+    procedure :: beside => grid_beside
+    procedure :: side_of_face => grid_side_of_face
+    procedure :: side_faces => grid_side_faces
+    procedure :: side_cells => grid_side_cells
   end type grid_t
 
 contains
@@ -80,22 +86,6 @@ contains
     self%last = hi + n_halo
   end subroutine grid_own
 
-  !> Code of a boundary kind; zero for an unknown name.
-  pure function side_code(kind) result(code)
-    character(*), intent(in) :: kind
-    integer :: code
-
-    select case (trim(kind))
-    case ('no_slip'); code = side_no_slip
-    case ('slip'); code = side_slip
-    case ('open'); code = side_open
-    case ('periodic'); code = side_periodic
-    case ('inflow'); code = side_inflow
-    case ('outflow'); code = side_outflow
-    case default; code = 0
-    end select
-  end function side_code
-
   !> Coordinate of lower face number i in direction d [m].
   elemental function grid_face(self, i, d) result(x)
     class(grid_t), intent(in) :: self
@@ -123,5 +113,79 @@ contains
 
     i = floor((x - self%origin(d))/self%h(d)) + 1
   end function grid_cell_of
+
+  !> Is this a cell of this process?
+  pure function grid_owns(self, c) result(yes)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: c(3)
+    logical :: yes
+
+    yes = all(c >= self%lo .and. c <= self%hi)
+  end function grid_owns
+
+  !> Does cell number i of direction d lie outside the domain? Nothing does in a periodic direction.
+  elemental function grid_beyond(self, i, d) result(yes)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: i, d
+    logical :: yes
+
+    yes = (i < 1 .or. i > self%n(d)) .and. .not. self%periodic(d)
+  end function grid_beyond
+
+  !> Does a cell lie outside the domain, in whatever direction?
+  pure function grid_outside(self, c) result(yes)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: c(3)
+    logical :: yes
+
+    yes = any((c < 1 .or. c > self%n) .and. .not. self%periodic)
+  end function grid_outside
+
+  !> Is cell number i of direction d the last one before the lower (s = 1) or upper (2) side?
+  elemental function grid_beside(self, i, s, d) result(yes)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: i, s, d
+    logical :: yes
+
+    yes = i == merge(1, self%n(d), s == 1) .and. .not. self%periodic(d)
+  end function grid_beside
+
+  !> The kind of side that lower face number i of direction d lies on, `no_side` between two cells.
+  elemental function grid_side_of_face(self, i, d) result(side)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: i, d
+    integer :: side
+
+    side = no_side
+    if (self%periodic(d)) return
+    if (i == 1) side = self%side(1, d)
+    if (i == self%n(d) + 1) side = self%side(2, d)
+  end function grid_side_of_face
+
+  !> The lower faces lower..upper on the lower (s = 1) or upper (2) side of direction d; none if the
+  !! direction is periodic or the side belongs to other processes.
+  pure subroutine grid_side_faces(self, s, d, lower, upper)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: s, d
+    integer, intent(out) :: lower(3), upper(3)
+
+    lower = self%lo
+    upper = self%hi
+    lower(d) = merge(1, self%n(d) + 1, s == 1)
+    upper(d) = lower(d)
+    if (self%periodic(d) .or. .not. self%at_side(s, d)) upper(d) = lower(d) - 1
+  end subroutine grid_side_faces
+
+  !> The cells lower..upper beside such a side, none likewise.
+  pure subroutine grid_side_cells(self, s, d, lower, upper)
+    class(grid_t), intent(in) :: self
+    integer, intent(in) :: s, d
+    integer, intent(out) :: lower(3), upper(3)
+
+    call self%side_faces(s, d, lower, upper)
+    if (s == 1) return
+    lower(d) = lower(d) - 1
+    upper(d) = upper(d) - 1
+  end subroutine grid_side_cells
 
 end module grid_m

@@ -15,7 +15,8 @@
 module outflow_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t, is_given
-  use grid_m, only: grid_t, side_outflow
+  use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: side_outflow
   use parallel_m, only: global_max
   implicit none
   private
@@ -138,23 +139,22 @@ contains
     real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(outflow_t), intent(inout) :: side
     real(wp) :: values(2*size(side%c))
-    integer :: at(3), face(3), i, j, m, n
+    integer :: lower(3), upper(3), at(3), face(3), i, j, k, m, n
 
     n = size(side%c)
     values = elsewhere
-    if (grid%at_side(s, d)) then
-      at(d) = merge(1, grid%n(d), s == 1)
-      do j = grid%lo(side%along(2)), grid%hi(side%along(2))
-        do i = grid%lo(side%along(1)), grid%hi(side%along(1))
-          at(side%along) = [i, j]
-          face = at
-          if (s == 2) face(d) = grid%n(d) + 1
-          m = i + (j - 1)*size(side%c, 1)
-          values(m) = c(at(1), at(2), at(3))
+    call grid%side_cells(s, d, lower, upper)
+    do k = lower(3), upper(3)
+      do j = lower(2), upper(2)
+        do i = lower(1), upper(1)
+          at = [i, j, k]
+          face = at + merge(0, 1, s == 1)*unit_step(:, d)
+          m = at(side%along(1)) + (at(side%along(2)) - 1)*size(side%c, 1)
+          values(m) = c(i, j, k)
           values(n + m) = merge(-1.0_wp, 1.0_wp, s == 1)*uf(face(1), face(2), face(3), d)
         end do
       end do
-    end if
+    end do
     call global_max(values)
     side%c = reshape(values(:n), shape(side%c))
     side%velocity = reshape(values(n + 1:), shape(side%c))

@@ -8,7 +8,7 @@ module rigid_flux_m
   use kinds_m, only: wp
   use vectors_m, only: cross
   use grid_m, only: grid_t, unit_step
-  use boundary_m, only: gives_pressure
+  use boundary_kinds_m, only: no_side, gives_pressure
   use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
@@ -97,7 +97,7 @@ contains
       real(wp), intent(in) :: outflow(6)
       integer :: e
 
-      if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (.not. grid%owns(c)) return
       if (.not. active(c(1), c(2), c(3))) return
       e = self%slot(c(1), c(2), c(3))
       if (e == 0) then
@@ -128,10 +128,10 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: i, d
     logical :: closed
+    integer :: side
 
-    closed = .not. grid%periodic(d) .and. &
-             ((i == 1 .and. .not. gives_pressure(grid%side(1, d))) .or. &
-              (i == grid%n(d) + 1 .and. .not. gives_pressure(grid%side(2, d))))
+    side = grid%side_of_face(i, d)
+    closed = side /= no_side .and. .not. gives_pressure(side)
   end function closed_side
 
   !> Each face belongs to one process: that of the cell above it, or at the upper end of the domain
@@ -201,10 +201,10 @@ contains
       integer :: d
 
       value = 0.0_wp
-      if (all((c >= 1 .and. c <= grid%n) .or. grid%periodic)) then
+      if (.not. grid%outside(c)) then
         value = p(c(1), c(2), c(3))
       else if (present(sides)) then
-        d = findloc((c < 1 .or. c > grid%n) .and. .not. grid%periodic, .true., 1)
+        d = findloc(grid%beyond(c, [1, 2, 3]), .true., 1)
         value = pressure_outside(sides(merge(1, 2, c(d) < 1), d), c)
       end if
     end function side_value

@@ -230,7 +230,7 @@ contains
         do s = 0, 1
           f = at + s*unit_step(:, d)
           nb = at + (2*s - 1)*unit_step(:, d)
-          if (.not. grid%periodic(d) .and. (nb(d) < 1 .or. nb(d) > grid%n(d))) cycle
+          if (grid%beyond(nb(d), d)) cycle
           value = c(nb(1), nb(2), nb(3))
           if (value < 0.0_wp) cycle
           if (solid%alpha(at(1), at(2), at(3)) < 1.0_wp .and. .not. &

@@ -7,11 +7,12 @@
 module flux_band_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: no_side
   use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, side_at
+  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
 
   type :: flux_band_t
     ! Arrays over cells with one halo cell.
@@ -160,18 +161,6 @@ contains
     red = modulo(sum(c), 2) == 0 .and. &
           .not. any(grid%periodic .and. modulo(grid%n, 2) == 1 .and. c == grid%n)
   end function is_red
-
-  !> What lies at lower face number i of direction d: 0 a neighbour cell, else the code of the side.
-  pure function side_at(grid, i, d) result(side)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: i, d
-    integer :: side
-
-    side = 0
-    if (grid%periodic(d)) return
-    if (i == 1) side = grid%side(1, d)
-    if (i == grid%n(d) + 1) side = grid%side(2, d)
-  end function side_at
 
   !> Find the connected parts, on all processes, and sort the list by them.
   subroutine find_parts(grid, self)
@@ -420,7 +409,7 @@ contains
       do d = 1, 3
         do s = 0, 1
           f = c + s*unit_step(:, d)
-          if (side_at(grid, f(d), d) == 0) cycle
+          if (grid%side_of_face(f(d), d) == no_side) cycle
           if (self%k(f(1), f(2), f(3), d) > 0.0_wp) at_open_side = .true.
         end do
       end do

@@ -391,7 +391,7 @@ contains
           under = c(i - e(1), j - e(2), k - e(3))
           under_2 = c(i - 2*e(1), j - 2*e(2), k - 2*e(3))
           z = min(up*grid%face(at(axis), axis), up*grid%face(at(axis) + 1, axis))
-          on_floor = .not. grid%periodic(axis) .and. at(axis) == merge(1, grid%n(axis), up > 0.0_wp)
+          on_floor = grid%beside(at(axis), merge(1, 2, up > 0.0_wp), axis)
           if (on_floor) then
             if (here <= 0.0_wp .or. here >= 0.5_wp) cycle
             z = z + here*grid%h(axis)

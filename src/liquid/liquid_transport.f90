@@ -18,7 +18,8 @@ module liquid_transport_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
   use case_types_m, only: absent, is_given
-  use grid_m, only: grid_t, n_halo, unit_step, side_inflow, side_outflow
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_kinds_m, only: side_inflow, side_outflow
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -489,26 +490,20 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d
     type(liquid_transport_t), intent(inout) :: self
-    integer :: i, j, k, s, e(3), a(3), b(3), inner(3)
+    integer :: i, j, k, s, e(3), a(3), b(3)
 
-    if (grid%periodic(d)) return
     e = unit_step(:, d)
     do s = 1, 2
-      if (.not. grid%at_side(s, d)) cycle
-      a = grid%lo
-      b = grid%hi
-      a(d) = merge(0, grid%n(d) + 1, s == 1)
-      b(d) = a(d)
+      call grid%side_faces(s, d, a, b)
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
-            inner = [i, j, k] + merge(e, -e, s == 1)
             if (s == 1) then
-              self%out_high(i, j, k) = max(self%q(inner(1), inner(2), inner(3), d), 0.0_wp) &
-                                       *incoming_share(grid, self, s, d, inner)
+              self%out_high(i - e(1), j - e(2), k - e(3)) = max(self%q(i, j, k, d), 0.0_wp) &
+                *incoming_share(grid, self, s, d, [i, j, k])
             else
               self%out_low(i, j, k) = max(-self%q(i, j, k, d), 0.0_wp) &
-                                      *incoming_share(grid, self, s, d, inner)
+                *incoming_share(grid, self, s, d, [i, j, k] - e)
             end if
           end do
         end do
@@ -691,7 +686,7 @@ contains
       integer, intent(in) :: at(3)
 
       number_of = 0
-      if (all(at >= grid%lo .and. at <= grid%hi)) number_of = self%number(at(1), at(2), at(3))
+      if (grid%owns(at)) number_of = self%number(at(1), at(2), at(3))
     end function number_of
   end subroutine late_values
 
@@ -706,10 +701,10 @@ contains
     do l = 1, self%n_late
       up = self%late_face(1:3, l)
       low = up - unit_step(:, self%late_face(4, l))
-      if (all(low >= grid%lo .and. low <= grid%hi)) then
+      if (grid%owns(low)) then
         amount(low(1), low(2), low(3)) = amount(low(1), low(2), low(3)) - flux(l)
       end if
-      if (all(up >= grid%lo .and. up <= grid%hi)) then
+      if (grid%owns(up)) then
         amount(up(1), up(2), up(3)) = amount(up(1), up(2), up(3)) + flux(l)
       end if
     end do
@@ -745,14 +740,9 @@ contains
 
     n = 0
     do d = 1, 3
-      if (grid%periodic(d)) cycle
       do s = 1, 2
-        if (.not. grid%at_side(s, d)) cycle
+        call grid%side_faces(s, d, a, b)
         way = merge(1.0_wp, -1.0_wp, s == 1)
-        a = grid%lo
-        b = grid%hi
-        a(d) = merge(1, grid%n(d) + 1, s == 1)
-        b(d) = a(d)
         do k = a(3), b(3)
           do j = a(2), b(2)
             do i = a(1), b(1)
@@ -777,7 +767,7 @@ contains
     self%ratio(1:self%n_small) = 0.0_wp
     do l = 1, self%n_late
       at = self%donor(:, l)
-      if (any(at < grid%lo .or. at > grid%hi)) cycle
+      if (.not. grid%owns(at)) cycle
       self%ratio(self%number(at(1), at(2), at(3))) = 1.0_wp
     end do
     count = 0_i8

@@ -11,10 +11,10 @@
 !! carried volume Vt on the right the errors of one step are made good by the next.
 module open_flux_m
   use kinds_m, only: wp, i8
-  use grid_m, only: grid_t, unit_step, side_open, side_outflow
-  use boundary_m, only: is_wall
+  use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: is_wall, gives_pressure
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, side_at
+  use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
   use flux_potential_m, only: solve_potential
   use parallel_m, only: halo_exchange, global_max
   implicit none
@@ -130,11 +130,11 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
-            side = side_at(grid, i*e(1) + j*e(2) + k*e(3), d)
+            side = grid%side_of_face(i*e(1) + j*e(2) + k*e(3), d)
             q(i, j, k, d) = dt*grid%area(d)*old%open(i, j, k, d)*uf(i, j, k, d)
             if (w < least_open .or. is_wall(side)) q(i, j, k, d) = 0.0_wp
             coupled = band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == 2
-            if (side == side_open .or. side == side_outflow) then
+            if (gives_pressure(side)) then
               coupled = band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == 1
             end if
             band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, coupled .and. w >= least_open &

@@ -84,7 +84,7 @@ contains
     do n = 1, size(neighbour, 2)
       o = neighbour(:, n)
       cell = at + o
-      if (any((cell < 1 .or. cell > grid%n) .and. .not. grid%periodic)) cycle
+      if (grid%outside(cell)) cycle
       do d = 1, 3
         if (o(d) == 0) cycle
         before = o
@@ -104,7 +104,7 @@ contains
     do n = 1, size(neighbour, 2)
       o = neighbour(:, n)
       cell = at + o
-      where ((cell < 1 .or. cell > grid%n) .and. .not. grid%periodic) cell = at
+      where (grid%beyond(cell, [1, 2, 3])) cell = at
       q(o(1), o(2), o(3)) = q(cell(1) - at(1), cell(2) - at(2), cell(3) - at(3))
     end do
   end function seen_shares

@@ -22,6 +22,7 @@ module surface_tension_m
   use kinds_m, only: wp, i8, pi
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_kinds_m, only: no_side
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t
@@ -340,7 +341,7 @@ contains
         if (s > 0 .and. is_empty(c(at(1), at(2), at(3))) .and. n > 0) cycle
         if (s < 0 .and. (is_full(c(at(1), at(2), at(3))) .or. n == 0)) cycle
         cell = at + s*way*n*unit_step(:, d)
-        if (.not. grid%periodic(d) .and. (cell(d) < 1 .or. cell(d) > grid%n(d))) cycle
+        if (grid%beyond(cell(d), d)) cycle
         if (place(cell(1), cell(2), cell(3)) >= no_height) cycle
         if (way_of_gas(grid, c, cell, d) /= way) cycle
         height = real(s*n, wp) + real(way, wp)*place(cell(1), cell(2), cell(3))
@@ -531,7 +532,7 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             f = [i, j, k]
-            if (.not. grid%periodic(d) .and. (f(d) == 1 .or. f(d) == grid%n(d) + 1)) cycle
+            if (grid%side_of_face(f(d), d) /= no_side) cycle
             associate (low => self%state(i - e(1), j - e(2), k - e(3)), &
                        high => self%state(i, j, k))
               known = count([low, high] /= no_surface)
@@ -574,7 +575,7 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             f = [i, j, k]
-            if (.not. grid%periodic(d) .and. (f(d) == 1 .or. f(d) == grid%n(d) + 1)) cycle
+            if (grid%side_of_face(f(d), d) /= no_side) cycle
             force(i, j, k, d) = weight*(uneven(f) - uneven(f - e))
           end do
         end do

@@ -8,6 +8,7 @@ module case_check_m
   use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm
   use case_types_m, only: case_t, drop_input_t
+  use boundary_kinds_m, only: side_code, side_periodic, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
   use tet_mesh_m, only: shape_t
@@ -248,7 +249,7 @@ contains
     character(:), allocatable :: text
     type(walls_t) :: one
     real(wp) :: depth, deepest, beyond
-    integer :: w, s, d
+    integer :: w, s, d, side
 
     text = ''
     call place(scene, b, 1)
@@ -273,15 +274,13 @@ contains
     end if
     do d = 1, 3
       do s = 1, 2
-        select case (case%boundary%kind(s, d))
-        case ('open', 'inflow', 'outflow')
-          beyond = scene%blocks%x(d, b) - case%grid%origin(d)
-          if (s == 2) beyond = case%grid%length(d) - beyond
-          if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
-            text = 'its centre lies '//brief(-beyond, 3)//' m beyond '//side_name(s, d)
-          end if
-        case default   ! a wall has been looked at, a periodic side is none
-        end select
+        side = side_code(case%boundary%kind(s, d))
+        if (is_wall(side) .or. side == side_periodic) cycle   ! walls have been looked at
+        beyond = scene%blocks%x(d, b) - case%grid%origin(d)
+        if (s == 2) beyond = case%grid%length(d) - beyond
+        if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
+          text = 'its centre lies '//brief(-beyond, 3)//' m beyond '//side_name(s, d)
+        end if
       end do
     end do
   end function way_out

@@ -65,11 +65,7 @@ contains
     side = 0.0_wp
     do d = 1, 3
       do s = 1, 2
-        if (grid%periodic(d) .or. .not. grid%at_side(s, d)) cycle
-        a = grid%lo
-        b = grid%hi
-        a(d) = merge(1, grid%n(d) + 1, s == 1)
-        b(d) = a(d)
+        call grid%side_faces(s, d, a, b)
         side = max(side, maxval(cf(a(1):b(1), a(2):b(2), a(3):b(3), d)))
       end do
     end do

@@ -2,7 +2,8 @@
 !! bodies.
 module box_solid_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, unit_step, side_slip, side_open, side_periodic
+  use boundary_kinds_m, only: side_slip, side_open, side_periodic
+  use grid_m, only: grid_t, unit_step
   use parallel_m, only: decompose
   use solid_geometry_m, only: solid_geometry_t
   implicit none

@@ -200,7 +200,7 @@ contains
 
   !> Sides of the domain: closed walls; at an open top p = 0 half a cell away.
   subroutine set_sides(grid, op)
-    use grid_m, only: side_open
+    use boundary_kinds_m, only: side_open
     type(grid_t), intent(in) :: grid
     type(face_operator_t), intent(inout) :: op
     integer :: d, s, a(3), b(3)

@@ -2,8 +2,8 @@
 program test_boundary
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
-  use grid_m, only: grid_t, grid_init, n_halo, side_no_slip, side_slip, side_open, side_periodic, &
-    side_inflow, side_outflow
+  use boundary_kinds_m, only: side_no_slip, side_slip, side_inflow, is_wall
+  use grid_m, only: grid_t, grid_init, n_halo
   use boundary_m, only: fill_scalar_halo, fill_velocity_halo, set_side_velocity, &
     is_wall, gives_pressure
   use check_m, only: check, finish_checks
@@ -11,12 +11,6 @@ program test_boundary
   real(wp), parameter :: lid(3) = [0.5_wp, -0.25_wp, 0.0_wp]   !! velocity of a moving wall [m/s]
   real(wp), parameter :: stream(3) = [0.75_wp, 0.5_wp, -1.25_wp]   !! of an inflow [m/s]
 
-  call check('walls', all([is_wall(side_no_slip), is_wall(side_slip)]))
-  call check('no walls', .not. any([is_wall(side_open), is_wall(side_periodic), &
-                                    is_wall(side_inflow), is_wall(side_outflow)]))
-  call check('pressure given', all([gives_pressure(side_open), gives_pressure(side_outflow)]))
-  call check('no pressure given', .not. any([gives_pressure(side_no_slip), &
-    gives_pressure(side_slip), gives_pressure(side_periodic), gives_pressure(side_inflow)]))
   call all_halos('tank', [6, 4, 5], reshape([character(8) :: &
                  'periodic', 'periodic', 'no_slip', 'slip', 'no_slip', 'open'], [2, 3]))
   call all_halos('other way round', [4, 5, 6], reshape([character(8) :: &

@@ -2,7 +2,8 @@
 program test_liquid_transport
   use kinds_m, only: wp, pi
   use case_types_m, only: case_t, fluid_t, water_t
-  use grid_m, only: grid_t, side_slip
+  use boundary_kinds_m, only: side_slip
+  use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction

@@ -5,7 +5,8 @@ program test_solid_fraction
   use check_m, only: check, finish_checks
   use case_types_m, only: shape_input_t
   use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
-  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_open, side_periodic
+  use boundary_kinds_m, only: side_no_slip, side_open, side_periodic
+  use grid_m, only: grid_t, n_halo, unit_step
   use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, &
     polyhedron_moments, polyhedron_section
   use shapes_builtin_m, only: make_shape
