@@ -104,9 +104,9 @@ contains
                                    case%numerics%solid_fraction == 'subcell'), bed)
     call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
     if (case%fluid%single_phase) then
-      sim%transport%incoming = 1.0_wp
+      sim%transport%sweeps%incoming = 1.0_wp
     else
-      sim%transport%level = case%fluid%water_level
+      sim%transport%sweeps%level = case%fluid%water_level
     end if
     call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
     call mid_step_init(sim%grid, sim%mid_step)
@@ -211,7 +211,7 @@ contains
     report%solver_iterations = stage%pressure%iterations
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
-    report%small_cells = sim%transport%small_count
+    report%small_cells = sim%transport%small%count
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%stage%tension%fallback
   end subroutine tell
@@ -270,17 +270,19 @@ contains
     associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
                carrier => sim%transport, &
                monolithic => sim%case%numerics%coupling == 'monolithic')
+      carrier%parts = parts
       if (sim%stage%implicit_momentum) then
-        call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow, parts)
+        call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow)
         sim%stage%c_ismac%q = carrier%q_step
         call mix_fluid(fluid, flow)
         return
       end if
-      call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow, parts)
+      call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow)
       if (monolithic) call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, sim%mid_step)
       do part = 1, parts
         call begin_part(grid, sim%before, part, sim%clock%step, carrier)
-        call momentum_begin(grid, fluid, carrier%w, carrier%v, carrier%c, flow%u, sim%momentum)
+        call momentum_begin(grid, fluid, carrier%volumes%w, carrier%volumes%v, carrier%volumes%c, &
+                            flow%u, sim%momentum)
         do n = 1, 3
           call momentum_sweep(grid, fluid, sim%before, carrier%order(n), carrier, flow%u, &
                               sim%momentum)

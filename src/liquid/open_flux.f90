@@ -13,6 +13,7 @@ module open_flux_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: is_wall, gives_pressure
+  use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
   use flux_potential_m, only: solve_potential
@@ -43,14 +44,11 @@ contains
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
-  subroutine find_open_flux(grid, old, new, room, uf, dt, self, q)
+  subroutine find_open_flux(grid, old, new, dt, flow, self, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies before and after the step
-    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! carried open volume [m3]
-    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! of the open part [m/s]
     real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(in) :: flow   !! carried open volume `room`, velocity `uf` of the open part
     type(open_flux_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m3]
@@ -60,8 +58,8 @@ contains
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
     call mark_band(grid, old, new, self%band)
-    call flux_of_velocity(grid, old, new, uf, dt, self%band, q)
-    call list_band(grid, new, room, q, self%band)
+    call flux_of_velocity(grid, old, new, flow%uf, dt, self%band, q)
+    call list_band(grid, new, flow%room, q, self%band)
     cells = real(self%band%n, wp)
     call global_max(cells)
     if (cells(1) < 0.5_wp) return

@@ -18,7 +18,9 @@ module momentum_conservative_m
   use boundary_m, only: fill_velocity_halo
   use mixture_m, only: pure_share
   use tvd_m, only: face_values, scheme_of, tvd_scheme
-  use liquid_transport_m, only: liquid_transport_t, sweep, small_cells, late_values, move_late
+  use carried_volumes_m, only: carried_volumes_t
+  use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
+  use small_cells_m, only: late_values, move_late
   implicit none
   private
   public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_late, mass_through
@@ -106,7 +108,7 @@ contains
     e = unit_step(:, d)
     call sweep(grid, old, d, transport)
     do m = 1, 3
-      call carried_momentum(grid, fluid, transport, d, u(:, :, :, m), self)
+      call carried_momentum(grid, fluid, transport%volumes, d, u(:, :, :, m), self)
       !$omp parallel do private(i, j) schedule(static)
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
@@ -117,7 +119,8 @@ contains
         end do
       end do
     end do
-    call velocity_of_momentum(grid, fluid, transport%w, transport%v, self%momentum, u)
+    call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
+                              self%momentum, u)
   end subroutine momentum_sweep
 
   !> Velocity after the small cells have given what they hold, with the same implicit donor value as
@@ -131,26 +134,26 @@ contains
     type(momentum_t), intent(inout) :: self
     integer :: m, l, at(3)
 
-    self%mass = mass_through(fluid, transport%v, transport%w)
+    self%mass = mass_through(fluid, transport%volumes%v, transport%volumes%w)
     call small_cells(grid, transport)
-    if (size(self%late) < transport%n_late) then
-      deallocate (self%late, self%late_mass)
-      allocate (self%late(2*transport%n_late), self%late_mass(2*transport%n_late))
-    end if
-    associate (n => transport%n_late)
-      self%late_mass(1:n) = mass_through(fluid, transport%late_q(1:n), transport%late_g(1:n))
+    associate (small => transport%small, n => transport%small%n_late)
+      if (size(self%late) < n) then
+        deallocate (self%late, self%late_mass)
+        allocate (self%late(2*n), self%late_mass(2*n))
+      end if
+      self%late_mass(1:n) = mass_through(fluid, small%q_late(1:n), small%g_late(1:n))
       do m = 1, 3
         call late_values(grid, self%momentum(:, :, :, m), self%mass, abs(self%late_mass(1:n)), &
-                         transport, &
-                         self%carried)
+                         small, self%carried)
         do l = 1, n
-          at = transport%donor(:, l)
+          at = small%donor(:, l)
           self%late(l) = self%late_mass(l)*self%carried(at(1), at(2), at(3))
         end do
-        call move_late(grid, transport, self%late(1:n), self%momentum(:, :, :, m))
+        call move_late(grid, small, self%late(1:n), self%momentum(:, :, :, m))
       end do
     end associate
-    call velocity_of_momentum(grid, fluid, transport%w, transport%v, self%momentum, u)
+    call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
+                              self%momentum, u)
   end subroutine momentum_late
 
   !> Velocity of every own cell that holds mass; the others keep theirs. Halo filled.
@@ -180,10 +183,10 @@ contains
 
   !> Momentum through the lower faces in direction d: mass times the mean velocity of the slab that
   !! leaves the donor.
-  subroutine carried_momentum(grid, fluid, transport, d, u, self)
+  subroutine carried_momentum(grid, fluid, volumes, d, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    type(liquid_transport_t), intent(in) :: transport
+    type(carried_volumes_t), intent(in) :: volumes
     integer, intent(in) :: d
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
       !! one component [m/s]
@@ -193,7 +196,7 @@ contains
     logical :: forward, mixed
 
     e = unit_step(:, d)
-    associate (q => transport%q, g => transport%g, v => transport%v_before, &
+    associate (q => volumes%q, g => volumes%g, v => volumes%v_before, &
                near => self%mixed_near, carried => self%carried)
       call face_values(grid, self%scheme, e, q(:, :, :, d), u, carried)
       !$omp parallel do private(i, j, donor, room, value, forward, mixed) schedule(static)

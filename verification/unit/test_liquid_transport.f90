@@ -127,8 +127,9 @@ contains
     flow%uf(:, :, :, 2) = -0.24_wp
     flow%uf(:, :, :, 3) = 0.24_wp
     worst = 0.0_wp
+    transport%parts = parts
     do step = 1, steps
-      call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow, parts)
+      call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow)
       worst = max(worst, out_of_bounds(grid, flow))
     end do
     shape_error = misplaced(grid, flow%liquid, start_liquid)/before
@@ -136,7 +137,7 @@ contains
     call check('ball: bounds', worst, 0.0_wp, 1.0e-15_wp)
     call check('ball: room', room_error(grid, new, flow), 0.0_wp, 1.0e-13_wp)
     call check('ball: shape after one turn', shape_error < 0.05_wp)
-    call check('ball: no small cells', transport%small_count, 0)
+    call check('ball: no small cells', transport%small%count, 0)
     print '(a, es9.2)', 'ball: share of the ball in the wrong place ', shape_error
   end subroutine ball_in_uniform_stream
 
@@ -236,15 +237,16 @@ contains
     worst = 0.0_wp
     impure = 0.0_wp
     small = 0
+    transport%parts = parts
     do step = 1, 60
       call set_boxes(grid, low, high, old)
       angle = 2.0_wp*pi*real(step, wp)/60.0_wp
       call box_at(place(angle), half, low, high)
       call set_boxes(grid, low, high, new)
-      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow, parts)
+      call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       worst = max(worst, room_error(grid, new, flow))
       impure = max(impure, maxval(abs(flow%liquid(1:16, 1:12, 1:16) - flow%room(1:16, 1:12, 1:16))))
-      small = max(small, transport%small_count)
+      small = max(small, transport%small%count)
     end do
     call check('box under water: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, &
                1.0e-14_wp)
@@ -296,8 +298,8 @@ contains
       worst = max(worst, room_error(grid, new, flow))
       bound = max(bound, out_of_bounds(grid, flow))
       drift = max(drift, abs(liquid_volume(grid, flow%liquid) - flow%liquid_inflow - before)/before)
-      clamped = max(clamped, transport%clamped)
-      late = max(late, transport%late_iterations)
+      clamped = max(clamped, transport%sweeps%clamped)
+      late = max(late, transport%small%iterations)
     end do
     call check('box through the surface: volume at every step', drift, 0.0_wp, 1.0e-13_wp)
     call check('box through the surface: bounds, to the tolerance of the volumes', bound, 0.0_wp, &
@@ -419,7 +421,7 @@ contains
       call set_boxes(grid, low, high, new)
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       bound = max(bound, out_of_bounds(grid, flow))
-      held = max(held, abs(transport%held)/grid%volume)
+      held = max(held, abs(transport%small%held)/grid%volume)
     end do
     call check('no way out: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, 1.0e-14_wp)
     call check('no way out: bounds', bound, 0.0_wp, 1.0e-12_wp)

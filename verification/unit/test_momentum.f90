@@ -64,10 +64,13 @@ contains
     integer, intent(in), optional :: parts   !! of the step, else 1
     integer :: n, part
 
-    call begin_transport(grid, old, new, dt, transport, flow, parts)
+    transport%parts = 1
+    if (present(parts)) transport%parts = parts
+    call begin_transport(grid, old, new, dt, transport, flow)
     do part = 1, transport%parts
       call begin_part(grid, old, part, step, transport)
-      call momentum_begin(grid, fluid, transport%w, transport%v, transport%c, flow%u, momentum)
+      call momentum_begin(grid, fluid, transport%volumes%w, transport%volumes%v, &
+                          transport%volumes%c, flow%u, momentum)
       do n = 1, 3
         call momentum_sweep(grid, fluid, old, transport%order(n), transport, flow%u, momentum)
       end do
@@ -135,7 +138,7 @@ contains
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
     call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
                > 50)
-    call check('parts keep cells from being small', transport%small_open, 0)
+    call check('parts keep cells from being small', transport%small%count_open, 0)
   end subroutine uniform_through_an_interface
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.
@@ -218,7 +221,7 @@ contains
       do d = 1, 3   ! the velocity stage gives closed cells the velocity of the body
         where (new%alpha >= 1.0_wp) flow%u(:, :, :, d) = stream(d)
       end do
-      small = max(small, transport%small_count)
+      small = max(small, transport%small%count)
     end do
     call check('uniform velocity around a moving box', worst, 0.0_wp, 1.0e-9_wp)
     call check('cells opened and closed', small > 0)

@@ -1,0 +1,376 @@
+!> One sweep of the liquid transport: every cell gives volume to its neighbours along one direction.
+!!
+!! Of the slab of open volume Q beside a face a cell gives the liquid below its plane. Slabs of one
+!! sweep do not overlap, so 0 <= W <= Vt holds without clipping, and pure cells stay pure to the
+!! last bit. Cells without a plane give what they hold in the mean.
+module liquid_sweep_m
+  use omp_lib, only: omp_get_max_threads, omp_get_thread_num
+  use kinds_m, only: wp
+  use case_types_m, only: absent, is_given
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_kinds_m, only: side_inflow, side_outflow
+  use boundary_m, only: fill_scalar_halo
+  use solid_geometry_m, only: solid_geometry_t
+  use plic_m, only: unit_constant, unit_slab
+  use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_constant, open_slab_below
+  use surface_normal_m, only: vertical_t, vertical_of, surface_normal
+  use extended_fraction_m, only: nearly_pure
+  use carried_volumes_m, only: carried_volumes_t
+  use parallel_m, only: halo_exchange
+  implicit none
+  private
+  public :: liquid_sweep_t, liquid_sweep_init, sweep_volumes
+
+  real(wp), parameter :: immobile = 1.0e-14_wp      !! share of liquid or gas that does not move
+  real(wp), parameter :: least_open = 1.0e-6_wp     !! open share of a cut cell that has a plane
+
+  type :: liquid_sweep_t
+    type(vertical_t) :: vertical
+    real(wp) :: incoming(2, 3) = 0.0_wp       !! liquid share of what enters through a side
+    real(wp) :: level = absent                !! an inflow brings liquid below it [m]
+    real(wp) :: clamped = 0.0_wp
+      !! largest change by the round-off guard of a slab in the step, of this process [V]
+    real(wp), allocatable :: out_low(:, :, :), out_high(:, :, :)
+      !! liquid that leaves a cell by its lower and its upper face [m3]
+    integer :: n_mixed = 0
+    integer, allocatable :: mixed_cell(:, :)  !! (3, *) cells whose planes are needed
+    integer, allocatable :: in_plane(:)       !! (lo(3):hi(3)+1) mixed cells below a plane of cells
+    type(cut_cell_t), allocatable :: cut(:)   !! one per thread, from 0
+  end type liquid_sweep_t
+
+contains
+
+  !> Allocate the work arrays once.
+  subroutine liquid_sweep_init(grid, gravity, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    type(liquid_sweep_t), intent(out) :: self
+    integer, parameter :: first_size = 1024
+    integer :: a(3), b(3), t
+
+    a = grid%first
+    b = grid%last
+    self%vertical = vertical_of(gravity)
+    allocate (self%out_low(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%out_high, source=self%out_low)
+    allocate (self%in_plane(grid%lo(3):grid%hi(3) + 1), source=0)
+    allocate (self%mixed_cell(3, first_size))
+    allocate (self%cut(0:omp_get_max_threads() - 1))
+    do t = 0, size(self%cut) - 1
+      call cut_cell_init(self%cut(t))
+    end do
+  end subroutine liquid_sweep_init
+
+  !> Move liquid and open volume in direction d; `g(:,:,:,d)` is new, w, v and c are updated.
+  subroutine sweep_volumes(grid, old, d, volumes, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old   !! bodies at the begin of the step
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(inout) :: volumes
+    type(liquid_sweep_t), intent(inout) :: self
+
+    call mixed_outflow(grid, d, volumes, self)
+    call list_mixed_cells(grid, d, volumes, self)
+    call plane_outflow(grid, old, d, volumes, self)
+    call halo_exchange(self%out_low, n_halo, d)
+    call halo_exchange(self%out_high, n_halo, d)
+    call outflow_of_sides(grid, d, volumes, self)
+    call swap(volumes%w, volumes%w_before)
+    call swap(volumes%v, volumes%v_before)
+    call move_volumes(grid, old, d, self, volumes)
+    call fill_scalar_halo(grid, volumes%v)
+    call fill_scalar_halo(grid, volumes%c)
+  end subroutine sweep_volumes
+
+  !> Liquid that leaves each cell if it were well mixed; right for pure cells, bit by bit. Rests at
+  !! round-off of liquid in gas or of gas in liquid stay where they are instead of spreading.
+  subroutine mixed_outflow(grid, d, volumes, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(in) :: volumes
+    type(liquid_sweep_t), intent(inout) :: self
+    integer :: i, j, k, e(3)
+    real(wp) :: share
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j, share) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          share = volumes%w(i, j, k)/merge(volumes%v(i, j, k), 1.0_wp, volumes%v(i, j, k) > 0.0_wp)
+          if (share < immobile) share = 0.0_wp
+          if (share > 1.0_wp - immobile) share = 1.0_wp
+          self%out_low(i, j, k) = max(-volumes%q(i, j, k, d), 0.0_wp)*share
+          self%out_high(i, j, k) = max(volumes%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp)*share
+        end do
+      end do
+    end do
+  end subroutine mixed_outflow
+
+  !> Cells with liquid and gas that give volume in direction d, in the order of the grid.
+  subroutine list_mixed_cells(grid, d, volumes, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(in) :: volumes
+    type(liquid_sweep_t), intent(inout) :: self
+    integer :: i, j, k, n
+
+    self%in_plane = 0
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          if (needs_plane(i, j, k)) self%in_plane(k + 1) = self%in_plane(k + 1) + 1
+        end do
+      end do
+    end do
+    do k = grid%lo(3), grid%hi(3)
+      self%in_plane(k + 1) = self%in_plane(k + 1) + self%in_plane(k)
+    end do
+    self%n_mixed = self%in_plane(grid%hi(3) + 1)
+    if (self%n_mixed > size(self%mixed_cell, 2)) then
+      deallocate (self%mixed_cell)
+      allocate (self%mixed_cell(3, 2*self%n_mixed))
+    end if
+    !$omp parallel do private(i, j, n) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      n = self%in_plane(k)
+      if (self%in_plane(k + 1) == n) cycle
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          if (.not. needs_plane(i, j, k)) cycle
+          n = n + 1
+          self%mixed_cell(:, n) = [i, j, k]
+        end do
+      end do
+    end do
+  contains
+    pure logical function needs_plane(i, j, k)
+      integer, intent(in) :: i, j, k
+      integer :: f(3)
+      real(wp) :: w, v
+
+      needs_plane = .false.
+      w = volumes%w(i, j, k)
+      v = volumes%v(i, j, k)
+      if (w <= 0.0_wp .or. w >= v) return
+      if (w <= nearly_pure*v .or. v - w <= nearly_pure*v) return
+      f = [i, j, k] + unit_step(:, d)
+      needs_plane = volumes%q(i, j, k, d) < 0.0_wp .or. volumes%q(f(1), f(2), f(3), d) > 0.0_wp
+    end function needs_plane
+  end subroutine list_mixed_cells
+
+  !> Liquid that leaves the mixed cells, by their planes.
+  subroutine plane_outflow(grid, old, d, volumes, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(in) :: volumes
+    type(liquid_sweep_t), intent(inout) :: self
+    integer :: l, i, j, k, f(3)
+    real(wp) :: m(3), w, v, out(2), liquid(2), clamped, largest
+
+    largest = 0.0_wp
+    !$omp parallel do private(i, j, k, f, m, w, v, out, liquid, clamped) reduction(max: largest) &
+    !$omp schedule(dynamic, 16)
+    do l = 1, self%n_mixed
+      i = self%mixed_cell(1, l)
+      j = self%mixed_cell(2, l)
+      k = self%mixed_cell(3, l)
+      f = [i, j, k] + unit_step(:, d)
+      w = volumes%w(i, j, k)
+      v = volumes%v(i, j, k)
+      out = [max(-volumes%q(i, j, k, d), 0.0_wp), max(volumes%q(f(1), f(2), f(3), d), 0.0_wp)]
+      m = surface_normal(grid, old, self%vertical, volumes%c, i, j, k)
+      if (old%cut(i, j, k) == 0) then
+        liquid = v*slabs_of_box(m, w/v, d, out/v)
+      else
+        associate (cut => self%cut(omp_get_thread_num()))
+          call load_cut_cell(old, old%cut(i, j, k), grid%face([i, j, k], [1, 2, 3]), grid%h, cut)
+          call slabs_of_cut_cell(m, w/v, d, out/v, cut, liquid)
+        end associate
+        liquid = v*liquid
+      end if
+      call guard(w, v, out, liquid, clamped)
+      largest = max(largest, clamped)
+      self%out_low(i, j, k) = liquid(1)
+      self%out_high(i, j, k) = liquid(2)
+    end do
+    self%clamped = max(self%clamped, largest/grid%volume)
+  end subroutine plane_outflow
+
+  !> Liquid in the slabs beside the two faces of a cell without solid [share of the cell].
+  pure function slabs_of_box(m, share, d, out) result(liquid)
+    real(wp), intent(in) :: m(3)     !! normal on the unit cube
+    real(wp), intent(in) :: share    !! of liquid
+    integer, intent(in) :: d
+    real(wp), intent(in) :: out(2)   !! volumes that leave below and above [share of the cell]
+    real(wp) :: liquid(2)
+    real(wp) :: a
+
+    a = unit_constant(m, share)
+    liquid(1) = unit_slab(m, a, d, 1, out(1))
+    liquid(2) = unit_slab(m, a, d, 2, out(2))
+  end function slabs_of_box
+
+  !> The same for a cut cell, all in shares of its open part.
+  subroutine slabs_of_cut_cell(m, share, d, out, cut, liquid)
+    real(wp), intent(in) :: m(3), share
+    integer, intent(in) :: d
+    real(wp), intent(in) :: out(2)
+    type(cut_cell_t), intent(inout) :: cut
+    real(wp), intent(out) :: liquid(2)
+    real(wp) :: a, limit, part, axis(3)
+
+    liquid = out*share
+    if (cut%open < least_open) return
+    axis = real(unit_step(:, d), wp)
+    call open_constant(cut, m, share*cut%open, a)
+    if (out(1) > 0.0_wp) then
+      call open_constant(cut, axis, out(1)*cut%open, limit)
+      call open_slab_below(cut, m, a, d, limit, part)
+      liquid(1) = part/cut%open
+    end if
+    if (out(2) > 0.0_wp) then
+      call open_constant(cut, axis, (1.0_wp - out(2))*cut%open, limit)
+      call open_slab_below(cut, m, a, d, limit, part)
+      liquid(2) = share - part/cut%open
+    end if
+  end subroutine slabs_of_cut_cell
+
+  !> Keep the liquid of both slabs within what there is of liquid and of gas: round-off only.
+  pure subroutine guard(w, v, out, liquid, clamped)
+    real(wp), intent(in) :: w, v, out(2)
+    real(wp), intent(inout) :: liquid(2)
+    real(wp), intent(out) :: clamped   !! largest change
+    real(wp) :: w_left, v_left, before
+    integer :: s
+
+    w_left = w
+    v_left = v
+    clamped = 0.0_wp
+    do s = 1, 2
+      before = liquid(s)
+      liquid(s) = max(liquid(s), out(s) - (v_left - w_left), 0.0_wp)
+      liquid(s) = min(liquid(s), out(s), w_left)
+      clamped = max(clamped, abs(liquid(s) - before))
+      w_left = w_left - liquid(s)
+      v_left = v_left - out(s)
+    end do
+  end subroutine guard
+
+  !> Liquid that comes in through the sides of the domain, as outflow of the halo cell behind them.
+  subroutine outflow_of_sides(grid, d, volumes, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(in) :: volumes
+    type(liquid_sweep_t), intent(inout) :: self
+    integer :: i, j, k, s, e(3), a(3), b(3)
+
+    e = unit_step(:, d)
+    do s = 1, 2
+      call grid%side_faces(s, d, a, b)
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            if (s == 1) then
+              self%out_high(i - e(1), j - e(2), k - e(3)) = max(volumes%q(i, j, k, d), 0.0_wp) &
+                *incoming_share(grid, volumes%c, self, s, d, [i, j, k])
+            else
+              self%out_low(i, j, k) = max(-volumes%q(i, j, k, d), 0.0_wp) &
+                *incoming_share(grid, volumes%c, self, s, d, [i, j, k] - e)
+            end if
+          end do
+        end do
+      end do
+    end do
+  end subroutine outflow_of_sides
+
+  !> Liquid share of what enters through side s of direction d into a cell: an inflow brings liquid
+  !! below its level, through an outflow comes back what stands there.
+  pure function incoming_share(grid, c, self, s, d, at) result(share)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^
+    type(liquid_sweep_t), intent(in) :: self
+    integer, intent(in) :: s, d, at(3)
+    real(wp) :: share
+    integer :: axis
+    real(wp) :: bounds(2)   ! of the face along the vertical
+
+    share = self%incoming(s, d)
+    if (grid%side(s, d) == side_outflow) share = c(at(1), at(2), at(3))
+    if (grid%side(s, d) /= side_inflow .or. .not. is_given(self%level)) return
+    axis = maxloc(abs(self%vertical%up), 1)
+    bounds = grid%face(at(axis) + [0, 1], axis)
+    if (axis == d) bounds = bounds(s)
+    if (self%vertical%up(axis) > 0.0_wp) then
+      share = self%level - bounds(1)
+    else
+      share = bounds(2) - self%level
+    end if
+    if (axis == d) then
+      share = merge(1.0_wp, 0.0_wp, share >= 0.0_wp)
+    else
+      share = min(max(share/grid%h(axis), 0.0_wp), 1.0_wp)
+    end if
+  end function incoming_share
+
+  !> Exchange two arrays without copying.
+  pure subroutine swap(a, b)
+    real(wp), allocatable, intent(inout) :: a(:, :, :), b(:, :, :)
+    real(wp), allocatable :: c(:, :, :)
+
+    call move_alloc(a, c)
+    call move_alloc(b, a)
+    call move_alloc(c, b)
+  end subroutine swap
+
+  !> Liquid volumes of the faces, and the new running values; W and Vt go through the same
+  !! operations.
+  subroutine move_volumes(grid, old, d, self, volumes)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    integer, intent(in) :: d
+    type(liquid_sweep_t), intent(in) :: self
+    type(carried_volumes_t), intent(inout) :: volumes
+    integer :: i, j, k, e(3)
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          volumes%g(i, j, k, d) = self%out_high(i - e(1), j - e(2), k - e(3)) - self%out_low(i, j, k)
+        end do
+      end do
+    end do
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          volumes%w(i, j, k) = ((volumes%w_before(i, j, k) - max(-volumes%g(i, j, k, d), 0.0_wp)) &
+                             - max(volumes%g(i + e(1), j + e(2), k + e(3), d), 0.0_wp)) &
+                            + (max(volumes%g(i, j, k, d), 0.0_wp) &
+                               + max(-volumes%g(i + e(1), j + e(2), k + e(3), d), 0.0_wp))
+          volumes%v(i, j, k) = ((volumes%v_before(i, j, k) - max(-volumes%q(i, j, k, d), 0.0_wp)) &
+                             - max(volumes%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp)) &
+                            + (max(volumes%q(i, j, k, d), 0.0_wp) &
+                               + max(-volumes%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp))
+          if (old%alpha(i, j, k) <= 0.0_wp) then
+            volumes%c(i, j, k) = share_of(volumes%w(i, j, k), volumes%v(i, j, k))
+          end if
+        end do
+      end do
+    end do
+  end subroutine move_volumes
+
+  !> Liquid share of a volume, within 0 and 1.
+  elemental function share_of(w, v) result(share)
+    real(wp), intent(in) :: w, v
+    real(wp) :: share
+
+    share = min(max(w/merge(v, 1.0_wp, v > 0.0_wp), 0.0_wp), 1.0_wp)
+  end function share_of
+
+end module liquid_sweep_m

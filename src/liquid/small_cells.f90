@@ -1,0 +1,329 @@
+!> Small cells of the liquid transport: they give after the sweeps, when all has come in.
+!!
+!! A small cell would give away nearly all it holds, or it opens or closes in this step. It receives
+!! in the sweeps and gives afterwards, of the implicit donor value, which is bounded for any step:
+!! $$ C_S = (W_S + \sum_{in} Q\, C_{S'}) / (V_S + \sum_{in} Q) $$
+!! Momentum goes the same way, with its mass in place of the volume (`late_values`, `move_late`).
+module small_cells_m
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_m, only: fill_scalar_halo
+  use solid_geometry_m, only: solid_geometry_t
+  use carried_volumes_m, only: carried_volumes_t
+  use exact_sum_m, only: exact_sum
+  use parallel_m, only: halo_exchange, global_max, global_sum
+  implicit none
+  private
+  public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells, count_small_cells
+  public :: late_values, move_late
+
+  real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
+  real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
+  real(wp), parameter :: closed_volume = 1.0e-12_wp !! open volume of a closed cell [V]
+  integer, parameter :: max_late_iterations = 1000
+
+  type :: small_cells_t
+    integer :: n = 0                          !! of this process
+    integer, allocatable :: cell(:, :)        !! (3, *)
+    integer, allocatable :: number(:, :, :)   !! of a small cell, 0 for others; halo filled
+    !> "Late" faces, whose donor is a small cell.
+    integer :: n_late = 0
+    integer, allocatable :: face(:, :)        !! (4, *) cell and direction of the lower face
+    integer, allocatable :: donor(:, :), receiver(:, :)   !! (3, *)
+    real(wp), allocatable :: q_late(:), g_late(:)
+      !! (*) volume and liquid through these faces, positive along the axis [m3]
+    ! Statistics of the last step, all processes.
+    integer :: count = 0                      !! small cells that gave something
+    integer :: count_open = 0                 !! of them without solid: the time step is long
+    integer :: iterations = 0                 !! of the last donor values
+    real(wp) :: held = 0.0_wp                 !! liquid in closed cells until they open [m3]
+    ! Work of the donor values, a number for each small cell.
+    real(wp), allocatable :: amount(:), mass(:), ratio(:)
+  end type small_cells_t
+
+contains
+
+  !> Allocate the lists; they grow by doubling.
+  subroutine small_cells_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(small_cells_t), intent(out) :: self
+    integer, parameter :: first_size = 1024
+    integer :: a(3), b(3)
+
+    a = grid%first
+    b = grid%last
+    allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    call allocate_small(first_size, self)
+    call allocate_late(first_size, self)
+  end subroutine small_cells_init
+
+  subroutine allocate_small(n, self)
+    integer, intent(in) :: n
+    type(small_cells_t), intent(inout) :: self
+
+    allocate (self%cell(3, n), self%amount(n), self%mass(n), self%ratio(n))
+  end subroutine allocate_small
+
+  subroutine allocate_late(n, self)
+    integer, intent(in) :: n
+    type(small_cells_t), intent(inout) :: self
+
+    allocate (self%face(4, n), self%donor(3, n), self%receiver(3, n))
+    allocate (self%q_late(n), self%g_late(n))
+  end subroutine allocate_late
+
+  !> Cells that would give nearly all they hold, or hold nearly nothing, and the faces they give
+  !! through: what goes there is taken out of the sweeps.
+  subroutine find_small_cells(grid, old, volumes, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    type(carried_volumes_t), intent(inout) :: volumes
+    type(small_cells_t), intent(inout) :: self
+    integer, allocatable :: cell(:, :)
+    integer :: i, j, k, n
+    real(wp) :: outflow, open
+
+    n = 0
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          self%number(i, j, k) = 0
+          outflow = max(volumes%q(i + 1, j, k, 1), 0.0_wp) + max(-volumes%q(i, j, k, 1), 0.0_wp) &
+                    + max(volumes%q(i, j + 1, k, 2), 0.0_wp) + max(-volumes%q(i, j, k, 2), 0.0_wp) &
+                    + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
+          open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
+          if (outflow <= most_outflow*open .and. open >= least_volume*grid%volume) cycle
+          if (n == size(self%amount)) then
+            call move_alloc(self%cell, cell)
+            deallocate (self%amount, self%mass, self%ratio)
+            call allocate_small(2*n, self)
+            self%cell(:, 1:n) = cell
+          end if
+          n = n + 1
+          self%number(i, j, k) = n
+          self%cell(:, n) = [i, j, k]
+        end do
+      end do
+    end do
+    self%n = n
+    call halo_exchange(self%number, n_halo)
+    call find_late_faces(grid, volumes, self)
+  end subroutine find_small_cells
+
+  !> Faces with a small donor: listed, and taken out of the sweeps.
+  subroutine find_late_faces(grid, volumes, self)
+    type(grid_t), intent(in) :: grid
+    type(carried_volumes_t), intent(inout) :: volumes
+    type(small_cells_t), intent(inout) :: self
+    integer :: d, i, j, k, e(3), up(3), low(3), donor(3)
+
+    self%n_late = 0
+    do d = 1, 3
+      e = unit_step(:, d)
+      do k = grid%lo(3), grid%hi(3) + e(3)
+        do j = grid%lo(2), grid%hi(2) + e(2)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            if (.not. abs(volumes%q(i, j, k, d)) > 0.0_wp) cycle
+            up = [i, j, k]
+            low = up - e
+            donor = merge(low, up, volumes%q(i, j, k, d) > 0.0_wp)
+            if (self%number(donor(1), donor(2), donor(3)) == 0) cycle
+            if (self%n_late == size(self%q_late)) call grow_late(self)
+            self%n_late = self%n_late + 1
+            self%face(:, self%n_late) = [i, j, k, d]
+            self%donor(:, self%n_late) = donor
+            self%receiver(:, self%n_late) = up + low - donor
+            self%q_late(self%n_late) = volumes%q(i, j, k, d)
+            volumes%q(i, j, k, d) = 0.0_wp
+          end do
+        end do
+      end do
+    end do
+  end subroutine find_late_faces
+
+  !> Twice the room for late faces.
+  subroutine grow_late(self)
+    type(small_cells_t), intent(inout) :: self
+    integer, allocatable :: face(:, :), donor(:, :), receiver(:, :)
+    real(wp), allocatable :: q(:)
+    integer :: n
+
+    n = self%n_late
+    call move_alloc(self%face, face)
+    call move_alloc(self%donor, donor)
+    call move_alloc(self%receiver, receiver)
+    call move_alloc(self%q_late, q)
+    deallocate (self%g_late)
+    call allocate_late(2*n, self)
+    self%face(:, 1:n) = face
+    self%donor(:, 1:n) = donor
+    self%receiver(:, 1:n) = receiver
+    self%q_late(1:n) = q
+  end subroutine grow_late
+
+  !> The small cells give what they hold once all has come in: w, v, q and g are complete.
+  subroutine give_small_cells(grid, volumes, self, share)
+    type(grid_t), intent(in) :: grid
+    type(carried_volumes_t), intent(inout) :: volumes
+    type(small_cells_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: share(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! work: liquid share of what the small cells give
+    integer :: l, n, at(3)
+
+    volumes%w_before = volumes%w
+    volumes%v_before = volumes%v
+    n = self%n_late
+    call late_values(grid, volumes%w, volumes%v, abs(self%q_late(1:n)), self, share)
+    do l = 1, n
+      at = self%donor(:, l)
+      self%g_late(l) = self%q_late(l)*min(max(share(at(1), at(2), at(3)), 0.0_wp), 1.0_wp)
+    end do
+    call move_late(grid, self, self%g_late, volumes%w)
+    call move_late(grid, self, self%q_late, volumes%v)
+    call fill_scalar_halo(grid, volumes%v)
+    do l = 1, n
+      associate (f => self%face(:, l))
+        volumes%q(f(1), f(2), f(3), f(4)) = self%q_late(l)
+        volumes%g(f(1), f(2), f(3), f(4)) = self%g_late(l)
+      end associate
+    end do
+  end subroutine give_small_cells
+
+  !> What small cells hold per mass of a carried quantity once all has come in:
+  !! $$ x_S = (a_S + \sum_{in} w\, x_{S'}) / (m_S + \sum_{in} w) $$
+  !! Every value follows from those of the pass before, so the result does not depend on any order.
+  subroutine late_values(grid, amount, mass, weight, self, value)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! carried, after the sweeps
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! mass or volume then
+    real(wp), intent(in) :: weight(:)   !! of the late faces, like `mass`, positive
+    type(small_cells_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: value(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of small cells
+    integer(i8) :: faces(1)
+    integer :: it
+    real(wp) :: change(2)   ! largest change and largest value of a pass
+
+    self%iterations = 0
+    faces = int(self%n_late, i8)
+    call global_sum(faces)
+    if (faces(1) == 0_i8) return
+    call first_values()
+    do it = 1, max_late_iterations
+      call halo_exchange(value, n_halo)
+      call next_values()
+      call global_max(change)
+      self%iterations = it
+      if (change(1) <= 4.0_wp*epsilon(1.0_wp)*change(2)) exit
+    end do
+    call halo_exchange(value, n_halo)
+  contains
+    !> What they hold after the sweeps, and their mass with all that comes in.
+    subroutine first_values()
+      integer :: l, s, at(3)
+
+      do s = 1, self%n
+        at = self%cell(:, s)
+        self%mass(s) = mass(at(1), at(2), at(3))
+        value(at(1), at(2), at(3)) = 0.0_wp
+        if (self%mass(s) > 0.0_wp) then
+          value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
+        end if
+      end do
+      do l = 1, self%n_late
+        s = number_of(self%receiver(:, l))
+        if (s > 0) self%mass(s) = self%mass(s) + weight(l)
+      end do
+    end subroutine first_values
+
+    !> One pass over the cells, and how much it changes.
+    subroutine next_values()
+      integer :: l, s, at(3)
+
+      do s = 1, self%n
+        at = self%cell(:, s)
+        self%amount(s) = amount(at(1), at(2), at(3))
+      end do
+      do l = 1, self%n_late
+        s = number_of(self%receiver(:, l))
+        if (s == 0) cycle
+        at = self%donor(:, l)
+        self%amount(s) = self%amount(s) + weight(l)*value(at(1), at(2), at(3))
+      end do
+      change = 0.0_wp
+      do s = 1, self%n
+        at = self%cell(:, s)
+        self%ratio(s) = 0.0_wp
+        if (self%mass(s) > 0.0_wp) self%ratio(s) = self%amount(s)/self%mass(s)
+        change(1) = max(change(1), abs(self%ratio(s) - value(at(1), at(2), at(3))))
+        change(2) = max(change(2), abs(self%ratio(s)))
+        value(at(1), at(2), at(3)) = self%ratio(s)
+      end do
+    end subroutine next_values
+
+    !> Number of the small cell at this place if it is a cell of this process, else 0.
+    pure integer function number_of(at)
+      integer, intent(in) :: at(3)
+
+      number_of = 0
+      if (grid%owns(at)) number_of = self%number(at(1), at(2), at(3))
+    end function number_of
+  end subroutine late_values
+
+  !> Move what crosses the late faces; `flux` is positive along the axis.
+  subroutine move_late(grid, self, flux, amount)
+    type(grid_t), intent(in) :: grid
+    type(small_cells_t), intent(in) :: self
+    real(wp), intent(in) :: flux(:)
+    real(wp), intent(inout), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: l, up(3), low(3)
+
+    do l = 1, self%n_late
+      up = self%face(1:3, l)
+      low = up - unit_step(:, self%face(4, l))
+      if (grid%owns(low)) then
+        amount(low(1), low(2), low(3)) = amount(low(1), low(2), low(3)) - flux(l)
+      end if
+      if (grid%owns(up)) then
+        amount(up(1), up(2), up(3)) = amount(up(1), up(2), up(3)) + flux(l)
+      end if
+    end do
+  end subroutine move_late
+
+  !> Small cells that gave something, and the liquid of closed cells.
+  subroutine count_small_cells(grid, new, liquid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: new   !! bodies at the end of the step
+    real(wp), intent(in), contiguous :: liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! W at the end of the step [m3]
+    type(small_cells_t), intent(inout) :: self
+    integer(i8) :: count(2)
+    integer :: s, l, n, at(3)
+
+    self%ratio(1:self%n) = 0.0_wp
+    do l = 1, self%n_late
+      at = self%donor(:, l)
+      if (.not. grid%owns(at)) cycle
+      self%ratio(self%number(at(1), at(2), at(3))) = 1.0_wp
+    end do
+    count = 0_i8
+    n = 0
+    do s = 1, self%n
+      at = self%cell(:, s)
+      if (self%ratio(s) > 0.0_wp) then
+        count(1) = count(1) + 1_i8
+        if (new%alpha(at(1), at(2), at(3)) <= 0.0_wp) count(2) = count(2) + 1_i8
+      end if
+      if (1.0_wp - new%alpha(at(1), at(2), at(3)) > closed_volume) cycle
+      n = n + 1
+      self%amount(n) = liquid(at(1), at(2), at(3))
+    end do
+    call global_sum(count)
+    self%count = int(count(1))
+    self%count_open = int(count(2))
+    self%held = exact_sum(self%amount(1:n))
+  end subroutine count_small_cells
+
+end module small_cells_m
