@@ -32,7 +32,9 @@ module momentum_c_ismac_m
   use tvd_m, only: face_values, scheme_of, tvd_scheme
   use viscous_system_m, only: viscous_t, wrench
   use viscous_m, only: apply_viscous, force_of_legs, velocity_scale, inertial_momentum
-  use krylov_m, only: linear_operator_t, identity_t, krylov_work_t, krylov_init, bicgstab, solved
+  use linear_operator_m, only: linear_operator_t, identity_t
+  use solve_control_m, only: solve_control_t, solve_report_t, solved
+  use krylov_m, only: krylov_work_t, krylov_init, bicgstab
   use exact_sum_m, only: exact_sums
   use parallel_m, only: halo_exchange
   implicit none
@@ -170,8 +172,10 @@ contains
     type(viscous_t), intent(inout) :: viscous
     type(c_ismac_t), intent(inout) :: self
     real(wp), dimension(6, bodies%n) :: none, pull, motion
-    real(wp) :: scale, residual
-    integer :: m, b, info
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    real(wp) :: scale
+    integer :: m, b
 
     call velocity_scale(grid, flow%u, bodies, scale)
     call set_operator(grid, rho, bodies, viscous%dt, viscous, self)
@@ -185,9 +189,11 @@ contains
     end do
     call right_side(grid, rho, viscous%dt, flow%u, motion, viscous, self)
     self%delta = 0.0_wp
-    call bicgstab(self%operator, self%identity, self%rhs, self%delta, tolerance*scale, &
-                  max_iterations, viscous%iterations, residual, info, self%work)
-    viscous%converged = info == solved
+    control%tolerance = tolerance*scale
+    control%max_iterations = max_iterations
+    call bicgstab(self%operator, self%identity, self%rhs, self%delta, control, report, self%work)
+    viscous%iterations = report%iterations
+    viscous%converged = report%info == solved
     call unpack_components(self%delta, self%operator)
     associate (a => grid%lo, z => grid%hi)
       do m = 1, 3

@@ -18,6 +18,7 @@ module pressure_system_m
   use mixture_m, only: face_mean
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   use exact_sum_m, only: exact_dot
+  use solve_control_m, only: solve_control_t, solve_report_t
   use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
   use multigrid_m, only: multigrid_t
   use parallel_m, only: halo_exchange
@@ -255,16 +256,17 @@ contains
   contains
     subroutine solve_with(preconditioner)
       class(preconditioner_t), intent(inout) :: preconditioner
-      real(wp) :: residual
-      integer :: info   !! 0: converged; the next pass sees what is left either way
+      type(solve_control_t) :: control
+      type(solve_report_t) :: report   ! how it ended does not matter: the next pass sees the rest
 
+      control%tolerance = tolerance
+      control%max_iterations = max_iterations
       if (trim(self%solver) == 'bicgstab') then
-        call bicgstab(self%operator, preconditioner, rhs, phi, tolerance, &
-                      max_iterations, iterations, residual, info, self%work)
+        call bicgstab(self%operator, preconditioner, rhs, phi, control, report, self%work)
       else
-        call conjugate_gradient(self%operator, preconditioner, rhs, phi, tolerance, &
-                                max_iterations, iterations, residual, info, self%work)
+        call conjugate_gradient(self%operator, preconditioner, rhs, phi, control, report, self%work)
       end if
+      iterations = report%iterations
     end subroutine solve_with
   end subroutine solve_linear
 

@@ -8,16 +8,13 @@ module krylov_m
   use grid_m, only: grid_t
   use exact_sum_m, only: exact_dot, exact_dots
   use parallel_m, only: global_max
+  use solve_control_m, only: solve_control_t, solve_report_t, solved, not_converged, broken_down
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   implicit none
   private
   public :: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   public :: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
-  public :: solved, not_converged, broken_down
-
-  integer, parameter :: solved = 0          !! the residual is small enough
-  integer, parameter :: not_converged = 1   !! stopped after `max_it` iterations
-  integer, parameter :: broken_down = 2     !! matrix or preconditioner not positive, or NaN
+  public :: solve_control_t, solve_report_t, solved, not_converged, broken_down
 
   integer, parameter :: worth_threads = 8192   !! fewer cells are the work of one thread
 
@@ -85,35 +82,28 @@ contains
   end subroutine find_null_space
 
   !> Solve A x = b with A and M symmetric and positive (constants excepted, see `find_null_space`).
-  subroutine conjugate_gradient(op, prec, b, x, tol, max_it, its, residual, info, work, relative)
+  subroutine conjugate_gradient(op, prec, b, x, control, report, work)
     class(linear_operator_t), intent(inout) :: op
     class(preconditioner_t), intent(inout) :: prec
     real(wp), intent(in), contiguous :: b(:, :, :)      !! right side, one halo cell
     real(wp), intent(inout), contiguous :: x(:, :, :)   !! first guess, then solution
-    real(wp), intent(in) :: tol                         !! stop at max |r| <= tol
-    integer, intent(in) :: max_it
-    integer, intent(out) :: its                         !! iterations done
-    real(wp), intent(out) :: residual                   !! max |r| at the end
-    integer, intent(out) :: info                        !! one of the codes above
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(out) :: report
     type(krylov_work_t), intent(inout) :: work
-    real(wp), intent(in), optional :: relative          !! ... or at max |r| <= relative*max |r_0|
     real(wp) :: bound, rz, rz_before, pq
 
-    call first_residual(op, b, x, work, residual)
-    bound = tol
-    if (present(relative)) bound = max(tol, relative*residual)
-    info = solved
+    call first_residual(op, b, x, work, report%residual)
+    bound = max(control%tolerance, control%relative*report%residual)
     rz = 1.0_wp
-    its = 0
-    do while (.not. residual <= bound)
-      info = not_converged
-      if (its == max_it) exit
-      info = broken_down
+    do while (.not. report%residual <= bound)
+      report%info = not_converged
+      if (report%iterations == control%max_iterations) exit
+      report%info = broken_down
       rz_before = rz
-      call prec%apply(work%r, residual, work%z)
+      call prec%apply(work%r, report%residual, work%z)
       rz = exact_dot(work%r, work%z, 1)
       if (.not. rz > 0.0_wp) exit
-      if (its == 0) then
+      if (report%iterations == 0) then
         call copy(work%z, work%p)
       else
         call new_direction(work%z, rz/rz_before, work%p)
@@ -121,9 +111,9 @@ contains
       call op%apply(work%p, work%q)
       pq = exact_dot(work%p, work%q, 1)
       if (.not. pq > 0.0_wp) exit
-      call step(rz/pq, work%p, work%q, x, work%r, residual)
-      its = its + 1
-      info = solved
+      call step(rz/pq, work%p, work%q, x, work%r, report%residual)
+      report%iterations = report%iterations + 1
+      report%info = solved
     end do
     if (work%singular) call remove_mean(work, x)
   end subroutine conjugate_gradient
@@ -132,32 +122,25 @@ contains
   !!
   !! Source: van der Vorst, SIAM J. Sci. Stat. Comput. 13 (1992), preconditioned from the right.
   !! When the residual is nearly orthogonal to its shadow, the iteration starts again where it is.
-  subroutine bicgstab(op, prec, b, x, tol, max_it, its, residual, info, work, relative)
+  subroutine bicgstab(op, prec, b, x, control, report, work)
     class(linear_operator_t), intent(inout) :: op
     class(preconditioner_t), intent(inout) :: prec
     real(wp), intent(in), contiguous :: b(:, :, :)      !! right side, one halo cell
     real(wp), intent(inout), contiguous :: x(:, :, :)   !! first guess, then solution
-    real(wp), intent(in) :: tol                         !! stop at max |r| <= tol
-    integer, intent(in) :: max_it
-    integer, intent(out) :: its                         !! iterations done
-    real(wp), intent(out) :: residual                   !! max |r| at the end
-    integer, intent(out) :: info                        !! one of the codes above
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(out) :: report
     type(krylov_work_t), intent(inout) :: work
-    real(wp), intent(in), optional :: relative          !! ... or at max |r| <= relative*max |r_0|
     real(wp), parameter :: orthogonal = 1.0e-14_wp      !! cosine of vectors at a right angle
     real(wp) :: bound, alpha, omega, rho, rho_before, norms(2), sums(2), p_max
     logical :: fresh   !! the iteration starts at the residual at hand
 
-    call first_residual(op, b, x, work, residual)
-    bound = tol
-    if (present(relative)) bound = max(tol, relative*residual)
-    info = solved
+    call first_residual(op, b, x, work, report%residual)
+    bound = max(control%tolerance, control%relative*report%residual)
     fresh = .true.
-    its = 0
-    do while (.not. residual <= bound)
-      info = not_converged
-      if (its == max_it) exit
-      info = broken_down
+    do while (.not. report%residual <= bound)
+      report%info = not_converged
+      if (report%iterations == control%max_iterations) exit
+      report%info = broken_down
       ! rho = shadow . r, against the norms of both
       sums = exact_dots(work%shadow, work%r, work%r, work%r, 1)
       if (.not. fresh) fresh = abs(sums(1)) <= orthogonal*sqrt(norms(1)*sums(2))
@@ -166,7 +149,7 @@ contains
         call copy(work%r, work%p)
         rho = sums(2)
         norms(1) = sums(2)
-        p_max = residual
+        p_max = report%residual
       else
         rho = sums(1)
         call next_direction(rho/rho_before*alpha/omega, omega, work%r, work%q, work%p, p_max)
@@ -181,20 +164,20 @@ contains
         cycle
       end if
       alpha = rho/sums(1)
-      call step(alpha, work%y, work%q, x, work%r, residual)
-      its = its + 1
-      info = solved
-      if (residual <= bound) exit
-      info = broken_down
-      call prec%apply(work%r, residual, work%z)
+      call step(alpha, work%y, work%q, x, work%r, report%residual)
+      report%iterations = report%iterations + 1
+      report%info = solved
+      if (report%residual <= bound) exit
+      report%info = broken_down
+      call prec%apply(work%r, report%residual, work%z)
       call op%apply(work%z, work%t)
       sums = exact_dots(work%t, work%r, work%t, work%t, 1)
       if (.not. sums(2) > 0.0_wp) exit
       omega = sums(1)/sums(2)
-      call step(omega, work%z, work%t, x, work%r, residual)
+      call step(omega, work%z, work%t, x, work%r, report%residual)
       fresh = .not. abs(omega) > 0.0_wp
       rho_before = rho
-      info = solved
+      report%info = solved
     end do
     if (work%singular) call remove_mean(work, x)
   end subroutine bicgstab

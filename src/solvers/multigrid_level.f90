@@ -178,7 +178,7 @@ contains
       do j = lo(2), hi(2) + 1
         do d = 1, 3
           if ((k > hi(3) .and. d /= 3) .or. (j > hi(2) .and. d /= 2)) cycle
-          call sum_lines(fine, cf, d, j, k, lo(1), last, coarse_cf(lo(1):last, j, k, d))
+          call sum_lines(fine, cf, d, [j, k], lo(1), coarse_cf(lo(1):last, j, k, d))
           associate (line => coarse_cf(lo(1):last, j, k, d))
             select case (d)
             case (1); line = line*fine%ratio(lo(1):last, 1)
@@ -192,15 +192,18 @@ contains
   end subroutine coarsen_coefficients
 
   !> Sums of the coefficients of the finer faces on a line of coarse faces of direction d.
-  subroutine sum_lines(fine, cf, d, jc, kc, first, last, line)
+  subroutine sum_lines(fine, cf, d, at, first, line)
     type(level_t), intent(in) :: fine
     real(wp), intent(in), contiguous :: cf(fine%lo(1) - 1:, fine%lo(2) - 1:, fine%lo(3) - 1:, :)
-    integer, intent(in) :: d, jc, kc, first, last   !! the last is the upper face of the last cell
-    real(wp), intent(inout) :: line(first:last)
-    integer :: i, j, k, low(3), high(3)
+    integer, intent(in) :: d
+    integer, intent(in) :: at(2)   !! j and k of the coarse line
+    integer, intent(in) :: first
+    real(wp), intent(inout), contiguous :: line(first:)   !! to the upper face of the last cell
+    integer :: i, j, k, low(3), high(3), last
 
-    low = first_of([1, jc, kc], fine%paired)
-    high = last_of([1, jc, kc], fine%paired, fine%hi)
+    last = ubound(line, 1)
+    low = first_of([1, at], fine%paired)
+    high = last_of([1, at], fine%paired, fine%hi)
     low(d) = min(low(d), fine%hi(d) + 1)
     high(d) = low(d)
     line = 0.0_wp
@@ -305,21 +308,23 @@ contains
   end subroutine relax_lines
 
   !> Add the residual of a line, unscaled, at the cells m of its pairs.
-  subroutine add_residual(a, z, m, j, k, c, b, x, t, r)
-    integer, intent(in) :: a(3), z(3), m, j, k
-    real(sp), intent(in) :: c(a(1):z(1), 2, a(2):z(2), a(3):z(3), 3)
-    real(sp), intent(in), dimension(a(1):z(1), 2, a(2):z(2), a(3):z(3)) :: b, x, t
-    real(sp), intent(inout) :: r(a(1):z(1))
+  subroutine add_residual(self, m, j, k, r)
+    type(level_t), intent(in) :: self
+    integer, intent(in) :: m, j, k
+    real(sp), intent(inout) :: r(self%a(1):self%z(1))
     integer :: p, o
 
     o = 3 - m
-    !$omp simd
-    do p = a(1) + 1, z(1) - 1
-      r(p) = r(p) + t(p, m, j, k)*((b(p, m, j, k) - x(p, m, j, k)) &
-        + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
-        + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
-        + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1))
-    end do
+    associate (c => self%c, b => self%b, x => self%x, t => self%t)
+      !$omp simd
+      do p = self%a(1) + 1, self%z(1) - 1
+        r(p) = r(p) + t(p, m, j, k)*((b(p, m, j, k) - x(p, m, j, k)) &
+          + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
+          + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
+          + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
+          + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1))
+      end do
+    end associate
   end subroutine add_residual
 
   !> Right side of the next level in its plane `kc`: sums of the residuals of the finer cells.
@@ -340,7 +345,7 @@ contains
         do j = first_of(jc, self%paired(2)), last_of(jc, self%paired(2), self%hi(2))
           do colour = 0, merge(1, 0, self%seam)
             m = 1 + modulo(j + k + colour, 2)
-            call add_residual(self%a, self%z, m, j, k, self%c, self%b, self%x, self%t, r(:, m))
+            call add_residual(self, m, j, k, r(:, m))
           end do
         end do
       end do

@@ -6,7 +6,8 @@ program test_krylov
   use kinds_m, only: wp
   use grid_m, only: grid_t
   use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab, &
-    preconditioner_t, jacobi_t, identity_t, solved, not_converged, broken_down
+    preconditioner_t, jacobi_t, identity_t, solve_control_t, solve_report_t, solved, &
+    not_converged, broken_down
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use parallel_m, only: parallel_init, parallel_final, gather_all
@@ -23,8 +24,7 @@ program test_krylov
     type(multigrid_t) :: multigrid
     type(krylov_work_t) :: work
     real(wp), allocatable :: b(:, :, :), x(:, :, :)
-    real(wp) :: residual = 0.0_wp
-    integer :: its = 0, info = 0
+    type(solve_report_t) :: report
   end type system_t
 
   !> The same system for all cells as one matrix, and its solution.
@@ -70,13 +70,14 @@ contains
     class(preconditioner_t), intent(inout) :: prec
     real(wp), intent(in) :: tol, relative
     type(system_t), intent(inout) :: system
+    type(solve_control_t) :: control
 
+    control = solve_control_t(tol, relative, max_it)
     if (method == 1) then
-      call conjugate_gradient(system%op, prec, system%b, system%x, tol, max_it, system%its, &
-        system%residual, system%info, system%work, relative)
+      call conjugate_gradient(system%op, prec, system%b, system%x, control, system%report, &
+        system%work)
     else
-      call bicgstab(system%op, prec, system%b, system%x, tol, max_it, system%its, &
-        system%residual, system%info, system%work, relative)
+      call bicgstab(system%op, prec, system%b, system%x, control, system%report, system%work)
     end if
   end subroutine solve
 
@@ -115,7 +116,7 @@ contains
     do method = 1, 2
       system%x = 0.0_wp
       call solve(method, prec, 0.0_wp, 1.0e-11_wp, 5000, system)
-      call check('end of '//trim(method_name(method))//', '//name, system%info, solved)
+      call check('end of '//trim(method_name(method))//', '//name, system%report%info, solved)
       call check(trim(method_name(method))//', '//name, &
         energy_error(system%grid, dense, system%x), 0.0_wp, 1.0e-8_wp)
     end do
@@ -261,26 +262,35 @@ contains
       if (method == 1) allocate (y, source=system%b)
       multigrid = system%multigrid
       call solve(method, multigrid, 0.0_wp, 0.0_wp, 0, system)
-      small = 1.0e-5_wp*system%residual
-      call check('no iteration allowed', system%info == not_converged .and. system%its == 0 &
+      small = 1.0e-5_wp*system%report%residual
+      call check('no iteration allowed', ended(system, not_converged, 0) &
         .and. all(abs(system%x) <= 0))
       call solve(method, multigrid, 0.0_wp, 0.0_wp, 2, system)
-      call check('stopped by the limit', system%info == not_converged .and. system%its == 2)
+      call check('stopped by the limit', ended(system, not_converged, 2))
       call solve(method, multigrid, small, 0.0_wp, 100, system)
-      call check('goes on from a first guess', system%info == solved .and. system%residual <= small)
+      call check('goes on from a first guess', system%report%info == solved &
+        .and. system%report%residual <= small)
       y = system%b
       call system%op%apply(system%x, y)
       call check('the residual is that of the solution', &
         norm(system%b - y) <= 1.01_wp*small*sqrt(720.0_wp))
       call solve(method, multigrid, 1.01_wp*small, 0.0_wp, 100, system)
-      call check('nothing left to do', system%info == solved .and. system%its == 0)
+      call check('nothing left to do', ended(system, solved, 0))
       system%b = 0.0_wp
       system%x = 0.0_wp
       call solve(method, multigrid, 0.0_wp, 0.0_wp, 10, system)
-      call check('zero right side', system%info == solved .and. system%its == 0 &
+      call check('zero right side', ended(system, solved, 0) &
         .and. all(abs(system%x) <= 0))
     end do
   end subroutine test_ends
+
+  !> Did the last solve end like this?
+  pure logical function ended(system, info, iterations)
+    type(system_t), intent(in) :: system
+    integer, intent(in) :: info, iterations
+
+    ended = system%report%info == info .and. system%report%iterations == iterations
+  end function ended
 
   !> Euclidean norm over the cells of all processes.
   real(wp) function norm(a)
@@ -304,7 +314,7 @@ contains
     call check('all cells are open', system%work%n_open, 720.0_wp, 0.0_wp)
     system%b = system%b + mean*system%work%is_open
     call solve(1, multigrid, 0.0_wp, 1.0e-10_wp, 100, system)
-    call check('right side with a mean', system%info, solved)
+    call check('right side with a mean', system%report%info, solved)
     call check('solution without a mean', exact_dot(system%x, system%work%is_open, 1), 0.0_wp, &
       1.0e-11_wp*norm(system%x))
     call system%op%apply(system%x, system%work%q)
@@ -342,12 +352,12 @@ contains
       if (method == 1) system%op%cf = -system%op%cf
       if (method == 2) system%op%cf = 0.0_wp
       call solve(method, identity, 0.0_wp, 0.0_wp, 10, system)
-      call check('matrix not positive', system%info, broken_down)
+      call check('matrix not positive', system%report%info, broken_down)
       call make_system([4, 4, 8], unit_box, 'open', walls, 1, system)
       system%b(system%grid%lo(1), system%grid%lo(2), system%grid%lo(3)) = &
         ieee_value(1.0_wp, ieee_quiet_nan)
       call solve(method, identity, 0.0_wp, 0.0_wp, 10, system)
-      call check('not a number', system%info, broken_down)
+      call check('not a number', system%report%info, broken_down)
     end do
     call ieee_set_flag(ieee_invalid, .false.)
   end subroutine test_failures

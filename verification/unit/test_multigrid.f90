@@ -5,7 +5,8 @@
 program test_multigrid
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, solved
+  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, &
+    solve_control_t, solve_report_t, solved
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use random_counter_m, only: uniform
@@ -157,16 +158,17 @@ contains
     character(*), intent(in) :: name
     type(system_t), intent(inout) :: system
     real(wp), allocatable :: first(:, :, :)
-    real(wp) :: residual
-    integer :: t, info
+    type(solve_report_t) :: report
+    integer :: t
 
     allocate (first, source=system%x)
     do t = 1, merge(2, 1, nproc() == 1)
       call set_threads(t)
       system%x = 0.0_wp
-      call conjugate_gradient(system%op, system%multigrid, system%b, system%x, 0.0_wp, 200, &
-        system%its, residual, info, system%work, relative=1.0e-6_wp)
-      call check(name//': solved', info, solved)
+      call conjugate_gradient(system%op, system%multigrid, system%b, system%x, &
+        solve_control_t(relative=1.0e-6_wp, max_iterations=200), report, system%work)
+      system%its = report%iterations
+      call check(name//': solved', report%info, solved)
       if (t == 1) first(:, :, :) = system%x
       call check(name//': bits do not depend on threads', all(abs(system%x - first) <= 0))
     end do
