@@ -14,6 +14,18 @@ module flux_band_m
   private
   public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
 
+  !> Work of finding and sorting the parts.
+  type :: part_finder_t
+    integer, allocatable :: root(:)          !! of a cell: the first of its part on this process
+    integer, allocatable :: group(:)         !! of a cell: 2c - 1 red, 2c black in part c
+    integer, allocatable :: order(:)         !! the cells by group
+    integer, allocatable :: spare(:)
+    real(wp), allocatable :: moved(:)
+    integer(i8), allocatable :: home(:)      !! (parts) labels, rising
+    integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
+    integer(i8), allocatable :: bins(:, :)   !! of the sums
+  end type part_finder_t
+
   type :: flux_band_t
     ! Arrays over cells with one halo cell.
     integer, allocatable :: marked(:, :, :)  !! 1: in the band; 2 while it is marked: holds solid
@@ -30,19 +42,15 @@ module flux_band_m
     real(wp), allocatable :: r(:)            !! volume balance of the cell [V]
     real(wp), allocatable :: diagonal(:)     !! sum of the conductances of its faces
     real(wp), allocatable :: open(:)         !! its open volume at the end of the step [V]
-    real(wp), allocatable :: s(:), phi(:), terms(:)   !! work of the solver
-    integer, allocatable :: root(:), group(:), order(:), spare(:)
 
     !> The connected parts, of all processes.
     integer :: parts = 0
     integer, allocatable :: first(:)         !! (2 parts + 1)
-    integer(i8), allocatable :: home(:)      !! (parts) labels, rising
-    integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
     integer(i8), allocatable :: vents(:)     !! (parts) cells at an open side
-    integer(i8), allocatable :: bins(:, :)
     real(wp), allocatable :: total(:)        !! (2 parts) sums of r, then of the open volume [V]
-    real(wp), allocatable :: energy(:), before(:), largest(:)
+    real(wp), allocatable :: largest(:)      !! (parts) largest |r| [V]
     logical, allocatable :: active(:)        !! (parts) still to be solved
+    type(part_finder_t) :: finder
   end type flux_band_t
 
 contains
@@ -60,7 +68,7 @@ contains
     allocate (self%number, self%label, source=self%marked)
     allocate (self%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%held(0:nproc() - 1), source=0_i8)
+    allocate (self%finder%held(0:nproc() - 1), source=0_i8)
     call allocate_lists(first_size, self)
     call allocate_parts(first_parts, self)
   end subroutine flux_band_init
@@ -69,16 +77,18 @@ contains
     integer, intent(in) :: n
     type(flux_band_t), intent(inout) :: self
 
-    allocate (self%at(n), self%root(n), self%group(n), self%order(n), self%spare(n))
-    allocate (self%r(n), self%s(n), self%phi(n), self%diagonal(n), self%open(n), self%terms(n))
+    allocate (self%at(n), self%r(n), self%diagonal(n), self%open(n))
+    associate (f => self%finder)
+      allocate (f%root(n), f%group(n), f%order(n), f%spare(n), f%moved(n))
+    end associate
   end subroutine allocate_lists
 
   subroutine allocate_parts(n, self)
     integer, intent(in) :: n
     type(flux_band_t), intent(inout) :: self
 
-    allocate (self%first(2*n + 1), self%home(n), self%vents(n), self%bins(bin_size, 2*n))
-    allocate (self%total(2*n), self%energy(n), self%before(n), self%largest(n), self%active(n))
+    allocate (self%first(2*n + 1), self%vents(n), self%total(2*n), self%largest(n), self%active(n))
+    allocate (self%finder%home(n), self%finder%bins(bin_size, 2*n))
   end subroutine allocate_parts
 
   !> Twice the room in the lists, the entries kept.
@@ -93,7 +103,9 @@ contains
     call move_alloc(self%r, r)
     call move_alloc(self%diagonal, diagonal)
     call move_alloc(self%open, open)
-    deallocate (self%root, self%group, self%order, self%spare, self%s, self%phi, self%terms)
+    associate (f => self%finder)
+      deallocate (f%root, f%group, f%order, f%spare, f%moved)
+    end associate
     call allocate_lists(2*n, self)
     self%at(1:n) = at(1:n)
     self%r(1:n) = r(1:n)
@@ -173,8 +185,9 @@ contains
     call list_parts(grid, self)
     do l = 1, self%n
       c = cell_at(grid, self%at(l))
-      self%group(l) = 2*position(int(self%label(c(1), c(2), c(3)), i8), self%home(1:self%parts))
-      if (is_red(grid, c)) self%group(l) = self%group(l) - 1
+      self%finder%group(l) = 2*position(int(self%label(c(1), c(2), c(3)), i8), &
+                                        self%finder%home(1:self%parts))
+      if (is_red(grid, c)) self%finder%group(l) = self%finder%group(l) - 1
     end do
     call sort_by_group(self)
   end subroutine find_parts
@@ -186,7 +199,7 @@ contains
     integer :: l, d, c(3), e(3), m, a, b
 
     do l = 1, self%n
-      self%root(l) = l
+      self%finder%root(l) = l
     end do
     do l = 1, self%n
       c = cell_at(grid, self%at(l))
@@ -195,15 +208,15 @@ contains
         e = c - unit_step(:, d)
         m = self%number(e(1), e(2), e(3))
         if (m == 0) cycle
-        call find_root(self%root, l, a)
-        call find_root(self%root, m, b)
-        self%root(max(a, b)) = min(a, b)
+        call find_root(self%finder%root, l, a)
+        call find_root(self%finder%root, m, b)
+        self%finder%root(max(a, b)) = min(a, b)
       end do
     end do
     do l = 1, self%n
-      call find_root(self%root, l, self%spare(l))
+      call find_root(self%finder%root, l, self%finder%spare(l))
     end do
-    self%root(1:self%n) = self%spare(1:self%n)
+    self%finder%root(1:self%n) = self%finder%spare(1:self%n)
   end subroutine join_neighbours
 
   !> Root of a cell; the path to it is shortened for the next call.
@@ -226,7 +239,7 @@ contains
     integer :: l, c(3)
     integer(i8) :: changes(1)
 
-    associate (smallest => self%spare)
+    associate (smallest => self%finder%spare)
       do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
         smallest(l) = global_number(grid, cell_at(grid, self%at(l)))
       end do
@@ -234,14 +247,14 @@ contains
       do
         do l = 1, self%n
           c = cell_at(grid, self%at(l))
-          self%label(c(1), c(2), c(3)) = smallest(self%root(l))
+          self%label(c(1), c(2), c(3)) = smallest(self%finder%root(l))
         end do
         call halo_exchange(self%label, 1)
         changes = 0_i8
         do l = 1, self%n
           c = cell_at(grid, self%at(l))
           if (all(c > grid%lo .and. c < grid%hi)) cycle
-          call look_across(c, smallest(self%root(l)))
+          call look_across(c, smallest(self%finder%root(l)))
         end do
         call global_sum(changes)
         if (changes(1) == 0_i8) exit
@@ -275,27 +288,27 @@ contains
     integer :: l, c(3), rank, n
 
     rank = my_rank()
-    self%held = 0_i8
+    self%finder%held = 0_i8
     do l = 1, self%n
-      if (is_home(l)) self%held(rank) = self%held(rank) + 1_i8
+      if (is_home(l)) self%finder%held(rank) = self%finder%held(rank) + 1_i8
     end do
-    call global_sum(self%held)
-    self%parts = int(sum(self%held))
-    if (self%parts > size(self%home)) then
-      deallocate (self%first, self%home, self%vents, self%bins)
-      deallocate (self%total, self%energy, self%before, self%largest, self%active)
+    call global_sum(self%finder%held)
+    self%parts = int(sum(self%finder%held))
+    if (self%parts > size(self%finder%home)) then
+      deallocate (self%first, self%vents, self%total, self%largest, self%active)
+      deallocate (self%finder%home, self%finder%bins)
       call allocate_parts(2*self%parts, self)
     end if
-    self%home(1:self%parts) = 0_i8
-    n = int(sum(self%held(0:rank - 1)))
+    self%finder%home(1:self%parts) = 0_i8
+    n = int(sum(self%finder%held(0:rank - 1)))
     do l = 1, self%n
       if (.not. is_home(l)) cycle
       n = n + 1
       c = cell_at(grid, self%at(l))
-      self%home(n) = int(global_number(grid, c), i8)
+      self%finder%home(n) = int(global_number(grid, c), i8)
     end do
-    call global_sum(self%home(1:self%parts))
-    call sort(self%home(1:self%parts))
+    call global_sum(self%finder%home(1:self%parts))
+    call sort(self%finder%home(1:self%parts))
   contains
     !> Is this the cell that gave its part the label?
     logical function is_home(l)
@@ -351,34 +364,42 @@ contains
     groups = 2*self%parts
     self%first(1:groups + 1) = 0
     do l = 1, self%n
-      self%first(self%group(l) + 1) = self%first(self%group(l) + 1) + 1
+      self%first(self%finder%group(l) + 1) = self%first(self%finder%group(l) + 1) + 1
     end do
     self%first(1) = 1
     do g = 1, groups
       self%first(g + 1) = self%first(g + 1) + self%first(g)
     end do
     do l = self%n, 1, -1   ! from the back, so that a group keeps its order
-      g = self%group(l)
+      g = self%finder%group(l)
       self%first(g + 1) = self%first(g + 1) - 1
-      self%order(self%first(g + 1)) = l
+      self%finder%order(self%first(g + 1)) = l
     end do
     do g = 1, groups       ! the ends have moved down to the begins
       self%first(g) = self%first(g + 1)
     end do
     self%first(groups + 1) = self%n + 1
     do l = 1, self%n
-      self%spare(l) = self%at(self%order(l))
-      self%terms(l) = self%r(self%order(l))
-      self%s(l) = self%diagonal(self%order(l))
+      self%finder%spare(l) = self%at(self%finder%order(l))
     end do
-    self%at(1:self%n) = self%spare(1:self%n)
-    self%r(1:self%n) = self%terms(1:self%n)
-    self%diagonal(1:self%n) = self%s(1:self%n)
-    do l = 1, self%n
-      self%s(l) = self%open(self%order(l))
-    end do
-    self%open(1:self%n) = self%s(1:self%n)
+    self%at(1:self%n) = self%finder%spare(1:self%n)
+    call reorder(self%finder%order(1:self%n), self%finder%moved, self%r)
+    call reorder(self%finder%order(1:self%n), self%finder%moved, self%diagonal)
+    call reorder(self%finder%order(1:self%n), self%finder%moved, self%open)
   end subroutine sort_by_group
+
+  !> Put a list in a new order.
+  pure subroutine reorder(order, moved, list)
+    integer, intent(in) :: order(:)       !! where the entries stand so far
+    real(wp), intent(inout) :: moved(:)   !! work
+    real(wp), intent(inout) :: list(:)
+    integer :: l
+
+    do l = 1, size(order)
+      moved(l) = list(order(l))
+    end do
+    list(1:size(order)) = moved(1:size(order))
+  end subroutine reorder
 
   !> Cells at an open side, sum of r and sum of the open volume of each part, over all processes.
   subroutine sum_by_part(grid, self)
@@ -388,17 +409,21 @@ contains
 
     n = self%parts
     self%vents(1:n) = 0_i8
-    do c = 1, n
-      do l = self%first(2*c - 1), self%first(2*c + 1) - 1
-        if (at_open_side(cell_at(grid, self%at(l)))) self%vents(c) = self%vents(c) + 1_i8
+    associate (bins => self%finder%bins)
+      do c = 1, n
+        associate (a => self%first(2*c - 1), b => self%first(2*c + 1) - 1)
+          do l = a, b
+            if (at_open_side(cell_at(grid, self%at(l)))) self%vents(c) = self%vents(c) + 1_i8
+          end do
+          bins(:, c) = no_terms
+          bins(:, n + c) = no_terms
+          call exact_add(self%r(a:b), bins(:, c))
+          call exact_add(self%open(a:b), bins(:, n + c))
+        end associate
       end do
-      self%bins(:, c) = no_terms
-      self%bins(:, n + c) = no_terms
-      call exact_add(self%r(self%first(2*c - 1):self%first(2*c + 1) - 1), self%bins(:, c))
-      call exact_add(self%open(self%first(2*c - 1):self%first(2*c + 1) - 1), self%bins(:, n + c))
-    end do
-    call global_sum(self%vents(1:n))
-    call exact_totals(self%bins(:, 1:2*n), self%total(1:2*n))
+      call global_sum(self%vents(1:n))
+      call exact_totals(bins(:, 1:2*n), self%total(1:2*n))
+    end associate
   contains
     !> Can this cell exchange through an open side of the domain?
     logical function at_open_side(c)

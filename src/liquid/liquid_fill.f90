@@ -88,8 +88,7 @@ contains
         if (all(a(:, n) <= 0.0_wp .and. b(:, n) >= 1.0_wp)) share = 1.0_wp
       end do
       if (n == 0 .or. share >= 1.0_wp) return
-      call open_union(grid, solid, solid%cut(at(1), at(2), at(3)), corner, a(:, 1:n), b(:, 1:n), &
-                      cut, share)
+      call open_union(grid, solid, at, a(:, 1:n), b(:, 1:n), cut, share)
     end function share_in_boxes
   end subroutine fill_liquid
 
@@ -122,18 +121,19 @@ contains
   !> Open volume of a cell in the union of boxes, as a share of its open volume.
   !!
   !! The faces of all boxes cut the cell into bricks; each lies in a box or outside all.
-  subroutine open_union(grid, solid, m, corner, a, b, cut, share)
+  subroutine open_union(grid, solid, at, a, b, cut, share)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: m                    !! number of the cut cell, 0: no body
-    real(wp), intent(in) :: corner(3)           !! lower corner of the cell [m]
+    integer, intent(in) :: at(3)
     real(wp), intent(in) :: a(:, :), b(:, :)    !! (3, n) boxes in shares of the cell, not empty
     type(cut_cell_t), intent(inout) :: cut
     real(wp), intent(out) :: share
-    real(wp) :: x(2*size(a, 2), 3), p(3), q(3), total
-    integer :: n, d, i, j, k
+    real(wp) :: x(2*size(a, 2), 3), p(3), q(3), corner(3), total
+    integer :: n, m, d, i, j, k
 
     n = size(a, 2)
+    m = solid%cut(at(1), at(2), at(3))
+    corner = grid%face(at, [1, 2, 3])
     do d = 1, 3
       x(1:n, d) = a(d, :)
       x(n + 1:, d) = b(d, :)
@@ -308,8 +308,8 @@ contains
       integer :: n
 
       do n = 1, size(gain)
-        call layer_in_cell(grid, solid, vertical, cell(:, n), surface_at(cell(:, n)), height, cut, &
-                           gain(n))
+        call layer_in_cell(grid, solid, vertical, cell(:, n), &
+                           surface_at(cell(:, n)) + [0.0_wp, height], cut, gain(n))
         associate (at => cell(:, n))
           gain(n) = min(gain(n), flow%room(at(1), at(2), at(3)) - flow%liquid(at(1), at(2), at(3)))
         end associate
@@ -327,14 +327,13 @@ contains
     end function surface_at
   end subroutine add_layer
 
-  !> Open volume of a cell between the heights `surface` and `surface + height` along the vertical
-  !! [m3].
-  subroutine layer_in_cell(grid, solid, vertical, at, surface, height, cut, volume)
+  !> Open volume of a cell between two heights along the vertical [m3].
+  subroutine layer_in_cell(grid, solid, vertical, at, heights, cut, volume)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(vertical_t), intent(in) :: vertical
     integer, intent(in) :: at(3)
-    real(wp), intent(in) :: surface, height   !! [m]
+    real(wp), intent(in) :: heights(2)   !! rising [m]
     type(cut_cell_t), intent(inout) :: cut
     real(wp), intent(out) :: volume
     real(wp) :: bottom, from, to, share(2)
@@ -343,8 +342,8 @@ contains
     axis = maxloc(abs(vertical%up), 1)
     bottom = min(vertical%up(axis)*grid%face(at(axis), axis), &
                  vertical%up(axis)*grid%face(at(axis) + 1, axis))
-    from = min(max((surface - bottom)/grid%h(axis), 0.0_wp), 1.0_wp)
-    to = min(max((surface + height - bottom)/grid%h(axis), 0.0_wp), 1.0_wp)
+    from = min(max((heights(1) - bottom)/grid%h(axis), 0.0_wp), 1.0_wp)
+    to = min(max((heights(2) - bottom)/grid%h(axis), 0.0_wp), 1.0_wp)
     volume = 0.0_wp
     if (to <= from) return
     if (solid%cut(at(1), at(2), at(3)) == 0) then

@@ -341,7 +341,8 @@ contains
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
         do i = grid%lo(1), grid%hi(1) + e(1)
-          volumes%g(i, j, k, d) = self%out_high(i - e(1), j - e(2), k - e(3)) - self%out_low(i, j, k)
+          volumes%g(i, j, k, d) = self%out_high(i - e(1), j - e(2), k - e(3)) &
+                                  - self%out_low(i, j, k)
         end do
       end do
     end do
@@ -349,14 +350,12 @@ contains
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          volumes%w(i, j, k) = ((volumes%w_before(i, j, k) - max(-volumes%g(i, j, k, d), 0.0_wp)) &
-                             - max(volumes%g(i + e(1), j + e(2), k + e(3), d), 0.0_wp)) &
-                            + (max(volumes%g(i, j, k, d), 0.0_wp) &
-                               + max(-volumes%g(i + e(1), j + e(2), k + e(3), d), 0.0_wp))
-          volumes%v(i, j, k) = ((volumes%v_before(i, j, k) - max(-volumes%q(i, j, k, d), 0.0_wp)) &
-                             - max(volumes%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp)) &
-                            + (max(volumes%q(i, j, k, d), 0.0_wp) &
-                               + max(-volumes%q(i + e(1), j + e(2), k + e(3), d), 0.0_wp))
+          volumes%w(i, j, k) = &
+            after_exchange(volumes%w_before(i, j, k), volumes%g(i, j, k, d), &
+                           volumes%g(i + e(1), j + e(2), k + e(3), d))
+          volumes%v(i, j, k) = &
+            after_exchange(volumes%v_before(i, j, k), volumes%q(i, j, k, d), &
+                           volumes%q(i + e(1), j + e(2), k + e(3), d))
           if (old%alpha(i, j, k) <= 0.0_wp) then
             volumes%c(i, j, k) = share_of(volumes%w(i, j, k), volumes%v(i, j, k))
           end if
@@ -364,6 +363,15 @@ contains
       end do
     end do
   end subroutine move_volumes
+
+  !> A volume less what leaves it, then with what enters through its lower and its upper face.
+  pure function after_exchange(volume, low, high) result(left)
+    real(wp), intent(in) :: volume, low, high   !! fluxes positive along the axis
+    real(wp) :: left
+
+    left = ((volume - max(-low, 0.0_wp)) - max(high, 0.0_wp)) &
+           + (max(low, 0.0_wp) + max(-high, 0.0_wp))
+  end function after_exchange
 
   !> Liquid share of a volume, within 0 and 1.
   elemental function share_of(w, v) result(share)

@@ -5,9 +5,10 @@
 !! direction (`liquid_sweep_m`): 0 <= W <= Vt holds without clipping and nothing is redistributed.
 !! Small cells receive in the sweeps and give afterwards (`small_cells_m`).
 !!
-!! Momentum rides on the same volumes: after `sweep`, `q(:,:,:,d)` and `g(:,:,:,d)` of `volumes` hold
-!! what has just moved; after `small_cells` the faces behind small donors do. Source and trial of the
-!! scheme: docs/theory.md. Departure from the paper: it moves the mixture and knows no open volume.
+!! Momentum rides on the same volumes: after `sweep`, `q(:,:,:,d)` and `g(:,:,:,d)` of `volumes`
+!! hold what has just moved; after `small_cells` the faces behind small donors do. Source and trial
+!! of the scheme: docs/theory.md. Departure from the paper: it moves the mixture and knows no open
+!! volume.
 module liquid_transport_m
   use kinds_m, only: wp
   use grid_m, only: grid_t

@@ -16,7 +16,8 @@ module open_flux_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
-  use flux_potential_m, only: solve_potential
+  use flux_potential_m, only: flux_potential_t, solve_potential
+  use solve_control_m, only: solve_control_t
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
@@ -25,12 +26,13 @@ module open_flux_m
   real(wp), parameter :: least_open = 1.0e-9_wp   !! mean open share below which a face is closed
 
   type :: open_flux_t
-    real(wp) :: tolerance = 1.0e-12_wp   !! of the volume balance of a cell [V]
-    integer :: max_iterations = 5000
+    type(solve_control_t) :: control = solve_control_t(tolerance=1.0e-12_wp, max_iterations=5000)
+      !! of the volume balance of a cell [V]
     integer :: iterations = 0            !! of the last step
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
     type(flux_band_t) :: band
+    type(flux_potential_t) :: potential
   end type open_flux_t
 
 contains
@@ -65,7 +67,7 @@ contains
     if (cells(1) < 0.5_wp) return
     call find_parts(grid, self%band)
     call balance_parts(grid, self)
-    call solve_potential(self%tolerance, self%max_iterations, self%band, self%iterations)
+    call solve_potential(self%control, self%band, self%potential, self%iterations)
     self%residual = maxval(self%band%largest(1:self%band%parts))
     call correct_flux(grid, self%band, q)
   end subroutine find_open_flux
@@ -196,7 +198,7 @@ contains
         end do
       end do
       call global_max(band%largest(1:band%parts))
-      band%active(1:band%parts) = band%largest(1:band%parts) > self%tolerance
+      band%active(1:band%parts) = band%largest(1:band%parts) > self%control%tolerance
     end associate
   end subroutine balance_parts
 
