@@ -213,7 +213,7 @@ contains
     report%viscous_converged = stage%viscous_converged
     report%small_cells = sim%transport%small%count
     report%sealed_cells = sim%solid%n_sealed
-    report%curvature_fallback = sim%stage%tension%fallback
+    report%curvature_fallback = sim%stage%tension%surface%fallback
   end subroutine tell
 
   !> Blocks whose time has come; the liquid in their place raises the free surface.

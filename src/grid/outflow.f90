@@ -17,6 +17,7 @@ module outflow_m
   use case_types_m, only: fluid_t, is_given
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: side_outflow
+  use face_weight_m, only: uneven_share
   use parallel_m, only: global_max
   implicit none
   private
@@ -204,7 +205,7 @@ contains
       p = p - c*fluid%liquid_density*abs(fluid%gravity(axis))*rise
     end subroutine one_column
 
-    !> How much more of the liquid of a cell lies in its lower half than in its upper one [-].
+    !> The uneven share of cell k of a column; the last cells repeat beyond its ends.
     pure real(wp) function uneven(c, k, up)
       real(wp), intent(in) :: c(:)
       integer, intent(in) :: k, up   !! cell; step upwards
@@ -212,7 +213,7 @@ contains
 
       below = min(max(k - up, 1), size(c))
       above = min(max(k + up, 1), size(c))
-      uneven = max(-1.0_wp, min(1.0_wp, c(below) - c(above)))*c(k)*(1.0_wp - c(k))
+      uneven = uneven_share(c(k), c(below), c(above))
     end function uneven
   end subroutine set_pressure
 

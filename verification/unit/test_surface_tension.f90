@@ -112,8 +112,8 @@ contains
         do i = grid%lo(1), grid%hi(1)
           if (c(i, j, k) <= 1.0e-6_wp .or. c(i, j, k) >= 1.0_wp - 1.0e-6_wp) cycle
           if (any(([i, j, k] <= 1 .or. [i, j, k] >= grid%n) .and. unit_step(:, d) == 0)) cycle
-          both = max(both, [abs(tension%curvature(i, j, k) - exact_curvature([i, j, k], d, way)), &
-                            1.0_wp])
+          both = max(both, [abs(tension%surface%curvature(i, j, k) &
+                                - exact_curvature([i, j, k], d, way)), 1.0_wp])
         end do
       end do
     end do
@@ -135,7 +135,7 @@ contains
     call worst_error(tension, d, way, worst, cases)
     call check('there is a surface', cases > 0.0_wp)
     call check('curvature of a parabola [1/m]', worst, 0.0_wp, 1.0e-11_wp)
-    call check('all of it from heights', tension%fallback, 0)
+    call check('all of it from heights', tension%surface%fallback, 0)
     bow(2:3) = [0.45_wp, -0.35_wp]   ! the surface of the next column may lie two cells higher
     bow(4:6) = 0.1_wp*bow(4:6)
     call fill_bowed(d, way)
@@ -160,7 +160,7 @@ contains
     call find_tension(grid, fluid, solid, c, tension)
     call worst_error(tension, 3, 1, worst, cases)
     call check('a film of half a cell: curvature [1/m]', worst, 0.0_wp, 1.0e-11_wp)
-    call check('a film has heights', tension%fallback, 0)
+    call check('a film has heights', tension%surface%fallback, 0)
     call check('there is a film', cases > 0.0_wp)
   end subroutine film_on_the_floor
 
@@ -175,11 +175,11 @@ contains
     call find_tension(grid, fluid, solid, c, tension)
     found = -huge(1.0_wp)
     if (all(grid%lo <= [8, 7, 9]) .and. all(grid%hi >= [8, 7, 9])) then
-      found = tension%curvature(8, 7, 9)
+      found = tension%surface%curvature(8, 7, 9)
     end if
     call global_max(found)
     call check('curvature of a drop of one cell [1/m]', found(1), sum(1.0_wp/grid%h), 1.0e-12_wp)
-    call check('counted', tension%fallback, 1)
+    call check('counted', tension%surface%fallback, 1)
   end subroutine curvature_beyond_heights
 
   !> Basins of different level beside one thin wall: the surface of each is level up to the wall.
@@ -198,9 +198,9 @@ contains
     call fill_scalar_halo(grid, c)
     call find_tension(grid, fluid, solid, c, tension)
     largest = 0.0_wp
-    associate (a => grid%lo, b => grid%hi)
-      largest = max(maxval(abs(tension%curvature(a(1):min(b(1), 7), a(2):b(2), a(3):b(3)))), &
-                    maxval(abs(tension%curvature(max(a(1), 8):b(1), a(2):b(2), a(3):b(3)))))
+    associate (a => grid%lo, b => grid%hi, curvature => tension%surface%curvature)
+      largest = max(maxval(abs(curvature(a(1):min(b(1), 7), a(2):b(2), a(3):b(3)))), &
+                    maxval(abs(curvature(max(a(1), 8):b(1), a(2):b(2), a(3):b(3)))))
     end associate
     call global_max(largest)
     call check('no curvature beside a wall between two levels [1/m]', largest(1), 0.0_wp, &
@@ -257,10 +257,10 @@ contains
     integer, intent(in) :: low(3), high(3)
     integer :: n
 
-    n = count([tension%state(low(1), low(2), low(3)), tension%state(high(1), high(2), &
-      high(3))] > 0)
-    face_curvature = (tension%curvature(low(1), low(2), low(3)) &
-                      + tension%curvature(high(1), high(2), high(3)))/real(max(n, 1), wp)
+    n = count([tension%surface%state(low(1), low(2), low(3)), &
+               tension%surface%state(high(1), high(2), high(3))] > 0)
+    face_curvature = (tension%surface%curvature(low(1), low(2), low(3)) &
+                      + tension%surface%curvature(high(1), high(2), high(3)))/real(max(n, 1), wp)
   end function face_curvature
 
   !> Level liquid to a share of a layer: with its weight on the two faces of the layer the pressure

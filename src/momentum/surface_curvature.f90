@@ -1,0 +1,251 @@
+!> Curvature of the surface in the cells that it passes.
+!!
+!! Nine heights (`surface_heights_m`) give it to second order (Cummins, Francois, Kothe, Comput.
+!! Struct. 83, 2005), along the main direction of the normal or the next one that has nine whole
+!! columns. Where none has, the cell takes the mean of its neighbours that have heights, and where
+!! there are none the divergence of the normals; both are counted.
+module surface_curvature_m
+  use kinds_m, only: wp, i8
+  use grid_m, only: grid_t, n_halo, unit_step
+  use solid_geometry_m, only: solid_geometry_t
+  use plic_m, only: unit_normal
+  use surface_heights_m, only: column_t, find_places, nine_heights, is_full, is_empty, no_height
+  use parallel_m, only: halo_exchange, global_sum
+  implicit none
+  private
+  public :: surface_curvature_t, surface_curvature_init, find_curvature, no_surface
+
+  !> What is known of the curvature of a cell.
+  integer, parameter :: no_surface = 0, wanted = 1, from_heights = 2, from_others = 3
+
+  type :: surface_curvature_t
+    real(wp), allocatable :: curvature(:, :, :)  !! of the surface, positive around liquid [1/m]
+    integer, allocatable :: state(:, :, :)       !! of the curvature, see above
+    !> Place of the surface along each direction from the centre of a cell at it [cells].
+    real(wp), allocatable :: place(:, :, :, :)
+    integer :: n_wanted = 0                      !! cells of this process without heights
+    integer, allocatable :: cell(:, :)           !! (3, *) those cells
+    real(wp), allocatable :: value(:)            !! (*) their curvature
+    integer :: fallback = 0                      !! such cells of all processes
+  end type surface_curvature_t
+
+contains
+
+  !> Room for the fields, at the start of a run.
+  subroutine surface_curvature_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(surface_curvature_t), intent(out) :: self
+    integer, parameter :: first_size = 1024
+    integer :: a(3), b(3)
+
+    a = grid%first
+    b = grid%last
+    allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
+    allocate (self%place(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=no_height)
+    allocate (self%cell(3, first_size), self%value(first_size))
+  end subroutine surface_curvature_init
+
+  !> Curvature of all cells at the surface, halo filled.
+  subroutine find_curvature(grid, solid, c, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    type(surface_curvature_t), intent(inout) :: self
+    integer(i8) :: cells(1)
+
+    call find_places(grid, c, self%place)
+    call curvature_from_heights(grid, solid, c, self)
+    call list_wanted(grid, self)
+    call curvature_from_others(grid, c, self)
+    cells = int(self%n_wanted, i8)
+    call global_sum(cells)
+    self%fallback = int(cells(1))
+  end subroutine find_curvature
+
+  !> Curvature of every own cell that holds or borders the surface, where its columns give one.
+  subroutine curvature_from_heights(grid, solid, c, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(surface_curvature_t), intent(inout) :: self
+    integer :: i, j, k
+    logical :: found
+
+    !$omp parallel do private(i, j, found) schedule(dynamic, 4)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          self%state(i, j, k) = no_surface
+          self%curvature(i, j, k) = 0.0_wp
+          if (.not. at_surface(grid, c, i, j, k)) cycle
+          call height_curvature(grid, solid, c, self%place, [i, j, k], self%curvature(i, j, k), &
+                                found)
+          self%state(i, j, k) = merge(from_heights, wanted, found)
+        end do
+      end do
+    end do
+    call halo_exchange(self%curvature, n_halo)
+    call halo_exchange(self%state, n_halo)
+  end subroutine curvature_from_heights
+
+  !> Does the surface pass through a cell or through one of its faces?
+  pure function at_surface(grid, c, i, j, k) result(yes)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: i, j, k
+    logical :: yes
+    real(wp) :: around(6)
+
+    yes = .not. (is_full(c(i, j, k)) .or. is_empty(c(i, j, k)))
+    if (yes) return
+    around = [c(i - 1, j, k), c(i + 1, j, k), c(i, j - 1, k), c(i, j + 1, k), c(i, j, k - 1), &
+              c(i, j, k + 1)]
+    if (is_full(c(i, j, k))) then
+      yes = any(is_empty(around))
+    else
+      yes = any(is_full(around))
+    end if
+  end function at_surface
+
+  !> Curvature at a cell from the heights of nine columns, in the direction of the largest component
+  !! of the normal that has them all.
+  !!
+  !! $$ \kappa = -\frac{h_{xx}(1 + h_y^2) + h_{yy}(1 + h_x^2) - 2 h_x h_y h_{xy}}
+  !! {(1 + h_x^2 + h_y^2)^{3/2}} $$
+  !! with h the height of the surface from the liquid towards the gas.
+  pure subroutine height_curvature(grid, solid, c, place, at, curvature, found)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    real(wp), intent(in), contiguous :: place(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! of the surface [cells]
+    integer, intent(in) :: at(3)
+    real(wp), intent(out) :: curvature   !! [1/m], 0 if not found
+    logical, intent(out) :: found
+    real(wp) :: normal(3), height(-1:1, -1:1)
+    logical :: tried(3)
+    integer :: d, n, x, y
+
+    curvature = 0.0_wp
+    found = .false.
+    normal = normal_at(grid, c, at)
+    tried = abs(normal) <= 0.0_wp
+    do n = 1, 3
+      if (all(tried)) return
+      d = maxloc(abs(normal), 1, .not. tried)
+      tried(d) = .true.
+      call nine_heights(grid, solid, c, place(:, :, :, d), &
+                        column_t(at, d, nint(sign(1.0_wp, normal(d)))), height, found)
+      if (.not. found) cycle
+      x = modulo(d, 3) + 1
+      y = modulo(d + 1, 3) + 1
+      curvature = curvature_of_heights(height*grid%h(d), grid%h(x), grid%h(y))
+      return
+    end do
+  end subroutine height_curvature
+
+  !> Curvature of the surface z = height(x, y) above its liquid [1/m].
+  pure function curvature_of_heights(z, dx, dy) result(curvature)
+    real(wp), intent(in) :: z(-1:1, -1:1)   !! [m]
+    real(wp), intent(in) :: dx, dy          !! [m]
+    real(wp) :: curvature
+    real(wp) :: zx, zy, zxx, zyy, zxy
+
+    zx = (z(1, 0) - z(-1, 0))/(2.0_wp*dx)
+    zy = (z(0, 1) - z(0, -1))/(2.0_wp*dy)
+    zxx = ((z(1, 0) - z(0, 0)) + (z(-1, 0) - z(0, 0)))/dx**2
+    zyy = ((z(0, 1) - z(0, 0)) + (z(0, -1) - z(0, 0)))/dy**2
+    zxy = ((z(1, 1) - z(-1, 1)) - (z(1, -1) - z(-1, -1)))/(4.0_wp*dx*dy)
+    curvature = -(zxx*(1.0_wp + zy**2) + zyy*(1.0_wp + zx**2) - 2.0_wp*zx*zy*zxy) &
+                /(1.0_wp + zx**2 + zy**2)**1.5_wp
+  end function curvature_of_heights
+
+  !> Unit vector from the liquid to the gas at a cell, zero where there is no direction.
+  pure function normal_at(grid, c, at) result(normal)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: at(3)
+    real(wp) :: normal(3)
+
+    normal = unit_normal(c(at(1) - 1:at(1) + 1, at(2) - 1:at(2) + 1, at(3) - 1:at(3) + 1))/grid%h
+    normal = normal/max(norm2(normal), tiny(1.0_wp))
+  end function normal_at
+
+  !> List the own cells that have no curvature from heights.
+  subroutine list_wanted(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(surface_curvature_t), intent(inout) :: self
+    integer, allocatable :: longer(:, :)
+    integer :: i, j, k, n
+
+    n = 0
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          if (self%state(i, j, k) /= wanted) cycle
+          if (n == size(self%value)) then
+            allocate (longer(3, 2*n))
+            longer(:, 1:n) = self%cell
+            call move_alloc(longer, self%cell)
+            deallocate (self%value)
+            allocate (self%value(2*n))
+          end if
+          n = n + 1
+          self%cell(:, n) = [i, j, k]
+        end do
+      end do
+    end do
+    self%n_wanted = n
+  end subroutine list_wanted
+
+  !> Mean of the neighbours that have heights, or the divergence of the normals.
+  subroutine curvature_from_others(grid, c, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(surface_curvature_t), intent(inout) :: self
+    integer :: l, n
+
+    do l = 1, self%n_wanted
+      associate (a => self%cell(:, l) - 1, b => self%cell(:, l) + 1)
+        n = count(self%state(a(1):b(1), a(2):b(2), a(3):b(3)) == from_heights)
+        if (n > 0) then
+          self%value(l) = sum(self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), &
+            self%state(a(1):b(1), a(2):b(2), a(3):b(3)) == from_heights)/real(n, wp)
+        else
+          self%value(l) = normal_curvature(grid, c, self%cell(:, l))
+        end if
+      end associate
+    end do
+    do l = 1, self%n_wanted
+      associate (at => self%cell(:, l))
+        self%curvature(at(1), at(2), at(3)) = self%value(l)
+        self%state(at(1), at(2), at(3)) = from_others
+      end associate
+    end do
+    call halo_exchange(self%curvature, n_halo)
+    call halo_exchange(self%state, n_halo)
+  end subroutine curvature_from_others
+
+  !> Divergence of the normals of the neighbours [1/m]: rough, but never more than that of a drop of
+  !! one cell.
+  pure function normal_curvature(grid, c, at) result(curvature)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    integer, intent(in) :: at(3)
+    real(wp) :: curvature
+    real(wp) :: above(3), below(3)
+    integer :: d
+
+    curvature = 0.0_wp
+    do d = 1, 3
+      above = normal_at(grid, c, at + unit_step(:, d))
+      below = normal_at(grid, c, at - unit_step(:, d))
+      curvature = curvature + (above(d) - below(d))/(2.0_wp*grid%h(d))
+    end do
+  end function normal_curvature
+
+end module surface_curvature_m
