@@ -262,6 +262,7 @@ def test_case_that_cannot_be_read(case: str, tmp_path: Path) -> None:
     assert done.stderr.startswith(f"mics: {case}: ")
 
 
+@pytest.mark.xdist_group("ranks")
 def test_every_rank_stops_and_one_speaks(tmp_path: Path) -> None:
     """The parallel build prints each message once and ends with the same code."""
     machine = Machine(ROOT / "mics_mpi", ranks=2)

@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 import pyvista
 
-from run_cases import CASES, ROOT
+from run_cases import CASES, ROOT, Machine
 from same_bits import differences
+from shared_runs import SharedRun
 
 MICS = ROOT / "mics"
+ALONE = Machine(MICS, threads=1)
 CASE = CASES / "ranks" / "coupled.nml"
 GRAVITY = np.array([0.0, 0.0, -9.81])
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -95,31 +97,22 @@ def opened(path: Path) -> h5py.File:
     return h5py.File(path, "r", locking=False)
 
 
-@pytest.fixture(scope="module")
-def wet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def wet(shared_run: SharedRun) -> Path:
     """Results of a coupled run with a fixed, a free and a dropped block."""
-    output = tmp_path_factory.mktemp("output") / "wet"
-    code, said = run(output)
-    assert code == 0, said
-    return output
+    return shared_run("coupled", ALONE)
 
 
-@pytest.fixture(scope="module")
-def dry(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def dry(shared_run: SharedRun) -> Path:
     """Results of a run without fluid."""
-    output = tmp_path_factory.mktemp("output") / "dry"
-    code, said = run(output, case=CASES / "ranks" / "dry.nml")
-    assert code == 0, said
-    return output
+    return shared_run("dry", ALONE)
 
 
-@pytest.fixture(scope="module")
-def fluid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def fluid(shared_run: SharedRun) -> Path:
     """Results of a run without blocks."""
-    output = tmp_path_factory.mktemp("output") / "fluid"
-    code, said = run(output, case=CASES / "ranks" / "stream.nml")
-    assert code == 0, said
-    return output
+    return shared_run("stream", ALONE)
 
 
 def test_names_units_and_shapes(wet: Path) -> None:

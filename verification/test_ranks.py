@@ -4,39 +4,39 @@ from pathlib import Path
 
 import pytest
 
-from run_cases import CASES, ROOT, Machine, prepare, run
+from run_cases import ROOT, Machine, prepare, run
 from same_bits import differences
+from shared_runs import SharedRun
 
 SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
-MACHINES = {
-    "two threads": Machine(SERIAL, threads=2),
-    "one rank": Machine(PARALLEL, ranks=1),
-    "two ranks": Machine(PARALLEL, ranks=2),
-    "two ranks of two threads": Machine(PARALLEL, ranks=2, threads=2),
-}
+ALONE = Machine(SERIAL, threads=1)
+several_processes = pytest.mark.xdist_group("ranks")
+MACHINES = [
+    pytest.param(Machine(SERIAL, threads=2), id="two threads"),
+    pytest.param(Machine(PARALLEL, ranks=1), id="one rank"),
+    pytest.param(Machine(PARALLEL, ranks=2), id="two ranks", marks=several_processes),
+    pytest.param(
+        Machine(PARALLEL, ranks=2, threads=2),
+        id="two ranks of two threads",
+        marks=several_processes,
+    ),
+]
 
 
-@pytest.fixture(scope="module", params=["coupled", "paper", "stream", "current", "dry"])
-def reference(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The result of one thread of the serial program."""
-    output = tmp_path_factory.mktemp("ranks") / request.param
-    run(CASES / "ranks" / f"{request.param}.nml", output, Machine(SERIAL, threads=1))
-    return output
-
-
-@pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES.keys())
-def test_same_bits(reference: Path, machine: Machine, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["coupled", "paper", "stream", "current", "dry"])
+@pytest.mark.parametrize("machine", MACHINES)
+def test_same_bits(name: str, machine: Machine, shared_run: SharedRun) -> None:
     """Compare every dataset and attribute of every result file."""
-    run(CASES / "ranks" / f"{reference.name}.nml", tmp_path / "run", machine)
-    assert differences(reference, tmp_path / "run") == []
+    assert differences(shared_run(name, ALONE), shared_run(name, machine)) == []
 
 
+@several_processes
 def test_same_bits_over_a_bed(tmp_path: Path) -> None:
     """Blocks in water on a rough bed; the map is found beside the case."""
     prepare("bed", tmp_path)
     case = tmp_path / "short.nml"
     text = (tmp_path / "drop.nml").read_text().replace("t_end = 0.4", "t_end = 0.05")
     case.write_text(text.replace("field_interval = 0.1", "field_interval = 0.02"))
-    run(case, tmp_path / "alone", Machine(SERIAL, threads=1))
+    run(case, tmp_path / "alone", ALONE)
     run(case, tmp_path / "shared", Machine(PARALLEL, ranks=2, threads=2))
     assert differences(tmp_path / "alone", tmp_path / "shared") == []

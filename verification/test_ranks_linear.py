@@ -29,6 +29,7 @@ def solutions(*command: str) -> list[str]:
     return [line for line in done.stdout.splitlines() if line.startswith("solution ")]
 
 
+@pytest.mark.xdist_group("ranks")
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_same_solutions(n: int) -> None:
     """Compare the parallel build on n processes with the serial build."""

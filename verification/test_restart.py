@@ -7,22 +7,28 @@ import pytest
 from micstools.reader import Run
 from run_cases import CASES, ROOT, Machine, run
 from same_bits import contents, differences
+from shared_runs import SharedRun
 
 RESULTS = ("run.h5", "fields.vtkhdf", "blocks.vtkhdf")
 
+ALONE = Machine(ROOT / "mics", threads=1)
+TWO_RANKS = Machine(ROOT / "mics_mpi", ranks=2)
+RUNS = [("coupled", ALONE), ("paper", ALONE), ("current", ALONE)] + [
+    pytest.param(name, TWO_RANKS, marks=pytest.mark.xdist_group("ranks"))
+    for name in ("coupled", "current")
+]
 
-RUNS = [("coupled", 1), ("coupled", 2), ("paper", 1), ("current", 1), ("current", 2)]
 
-
-@pytest.mark.parametrize(("name", "ranks"), RUNS)
-def test_restart_equals_uninterrupted_run(name: str, ranks: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "machine"), RUNS, ids=lambda value: getattr(value, "ranks", value)
+)
+def test_restart_equals_uninterrupted_run(
+    name: str, machine: Machine, tmp_path: Path, shared_run: SharedRun
+) -> None:
     """Go on from the first restart file of a finished run, in a copy, and compare."""
-    case = CASES / "ranks" / f"{name}.nml"
-    machine = Machine(ROOT / "mics") if ranks == 1 else Machine(ROOT / "mics_mpi", ranks)
-    whole, again = tmp_path / "whole", tmp_path / "again"
-    run(case, whole, machine)
+    whole, again = shared_run(name, machine), tmp_path / "again"
     first, last = Run(whole).restart_files
-    run(case, again, machine, "--restart", str(whole / first))
+    run(CASES / "ranks" / f"{name}.nml", again, machine, "--restart", str(whole / first))
     found = differences(whole, again)
     assert [line for line in found if line.startswith(RESULTS)] == []
     end = Run(again).restart_files[-1]

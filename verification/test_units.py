@@ -3,6 +3,7 @@
 A program that holds the comment line `! ranks: 2 4` is also run by mpirun on 2 and on 4 processes.
 """
 
+import os
 import re
 import subprocess
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SOURCES = sorted((ROOT / "verification" / "unit").glob("test_*.f90"))
+THREADS = {"OMP_NUM_THREADS": "2", "OMP_WAIT_POLICY": "passive"}
+"""Two threads, so that the loops of the modules are tested as they run."""
 
 
 def ranks(source: Path) -> list[int]:
@@ -22,7 +25,13 @@ def ranks(source: Path) -> list[int]:
 def run(command: list[str | Path], folder: Path) -> None:
     """Run a unit program; its output is shown when it fails."""
     done = subprocess.run(
-        command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300
+        command,
+        cwd=folder,
+        env={**os.environ, **THREADS},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert done.returncode == 0, f"\n{done.stdout}\n{done.stderr}"
     assert re.search(r"^[1-9]\d* passed, 0 failed$", done.stdout, re.MULTILINE), done.stdout
@@ -34,6 +43,7 @@ def test_unit(source: Path, build: str, tmp_path: Path) -> None:
     run([ROOT / "build" / build / source.stem], tmp_path)
 
 
+@pytest.mark.xdist_group("ranks")
 @pytest.mark.parametrize(
     ("source", "n"),
     [pytest.param(source, n, id=f"{source.stem}-{n}") for source in SOURCES for n in ranks(source)],

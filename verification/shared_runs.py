@@ -1,0 +1,33 @@
+"""Runs that several tests look at, made once."""
+
+import fcntl
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from run_cases import CASES, Machine, run
+
+SharedRun = Callable[[str, Machine], Path]
+
+
+@pytest.fixture(scope="session")
+def shared_run(tmp_path_factory: pytest.TempPathFactory) -> SharedRun:
+    """The results of `verification/cases/ranks/NAME.nml` on a machine, made by the first test that
+    asks and read by all, whichever process they run in. They must not be changed."""
+    base = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent  # each worker has a folder of its own within that of the session
+
+    def results(name: str, machine: Machine) -> Path:
+        folder = base / f"{name}-{machine.program.name}-{machine.ranks}-{machine.threads}"
+        with Path(f"{folder}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not folder.exists():
+                unfinished = Path(f"{folder}.unfinished")
+                run(CASES / "ranks" / f"{name}.nml", unfinished, machine)
+                unfinished.rename(folder)
+        return folder
+
+    return results
