@@ -38,58 +38,85 @@ module hdf5_file_m
   !> A file with all that a writer or reader asks of it.
   type, extends(h5_datasets_t) :: h5_file_t
   contains
-    procedure :: new_column, open_column, resize, append, append_rows, append_integers, append_wide
-    procedure :: append_block, read_row, count_rows
+    procedure :: new_column, new_compressed_column, open_column, resize
+    procedure :: append, append_rows, append_integers, append_wide, append_block
+    procedure :: read_row, count_rows
     procedure, private :: transfer_rows
   end type h5_file_t
 
 contains
 
-  !> Create a column without rows. Rows are `row` in shape, for h5py (rows, reversed row).
-  !!
-  !! Not compressed: chunks of `chunk_rows` rows, written in place at once. Compressed:
-  !! `row(size(row))` is cut into layers of `chunk_layers`, and a row must be written whole by
-  !! `append_block`.
-  subroutine new_column(self, name, units, kind, row, chunk_rows, column, chunk_layers)
+  !> Create a column without rows, in chunks of `chunk_rows` rows that are written in place at once.
+  !! Rows are `row` in shape, for h5py (rows, reversed row).
+  subroutine new_column(self, name, units, kind, row, chunk_rows, column)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
-    integer, intent(in) :: kind              !! file_real64, ...
-    integer, intent(in) :: row(:)            !! shape of a row; empty: a number
+    integer, intent(in) :: kind         !! file_real64, ...
+    integer, intent(in) :: row(:)       !! shape of a row; empty: a number
     integer, intent(in) :: chunk_rows
     type(h5_column_t), intent(out) :: column
-    integer, intent(in), optional :: chunk_layers   !! given: compress
-    integer(hsize_t) :: chunk(size(row) + 1)
-    integer(hid_t) :: list
-    integer :: status
 
     if (self%info /= 0) return
+    column = empty_column(name, kind, row, chunk_rows)
+    call create_column(self, units, column)
+  end subroutine new_column
+
+  !> Create a column of 32-bit reals that is compressed; a row must be written whole.
+  subroutine new_compressed_column(self, name, units, row, chunk_rows, chunk_layers, column)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: name, units
+    integer, intent(in) :: row(:)         !! shape of a row, not empty
+    integer, intent(in) :: chunk_rows
+    integer, intent(in) :: chunk_layers   !! a chunk has this many of the `row(size(row))` layers
+    type(h5_column_t), intent(out) :: column
+
+    if (self%info /= 0) return
+    column = empty_column(name, file_real32, row, chunk_rows)
+    column%compressed = .true.
+    column%chunk(size(row)) = int(min(chunk_layers, row(size(row))), hsize_t)
+    call create_column(self, units, column)
+  end subroutine new_compressed_column
+
+  !> A column that is not in the file yet, in chunks of whole rows.
+  pure function empty_column(name, kind, row, chunk_rows) result(column)
+    character(*), intent(in) :: name
+    integer, intent(in) :: kind, row(:), chunk_rows
+    type(h5_column_t) :: column
+
     column%name = name
     column%kind = kind
     column%rank = size(row) + 1
-    column%extent(:size(row)) = int(row, hsize_t)
-    column%extent(column%rank) = 0
-    column%compressed = present(chunk_layers)
-    chunk(:size(row)) = int(max(1, row), hsize_t)
-    chunk(column%rank) = int(chunk_rows, hsize_t)
-    if (present(chunk_layers)) chunk(size(row)) = int(min(chunk_layers, row(size(row))), hsize_t)
-    column%chunk(:column%rank) = chunk
+    column%extent(:column%rank) = int([row, 0], hsize_t)
+    column%chunk(:column%rank) = int([max(1, row), chunk_rows], hsize_t)
+  end function empty_column
+
+  !> Create a column in the file as it is described.
+  subroutine create_column(self, units, column)
+    class(h5_file_t), intent(inout) :: self
+    character(*), intent(in) :: units
+    type(h5_column_t), intent(inout) :: column
+    character(:), allocatable :: what
+    integer(hid_t) :: list
+    integer :: status
+
+    what = 'create '//column%name
     call h5pcreate_f(H5P_DATASET_CREATE_F, list, status)
-    call self%check(status, 'create '//name)
-    call h5pset_chunk_f(list, column%rank, chunk, status)
-    call self%check(status, 'create '//name)
+    call self%check(status, what)
+    call h5pset_chunk_f(list, column%rank, column%chunk(:column%rank), status)
+    call self%check(status, what)
     if (column%compressed) then
       call h5pset_shuffle_f(list, status)
-      call self%check(status, 'create '//name)
+      call self%check(status, what)
       call h5pset_deflate_f(list, deflate_level, status)
-      call self%check(status, 'create '//name)
+      call self%check(status, what)
       call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status)   ! as many processes need it
-      call self%check(status, 'create '//name)
+      call self%check(status, what)
     end if
-    call set_fill(self, name, kind, list)
-    call self%new_dataset(name, units, type_in_file(kind), column%extent(:column%rank), list, &
-      column%id)
+    call set_fill(self, column%name, column%kind, list)
+    call self%new_dataset(column%name, units, type_in_file(column%kind), &
+                          column%extent(:column%rank), list, column%id)
     call h5pclose_f(list, status)
-  end subroutine new_column
+  end subroutine create_column
 
   !> What a row that never arrived shows: NaN, or -1 for integers.
   subroutine set_fill(self, name, kind, list)

@@ -69,13 +69,11 @@ contains
       call file%group(root//'/CellData')
       layers = max(1, chunk_bytes/(4*n(1)*n(2)))
       do s = 1, n_scalars
-        call file%new_column(root//'/CellData/'//trim(scalar_name(s)), trim(scalar_units(s)), &
-          file_real32, n, 1, &
-                             self%scalar(s), layers)
+        call file%new_compressed_column(root//'/CellData/'//trim(scalar_name(s)), &
+                                        trim(scalar_units(s)), n, 1, layers, self%scalar(s))
       end do
-      call file%new_column(root//'/CellData/velocity', 'm/s', file_real32, [3, n], 1, &
-        self%velocity, &
-                           max(1, layers/3))
+      call file%new_compressed_column(root//'/CellData/velocity', 'm/s', [3, n], 1, &
+                                      max(1, layers/3), self%velocity)
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       do s = 1, n_scalars + 1
@@ -302,13 +300,12 @@ contains
       call file%create(path, .false.)
       call start_file(file, 'PolyData')
       call file%store_wide_integers(root//'/NumberOfPoints', '1', [n])
-      call file%new_column(root//'/Points', 'm', file_real32, [3], n, self%points, 3)
+      call file%new_compressed_column(root//'/Points', 'm', [3], n, 3, self%points)
       call write_cells(blocks, file)
       call file%new_column(root//'/CellData/released', '1', file_integer32, [integer ::], &
         self%n_cells, self%released)
       call file%group(root//'/PointData')
-      call file%new_column(root//'/PointData/velocity', 'm/s', file_real32, [3], n, self%velocity, &
-        3)
+      call file%new_compressed_column(root//'/PointData/velocity', 'm/s', [3], n, 3, self%velocity)
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       call file%group(steps//'/PointDataOffsets')
