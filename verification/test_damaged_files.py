@@ -84,7 +84,7 @@ def test_corners_without_points(text: str, message: str, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("kind = 'cylinder' size = 1e5, 0.03", "so slender a block would need 1.43e15 points on"),
+        ("kind = 'cylinder' size = 1e5, 0.03", "so slender a block would need 1.428e15 points on"),
         ("kind = 'cylinder' size = 1e2, 0.03", "so slender a block would need 1.43e9 points on"),
         ("kind = 'cylinder' size = 1e-3, 1e3", "its height must be at most 212 diameters with"),
         ("kind = 'cylinder' size = 1, 200 refinement = 8", "height must be at most 106 diameters"),

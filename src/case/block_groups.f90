@@ -2,8 +2,8 @@
 module block_groups_m
   use kinds_m, only: wp, name_length, pi
   use vectors_m, only: quaternion_from_axis
-  use case_types_m, only: size_count, contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t, &
-    absent
+  use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
+    bed_input_t, absent, size_count
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
     between
   use group_visitor_m, only: group_visitor_t

@@ -173,8 +173,7 @@ contains
     high = near_tank(case, high)
     low(3, :) = 0.0_wp
     high(3, :) = 0.0_wp
-    spacing = mean_spacing(maxval(high, 2) - minval(low, 2), n)
-    call bins_build(low, high, spacing, bed%columns)
+    call bins_build(low, high, mean_spacing(maxval(high, 2) - minval(low, 2), n), bed%columns)
     bed%there = .true.
   end subroutine set_bed
 

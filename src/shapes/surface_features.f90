@@ -246,8 +246,7 @@ contains
     integer, intent(in) :: edge(:, :)             !! (4, edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
     type(surface_t), intent(inout) :: surface
-    integer :: bend(size(edge, 2))
-    integer :: e, m, wanted
+    integer :: bend(size(edge, 2)), e, m, wanted
 
     do e = 1, size(edge, 2)
       bend(e) = bend_of(shape, edge(:, e), surface%normal)

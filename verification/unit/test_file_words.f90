@@ -50,7 +50,7 @@ contains
       call get_real(words, x(i))
     end do
     call get_real(words, x(4))
-    call check('numbers; too small is zero, whole will do', x, [1.5_wp, 2.0e-3_wp, 0.0_wp, 7.0_wp], &
+    call check('numbers; too small is zero', x, [1.5_wp, 2.0e-3_wp, 0.0_wp, 7.0_wp], &
                1.0e-18_wp)
     call check('all were numbers', len(words%problem), 0)
     words = text_of('1e400')
