@@ -11,14 +11,10 @@ module time_step_m
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
-  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    begin_part, finish_transport, transport_liquid
   use liquid_fill_m, only: fill_liquid, raise_surface
   use initial_state_m, only: read_initial_liquid, read_initial_velocity
   use extended_fraction_m, only: extend_fraction
-  use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
-                                     momentum_late
-  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, from_mid_step
+  use fluid_transport_m, only: fluid_transport_t, fluid_transport_init, carry_fluid, span_t
   use mixture_m, only: mix_fluid
   use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
@@ -46,17 +42,13 @@ module time_step_m
   public :: simulation_t, simulation_init, resume, take_step
 
   real(wp), parameter :: least_open = 0.5_wp   !! share of a face whose velocity limits the step
-  real(wp), parameter :: part_courant = 0.5_wp !! Courant number above which the transport is parted
-  integer, parameter :: max_parts = 100        !! of the transport of one step
 
   !> Everything that lives as long as the run.
   type, extends(run_state_t) :: simulation_t
     type(case_t) :: case
     type(solid_geometry_t), allocatable :: before    !! solids at the start of the step
     type(solid_fraction_t) :: fraction
-    type(liquid_transport_t) :: transport
-    type(momentum_t) :: momentum
-    type(mid_step_t) :: mid_step
+    type(fluid_transport_t) :: transport
     type(stage_t) :: stage
     type(walls_t) :: walls
     type(overlap_t) :: overlap
@@ -102,19 +94,12 @@ contains
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, &
                              merge(case%numerics%subcells, 0, &
                                    case%numerics%solid_fraction == 'subcell'), bed)
-    call liquid_transport_init(sim%grid, case%fluid%gravity, sim%transport)
-    if (case%fluid%single_phase) then
-      sim%transport%sweeps%incoming = 1.0_wp
-    else
-      sim%transport%sweeps%level = case%fluid%water_level
-    end if
-    call momentum_init(sim%grid, sim%momentum, case%numerics%advection)
-    call mid_step_init(sim%grid, sim%mid_step)
+    call fluid_transport_init(case, sim%grid, sim%transport)
     call stage_init(sim%grid, n_solids, case%numerics, sim%stage)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
     call read_initial_liquid(case%fluid, sim%grid, sim%flow)
-    call extend_fraction(sim%grid, sim%solid, sim%transport%extension, sim%flow)
+    call extend_fraction(sim%grid, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(case%fluid, sim%flow)
     do d = 1, 3
       sim%flow%u(:, :, :, d) = case%fluid%velocity(d)
@@ -173,7 +158,9 @@ contains
         call update_solid(sim%fraction, grid, blocks, sim%solid)
         call toc(sim%timer_solid)
         call tic(sim%timer_transport)
-        call transport(sim, dt, parts_of_step(report%cfl))
+        call carry_fluid(case, grid, sim%before, sim%solid, &
+                         span_t(dt, report%cfl, sim%clock%step), flow, sim%transport)
+        if (sim%stage%implicit_momentum) sim%stage%c_ismac%q = sim%transport%liquid%q_step
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
@@ -211,7 +198,7 @@ contains
     report%solver_iterations = stage%pressure%iterations
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
-    report%small_cells = sim%transport%small%count
+    report%small_cells = sim%transport%liquid%small%count
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%stage%tension%surface%fallback
   end subroutine tell
@@ -227,7 +214,7 @@ contains
     if (.not. released .or. .not. sim%wet) return
     call swap_solids(sim)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
-    call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%extension, sim%flow)
+    call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
   end subroutine release
 
@@ -258,53 +245,6 @@ contains
     call move_alloc(sim%before, sim%solid)
     call move_alloc(keep, sim%before)
   end subroutine swap_solids
-
-  !> Liquid and momentum through the faces, direction by direction; new density and viscosity. With
-  !! C-ISMAC momentum waits for the predictor, which uses the same volumes.
-  subroutine transport(sim, dt, parts)
-    type(simulation_t), intent(inout) :: sim
-    real(wp), intent(in) :: dt      !! [s]
-    integer, intent(in) :: parts    !! in which the volumes of the step move
-    integer :: n, part
-
-    associate (fluid => sim%case%fluid, grid => sim%grid, flow => sim%flow, &
-               carrier => sim%transport, &
-               monolithic => sim%case%numerics%coupling == 'monolithic')
-      carrier%parts = parts
-      if (sim%stage%implicit_momentum) then
-        call transport_liquid(grid, sim%before, sim%solid, dt, sim%clock%step, carrier, flow)
-        sim%stage%c_ismac%q = carrier%q_step
-        call mix_fluid(fluid, flow)
-        return
-      end if
-      call begin_transport(grid, sim%before, sim%solid, dt, carrier, flow)
-      if (monolithic) call to_mid_step(grid, fluid, sim%before, sim%solid, dt, flow, sim%mid_step)
-      do part = 1, parts
-        call begin_part(grid, sim%before, part, sim%clock%step, carrier)
-        call momentum_begin(grid, fluid, carrier%volumes%w, carrier%volumes%v, carrier%volumes%c, &
-                            flow%u, sim%momentum)
-        do n = 1, 3
-          call momentum_sweep(grid, fluid, sim%before, carrier%order(n), carrier, flow%u, &
-                              sim%momentum)
-        end do
-        call momentum_late(grid, fluid, carrier, flow%u, sim%momentum)
-      end do
-      call finish_transport(grid, sim%solid, carrier, flow)
-      if (monolithic) call from_mid_step(grid, fluid, sim%mid_step, flow)
-      call mix_fluid(fluid, flow)
-    end associate
-  end subroutine transport
-
-  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
-  !! number that the sweeps can follow; one where `cfl_max` keeps the step that short.
-  pure function parts_of_step(courant) result(parts)
-    real(wp), intent(in) :: courant   !! of the whole step [-]
-    integer :: parts
-    real(wp), parameter :: round_off = 1.0e-9_wp
-
-    parts = ceiling(min(courant/part_courant - round_off, real(max_parts, wp)))
-    parts = max(parts, 1)
-  end function parts_of_step
 
   !> Length of the step: what stability allows, or less to land on a release or on the end.
   subroutine choose_step(sim, report)

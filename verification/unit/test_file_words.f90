@@ -71,13 +71,16 @@ contains
     integer :: n
 
     words = text_of('3 a b c')
-    call get_count(words, 'corners', n)
+    call get_count(words, 'corners', 1, n)
     call check('count', n, 3)
+    words = text_of('3 a b c')
+    call get_count(words, 'corners', 3, n)
+    call check('more words than the file holds', n == 0 .and. len(words%problem) > 0)
     words = text_of('9 a b c')
-    call get_count(words, 'corners', n)
+    call get_count(words, 'corners', 1, n)
     call check('more than the file holds', n == 0 .and. index(words%problem, '9 corners') > 0)
     words = text_of('-1 a b c')
-    call get_count(words, 'corners', n)
+    call get_count(words, 'corners', 1, n)
     call check('less than none', n == 0 .and. len(words%problem) > 0)
   end subroutine counts
 
