@@ -27,7 +27,8 @@ variant := $(parallel)$(if $(DEBUG),-debug)$(if $(SAN),-san)
 B := build/$(variant)
 binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)$(if $(SAN),_san)
 compiler := $(if $(MPI),$(FC_MPI),$(FC_SERIAL))
-flags := $(FFLAGS) $(if $(SAN),$(OPT_SAN),$(if $(DEBUG),$(OPT_DEBUG),$(OPT) $(LTO)))
+checks := $(if $(SAN),$(OPT_SAN),$(if $(DEBUG),$(OPT_DEBUG)))
+flags := $(FFLAGS) $(or $(checks),$(OPT) $(LTO))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
@@ -43,7 +44,8 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units everything deps run test verify mutate bench-contact reference lint clean help FORCE
+.PHONY: all units everything deps run test verify mutate soak bench bench-contact docs reference \
+  lint clean help FORCE
 
 all: $(binary)
 
@@ -56,8 +58,11 @@ help:
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
+	@echo 'make soak     faults many times: full disks, programs at once, broken files; an hour'
+	@echo 'make bench    time the main job, a dam break and a dry pile; writes build/bench.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
+	@echo 'make docs     pages to browse, build/docs/site/index.html; every link is followed'
 	@echo 'make lint     style of the Fortran and Python sources'
 	@echo 'make clean    remove what make has built'
 	@echo 'Variables: OPT="-O2" for a portable binary, LTO= for a quick build, FC_SERIAL, FC_MPI, CASE'
@@ -87,7 +92,7 @@ $(call program,$(tests) $(drivers)): $(B)/%: $$(OBJECTS_$$*)
 
 # The tests themselves need no speed, what they test does.
 $(unit_objects): $(B)/%.o: %.f90 $(B)/settings
-	$(call say,FC $@)$(compiler) $(FFLAGS) $(if $(DEBUG),$(OPT_DEBUG),-O0) -J$(B) -c -o $@ $<
+	$(call say,FC $@)$(compiler) $(FFLAGS) $(or $(checks),-O0) -J$(B) -c -o $@ $<
 
 $(B)/%.o: %.f90 $(B)/settings
 	$(call say,FC $@)$(compiler) $(flags) -J$(B) -c -o $@ $<
@@ -114,7 +119,8 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
 	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
 
-no_build := deps lint clean help run test verify mutate bench-contact reference everything $(variants)
+no_build := deps lint clean help run test verify mutate soak bench bench-contact docs reference \
+  everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 endif
@@ -138,6 +144,16 @@ verify: deps
 mutate: deps
 	@$(PYTHON) verification/mutate.py
 
+# Every script of the folder, though one finds a fault.
+soak: deps
+	@$(MAKE) --no-print-directory
+	@status=0; for script in verification/soak/*.py; do \
+	  echo "$$script"; $(PYTHON) $$script || status=1; done; exit $$status
+
+bench: deps
+	@$(MAKE) --no-print-directory
+	@$(PYTHON) tools/bench.py --out build/bench.json
+
 N := 64
 THREADS := 1
 bench-contact: deps
@@ -149,6 +165,10 @@ reference:
 	@$(MAKE) --no-print-directory
 	./mics --help=markdown > docs/reference.md
 	./mics --help=json > docs/mics-case.schema.json
+
+docs:
+	@tools/deps.sh docs
+	@$(PYTHON) tools/build_docs.py
 
 lint: deps
 	@tools/lint.sh

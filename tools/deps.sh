@@ -1,6 +1,6 @@
 #!/bin/sh
 # Install what is missing: compiler, HDF5, MPI, drawing libraries; Python packages in .venv.
-# Does nothing, quickly, when everything is there.
+# Does nothing, quickly, when everything is there. `deps.sh docs` also installs what `make docs` needs.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 
@@ -69,14 +69,17 @@ system() {
   [ -z "$left" ] || stop "still missing after installing: $left"
 }
 
+requirements="requirements.txt requirements-lint.txt${1:+ requirements-$1.txt}"
+
 # Exit code 0 when .venv holds exactly the pinned versions.
 python_packages_ready() {
-  [ -x .venv/bin/python ] && .venv/bin/python - <<'END' 2> /dev/null
+  # shellcheck disable=SC2086
+  [ -x .venv/bin/python ] && .venv/bin/python - $requirements <<'END' 2> /dev/null
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
-for name in ('requirements.txt', 'requirements-lint.txt'):
+for name in sys.argv[1:]:
     for line in Path(name).read_text().splitlines():
         if line.strip() and not line.startswith('#'):
             package, pin = line.split('==')
@@ -91,8 +94,9 @@ python_packages() {
   [ -x .venv/bin/python ] && .venv/bin/python -m pip --version > /dev/null 2>&1 \
     || { rm -rf .venv && python3 -m venv .venv; } || stop 'python3 -m venv failed'
   log=$(mktemp) || exit 1
+  # shellcheck disable=SC2046
   if ! .venv/bin/python -m pip install --quiet --disable-pip-version-check --only-binary :all: \
-    -r requirements.txt -r requirements-lint.txt > "$log" 2>&1; then
+    $(printf -- '-r %s ' $requirements) > "$log" 2>&1; then
     without_addresses < "$log" | tail -n 30 >&2
     rm -f "$log"
     stop 'pip install failed'
