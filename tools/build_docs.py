@@ -36,7 +36,13 @@ preprocess: false
 display: public
 sort: alpha
 print_creation_date: false
+md_extensions: markdown.extensions.toc
+css: {style}
 ---
+"""
+STYLE = """img { max-width: 100%; }
+blockquote { border-left: 3px solid #aaa; padding-left: 1em; }
+td, th { padding: 0.2em 0.8em; vertical-align: top; }
 """
 # FORD takes a comment that begins with a word and a colon, like `0: off`, for its own settings; our
 # comments hold none.
@@ -59,7 +65,7 @@ def write_pages(known: list[Page], links: Links, out: Path) -> Path:
     for page in known:
         text = with_links(page, (ROOT / page.source).read_text(), links)
         if page.place == "index":
-            first = text
+            first = text.partition("\n")[2]  # FORD writes the title itself
             continue
         title, _, rest = text.partition("\n")
         path = folder / f"{page.place.removeprefix('page/')}.md"
@@ -68,7 +74,10 @@ def write_pages(known: list[Page], links: Links, out: Path) -> Path:
     top = [f"- [{page.source}]({page.url})" for page in known if "cases/" not in str(page.source)]
     (folder / "index.md").write_text("\n".join(["---", "title: Documents", "---", "", *top, ""]))
     settings = out / "ford.md"
-    settings.write_text(SETTINGS.format(root=ROOT, site=out / "site", pages=folder) + first)
+    style = out / "style.css"
+    style.write_text(STYLE)
+    given = SETTINGS.format(root=ROOT, site=out / "site", pages=folder, style=style)
+    settings.write_text(given + first)
     return settings
 
 

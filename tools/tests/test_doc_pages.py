@@ -42,7 +42,14 @@ def test_names_of_no_file_are_found(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["[x](https://example.org/a.md)", "[x](#part)", "`case.nml`", "```\n`no/file.f90`\n```"]
+    "text",
+    [
+        "[x](https://example.org/a.md)",
+        "[x](#part)",
+        "`case.nml`",
+        "`law_NAME.f90`",
+        "```\n`no/file.f90`\n```",
+    ],
 )
 def test_what_is_left_alone(text: str) -> None:
     assert linked(text) == (text, [])
