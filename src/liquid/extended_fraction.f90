@@ -9,6 +9,7 @@
 module extended_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
@@ -50,27 +51,18 @@ module extended_fraction_m
 
 contains
 
-  !> Allocate; the vertical is the main axis of gravity.
+  !> The vertical is the main axis of gravity.
   subroutine extended_fraction_init(gravity, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(extended_fraction_t), intent(out) :: self
-    integer, parameter :: first_size = 4096
     integer :: t
 
     self%vertical = vertical_of(gravity)
-    call allocate_lists(first_size, self)
     allocate (self%cut(0:omp_get_max_threads() - 1))
     do t = 0, size(self%cut) - 1
       call cut_cell_init(self%cut(t))
     end do
   end subroutine extended_fraction_init
-
-  subroutine allocate_lists(n, self)
-    integer, intent(in) :: n
-    type(extended_fraction_t), intent(inout) :: self
-
-    allocate (self%cell(3, n), self%open_list(n), self%has_plane(n), self%value(n))
-  end subroutine allocate_lists
 
   !> Liquid share of the open part of a cell.
   elemental function liquid_share(liquid, room) result(c)
@@ -128,7 +120,6 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(extended_fraction_t), intent(inout) :: self
-    integer, allocatable :: cell(:, :)
     integer :: i, j, k, n
 
     n = 0
@@ -136,18 +127,16 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (solid%alpha(i, j, k) <= 0.0_wp) cycle
-          if (n == size(self%value)) then
-            call move_alloc(self%cell, cell)
-            deallocate (self%open_list, self%has_plane, self%value)
-            call allocate_lists(2*n, self)
-            self%cell(:, 1:n) = cell
-          end if
           n = n + 1
+          call ensure_room(n, self%cell)
           self%cell(:, n) = [i, j, k]
         end do
       end do
     end do
     self%n = n
+    call ensure_room(n, self%open_list)
+    call ensure_room(n, self%has_plane)
+    call ensure_room(n, self%value)
   end subroutine list_solid_cells
 
   !> Give cells without a value the mean of their neighbours in the row, ring by ring; where a whole

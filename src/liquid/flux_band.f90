@@ -6,6 +6,7 @@
 !! processes.
 module flux_band_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side
   use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
@@ -59,7 +60,7 @@ contains
   subroutine flux_band_init(grid, self)
     type(grid_t), intent(in) :: grid
     type(flux_band_t), intent(out) :: self
-    integer, parameter :: first_size = 4096, first_parts = 64
+    integer, parameter :: first_parts = 64
     integer :: a(3), b(3)
 
     a = grid%lo - 1
@@ -69,19 +70,10 @@ contains
     allocate (self%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
-    call allocate_lists(first_size, self)
+    allocate (self%at(0))
+    call grow_lists(self)
     call allocate_parts(first_parts, self)
   end subroutine flux_band_init
-
-  subroutine allocate_lists(n, self)
-    integer, intent(in) :: n
-    type(flux_band_t), intent(inout) :: self
-
-    allocate (self%at(n), self%r(n), self%diagonal(n), self%open(n))
-    associate (f => self%finder)
-      allocate (f%root(n), f%group(n), f%order(n), f%spare(n), f%moved(n))
-    end associate
-  end subroutine allocate_lists
 
   subroutine allocate_parts(n, self)
     integer, intent(in) :: n
@@ -91,26 +83,23 @@ contains
     allocate (self%finder%home(n), self%finder%bins(bin_size, 2*n))
   end subroutine allocate_parts
 
-  !> Twice the room in the lists, the entries kept.
+  !> More room in the lists, the entries kept.
   subroutine grow_lists(self)
     type(flux_band_t), intent(inout) :: self
-    integer, allocatable :: at(:)
-    real(wp), allocatable :: r(:), diagonal(:), open(:)
     integer :: n
 
-    n = self%n
-    call move_alloc(self%at, at)
-    call move_alloc(self%r, r)
-    call move_alloc(self%diagonal, diagonal)
-    call move_alloc(self%open, open)
+    call ensure_room(self%n + 1, self%at)
+    n = size(self%at)
+    call ensure_room(n, self%r)
+    call ensure_room(n, self%diagonal)
+    call ensure_room(n, self%open)
     associate (f => self%finder)
-      deallocate (f%root, f%group, f%order, f%spare, f%moved)
+      call ensure_room(n, f%root)
+      call ensure_room(n, f%group)
+      call ensure_room(n, f%order)
+      call ensure_room(n, f%spare)
+      call ensure_room(n, f%moved)
     end associate
-    call allocate_lists(2*n, self)
-    self%at(1:n) = at(1:n)
-    self%r(1:n) = r(1:n)
-    self%diagonal(1:n) = diagonal(1:n)
-    self%open(1:n) = open(1:n)
   end subroutine grow_lists
 
   !> Append a cell to the list; call in the order of the grid.

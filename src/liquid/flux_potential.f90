@@ -12,6 +12,7 @@
 !! left in common are the two quotients of the method.
 module flux_potential_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use flux_band_m, only: flux_band_t
   use solve_control_m, only: solve_control_t
   use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
@@ -74,17 +75,15 @@ contains
     type(flux_band_t), intent(in) :: band
     type(flux_potential_t), intent(inout) :: self
 
-    if (.not. allocated(self%phi)) allocate (self%phi(0), self%s(0), self%terms(0))
-    if (.not. allocated(self%energy)) allocate (self%energy(0), self%before(0), self%bins(0, 0))
-    if (size(self%phi) < size(band%at)) then
-      deallocate (self%phi, self%s, self%terms)
-      allocate (self%phi(size(band%at)), self%s(size(band%at)), self%terms(size(band%at)))
-    end if
-    if (size(self%energy) < size(band%active)) then
-      deallocate (self%energy, self%before, self%bins)
-      allocate (self%energy(size(band%active)), self%before(size(band%active)))
-      allocate (self%bins(bin_size, size(band%active)))
-    end if
+    call ensure_room(band%n, self%phi)
+    call ensure_room(band%n, self%s)
+    call ensure_room(band%n, self%terms)
+    call ensure_room(band%parts, self%before)
+    call ensure_room(band%parts, self%energy)
+    if (.not. allocated(self%bins)) allocate (self%bins(bin_size, size(self%energy)))
+    if (size(self%bins, 2) >= size(self%energy)) return
+    deallocate (self%bins)
+    allocate (self%bins(bin_size, size(self%energy)))
   end subroutine make_room
 
   !> Steps in memory to the next cell in x, y and z, and to the next direction of a face array.

@@ -6,6 +6,7 @@
 module liquid_sweep_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use case_types_m, only: absent, is_given
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_kinds_m, only: side_inflow, side_outflow
@@ -45,7 +46,6 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(liquid_sweep_t), intent(out) :: self
-    integer, parameter :: first_size = 1024
     integer :: a(3), b(3), t
 
     a = grid%first
@@ -54,7 +54,6 @@ contains
     allocate (self%out_low(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%out_high, source=self%out_low)
     allocate (self%in_plane(grid%lo(3):grid%hi(3) + 1), source=0)
-    allocate (self%mixed_cell(3, first_size))
     allocate (self%cut(0:omp_get_max_threads() - 1))
     do t = 0, size(self%cut) - 1
       call cut_cell_init(self%cut(t))
@@ -128,10 +127,7 @@ contains
       self%in_plane(k + 1) = self%in_plane(k + 1) + self%in_plane(k)
     end do
     self%n_mixed = self%in_plane(grid%hi(3) + 1)
-    if (self%n_mixed > size(self%mixed_cell, 2)) then
-      deallocate (self%mixed_cell)
-      allocate (self%mixed_cell(3, 2*self%n_mixed))
-    end if
+    call ensure_room(self%n_mixed, self%mixed_cell)
     !$omp parallel do private(i, j, n) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       n = self%in_plane(k)

@@ -6,6 +6,7 @@
 !! Momentum goes the same way, with its mass in place of the volume (`late_values`, `move_late`).
 module small_cells_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -43,7 +44,7 @@ module small_cells_m
 
 contains
 
-  !> Allocate the lists; they grow by doubling.
+  !> Allocate the lists; they grow.
   subroutine small_cells_init(grid, self)
     type(grid_t), intent(in) :: grid
     type(small_cells_t), intent(out) :: self
@@ -53,24 +54,9 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    call allocate_small(first_size, self)
-    call allocate_late(first_size, self)
+    allocate (self%cell(3, first_size))
+    allocate (self%face(4, first_size), self%donor(3, first_size), self%receiver(3, first_size))
   end subroutine small_cells_init
-
-  subroutine allocate_small(n, self)
-    integer, intent(in) :: n
-    type(small_cells_t), intent(inout) :: self
-
-    allocate (self%cell(3, n), self%amount(n), self%mass(n), self%ratio(n))
-  end subroutine allocate_small
-
-  subroutine allocate_late(n, self)
-    integer, intent(in) :: n
-    type(small_cells_t), intent(inout) :: self
-
-    allocate (self%face(4, n), self%donor(3, n), self%receiver(3, n))
-    allocate (self%q_late(n), self%g_late(n))
-  end subroutine allocate_late
 
   !> Cells that would give nearly all they hold, or hold nearly nothing, and the faces they give
   !! through: what goes there is taken out of the sweeps.
@@ -79,7 +65,6 @@ contains
     type(solid_geometry_t), intent(in) :: old
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
-    integer, allocatable :: cell(:, :)
     integer :: i, j, k, n
     real(wp) :: outflow, open
 
@@ -93,19 +78,17 @@ contains
                     + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
           open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
           if (outflow <= most_outflow*open .and. open >= least_volume*grid%volume) cycle
-          if (n == size(self%amount)) then
-            call move_alloc(self%cell, cell)
-            deallocate (self%amount, self%mass, self%ratio)
-            call allocate_small(2*n, self)
-            self%cell(:, 1:n) = cell
-          end if
           n = n + 1
+          call ensure_room(n, self%cell)
           self%number(i, j, k) = n
           self%cell(:, n) = [i, j, k]
         end do
       end do
     end do
     self%n = n
+    call ensure_room(n, self%amount)
+    call ensure_room(n, self%mass)
+    call ensure_room(n, self%ratio)
     call halo_exchange(self%number, n_halo)
     call find_late_faces(grid, volumes, self)
   end subroutine find_small_cells
@@ -115,9 +98,9 @@ contains
     type(grid_t), intent(in) :: grid
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
-    integer :: d, i, j, k, e(3), up(3), low(3), donor(3)
+    integer :: d, i, j, k, n, e(3), up(3), low(3), donor(3)
 
-    self%n_late = 0
+    n = 0
     do d = 1, 3
       e = unit_step(:, d)
       do k = grid%lo(3), grid%hi(3) + e(3)
@@ -128,38 +111,24 @@ contains
             low = up - e
             donor = merge(low, up, volumes%q(i, j, k, d) > 0.0_wp)
             if (self%number(donor(1), donor(2), donor(3)) == 0) cycle
-            if (self%n_late == size(self%q_late)) call grow_late(self)
-            self%n_late = self%n_late + 1
-            self%face(:, self%n_late) = [i, j, k, d]
-            self%donor(:, self%n_late) = donor
-            self%receiver(:, self%n_late) = up + low - donor
-            self%q_late(self%n_late) = volumes%q(i, j, k, d)
+            n = n + 1
+            call ensure_room(n, self%face)
+            call ensure_room(n, self%donor)
+            call ensure_room(n, self%receiver)
+            call ensure_room(n, self%q_late)
+            self%face(:, n) = [i, j, k, d]
+            self%donor(:, n) = donor
+            self%receiver(:, n) = up + low - donor
+            self%q_late(n) = volumes%q(i, j, k, d)
             volumes%q(i, j, k, d) = 0.0_wp
           end do
         end do
       end do
     end do
+    self%n_late = n
+    call ensure_room(n, self%q_late)
+    call ensure_room(n, self%g_late)
   end subroutine find_late_faces
-
-  !> Twice the room for late faces.
-  subroutine grow_late(self)
-    type(small_cells_t), intent(inout) :: self
-    integer, allocatable :: face(:, :), donor(:, :), receiver(:, :)
-    real(wp), allocatable :: q(:)
-    integer :: n
-
-    n = self%n_late
-    call move_alloc(self%face, face)
-    call move_alloc(self%donor, donor)
-    call move_alloc(self%receiver, receiver)
-    call move_alloc(self%q_late, q)
-    deallocate (self%g_late)
-    call allocate_late(2*n, self)
-    self%face(:, 1:n) = face
-    self%donor(:, 1:n) = donor
-    self%receiver(:, 1:n) = receiver
-    self%q_late(1:n) = q
-  end subroutine grow_late
 
   !> The small cells give what they hold once all has come in: w, v, q and g are complete.
   subroutine give_small_cells(grid, volumes, self, share)

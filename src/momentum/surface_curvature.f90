@@ -6,6 +6,7 @@
 !! there are none the divergence of the normals; both are counted.
 module surface_curvature_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use plic_m, only: unit_normal
@@ -178,7 +179,6 @@ contains
   subroutine list_wanted(grid, self)
     type(grid_t), intent(in) :: grid
     type(surface_curvature_t), intent(inout) :: self
-    integer, allocatable :: longer(:, :)
     integer :: i, j, k, n
 
     n = 0
@@ -186,19 +186,14 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (self%state(i, j, k) /= wanted) cycle
-          if (n == size(self%value)) then
-            allocate (longer(3, 2*n))
-            longer(:, 1:n) = self%cell
-            call move_alloc(longer, self%cell)
-            deallocate (self%value)
-            allocate (self%value(2*n))
-          end if
           n = n + 1
+          call ensure_room(n, self%cell)
           self%cell(:, n) = [i, j, k]
         end do
       end do
     end do
     self%n_wanted = n
+    call ensure_room(n, self%value)
   end subroutine list_wanted
 
   !> Mean of the neighbours that have heights, or the divergence of the normals.

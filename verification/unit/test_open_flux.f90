@@ -1,0 +1,99 @@
+!> Volumes through the faces that fit a moving body, in every cell of the band around it.
+program test_open_flux
+  use kinds_m, only: wp
+  use boundary_kinds_m, only: side_slip
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t, flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
+  use random_counter_m, only: uniform
+  use box_solid_m, only: simple_grid, set_boxes
+  use check_m, only: check, finish_checks
+  implicit none
+  real(wp), parameter :: low(3) = [0.23_wp, 0.22_wp, 0.51_wp], high(3) = [0.55_wp, 0.51_wp, 0.86_wp]
+  real(wp), parameter :: move(3) = [0.03_wp, -0.02_wp, 0.015_wp]   !! of the body in the step [m]
+  real(wp), parameter :: dt = 0.01_wp
+  type(grid_t) :: grid
+  type(flow_t) :: flow
+  type(solid_geometry_t) :: old, new
+  type(open_flux_t) :: flux
+  real(wp), allocatable :: q(:, :, :, :)
+
+  call start(.false.)
+  call find_open_flux(grid, old, new, dt, flow, flux, q)
+  call check('tank: solved', flux%iterations > 0 .and. flux%residual <= flux%control%tolerance)
+  call check('tank: one part', flux%band%parts, 1)
+  call check('tank: balance of the band', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
+  call check('tank: flux of the velocity elsewhere', q(2, 9, 9, 1), &
+             dt*grid%area(1)*flow%uf(2, 9, 9, 1), 0.0_wp)
+  call check('tank: none through walls', maxval(abs(q(1, 1:9, 1:10, 1))), 0.0_wp, 0.0_wp)
+
+  call start(.true.)
+  call find_open_flux(grid, old, new, dt, flow, flux, q)
+  call check('closed: told', flux%unmatched > 1.0e-3_wp)
+  call check('closed: two parts', flux%band%parts, 2)
+  call check('closed: the lower one balances', imbalance(1, 5, 0.0_wp), 0.0_wp, 2.0e-12_wp)
+  call check('closed: the upper one shares it out', imbalance(6, 10, flux%unmatched), 0.0_wp, &
+             2.0e-12_wp)
+  call finish_checks()
+
+contains
+
+  !> A box near the open top in any flow; or a plate across a closed tank whose upper side rises.
+  subroutine start(closed)
+    logical, intent(in) :: closed
+    integer :: i, j, k, d
+
+    call simple_grid([8, 9, 10], [0.8_wp, 0.9_wp, 1.0_wp], grid)
+    if (closed) grid%side = side_slip
+    call flow_init(grid, flow)
+    call solid_geometry_init(grid, old)
+    call solid_geometry_init(grid, new)
+    if (closed) then
+      call set_boxes(grid, reshape([-1.0_wp, -1.0_wp, 0.15_wp], [3, 1]), &
+                     reshape([2.0_wp, 2.0_wp, 0.85_wp], [3, 1]), old)
+      call set_boxes(grid, reshape([-1.0_wp, -1.0_wp, 0.15_wp], [3, 1]), &
+                     reshape([2.0_wp, 2.0_wp, 0.86_wp], [3, 1]), new)
+    else
+      call set_boxes(grid, reshape(low, [3, 1]), reshape(high, [3, 1]), old)
+      call set_boxes(grid, reshape(low + move, [3, 1]), reshape(high + move, [3, 1]), new)
+    end if
+    call open_flux_init(grid, flux)
+    flow%room = grid%volume*(1.0_wp - old%alpha)
+    do d = 1, 3
+      do k = 1, 11
+        do j = 1, 10
+          do i = 1, 9
+            if (.not. closed) flow%uf(i, j, k, d) = uniform(d, i, j + 20*k) - 0.5_wp
+          end do
+        end do
+      end do
+    end do
+    if (allocated(q)) deallocate (q)
+    allocate (q, source=flow%uf)
+  end subroutine start
+
+  !> Largest error of the layers first..last of the band: outflow against the change of room, less
+  !! what stays, a share of the open volume [V].
+  real(wp) function imbalance(first, last, share) result(worst)
+    integer, intent(in) :: first, last
+    real(wp), intent(in) :: share
+    integer :: i, j, k
+    real(wp) :: outflow
+
+    worst = 0.0_wp
+    do k = first, last
+      do j = 1, 9
+        do i = 1, 8
+          if (flux%band%number(i, j, k) == 0) cycle
+          outflow = q(i + 1, j, k, 1) - q(i, j, k, 1) + q(i, j + 1, k, 2) - q(i, j, k, 2) &
+                    + q(i, j, k + 1, 3) - q(i, j, k, 3)
+          associate (open => 1.0_wp - new%alpha(i, j, k))
+            worst = max(worst, abs((flow%room(i, j, k) - outflow)/grid%volume - open - share*open))
+          end associate
+        end do
+      end do
+    end do
+  end function imbalance
+
+end program test_open_flux
