@@ -16,7 +16,7 @@ module buoyancy_m
   use vectors_m, only: cross
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, unit_step
-  use boundary_m, only: gives_pressure
+  use boundary_kinds_m, only: gives_pressure
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t, nearest_arm

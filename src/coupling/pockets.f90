@@ -1,7 +1,8 @@
 !> Sealed pockets: cut cells from which no open faces lead to a cell without solid.
 module pockets_m
   use kinds_m, only: wp, i8
-  use grid_m, only: grid_t, n_halo, unit_step, side_no_slip, side_slip
+  use grid_m, only: grid_t, n_halo, unit_step
+  use boundary_kinds_m, only: is_wall
   use solid_geometry_m, only: solid_geometry_t, set_faces
   use parallel_m, only: halo_exchange, global_sum
   implicit none
@@ -170,7 +171,7 @@ contains
 
     leads_out = .false.
     if (grid%periodic(d) .or. (index >= 1 .and. index <= grid%n(d))) return
-    leads_out = grid%side(s, d) /= side_no_slip .and. grid%side(s, d) /= side_slip
+    leads_out = .not. is_wall(grid%side(s, d))
   end function leads_out
 
 end module pockets_m

@@ -10,7 +10,7 @@ module boundary_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: fill_scalar_halo, fill_velocity_halo, set_side_velocity, is_wall, gives_pressure
+  public :: fill_scalar_halo, fill_velocity_halo, set_side_velocity
 
 contains
 

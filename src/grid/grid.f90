@@ -8,13 +8,11 @@
 module grid_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
-  use boundary_kinds_m, only: no_side, side_code, side_no_slip, side_slip, side_open, &
-                              side_periodic, side_inflow, side_outflow
+  use boundary_kinds_m, only: no_side, side_code, side_no_slip, side_periodic
   use parallel_m, only: decompose
   implicit none
   private
   public :: grid_t, grid_init, n_halo, unit_step
-  public :: side_no_slip, side_slip, side_open, side_periodic, side_inflow, side_outflow
 
   integer, parameter :: n_halo = 3
     !! halo width of cell and face arrays: reach of the fifth-order scheme

@@ -1,7 +1,8 @@
 !> Wall legs of film cells, whose centre lies inside a body but which have open faces.
 module film_legs_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, unit_step, side_no_slip
+  use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: side_no_slip
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm

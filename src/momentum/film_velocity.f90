@@ -12,7 +12,7 @@
 module film_velocity_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
-  use boundary_m, only: gives_pressure
+  use boundary_kinds_m, only: gives_pressure
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm

@@ -26,7 +26,8 @@
 !! any Courant number in one direction from 0.70 on.
 module momentum_c_ismac_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, unit_step, side_inflow
+  use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: side_inflow
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, tvd_scheme

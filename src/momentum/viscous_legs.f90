@@ -6,7 +6,8 @@
 !! centre lies in a body but which has open faces (film cell) hangs on the wall alone.
 module viscous_legs_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, unit_step, side_no_slip, side_slip, side_inflow
+  use grid_m, only: grid_t, unit_step
+  use boundary_kinds_m, only: drags, is_wall
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
@@ -159,13 +160,11 @@ contains
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       if (solid%inside(c(1), c(2), c(3)) /= 0) return
       value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
-      select case (grid%side(s, d))
-      case (side_no_slip, side_inflow)
+      if (drags(grid%side(s, d))) then
         call add_side(self, c, value, grid%side_velocity(:, s, d))
-      case (side_slip)
+      else if (is_wall(grid%side(s, d))) then
         self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
-      case default   ! open sides and outflows hold nothing
-      end select
+      end if
     end subroutine side_leg
   end subroutine legs_of_direction
 

@@ -3,7 +3,8 @@ module face_velocity_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
-  use boundary_m, only: set_side_velocity, gives_pressure
+  use boundary_kinds_m, only: gives_pressure
+  use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity

@@ -11,7 +11,7 @@ module pressure_system_m
   use kinds_m, only: wp, name_length
   use case_types_m, only: numerics_t
   use grid_m, only: grid_t, unit_step
-  use boundary_m, only: gives_pressure
+  use boundary_kinds_m, only: gives_pressure
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, force_from_cells, add_cell_flux
   use outflow_m, only: outflow_t, side_reach

@@ -9,12 +9,10 @@ module krylov_m
   use exact_sum_m, only: exact_dot, exact_dots
   use parallel_m, only: global_max
   use solve_control_m, only: solve_control_t, solve_report_t, solved, not_converged, broken_down
-  use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
+  use linear_operator_m, only: linear_operator_t, preconditioner_t
   implicit none
   private
-  public :: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   public :: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
-  public :: solve_control_t, solve_report_t, solved, not_converged, broken_down
 
   integer, parameter :: worth_threads = 8192   !! fewer cells are the work of one thread
 

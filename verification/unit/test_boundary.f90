@@ -2,10 +2,9 @@
 program test_boundary
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
-  use boundary_kinds_m, only: side_no_slip, side_slip, side_inflow, is_wall
+  use boundary_kinds_m, only: side_no_slip, side_slip, side_inflow, is_wall, gives_pressure
   use grid_m, only: grid_t, grid_init, n_halo
-  use boundary_m, only: fill_scalar_halo, fill_velocity_halo, set_side_velocity, &
-    is_wall, gives_pressure
+  use boundary_m, only: fill_scalar_halo, fill_velocity_halo, set_side_velocity
   use check_m, only: check, finish_checks
   implicit none
   real(wp), parameter :: lid(3) = [0.5_wp, -0.25_wp, 0.0_wp]   !! velocity of a moving wall [m/s]

@@ -5,9 +5,9 @@ program test_krylov
     ieee_set_halting_mode, ieee_set_flag
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab, &
-    preconditioner_t, jacobi_t, identity_t, solve_control_t, solve_report_t, solved, &
-    not_converged, broken_down
+  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
+  use linear_operator_m, only: preconditioner_t, jacobi_t, identity_t
+  use solve_control_m, only: solve_control_t, solve_report_t, solved, not_converged, broken_down
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use parallel_m, only: parallel_init, parallel_final, gather_all

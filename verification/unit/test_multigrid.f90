@@ -5,8 +5,8 @@
 program test_multigrid
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, &
-    solve_control_t, solve_report_t, solved
+  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient
+  use solve_control_m, only: solve_control_t, solve_report_t, solved
   use multigrid_m, only: multigrid_t
   use exact_sum_m, only: exact_dot
   use random_counter_m, only: uniform

@@ -1,7 +1,8 @@
 !> Sealed pockets in a geometry made by hand: two cut cells behind closed faces.
 program test_pockets
   use kinds_m, only: wp
-  use grid_m, only: grid_t, side_open
+  use grid_m, only: grid_t
+  use boundary_kinds_m, only: side_open
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use pockets_m, only: pockets_t, pockets_init, close_pockets
   use box_solid_m, only: simple_grid
