@@ -1,4 +1,5 @@
-!> Blocks at rest sleep, bear what lies on them, and wake by touch, by flow and with a support.
+!> Blocks at rest sleep, bear what lies on them, and wake by touch, by flow and with a support: the
+!! rules one by one, and worlds beside others without sleep.
 program test_sleep
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
@@ -8,6 +9,8 @@ program test_sleep
   use rigid_body_m, only: blocks_t, blocks_init, release_body, kinetic_energy, potential_energy, &
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
+  use springs_m, only: reserve_springs
+  use sleep_m, only: sleep_t, sleep_init, balanced, note_quiet, note_quiet_end, is_tired, know_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -29,8 +32,11 @@ program test_sleep
   integer :: model
 
   call make_shapes()
+  call check_balanced()
+  call check_loads()
   do model = 1, 2
     print '(a)', 'model '''//trim(models(model))//''''
+    call check_quiet()
     call check_rest()
     call check_hit()
     call check_afloat()
@@ -60,6 +66,78 @@ contains
       call make_shape(case%shape(s), shapes(s), message)
     end do
   end subroutine make_shapes
+
+  !> Contact balances all else within a share of one per cent of it, torques within that at the
+  !! reach of the body; without any load only in full.
+  subroutine check_balanced()
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, reach = 0.3_wp
+    real(wp), parameter :: load(3) = [0.0_wp, 6.0_wp, -8.0_wp]   !! of size 10
+    real(wp), parameter :: off(2) = [0.0999_wp, 0.1001_wp]
+
+    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, reach), &
+      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, reach)]))
+    call check('half of it', all([ &
+      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, reach), &
+      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, reach)]))
+    call check('torque', all([balanced(1.0_wp, -load, off(1)*reach*x - 3*x, load, 3*x, reach), &
+      .not. balanced(1.0_wp, -load, off(2)*reach*x - 3*x, load, 3*x, reach)]))
+    call check('no load', all([balanced(1.0_wp, none, none, none, none, reach), &
+      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, reach)]))
+  end subroutine check_balanced
+
+  !> A block is tired that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) without a break; its
+  !! turning counts, and one that is held or not there is never tired.
+  subroutine check_quiet()
+    type(world_t) :: world
+    type(sleep_t) :: sleep
+    real(wp) :: slow, fall
+    integer :: b, n
+    real(wp), parameter :: reach = 0.3_wp
+
+    call new_world(.true., 4, world)
+    call start(world)
+    call sleep_init(.true., spread(reach, 1, 4), sleep)
+    slow = 5.0e-4_wp*sqrt(g*reach)
+    fall = sqrt(reach/g)
+    associate (blocks => world%blocks)
+      blocks%v(1, 1) = 0.99_wp*slow
+      blocks%v(1, 2) = 0.5_wp*slow
+      blocks%omega(2, 2) = 0.49_wp*slow/reach
+      blocks%fixed(3) = .true.
+      blocks%present(4) = .false.
+      do n = 1, 49
+        call note_quiet(world%gravity, 0.101_wp*fall, blocks, sleep)
+      end do
+      call check('not yet', .not. any([(is_tired(world%gravity, b, blocks, sleep), b=1, 4)]))
+      call note_quiet(world%gravity, 0.101_wp*fall, blocks, sleep)
+      call check('tired', all([(is_tired(world%gravity, b, blocks, sleep), b=1, 4)] &
+        .eqv. [.true., .true., .false., .false.]))
+      blocks%omega(2, 2) = 0.51_wp*slow/reach
+      call note_quiet_end(world%gravity, blocks, sleep)
+      call check('turns too fast', sleep%quiet(:2), [5.05_wp*fall, 0.0_wp], 1.0e-13_wp)
+      blocks%v(1, 1) = 1.01_wp*slow
+      call note_quiet(world%gravity, fall, blocks, sleep)
+      call check('moves too fast', sleep%quiet(1), 0.0_wp, 0.0_wp)
+    end associate
+  end subroutine check_quiet
+
+  !> What rests bears on body and partner, on the partner the other way, and on no wall.
+  subroutine check_loads()
+    type(sleep_t) :: sleep
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
+
+    call sleep_init(.true., [1.0_wp, 1.0_wp, 1.0_wp], sleep)
+    call reserve_springs(3, sleep%rest)
+    sleep%rest%n = 3
+    sleep%rest%a(:3) = [1, 2, 3]
+    sleep%rest%b(:3) = [-5, 1, 1]
+    sleep%rest%force(:, :3) = reshape([5*x, 2*x, 3*x], [3, 3])
+    sleep%rest%torque_a(:, :3) = reshape([7*x, 20*x, 30*x], [3, 3])
+    sleep%rest%torque_b(:, :3) = reshape([1000*x, 100*x, 300*x], [3, 3])
+    call know_loads(sleep)
+    call check('forces at rest', sleep%load(1, :), [5.0_wp - 2 - 3, 2.0_wp, 3.0_wp], 0.0_wp)
+    call check('torques at rest', sleep%load_torque(1, :), [407.0_wp, 20.0_wp, 30.0_wp], 0.0_wp)
+  end subroutine check_loads
 
   !> A tank of 1 m with n cubes above one another on its floor.
   subroutine new_world(sleep, n, world)

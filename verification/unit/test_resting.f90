@@ -1,0 +1,182 @@
+!> Who falls asleep and who wakes at the start of a step, and where the springs of its touches go.
+program test_resting
+  use kinds_m, only: wp
+  use check_m, only: check, finish_checks
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init
+  use walls_m, only: walls_t, walls_init
+  use sleep_m, only: know_stillness
+  use contact_partners_m, only: know_partners
+  use touching_m, only: find_touches
+  use contact_state_m, only: contacts_t, contacts_init
+  use resting_m, only: wake_or_sleep
+  implicit none
+
+  !> A ball in balance on the floor, or on another ball that is held, slow for long.
+  type :: world_t
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contacts_t) :: contacts
+  end type world_t
+
+  real(wp), parameter :: r = 0.05_wp          !! of the balls [m]
+  real(wp), parameter :: k_n = 1.0e6_wp       !! of their springs [N/m]
+  real(wp), parameter :: dt = 1.0e-3_wp, gravity(3) = [0.0_wp, 0.0_wp, -10.0_wp]
+  type(shape_t) :: shapes(1)
+  real(wp) :: load                            !! weight of a ball [N]
+
+  call make_ball()
+  call check_balance()
+  call check_touch()
+  call check_springs()
+  call check_held()
+  call finish_checks()
+
+contains
+
+  subroutine make_ball()
+    type(case_t) :: case
+    character(:), allocatable :: message
+
+    allocate (case%shape(1))
+    case%shape(1)%name = 'ball'
+    case%shape(1)%kind = 'sphere'
+    case%shape(1)%size = 2*r
+    call make_shape(case%shape(1), shapes(1), message)
+    load = 10.0_wp*shapes(1)%density*shapes(1)%volume
+  end subroutine make_ball
+
+  !> A ball whose spring carries a part of its weight.
+  subroutine begin(part, support, speed, world)
+    real(wp), intent(in) :: part         !! 1: in balance [-]
+    integer, intent(in) :: support       !! 0: the floor, 1: a ball that is held
+    real(wp), intent(in) :: speed        !! of the support [m/s]
+    type(world_t), intent(out) :: world
+    type(case_t) :: case
+    integer :: b
+
+    case%grid%length = 1.0_wp
+    case%contact%law = 'constants'
+    case%contact%k_n = k_n
+    case%contact%eta_n = 0.0_wp
+    case%contact%eta_t = 0.0_wp
+    if (support == 0) case%boundary%velocity(1, 1, 3) = speed
+    allocate (case%body(1 + support), case%drop(0))
+    case%body%shape = 'ball'
+    do b = 1, 1 + support
+      case%body(b)%position = [0.5_wp, 0.5_wp, r]
+    end do
+    if (support == 1) then
+      case%body(1)%fixed = .true.
+      case%body(1)%velocity(1) = speed
+    end if
+    b = 1 + support
+    case%body(b)%position(3) = r + 2*r*support - part*load/k_n
+    call blocks_init(case, shapes, world%blocks)
+    call walls_init(case%grid, case%boundary, world%walls)
+    call contacts_init(case%contact, world%blocks, world%contacts)
+    call know_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
+    call know_stillness(world%blocks)
+    call find_touches(world%walls, world%blocks, 0.0_wp, world%contacts%touching)
+    world%contacts%sleep%quiet = 1000.0_wp
+  end subroutine begin
+
+  subroutine start_step(world)
+    type(world_t), intent(inout) :: world
+
+    call wake_or_sleep(world%walls, gravity, dt, world%contacts, world%blocks)
+  end subroutine start_step
+
+  !> It sleeps where the forces balance within half a per cent of the load; what the fluid bears
+  !! counts. It wakes where they leave more than one per cent.
+  subroutine check_balance()
+    real(wp), parameter :: off(4) = [-0.0051_wp, -0.0049_wp, 0.0049_wp, 0.0051_wp]
+    type(world_t) :: world
+    integer :: i
+
+    do i = 1, 4
+      call begin(1 + off(i), 0, 0.0_wp, world)
+      call start_step(world)
+      call check('sleeps in balance', world%blocks%asleep(1) .eqv. abs(off(i)) < 0.005_wp)
+      call begin(0.5_wp*(1 + off(i)), 0, 0.0_wp, world)
+      world%contacts%steady(3, 1) = 0.5_wp*load
+      call start_step(world)
+      call check('half afloat', world%blocks%asleep(1) .eqv. abs(off(i)) < 0.005_wp)
+    end do
+    call begin(1.0_wp, 0, 0.0_wp, world)
+    call start_step(world)
+    world%contacts%steady(3, 1) = 0.0099_wp*load
+    call start_step(world)
+    call check('sleeps on', world%blocks%asleep(1))
+    world%contacts%steady(3, 1) = 0.0102_wp*load
+    call start_step(world)
+    call check('wakes', .not. world%blocks%asleep(1))
+    call check('and has to rest anew', world%contacts%sleep%quiet(1), 0.0_wp, 0.0_wp)
+  end subroutine check_balance
+
+  !> What is not tired, or touches nothing, or what is moved, stays awake.
+  subroutine check_touch()
+    type(world_t) :: world
+    integer :: support
+
+    call begin(1.0_wp, 0, 0.0_wp, world)
+    world%contacts%sleep%quiet = 0.0_wp
+    call start_step(world)
+    call check('not tired', .not. world%blocks%asleep(1))
+    call begin(-1.0_wp, 0, 0.0_wp, world)
+    world%contacts%steady(3, 1) = load
+    call start_step(world)
+    call check('afloat', .not. world%blocks%asleep(1))
+    do support = 0, 1
+      call begin(1.0_wp, support, 0.01_wp, world)
+      call start_step(world)
+      call check('on what is moved', .not. world%blocks%asleep(1 + support))
+    end do
+  end subroutine check_touch
+
+  !> The spring of a sleeper rests with the force and the energy of its touch, is told as a partner
+  !! met, and is at work again when the sleeper wakes. What it had of momentum went into the touch.
+  subroutine check_springs()
+    type(world_t) :: world
+    real(wp), parameter :: slow = 1.0e-6_wp   !! [m/s]
+    real(wp) :: energy
+
+    call begin(1.0_wp, 0, 0.0_wp, world)
+    world%blocks%v(1, 1) = slow
+    energy = 0.5_wp*load**2/k_n
+    call start_step(world)
+    associate (contacts => world%contacts, blocks => world%blocks)
+      call check('at rest', all([contacts%springs%n, contacts%sleep%rest%n] == [0, 1]))
+      call check('its force', contacts%sleep%rest%force(:, 1), [0.0_wp, 0.0_wp, load], &
+        1.0e-9_wp*load)
+      call check('its energy', contacts%sleep%rest%energy(1), energy, 1.0e-9_wp*energy)
+      call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
+        1.0e-9_wp*load)
+      call check('no more touches', contacts%touching%touches%n, 0)
+      call check('but a partner', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
+        == [1, 1, -5]))
+      call check('stands', norm2(blocks%v(:, 1)), 0.0_wp, 0.0_wp)
+      call check('its momentum', contacts%loads%impulse(1, 1), -blocks%mass(1)*slow, &
+        1.0e-12_wp*blocks%mass(1)*slow)
+      contacts%steady(1, 1) = 0.1_wp*load
+      call start_step(world)
+      call check('at work again', all([contacts%springs%n, contacts%sleep%rest%n] == [1, 0]))
+      call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp, 0.0_wp)
+      call check('touches again', contacts%touching%touches%n, 1)
+    end associate
+  end subroutine check_springs
+
+  !> A ball on one that is held sleeps, and the one held bears it.
+  subroutine check_held()
+    type(world_t) :: world
+
+    call begin(1.0_wp, 1, 0.0_wp, world)
+    call start_step(world)
+    call check('on a ball that is held', all(world%blocks%asleep .eqv. [.false., .true.]))
+    call check('which bears it', world%contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, -load], &
+      1.0e-9_wp*load)
+  end subroutine check_held
+
+end program test_resting
