@@ -38,7 +38,7 @@ contains
     if (n > 0) call add('tetrahedra overlap at '//to_text(n)//' of their faces')
     if (len(message) > 0) return
     call surface_of_tets(size(point, 2), tet, triangle, triangle_tet)
-    n = bad_edges(triangle)
+    n = bad_edges(size(point, 2), triangle)
     if (n > 0) call add('the surface meets itself along '//to_text(n)//' edges')
     n = pieces(size(point, 2), tet)
     if (n > 1) call add('falls into '//to_text(n)//' separate pieces')
@@ -105,6 +105,7 @@ contains
     real(wp), intent(in) :: point(:, :)
     integer :: n
     type(bins_t) :: bins
+    logical, allocatable :: doubled(:)   ! a point may stand in several bins
     real(wp) :: extent, near
     integer :: c, i, j
 
@@ -112,17 +113,18 @@ contains
     near = same_place*extent
     call bins_build(point - 0.5_wp*near, point + 0.5_wp*near, &
                     extent/real(size(point, 2), wp)**(1.0_wp/3.0_wp), bins)
-    n = 0
+    allocate (doubled(size(point, 2)), source=.false.)
     do c = 1, size(bins%first) - 1
       do i = bins%first(c) + 1, bins%first(c + 1) - 1
         do j = bins%first(c), i - 1
           if (all(abs(point(:, bins%item(i)) - point(:, bins%item(j))) <= near)) then
-            n = n + 1
+            doubled(bins%item(i)) = .true.
             exit
           end if
         end do
       end do
     end do
+    n = count(doubled)
   end function coinciding
 
   !> Faces with two tetrahedra on the same side; of three at one face two are.
@@ -150,16 +152,33 @@ contains
     end do
   end function overlapping_faces
 
-  !> Edges of the surface that do not join just two triangles.
-  pure function bad_edges(triangle) result(n)
+  !> Edges of the surface that do not join just two triangles. They lead from triangle to triangle
+  !! both ways equally often, so one way is enough.
+  pure function bad_edges(n_point, triangle) result(n)
+    integer, intent(in) :: n_point
     integer, intent(in) :: triangle(:, :)
     integer :: n
-    integer, allocatable :: twin(:)
-    integer :: i
+    integer, allocatable :: twin(:), finish(:), next(:), head(:)
+    integer :: i, e, a, g
 
-    allocate (twin(size(triangle)))
+    allocate (twin(size(triangle)), next(size(triangle)))
     call edge_twins([(1 + 3*i, i=0, size(triangle, 2))], reshape(triangle, [size(triangle)]), twin)
-    n = count(twin == 0)
+    finish = reshape(cshift(triangle, 1), [size(triangle)])
+    allocate (head(n_point), source=0)   ! edges are chained by the point where they begin
+    n = 0
+    do e = 1, size(twin)
+      a = triangle(mod(e - 1, 3) + 1, (e - 1)/3 + 1)
+      if (twin(e) > 0 .or. a > finish(e)) cycle
+      g = head(a)
+      do while (g > 0)
+        if (finish(g) == finish(e)) exit
+        g = next(g)
+      end do
+      if (g > 0) cycle
+      next(e) = head(a)
+      head(a) = e
+      n = n + 1
+    end do
   end function bad_edges
 
   !> Parts of the mesh that share no point with one another.

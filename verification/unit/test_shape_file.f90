@@ -345,7 +345,7 @@ contains
     call expect('mics-shape 1 points 8 0 0 0 1 0 0 0 1 0 0 0 1  0 0 0 1 0 0 0 1 0 0 0 -1 ' &
                 //'tets 2 1 2 3 4 5 6 7 8', '3 points stand in the place of another, join them')
     call expect('mics-shape 1 points 6 0 0 0 1 0 0 0 1 0 0 0 1  0 -1 0 0 -.2 -1 ' &
-                //'tets 2 1 2 3 4 1 2 5 6', 'the surface meets itself along 4 edges')
+                //'tets 2 1 2 3 4 1 2 5 6', 'the surface meets itself along 1 edges')
     call expect('mics-shape 1 points 8 0 0 0 1 0 0 0 1 0 0 0 1  2 0 0 3 0 0 2 1 0 2 0 1 ' &
                 //'tets 2 1 2 3 4 5 6 7 8', 'falls into 2 separate pieces')
   end subroutine faults_of_mesh
