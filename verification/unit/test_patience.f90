@@ -1,0 +1,59 @@
+!> The program begins again with a short spin and the same arguments, unless the user has chosen how
+!! threads wait. It calls itself: with arguments it is the program that begins again.
+program test_patience
+  use check_m, only: check, finish_checks
+  use patience_m, only: spin_briefly
+  implicit none
+
+  if (command_argument_count() > 0) then
+    call begin_again()
+  else
+    call check('a short spin', status_of('-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT', 'short'), 0)
+    call check('the user''s policy', &
+      status_of('-u GOMP_SPINCOUNT OMP_WAIT_POLICY=active', 'none'), 0)
+    call check('the user''s count', status_of('-u OMP_WAIT_POLICY GOMP_SPINCOUNT=7', 'count'), 0)
+  end if
+  call finish_checks()
+
+contains
+
+  !> Exit code of this program with arguments, among them one with blanks and one without letters.
+  function status_of(settings, wanted) result(status)
+    character(*), intent(in) :: settings, wanted
+    integer :: status
+    character(4096) :: program
+
+    call get_command_argument(0, program)
+    call execute_command_line('env '//settings//' "'//trim(program)//'" '//wanted &
+      //' "two words" "" > /dev/null', exitstat=status)
+  end function status_of
+
+  !> What a program finds once it has called spin_briefly: a spin that is set only where the user
+  !! has said nothing, far below the 300000 of the library, and its arguments.
+  subroutine begin_again()
+    character(20) :: wanted, count
+    integer :: length, info, spins
+
+    call spin_briefly()
+    call get_command_argument(1, wanted)
+    call get_environment_variable('GOMP_SPINCOUNT', count, status=info)
+    select case (wanted)
+    case ('short')
+      call check('is set', info, 0)
+      read (count, *) spins
+      call check('is short', spins > 0 .and. spins <= 3000)
+    case ('none')
+      call check('is not set', info, 1)
+    case ('count')
+      call check('stays', info == 0 .and. count == '7')
+    case default
+      call check('called as it should be', .false.)
+    end select
+    call check('three arguments', command_argument_count(), 3)
+    call get_command_argument(2, wanted, length)
+    call check('one with a blank', wanted == 'two words' .and. length == 9)
+    call get_command_argument(3, length=length)
+    call check('one without letters', length, 0)
+  end subroutine begin_again
+
+end program test_patience
