@@ -1,5 +1,5 @@
-"""The program holds no fused multiply-add: its results hang on the numbers, not on what the compiler
-happened to fuse (flags `-ffp-contract=off` and, as gcc 12 fuses in straight code all the same,
+"""The program holds no fused multiply-add: its results hang on the numbers, not on what the
+compiler happened to fuse (`-ffp-contract=off` and, as gcc 12 fuses in straight code all the same,
 `-fno-tree-slp-vectorize`)."""
 
 import re
