@@ -12,7 +12,7 @@ module mass_average_m
   use vectors_m, only: cross
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo, unit_step
-  use fields_m, only: flow_t
+  use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
@@ -156,7 +156,7 @@ contains
       if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
       call surface_stress(grid, solid%alpha, rho, flow%mu, flow%u, stage%a_stress)
       call accelerate_cells(grid, dt, flow, stage)
-      flow%u = flow%u + dt*stage%a_stress
+      call add_product(grid, dt, stage%a_stress, flow%u)
       call build_viscous(grid, stage%whole, stage%bodies, rho, flow%mu, dt, stage%viscous)
       call predict_velocity(grid, rho, flow, stage)
       if (stage%implicit_momentum) then   ! the force on a body has no part in advection
@@ -198,7 +198,7 @@ contains
       call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, a%face, &
                              flow%sides)
       call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
-      flow%u = flow%u + dt*a%cell
+      call add_product(grid, dt, a%cell, flow%u)
     end associate
     call fill_velocity_halo(grid, flow%u)
   end subroutine project_mixture

@@ -9,7 +9,7 @@ module monolithic_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo
-  use fields_m, only: flow_t
+  use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, solid_face_flux, nearest_arm
@@ -81,7 +81,7 @@ contains
     end associate
     call surface_stress(grid, solid%alpha, flow%rho, flow%mu, flow%u, stage%a_stress)
     call accelerate_cells(grid, dt, flow, stage)
-    flow%u = flow%u + dt*stage%a_stress
+    call add_product(grid, dt, stage%a_stress, flow%u)
   end subroutine accelerate_fluid
 
   !> The same forces on the bodies.
@@ -152,7 +152,7 @@ contains
       call face_acceleration(grid, weightless, flow%rho, flow%rho, stage%pressure%phi_total, &
                              a%face, flow%sides)
       call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
-      flow%u = flow%u + dt*a%cell
+      call add_product(grid, dt, a%cell, flow%u)
       call impose_rigid_velocity(grid, solid, bodies, mass, flow%u)
       call tie_films(grid, solid, bodies, mass, flow%uf, flow%u, stage%debt%tied)
       if (case%numerics%momentum == 'conservative') then

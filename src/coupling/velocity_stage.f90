@@ -5,7 +5,7 @@ module velocity_stage_m
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: numerics_t
-  use fields_m, only: flow_t
+  use fields_m, only: flow_t, add_product
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
@@ -123,7 +123,7 @@ contains
       stage%c_ismac%a_new = stage%acceleration%cell
       stage%acceleration%cell = stage%c_ismac%a_old
     end if
-    flow%u = flow%u + dt*stage%acceleration%cell
+    call add_product(grid, dt, stage%acceleration%cell, flow%u)
   end subroutine accelerate_cells
 
   !> With C-ISMAC: exchange the acceleration in the cells for that of the density at hand, once the

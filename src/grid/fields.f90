@@ -5,7 +5,7 @@ module fields_m
   use outflow_m, only: outflow_t
   implicit none
   private
-  public :: flow_t, flow_init
+  public :: flow_t, flow_init, add_product
 
   type :: flow_t
     real(wp), allocatable :: u(:, :, :, :)      !! velocity at the cell centre, x y z last [m/s]
@@ -47,5 +47,25 @@ contains
     allocate (flow%rho, source=flow%p)
     allocate (flow%mu, source=flow%p)
   end subroutine flow_init
+
+  !> b := b + s*a in the own cells and the lower faces lo..hi+1, all components.
+  subroutine add_product(grid, s, a, b)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: s
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: b(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, c
+
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, size(b, 4)
+      do k = grid%lo(3), grid%hi(3) + 1
+        do j = grid%lo(2), grid%hi(2) + 1
+          do i = grid%lo(1), grid%hi(1) + 1
+            b(i, j, k, c) = b(i, j, k, c) + s*a(i, j, k, c)
+          end do
+        end do
+      end do
+    end do
+  end subroutine add_product
 
 end module fields_m

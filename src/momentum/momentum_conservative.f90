@@ -76,8 +76,16 @@ contains
     integer :: i, j, k, m
     real(wp) :: least, most
 
-    do m = 1, 3
-      self%momentum(:, :, :, m) = mass_through(fluid, room, liquid)*u(:, :, :, m)
+    !$omp parallel do private(j, m) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do m = 1, 3
+        do j = grid%lo(2), grid%hi(2)
+          associate (a => grid%lo(1), b => grid%hi(1))
+            self%momentum(a:b, j, k, m) = mass_through(fluid, room(a:b, j, k), liquid(a:b, j, k)) &
+                                          *u(a:b, j, k, m)
+          end associate
+        end do
+      end do
     end do
     !$omp parallel do private(i, j, least, most) schedule(static)
     do k = grid%lo(3) - 1, grid%hi(3) + 1
@@ -103,25 +111,37 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
-    integer :: i, j, k, m, e(3)
+    integer :: m
 
-    e = unit_step(:, d)
     call sweep(grid, old, d, transport)
     do m = 1, 3
       call carried_momentum(grid, fluid, transport%volumes, d, u(:, :, :, m), self)
-      !$omp parallel do private(i, j) schedule(static)
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            self%momentum(i, j, k, m) = self%momentum(i, j, k, m) &
-              - (self%carried(i + e(1), j + e(2), k + e(3)) - self%carried(i, j, k))
-          end do
-        end do
-      end do
+      call move_momentum(grid, unit_step(:, d), self%carried, self%momentum(:, :, :, m))
     end do
     call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
                               self%momentum, u)
   end subroutine momentum_sweep
+
+  !> One component of the momentum after what crosses the faces in one direction, e along it.
+  subroutine move_momentum(grid, e, carried, momentum)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: e(3)
+    real(wp), intent(in), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! through the lower faces [kg m/s]
+    real(wp), intent(inout), contiguous :: momentum(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg m/s]
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          momentum(i, j, k) = momentum(i, j, k) &
+                              - (carried(i + e(1), j + e(2), k + e(3)) - carried(i, j, k))
+        end do
+      end do
+    end do
+  end subroutine move_momentum
 
   !> Velocity after the small cells have given what they hold, with the same implicit donor value as
   !! their liquid; moves the volumes of the small cells too (`small_cells`).
@@ -132,9 +152,13 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on return [m/s]
     type(momentum_t), intent(inout) :: self
-    integer :: m, l, at(3)
+    integer :: m, l, k, at(3)
 
-    self%mass = mass_through(fluid, transport%volumes%v, transport%volumes%w)
+    !$omp parallel do schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      self%mass(:, :, k) = mass_through(fluid, transport%volumes%v(:, :, k), &
+                                        transport%volumes%w(:, :, k))
+    end do
     call small_cells(grid, transport)
     associate (small => transport%small, n => transport%small%n_late)
       if (size(self%late) < n) then
@@ -166,15 +190,19 @@ contains
       !! [kg m/s]
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-    integer :: i, j, k
+    integer :: i, j, k, m
     real(wp) :: mass
 
-    !$omp parallel do private(i, j, mass) schedule(static)
+    !$omp parallel do private(i, j, m, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          mass = mass_through(fluid, room(i, j, k), liquid(i, j, k))
-          if (mass > 0.0_wp) u(i, j, k, :) = momentum(i, j, k, :)/mass
+      do m = 1, 3
+        do j = grid%lo(2), grid%hi(2)
+          !$omp simd private(mass)
+          do i = grid%lo(1), grid%hi(1)
+            mass = mass_through(fluid, room(i, j, k), liquid(i, j, k))
+            u(i, j, k, m) = merge(momentum(i, j, k, m)/merge(mass, 1.0_wp, mass > 0.0_wp), &
+                                  u(i, j, k, m), mass > 0.0_wp)
+          end do
         end do
       end do
     end do
@@ -191,31 +219,44 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
       !! one component [m/s]
     type(momentum_t), intent(inout) :: self
-    integer :: i, j, k, e(3)
+
+    associate (e => unit_step(:, d))
+      call face_values(grid, self%scheme, e, volumes%q(:, :, :, d), u, self%carried)
+      call carry_slabs(grid, fluid, e, volumes%q(:, :, :, d), volumes%g(:, :, :, d), &
+                       volumes%v_before, u, self%mixed_near, self%carried)
+    end associate
+  end subroutine carried_momentum
+
+  !> The same in one direction, e along it, from the values on the faces.
+  subroutine carry_slabs(grid, fluid, e, q, g, v, u, near, carried)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    integer, intent(in) :: e(3)
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: q, g, v, u   !! volume and liquid through the faces, open volume [m3], velocity
+    logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! value on the face [m/s], on return momentum through it [kg m/s]
+    integer :: i, j, k
     real(wp) :: donor, room, value
     logical :: forward, mixed
 
-    e = unit_step(:, d)
-    associate (q => volumes%q, g => volumes%g, v => volumes%v_before, &
-               near => self%mixed_near, carried => self%carried)
-      call face_values(grid, self%scheme, e, q(:, :, :, d), u, carried)
-      !$omp parallel do private(i, j, donor, room, value, forward, mixed) schedule(static)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          !$omp simd private(donor, room, value, forward, mixed)
-          do i = grid%lo(1), grid%hi(1) + e(1)
-            forward = q(i, j, k, d) > 0.0_wp
-            donor = merge(u(i - e(1), j - e(2), k - e(3)), u(i, j, k), forward)
-            room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
-            mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
-            value = max(0.0_wp, 1.0_wp - abs(q(i, j, k, d))/max(room, tiny(room))) &
-                    *(carried(i, j, k) - donor)
-            carried(i, j, k) = mass_through(fluid, q(i, j, k, d), g(i, j, k, d)) &
-                               *(donor + merge(0.0_wp, value, mixed))
-          end do
+    !$omp parallel do private(i, j, donor, room, value, forward, mixed) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        !$omp simd private(donor, room, value, forward, mixed)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          forward = q(i, j, k) > 0.0_wp
+          donor = merge(u(i - e(1), j - e(2), k - e(3)), u(i, j, k), forward)
+          room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
+          mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
+          value = max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(room, tiny(room))) &
+                  *(carried(i, j, k) - donor)
+          carried(i, j, k) = mass_through(fluid, q(i, j, k), g(i, j, k)) &
+                             *(donor + merge(0.0_wp, value, mixed))
         end do
       end do
-    end associate
-  end subroutine carried_momentum
+    end do
+  end subroutine carry_slabs
 
 end module momentum_conservative_m

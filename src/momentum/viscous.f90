@@ -38,10 +38,8 @@ contains
     start = bodies%motion
     s_body = bodies%motion
     call velocity_scale(grid, flow%u, bodies, scale)
-    where (self%mass <= 0.0_wp) flow%u = 0.0_wp   ! the wall's; `impose_rigid_velocity` sets them
-    self%s = flow%u
+    call first_guess(grid, self%mass, flow%u, self%s, self%r)
     call apply_viscous(grid, bodies, self, s_body, y_body)
-    self%r = self%mass*flow%u
     call add_side_pull(self)
     do b = 1, bodies%n
       r_body(:, b) = inertial_momentum(bodies, b, self%dt, start(:, b))
@@ -108,6 +106,29 @@ contains
       end do
     end function sum_bodies
   end subroutine solve_viscous
+
+  !> The velocity at hand as the guess s, with its momentum over dt, r; none where the velocity is
+  !! the wall's (`impose_rigid_velocity` sets it).
+  subroutine first_guess(grid, mass, u, s, r)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: u, s, r
+    integer :: i, j, k, c
+
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            u(i, j, k, c) = merge(u(i, j, k, c), 0.0_wp, mass(i, j, k, c) > 0.0_wp)
+            s(i, j, k, c) = u(i, j, k, c)
+            r(i, j, k, c) = mass(i, j, k, c)*u(i, j, k, c)
+          end do
+        end do
+      end do
+    end do
+  end subroutine first_guess
 
   !> What the moving sides pull goes to the right side.
   pure subroutine add_side_pull(self)

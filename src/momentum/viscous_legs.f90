@@ -48,13 +48,30 @@ contains
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
-    self%diagonal = self%diagonal + self%mass
-    where (self%mass > 0.0_wp)
-      self%inverse = 1.0_wp/self%diagonal
-    else where
-      self%inverse = 0.0_wp
-    end where
+    call finish_diagonal(grid, self%mass, self%diagonal, self%inverse)
   end subroutine build_viscous
+
+  !> The masses into the diagonal, and its inverse; zero where there is no unknown.
+  subroutine finish_diagonal(grid, mass, diagonal, inverse)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: diagonal, inverse
+    integer :: i, j, k, c
+
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k, c)
+            inverse(i, j, k, c) = merge(1.0_wp/max(diagonal(i, j, k, c), tiny(1.0_wp)), 0.0_wp, &
+                                        mass(i, j, k, c) > 0.0_wp)
+          end do
+        end do
+      end do
+    end do
+  end subroutine finish_diagonal
 
   !> Mass over dt of component d in each cell; zero where the velocity is the wall's.
   subroutine unknown_masses(grid, solid, rho, dt, d, self)

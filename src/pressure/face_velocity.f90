@@ -150,26 +150,13 @@ contains
       deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     integer :: i, j, k, d, e(3)
-    real(wp) :: nu
 
     do d = 1, 3
       e = unit_step(:, d)
-      !$omp parallel do private(i, j, nu) schedule(static)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          do i = grid%lo(1), grid%hi(1) + e(1)
-            associate (il => i - e(1), jl => j - e(2), kl => k - e(3))
-              nu = face_mean(flow%mu(il, jl, kl), flow%mu(i, j, k)) &
-                   /face_mean(rho(il, jl, kl), rho(i, j, k))
-              flow%uf(i, j, k, d) = face_mean(flow%u(il, jl, kl, d), flow%u(i, j, k, d)) &
-                + face_step(grid, dt, nu)*(a%face(i, j, k, d) - face_mean(a%cell(il, jl, kl, d), &
-                    a%cell(i, j, k, d)))
-              if (present(deviation)) flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
-                + face_step(grid, dt, nu)/dt*deviation(i, j, k, d)
-            end associate
-          end do
-        end do
-      end do
+      call interpolate(grid, dt, e, rho, flow%mu, flow%u(:, :, :, d), a%face(:, :, :, d), &
+                       a%cell(:, :, :, d), flow%uf(:, :, :, d))
+      if (present(deviation)) call add_deviation(grid, dt, e, rho, flow%mu, &
+                                                 deviation(:, :, :, d), flow%uf(:, :, :, d))
       if (.not. grid%periodic(d)) call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
@@ -225,14 +212,67 @@ contains
     end subroutine sides_of_direction
   end subroutine predict_face_velocity
 
-  !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
-  pure function face_step(grid, dt, nu) result(step)
+  !> Velocity of the lower faces in one direction, e along it.
+  subroutine interpolate(grid, dt, e, rho, mu, u, a_face, a_cell, uf)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in) :: nu   !! kinematic viscosity [m2/s]
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: e(3)
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: rho, mu, u, a_face, a_cell
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k
+    real(wp) :: nu, reach
+
+    reach = sum(1.0_wp/grid%h**2)
+    !$omp parallel do private(i, j, nu) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        !$omp simd private(nu)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
+               /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+          uf(i, j, k) = face_mean(u(i - e(1), j - e(2), k - e(3)), u(i, j, k)) &
+            + face_step(dt, nu, reach)*(a_face(i, j, k) &
+                - face_mean(a_cell(i - e(1), j - e(2), k - e(3)), a_cell(i, j, k)))
+        end do
+      end do
+    end do
+  end subroutine interpolate
+
+  !> Add what the faces in one direction differed from their cells.
+  subroutine add_deviation(grid, dt, e, rho, mu, deviation, uf)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: e(3)
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: rho, mu, deviation
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k
+    real(wp) :: nu, reach
+
+    reach = sum(1.0_wp/grid%h**2)
+    !$omp parallel do private(i, j, nu) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        if (.not. any(abs(deviation(grid%lo(1):grid%hi(1) + e(1), j, k)) > 0.0_wp)) cycle
+        !$omp simd private(nu)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
+               /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
+          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, reach)/dt*deviation(i, j, k)
+        end do
+      end do
+    end do
+  end subroutine add_deviation
+
+  !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
+  elemental function face_step(dt, nu, reach) result(step)
+    real(wp), intent(in) :: dt      !! [s]
+    real(wp), intent(in) :: nu      !! kinematic viscosity [m2/s]
+    real(wp), intent(in) :: reach   !! sum of 1/h**2 [1/m2]
     real(wp) :: step
 
-    step = dt/(1.0_wp + 2.0_wp*nu*dt*sum(1.0_wp/grid%h**2))
+    step = dt/(1.0_wp + 2.0_wp*nu*dt*reach)
   end function face_step
 
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
@@ -284,7 +324,7 @@ contains
 
       if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
-      dt_face = face_step(grid, dt, nu)
+      dt_face = face_step(dt, nu, sum(1.0_wp/grid%h**2))
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))

@@ -5,7 +5,7 @@
 module pressure_m
   use kinds_m, only: wp
   use case_types_m, only: numerics_t
-  use fields_m, only: flow_t
+  use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use grid_m, only: grid_t
   use boundary_m, only: fill_scalar_halo
@@ -145,7 +145,7 @@ contains
     end associate
     call fill_scalar_halo(grid, self%phi_pass)
     call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_pass, flow%sides)
-    flow%uf = flow%uf + dt*self%a_pass
+    call add_product(grid, dt, self%a_pass, flow%uf)
     self%phi_total = self%phi_total + self%phi_pass
     associate (op => self%system%operator)
       call force_from_cells(bodies, op%flux, self%phi, grid%lo - 1, op%push)
@@ -163,35 +163,47 @@ contains
     real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flow_t), intent(in) :: flow
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) &
-                                                   - 1:)
+    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
+                                                   grid%lo(3) - 1:)
     real(wp), intent(out) :: largest
+    real(wp) :: worst(1)
+
+    call net_outflow(grid, open, flow%uf, flow%solid_flux, active, outflow, worst(1))
+    call global_max(worst)
+    largest = worst(1)/grid%volume
+  end subroutine divergence
+
+  !> The same on this process; `worst` is the largest outflow [m3/s].
+  subroutine net_outflow(grid, open, uf, solid_flux, active, outflow, worst)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: open, uf, solid_flux
+    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
+                                                   grid%lo(3) - 1:)
+    real(wp), intent(out) :: worst
     integer :: i, j, k
-    real(wp) :: worst(1), a(3)
+    real(wp) :: a(3)
 
     a = grid%area
     worst = 0.0_wp
     !$omp parallel do private(i, j) reduction(max: worst) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
+        !$omp simd
         do i = grid%lo(1), grid%hi(1)
-          outflow(i, j, k) = merge(through(i + 1, j, k, 1) - through(i, j, k, 1) &
-                                   + through(i, j + 1, k, 2) - through(i, j, k, 2) &
-                                   + through(i, j, k + 1, 3) - through(i, j, k, 3), 0.0_wp, &
-                                     active(i, j, k))
-          worst = max(worst, abs(outflow(i, j, k)))
+          outflow(i, j, k) = merge( &
+            (open(i + 1, j, k, 1)*a(1)*uf(i + 1, j, k, 1) + solid_flux(i + 1, j, k, 1)) &
+            - (open(i, j, k, 1)*a(1)*uf(i, j, k, 1) + solid_flux(i, j, k, 1)) &
+            + (open(i, j + 1, k, 2)*a(2)*uf(i, j + 1, k, 2) + solid_flux(i, j + 1, k, 2)) &
+            - (open(i, j, k, 2)*a(2)*uf(i, j, k, 2) + solid_flux(i, j, k, 2)) &
+            + (open(i, j, k + 1, 3)*a(3)*uf(i, j, k + 1, 3) + solid_flux(i, j, k + 1, 3)) &
+            - (open(i, j, k, 3)*a(3)*uf(i, j, k, 3) + solid_flux(i, j, k, 3)), 0.0_wp, &
+            active(i, j, k))
         end do
+        worst = max(worst, maxval(abs(outflow(grid%lo(1):grid%hi(1), j, k))))
       end do
     end do
-    call global_max(worst)
-    largest = worst(1)/grid%volume
-  contains
-    pure function through(i, j, k, d) result(q)
-      integer, intent(in) :: i, j, k, d
-      real(wp) :: q
-
-      q = open(i, j, k, d)*a(d)*flow%uf(i, j, k, d) + flow%solid_flux(i, j, k, d)
-    end function through
-  end subroutine divergence
+  end subroutine net_outflow
 
 end module pressure_m
