@@ -8,9 +8,11 @@ program mics
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, nproc, &
-    set_threads, global_max
+    set_threads
   use patience_m, only: spin_briefly
-  use signals_m, only: catch_signals, signal_caught
+  use signals_m, only: catch_signals
+  use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
+  use timers_m, only: wall_clock
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use case_file_m, only: read_text
   use case_types_m, only: case_t
@@ -36,10 +38,13 @@ program mics
   type(output_t) :: output
   type(step_report_t) :: report
   type(fault_t) :: fault
+  type(stop_requests_t) :: stop_requests
   integer :: code, signal = 0
+  real(wp) :: began   !! wall clock at the start [s]
 
   call spin_briefly()
   call parallel_init()
+  began = wall_clock()
   call read_options()
   call read_and_check()
   call catch_signals()
@@ -49,10 +54,11 @@ program mics
   call open_output(case, parameters(), options, sim%run_state_t, bed, output)
   call stop_on_trouble()
   call write_due_output(sim%run_state_t, report, output)
+  call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
     call find_fault(sim, report, fault)
-    signal = any_signal()
+    signal = stop_asked(stop_requests)
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)
   end do
@@ -63,8 +69,8 @@ program mics
   call close_output(code, sim%run_state_t, report, output)
   call stop_on_trouble()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
-  if (code /= exit_ok) call fatal(code, 'stopped by a signal; the run goes on with'//new_line('a') &
-    //'  '//restart_command(program_name(), nproc(), options, output%restart_file))
+  if (code /= exit_ok) call fatal(code, stop_requests%reason//'; the run goes on with' &
+    //new_line('a')//'  '//restart_command(program_name(), nproc(), options, output%restart_file))
   call parallel_final()
 
 contains
@@ -86,16 +92,6 @@ contains
     allocate (character(length) :: name)
     call get_command_argument(0, name)
   end function program_name
-
-  !> Number of the signal that any process has caught, 0 for none.
-  function any_signal() result(number)
-    integer :: number
-    real(wp) :: caught(1)
-
-    caught = real(signal_caught(), wp)
-    call global_max(caught)
-    number = nint(caught(1))
-  end function any_signal
 
   !> Options that end the program at once, and the number of threads.
   subroutine read_options()

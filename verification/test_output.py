@@ -21,6 +21,7 @@ from shared_runs import SharedRun
 MICS = ROOT / "mics"
 ALONE = Machine(MICS, threads=1)
 CASE = CASES / "ranks" / "coupled.nml"
+LONG = ROOT / "input" / "blocks_coarse.nml"
 GRAVITY = np.array([0.0, 0.0, -9.81])
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
@@ -337,7 +338,17 @@ def test_restart_gives_the_same_bits(wet: Path, tmp_path: Path) -> None:
     assert but_restarts(differences(wet, tmp_path / "copy")) == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+ENDING = [
+    signal.SIGHUP,
+    signal.SIGINT,
+    signal.SIGUSR1,
+    signal.SIGPIPE,
+    signal.SIGTERM,
+    signal.SIGXCPU,
+]
+
+
+@pytest.mark.parametrize("number", ENDING)
 def test_signal(wet: Path, tmp_path: Path, number: int) -> None:
     """A run that is stopped has saved its state and goes on as if nothing had happened."""
     output = tmp_path / "run"
@@ -357,6 +368,50 @@ def test_signal(wet: Path, tmp_path: Path, number: int) -> None:
     again = subprocess.run(command, shell=True, capture_output=True, timeout=300, text=True)
     assert again.returncode == 0, again.stderr
     assert but_restarts(differences(wet, output)) == []
+
+
+def test_stop_file(wet: Path, tmp_path: Path) -> None:
+    """A file `stop` in the folder ends a run like SIGTERM, and does not end the next one."""
+    output = tmp_path / "run"
+    process = start(output)
+    while not has_rows(output, 4) and process.poll() is None:
+        time.sleep(0.002)
+    (output / "stop").touch()
+    said = process.communicate(timeout=60)[1]
+    if process.returncode == 0:
+        pytest.skip("the run was faster than the file")
+    assert process.returncode == 143
+    assert f"stopped by the file '{output}/stop', now removed" in said
+    assert not (output / "stop").exists()
+    command = said.splitlines()[-1].strip()
+    again = subprocess.run(command, shell=True, capture_output=True, timeout=300, text=True)
+    assert again.returncode == 0, again.stderr
+    assert but_restarts(differences(wet, output)) == []
+
+
+def test_max_wall(wet: Path, tmp_path: Path) -> None:
+    """A run ends in good order before its wall time is over, and says how to go on."""
+    output = tmp_path / "run"
+    began = time.monotonic()
+    run = subprocess.run(
+        [MICS, "--max-wall", "0:00:01", "--threads", "1", "--quiet", "--output", output, LONG],
+        capture_output=True,
+        timeout=60,
+        text=True,
+    )
+    assert run.returncode == 143
+    assert "stopped as --max-wall asks" in run.stderr
+    assert time.monotonic() - began < 5.0
+    assert list(output.glob("restart-?.h5"))
+
+
+def test_reader_of_the_table_goes(tmp_path: Path) -> None:
+    """`./mics case.nml | head -1` ends the run in good order."""
+    output = tmp_path / "run"
+    command = f"({MICS} --threads 1 --output {output} {LONG}; echo $? >&2) | head -2"
+    run = subprocess.run(command, shell=True, capture_output=True, timeout=120, text=True)
+    assert run.stderr.split()[-1] == "141", run.stderr
+    assert list(output.glob("restart-?.h5"))
 
 
 def test_how_to_go_on_with_a_case_from_standard_input(tmp_path: Path) -> None:

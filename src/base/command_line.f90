@@ -1,5 +1,6 @@
 !> The options of the program.
 module command_line_m
+  use kinds_m, only: wp
   use errors_m, only: problems_t, to_text
   use value_text_m, only: nearest_name, parse_integer, value_ok
   implicit none
@@ -14,6 +15,7 @@ module command_line_m
     logical :: help = .false.
     character(:), allocatable :: topic       !! what help is wanted on, empty: the options
     integer :: threads = 0           !! 0: not given
+    real(wp) :: max_wall = 0.0_wp    !! wall time given [s], 0: no end
     character(:), allocatable :: case_file   !! empty: standard input
     character(:), allocatable :: restart     !! restart file, empty: not given
     character(:), allocatable :: output      !! folder, empty: as the case says
@@ -24,8 +26,8 @@ module command_line_m
     character(:), allocatable :: text
   end type argument_t
 
-  character(*), parameter :: known(7) = [character(9) :: '--check', '--restart', '--output', &
-    '--threads', '--quiet', '--version', '--help']
+  character(*), parameter :: known(8) = [character(10) :: '--check', '--restart', '--output', &
+    '--threads', '--max-wall', '--quiet', '--version', '--help']
 
 contains
 
@@ -87,7 +89,7 @@ contains
     character(*), intent(in) :: word
 
     select case (word)
-    case ('--restart', '--output', '--threads'); wants_value = .true.
+    case ('--restart', '--output', '--threads', '--max-wall'); wants_value = .true.
     case default; wants_value = .false.
     end select
   end function wants_value
@@ -137,6 +139,7 @@ contains
     case ('--restart'); options%restart = value
     case ('--output'); options%output = value
     case ('--threads'); call take_threads(value, options, problems)
+    case ('--max-wall'); call take_max_wall(value, options, problems)
     case default; error stop 'take_option: an option is known but not handled'
     end select
   end subroutine take_option
@@ -148,6 +151,7 @@ contains
     select case (word)
     case ('--restart'); what = 'a file name'
     case ('--output'); what = 'a folder'
+    case ('--max-wall'); what = 'hours and minutes, HH:MM,'
     case default; what = 'a number'
     end select
   end function what_value
@@ -168,6 +172,39 @@ contains
     end if
   end subroutine take_threads
 
+  !> Hours and minutes, perhaps seconds: 12:00, 0:30, 1:30:00.
+  subroutine take_max_wall(value, options, problems)
+    character(*), intent(in) :: value
+    type(options_t), intent(inout) :: options
+    type(problems_t), intent(inout) :: problems
+    integer, parameter :: most_hours = 100000
+    integer :: colon, again, h, m, s, info(3)
+
+    info = value_ok
+    h = 0
+    m = 0
+    s = 0
+    colon = index(value, ':')
+    again = index(value, ':', back=.true.)
+    if (colon == 0) then
+      info = value_ok + 1
+    else
+      call parse_integer(value(:colon - 1), h, info(1))
+      if (again == colon) then
+        call parse_integer(value(colon + 1:), m, info(2))
+      else
+        call parse_integer(value(colon + 1:again - 1), m, info(2))
+        call parse_integer(value(again + 1:), s, info(3))
+      end if
+    end if
+    if (any(info /= value_ok) .or. h < 0 .or. h > most_hours .or. m < 0 .or. m > 59 &
+        .or. s < 0 .or. s > 59 .or. h + m + s == 0) then
+      call problems%add('--max-wall', value, 'must be a time HH:MM or HH:MM:SS above 0:00')
+    else
+      options%max_wall = 3600.0_wp*h + 60.0_wp*m + s
+    end if
+  end subroutine take_max_wall
+
   !> The command line that goes on from a restart file, as a shell reads it.
   !!
   !! The results of a run that goes on stay in the folder of that file, so `--output` is not said
@@ -183,6 +220,7 @@ contains
     if (processes > 1) command = 'mpirun -n '//to_text(processes)//' '
     command = command//shell_word(program)//' --restart '//shell_word(restart_file)
     if (options%threads > 0) command = command//' --threads '//to_text(options%threads)
+    if (options%max_wall > 0.0_wp) command = command//' --max-wall '//time_text(options%max_wall)
     if (options%quiet) command = command//' --quiet'
     if (len(options%case_file) > 0) then
       command = command//' '//shell_word(options%case_file)
@@ -190,6 +228,19 @@ contains
       command = command//' < CASE   (CASE: the case file, which came on standard input)'
     end if
   end function restart_command
+
+  !> A time as the option takes it, HH:MM or HH:MM:SS.
+  pure function time_text(seconds) result(text)
+    real(wp), intent(in) :: seconds   !! whole seconds
+    character(:), allocatable :: text
+    character(16) :: buffer
+    integer :: s
+
+    s = nint(seconds)
+    write (buffer, '(i0, 2(":", i2.2))') s/3600, modulo(s/60, 60), modulo(s, 60)
+    text = trim(buffer)
+    if (modulo(s, 60) == 0) text = text(:len(text) - 3)
+  end function time_text
 
   !> A word between quotes where a shell would take it apart.
   pure function shell_word(word) result(text)
@@ -226,6 +277,8 @@ contains
       '  --output DIR    folder for the results, instead of the one named in the case', &
       '  --threads N     threads (default OMP_NUM_THREADS, else all cores;', &
       '                  1 for each process under mpirun)', &
+      '  --max-wall HH:MM', &
+      '                  stop in good order before this much wall time has passed', &
       '  --quiet         no progress table', &
       '  --version       version and how the program was built', &
       '  --help [GROUP]  this text, or every variable of a group of the case', &
@@ -233,7 +286,8 @@ contains
       '                  all groups as the page docs/reference.md, or as a JSON schema', &
       '', &
       'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
-      '            130 or 143 ended by a signal after writing a restart file.', &
+      '            130 or 143 ended by a signal, a file named stop in the folder', &
+      '            of the results, or --max-wall; a restart file was written.', &
       '']
     integer :: i
 

@@ -1,5 +1,7 @@
-!> SIGINT and SIGTERM set a flag; the time loop looks at it and ends in good order.
+!> Signals that ask a run to end set a flag; the time loop looks at it and ends in good order.
 !!
+!! They come from the keyboard (SIGINT), from a queue (SIGTERM, SIGUSR1, SIGXCPU), from a terminal
+!! that closes (SIGHUP) or from a reader of the table that has gone (SIGPIPE).
 !! SIGXFSZ, a file beyond the user's limit, is left to the write that then fails: it is trouble with
 !! files like a full disk.
 module signals_m
@@ -11,9 +13,12 @@ module signals_m
   public :: catch_signals, signal_caught
   public :: signal_interrupt, signal_terminate
 
-  integer, parameter :: signal_interrupt = 2    !! the number POSIX systems give SIGINT
-  integer, parameter :: signal_terminate = 15   !! and SIGTERM
-  integer, parameter :: signal_file_size = 25   !! and SIGXFSZ
+  ! The numbers that Linux gives them.
+  integer, parameter :: signal_interrupt = 2    !! SIGINT
+  integer, parameter :: signal_terminate = 15   !! SIGTERM
+  integer, parameter :: signal_file_size = 25   !! SIGXFSZ
+  !> SIGHUP, SIGINT, SIGUSR1, SIGPIPE, SIGTERM and SIGXCPU end a run.
+  integer, parameter :: ends_a_run(6) = [1, signal_interrupt, 10, 13, signal_terminate, 24]
 
   integer(c_int), volatile :: caught = 0
 
@@ -32,9 +37,11 @@ contains
   !> From now on the signals end nothing by themselves. Call it after `parallel_init`.
   subroutine catch_signals()
     type(c_funptr) :: previous
+    integer :: i
 
-    previous = c_signal(int(signal_interrupt, c_int), c_funloc(remember))
-    previous = c_signal(int(signal_terminate, c_int), c_funloc(remember))
+    do i = 1, size(ends_a_run)
+      previous = c_signal(int(ends_a_run(i), c_int), c_funloc(remember))
+    end do
     previous = c_signal(int(signal_file_size, c_int), c_funloc(remember))
   end subroutine catch_signals
 

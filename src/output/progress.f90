@@ -64,7 +64,7 @@ contains
 
     if (.not. self%shown .or. clock%step == self%last_step) return
     self%last_step = clock%step
-    if (modulo(self%lines, lines_per_header) == 0) write (output_unit, '(a)') header(self%fluid)
+    if (modulo(self%lines, lines_per_header) == 0) call say(header(self%fluid), self)
     self%lines = self%lines + 1
     self%last_line = wall_clock()
     released = count(blocks%present)
@@ -82,9 +82,20 @@ contains
       //to_text(blocks%n), moving, count(blocks%asleep), &
       1.0e3_wp*row%max_overlap
     if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') row%liquid_volume_drift
-    write (output_unit, '(2a)') trim(line), time_left(self, clock)
-    flush (output_unit)
+    call say(trim(line)//time_left(self, clock), self)
   end subroutine write_line
+
+  !> One line to whoever reads; nothing more once the reader has gone.
+  subroutine say(line, self)
+    character(*), intent(in) :: line
+    type(progress_t), intent(inout) :: self
+    integer :: info
+
+    if (.not. self%shown) return
+    write (output_unit, '(a)', iostat=info) line
+    if (info == 0) flush (output_unit, iostat=info)
+    self%shown = info == 0
+  end subroutine say
 
   pure function header(fluid) result(line)
     logical, intent(in) :: fluid
@@ -131,7 +142,7 @@ contains
 
   !> Say how the run went.
   subroutine write_summary(self, clock, cells, exit_code, folder)
-    type(progress_t), intent(in) :: self
+    type(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
     integer(i8), intent(in) :: cells   !! of the whole domain
     integer, intent(in) :: exit_code
@@ -151,9 +162,8 @@ contains
     if (self%fluid .and. steps > 0) line = line//', ' &
       //fixed_text(1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), 3)//' us per cell and step'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
-    write (output_unit, '(a)') line
-    write (output_unit, '(2a)') 'results in ', folder
-    flush (output_unit)
+    call say(line, self)
+    call say('results in '//folder, self)
   end subroutine write_summary
 
 end module progress_m
