@@ -29,7 +29,6 @@ src_dir: {root}/src
 output_dir: {site}
 page_dir: {pages}
 media_dir: {root}/docs/figures
-exclude: **/parallel_mpi.f90
 docmark: !
 predocmark: >
 preprocess: false

@@ -71,19 +71,14 @@ class Links:
         path = PurePosixPath(file)
         if file in self.pages:
             return self.pages[file]
-        if path.parts[0] == "src" and path.name not in ("mics.f90", "parallel_mpi.f90"):
-            return f"{IN_SITE}/module/{module_of(path)}.html"
+        if path.parts[0] == "src" and path.name != "mics.f90":
+            return f"{IN_SITE}/module/{path.stem}_m.html"
         if path.parts[0] == "src" and path.name == "mics.f90":
             return f"{IN_SITE}/program/mics.html"
         if path.parts[:2] == ("docs", "figures"):
             return f"{IN_SITE}/media/{path.relative_to('docs/figures')}"
         self.copied.add(file)
         return f"{IN_SITE}/files/{file}"
-
-
-def module_of(path: PurePosixPath) -> str:
-    """The module that a source file holds."""
-    return f"{'parallel' if path.stem == 'parallel_serial' else path.stem}_m"
 
 
 def with_links(page: Page, text: str, links: Links) -> str:

@@ -32,7 +32,9 @@ LAYERS = (
 HEIGHT = {room: height for height, layer in enumerate(LAYERS) for room in layer}
 
 MODULE = re.compile(r"^\s*(?:module|program)\s+(\w+)\s*$", re.MULTILINE | re.IGNORECASE)
-USE = re.compile(r"^\s*use\b(?:\s*,\s*\w+)?\s*(?:::)?\s*(\w+)", re.MULTILINE | re.IGNORECASE)
+USE = re.compile(
+    r"^\s*(?:use\b(?:\s*,\s*\w+)?\s*(?:::)?|submodule\s*\()\s*(\w+)", re.MULTILINE | re.IGNORECASE
+)
 
 Imports = dict[str, set[str]]
 """The files that a file uses, all named from `src`, as in {'case/case_types.f90': {...}}."""
@@ -41,13 +43,13 @@ Imports = dict[str, set[str]]
 def imports(source: Path) -> Imports:
     """Which file uses which; modules from elsewhere, as those of HDF5, are left out.
 
-    Of the twins of one module, with and without MPI, the first by name stands for both.
+    A submodule uses its module.
     """
     texts = {str(p.relative_to(source)): p.read_text() for p in sorted(source.rglob("*.f90"))}
     homes: dict[str, str] = {}
     for file, text in texts.items():
         for name in MODULE.findall(text):
-            homes.setdefault(name.lower(), file)
+            homes[name.lower()] = file
     found: Imports = {}
     for file, text in texts.items():
         used = {homes[name.lower()] for name in USE.findall(text) if name.lower() in homes}

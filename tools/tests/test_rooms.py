@@ -49,6 +49,13 @@ def test_a_use_of_a_room_of_the_same_layer_is_named(tmp_path: Path) -> None:
     assert line.endswith("pressure is not below liquid")
 
 
+def test_a_submodule_uses_its_module(tmp_path: Path) -> None:
+    source = write(tmp_path, base__kinds="", grid__layer="")
+    (source / "base" / "part.f90").write_text("submodule (layer_m) part_m\nend submodule part_m\n")
+    (line,) = rooms.faults(rooms.imports(source))
+    assert line == "base/part.f90 uses grid/layer.f90: grid is not below base"
+
+
 def test_a_circle_is_named(tmp_path: Path) -> None:
     source = write(tmp_path, base__a="b_m", base__b="c_m", base__c="a_m")
     (line,) = rooms.faults(rooms.imports(source))
