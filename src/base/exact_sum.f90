@@ -10,8 +10,10 @@ module exact_sum_m
   implicit none
   private
   public :: exact_sum, exact_sums, exact_dot, exact_dots
-  public :: bin_size, no_terms, exact_add, merge_bins, exact_totals
+  public :: bin_size, no_terms, exact_add, exact_add_columns, merge_bins, exact_totals
+  public :: terms_at_once
 
+  integer, parameter :: terms_at_once = 256    !! for `exact_add_columns`: they stay in the cache
   integer, parameter :: worth_threads = 8192   !! fewer terms are summed by one thread
 
 contains
@@ -84,6 +86,24 @@ contains
       call add_terms(p(:n), bins)
     end do
   end subroutine exact_add
+
+  !> Add the columns of `a` to as many sums kept in bins, which the threads share.
+  subroutine exact_add_columns(a, bins)
+    real(wp), intent(in) :: a(:, :)              !! (terms, sums)
+    integer(i8), intent(inout) :: bins(:, :)     !! (bin_size, sums)
+    integer(i8) :: mine(bin_size, size(a, 2))
+    integer :: m
+
+    do m = 1, size(a, 2)
+      mine(:, m) = no_terms
+      call exact_add(a(:, m), mine(:, m))
+    end do
+    !$omp critical (merge_shared)
+    do m = 1, size(a, 2)
+      call merge_bins(mine(:, m), bins(:, m))
+    end do
+    !$omp end critical (merge_shared)
+  end subroutine exact_add_columns
 
   !> Values of sums kept in bins, over all processes, with one message.
   subroutine exact_totals(bins, s)

@@ -5,28 +5,31 @@
 !! by parts, turn the pressure into the paper's volume integral of -grad p over the body.
 !! Source: Batty, Bertails & Bridson (2007) in the variational form, with exact face areas.
 module rigid_flux_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use vectors_m, only: cross
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side, gives_pressure
   use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: bin_size, no_terms, exact_add_columns, exact_totals, &
+    terms_at_once
   implicit none
   private
   public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux
   public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm
 
+  integer, parameter :: worth_threads = 1000   !! fewer faces or cells are looked at by one thread
+
   type :: rigid_flux_t
     real(wp), allocatable :: s(:, :)
       !! (6, faces of `solid%face`) flux of the unit motions [m2, m3]
     logical, allocatable :: mine(:)          !! (faces) this process adds the face to sums
-    integer, allocatable :: first(:)         !! (bodies + 1) entries of each body in the lists below
+    integer, allocatable :: first(:)
+      !! (bodies + 1) entries of each body in the lists below; held bodies have none
     integer, allocatable :: cell(:, :)
       !! (3, *) own cells with open faces that a body pushes on
-    real(wp), allocatable :: j(:, :)         !! (6, *) net unit fluxes out of the cell [m2, m3]
-    real(wp), allocatable :: work(:, :)      !! (*, 6) terms of the sums
+    real(wp), allocatable :: j(:, :)         !! (*, 6) net unit fluxes out of the cell [m2, m3]
     integer, allocatable :: slot(:, :, :)    !! entry of a cell while the lists are built
   end type rigid_flux_t
 
@@ -43,7 +46,7 @@ contains
     b = grid%last
     allocate (self%slot(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%first(n + 1), source=1)
-    allocate (self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(6, 0), self%work(0, 6))
+    allocate (self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(0, 6))
   end subroutine rigid_flux_init
 
   !> Lever arm from a centre of mass, by the nearest periodic image [m].
@@ -53,10 +56,11 @@ contains
     real(wp) :: arm(3)
 
     arm = x - centre
+    if (.not. any(grid%periodic)) return
     where (grid%periodic) arm = arm - grid%length*anint(arm/grid%length)
   end function nearest_arm
 
-  !> Unit fluxes through the faces, and their net values for the cells that hold fluid.
+  !> Unit fluxes through the faces, and those of free bodies net for the cells that hold fluid.
   subroutine build_rigid_flux(grid, solid, bodies, active, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -64,24 +68,28 @@ contains
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
       !! cell has an open face
     type(rigid_flux_t), intent(inout) :: self
-    integer :: b, m, d, n_entry, entry_of_body
-    integer :: low(3), high(3)
+    integer :: b, m, n_face, n_entry, entry_of_body, high(3)
 
-    call make_room(self, solid%body_face(bodies%n + 1) - 1)
+    n_face = solid%body_face(bodies%n + 1) - 1
+    call make_room(self, n_face)
+    !$omp parallel private(b) if (n_face > worth_threads)
+    do b = 1, bodies%n
+      !$omp do schedule(static)
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        self%mine(m) = owned(grid, solid%face(1:3, m), solid%face(4, m))
+        self%s(:, m) = unit_fluxes(grid, solid, m, bodies%x(:, b))
+      end do
+      !$omp end do nowait
+    end do
+    !$omp end parallel
     n_entry = 0
     do b = 1, bodies%n
       self%first(b) = n_entry + 1
+      if (.not. bodies%free(b)) cycle
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        d = solid%face(4, m)
         high = solid%face(1:3, m)
-        low = high - unit_step(:, d)
-        self%s(:, m) = 0.0_wp
-        self%mine(m) = owned(grid, high, d)
-        if (closed_side(grid, high(d), d)) cycle
-        self%s(1:3, m) = grid%area(d)*solid%face_beta(m)*real(unit_step(:, d), wp)
-        self%s(4:6, m) = cross(nearest_arm(grid, solid%face_centroid(:, m), bodies%x(:, b)), &
-                               self%s(1:3, m))
-        call add_to_cell(low, self%s(:, m))
+        if (closed_side(grid, high(solid%face(4, m)), solid%face(4, m))) cycle
+        call add_to_cell(high - unit_step(:, solid%face(4, m)), self%s(:, m))
         call add_to_cell(high, -self%s(:, m))
       end do
       do entry_of_body = self%first(b), n_entry
@@ -105,11 +113,28 @@ contains
         e = n_entry
         self%slot(c(1), c(2), c(3)) = e
         self%cell(:, e) = c
-        self%j(:, e) = 0.0_wp
+        self%j(e, :) = 0.0_wp
       end if
-      self%j(:, e) = self%j(:, e) + outflow
+      self%j(e, :) = self%j(e, :) + outflow
     end subroutine add_to_cell
   end subroutine build_rigid_flux
+
+  !> Flux of the unit motions of a body with its centre at x through face m, upwards; none through a
+  !! closed side of the domain.
+  pure function unit_fluxes(grid, solid, m, x) result(s)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: m
+    real(wp), intent(in) :: x(3)   !! [m]
+    real(wp) :: s(6)               !! [m2, m3]
+    integer :: d
+
+    d = solid%face(4, m)
+    s = 0.0_wp
+    if (closed_side(grid, solid%face(d, m), d)) return
+    s(1:3) = grid%area(d)*solid%face_beta(m)*real(unit_step(:, d), wp)
+    s(4:6) = cross(nearest_arm(grid, solid%face_centroid(:, m), x), s(1:3))
+  end function unit_fluxes
 
   !> Lists long enough for n_face faces; a face gives at most two cells.
   subroutine make_room(self, n_face)
@@ -117,9 +142,9 @@ contains
     integer, intent(in) :: n_face
 
     if (size(self%s, 2) >= n_face) return
-    deallocate (self%s, self%mine, self%cell, self%j, self%work)
+    deallocate (self%s, self%mine, self%cell, self%j)
     allocate (self%s(6, 2*n_face), self%mine(2*n_face))
-    allocate (self%cell(3, 4*n_face), self%j(6, 4*n_face), self%work(4*n_face, 6))
+    allocate (self%cell(3, 4*n_face), self%j(4*n_face, 6))
   end subroutine make_room
 
   !> A lower face of index i on a side of the domain where no pressure is given: what a body does
@@ -154,16 +179,23 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: self
     real(wp), intent(out), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: b, m, f(4)
+    integer :: b, k, m, f(4)
 
-    flux = 0.0_wp
+    !$omp parallel private(b)
+    !$omp do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      flux(:, :, k, :) = 0.0_wp
+    end do
     do b = 1, bodies%n
+      if (all(abs(bodies%motion(:, b)) <= 0.0_wp)) cycle
+      !$omp do private(f) schedule(static)
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         f = solid%face(:, m)
         flux(f(1), f(2), f(3), f(4)) = flux(f(1), f(2), f(3), f(4)) + &
                                        dot_product(self%s(:, m), bodies%motion(:, b))
       end do
     end do
+    !$omp end parallel
   end subroutine solid_face_flux
 
   !> Force and torque of a cell field of pressure on each body, face by face:
@@ -174,25 +206,36 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    type(rigid_flux_t), intent(inout) :: self
+    type(rigid_flux_t), intent(in) :: self
     real(wp), intent(in), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [Pa], halo filled
     real(wp), intent(out) :: force(:, :)
       !! (6, bodies) force, torque about the centre of mass [N, N m]
     type(outflow_t), intent(in), optional :: sides(2, 3)
-    integer :: b, m, t, f(3), e(3)
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
+    integer :: b, m, n, from, f(3), e(3)
 
+    bins = spread(no_terms, 2, 6*bodies%n)
+    !$omp parallel private(b, m, n, f, e, term) if (solid%body_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
-      t = 0
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        if (.not. self%mine(m)) cycle
-        f = solid%face(1:3, m)
-        e = unit_step(:, solid%face(4, m))
-        t = t + 1
-        self%work(t, :) = self%s(:, m)*(side_value(f - e) - side_value(f))
+      !$omp do schedule(static)
+      do from = solid%body_face(b), solid%body_face(b + 1) - 1, terms_at_once
+        n = 0
+        do m = from, min(from + terms_at_once, solid%body_face(b + 1)) - 1
+          if (.not. self%mine(m)) cycle
+          f = solid%face(1:3, m)
+          e = unit_step(:, solid%face(4, m))
+          n = n + 1
+          term(n, :) = self%s(:, m)*(side_value(f - e) - side_value(f))
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
-      force(:, b) = exact_sums(self%work(1:t, :))
+      !$omp end do nowait
     end do
+    !$omp end parallel
+    call exact_totals(bins, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
     !> Pressure of a cell, or outside the tank; zero outside an open side.
     pure function side_value(c) result(value)
@@ -201,7 +244,7 @@ contains
       integer :: d
 
       value = 0.0_wp
-      if (.not. grid%outside(c)) then
+      if (all(c >= grid%lo .and. c <= grid%hi) .or. .not. grid%outside(c)) then
         value = p(c(1), c(2), c(3))
       else if (present(sides)) then
         d = findloc(grid%beyond(c, [1, 2, 3]), .true., 1)
@@ -213,23 +256,35 @@ contains
   !> Force and torque of a pressure correction that is zero in cells without open faces.
   subroutine force_from_cells(bodies, self, phi, lower, force)
     type(rigid_motion_t), intent(in) :: bodies
-    type(rigid_flux_t), intent(inout) :: self
+    type(rigid_flux_t), intent(in) :: self
     integer, intent(in) :: lower(3)        !! lower bounds of phi
     real(wp), intent(in), contiguous :: phi(lower(1):, lower(2):, lower(3):)   !! [Pa]
     real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
-    integer :: b, e, first, last
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n), term(terms_at_once, 6), pressure
+    integer :: b, e, n, from
 
     force = 0.0_wp
+    bins = spread(no_terms, 2, 6*bodies%n)
+    !$omp parallel private(b, e, n, term, pressure) if (self%first(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
-      first = self%first(b)
-      last = self%first(b + 1) - 1
-      do e = first, last
-        self%work(e - first + 1, :) = self%j(:, e)*phi(self%cell(1, e), self%cell(2, e), &
-                                                       self%cell(3, e))
+      !$omp do schedule(static)
+      do from = self%first(b), self%first(b + 1) - 1, terms_at_once
+        n = min(terms_at_once, self%first(b + 1) - from)
+        do e = 1, n
+          associate (c => self%cell(:, from + e - 1))
+            pressure = phi(c(1), c(2), c(3))
+          end associate
+          term(e, :) = self%j(from + e - 1, :)*pressure
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
-      force(:, b) = exact_sums(self%work(1:last - first + 1, :))
+      !$omp end do nowait
     end do
+    !$omp end parallel
+    call exact_totals(bins, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
   end subroutine force_from_cells
 
   !> Add the flux of given motions of the free bodies to a cell field: y += sum_k J_k a_k.
@@ -245,7 +300,7 @@ contains
       if (.not. bodies%free(b)) cycle
       do e = self%first(b), self%first(b + 1) - 1
         associate (c => self%cell(:, e))
-          y(c(1), c(2), c(3)) = y(c(1), c(2), c(3)) + dot_product(self%j(:, e), a(:, b))
+          y(c(1), c(2), c(3)) = y(c(1), c(2), c(3)) + dot_product(self%j(e, :), a(:, b))
         end associate
       end do
     end do

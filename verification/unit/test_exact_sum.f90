@@ -6,7 +6,7 @@ program test_exact_sum
   use kinds_m, only: wp, i8
   use check_m, only: check, finish_checks
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_dots, exact_add, exact_totals, &
-    merge_bins, no_terms, bin_size
+    exact_add_columns, merge_bins, no_terms, bin_size
   use parallel_m, only: parallel_init, parallel_final, set_threads
   implicit none
   integer, parameter :: n = 20000
@@ -110,8 +110,9 @@ contains
   end subroutine test_exact_cases
 
   subroutine test_columns()
-    real(wp) :: c(500, 3), s(3)
-    integer :: m
+    real(wp) :: c(500, 3), s(3), by_blocks(3)
+    integer(i8) :: bins(bin_size, 3)
+    integer :: m, from
 
     call mixed_numbers(c(:, 1))
     c(:, 2) = -3*c(:, 1)
@@ -121,6 +122,14 @@ contains
       call check('a column is summed like alone', s(m), exact_sum(c(:, m)), 0.0_wp)
     end do
     call check('constant column', s(3), 500.0e-200_wp, 1.0e-213_wp)
+
+    bins = spread(no_terms, 2, 3)
+    !$omp parallel do schedule(dynamic, 1)
+    do from = 1, 500, 70
+      call exact_add_columns(c(from:min(from + 69, 500), :), bins)
+    end do
+    call exact_totals(bins, by_blocks)
+    call check('columns are summed block by block as at once', by_blocks, s, 0.0_wp)
   end subroutine test_columns
 
   !> Dot products leave the halo out and agree with the sum of the products.
