@@ -144,8 +144,7 @@ contains
                dt => sim%clock%dt)
       if (sim%wet) then
         call copy_motion(blocks, sim%stage%bodies)
-        call know_added_mass(grid, case%fluid, sim%solid, sim%stage%bodies, flow%c, &
-                             sim%stage%buoyancy, blocks)
+        call know_added_mass(grid, case%fluid, sim%solid, sim%stage%bodies, flow%c, blocks)
         call note_start(case, grid, sim%solid, flow, sim%stage)
       end if
       call tic(sim%timer_blocks)
@@ -227,7 +226,7 @@ contains
     if (all(sim%felt .or. .not. sim%blocks%present)) return
     call copy_motion(sim%blocks, sim%stage%bodies)
     call displaced_force(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
-                         sim%stage%buoyancy, sim%stage%from_level)
+                         sim%stage%from_level)
     do b = 1, sim%blocks%n
       if (sim%felt(b) .or. .not. sim%blocks%present(b)) cycle
       sim%blocks%fluid_force(:, b) = sim%stage%from_level(1:3, b)

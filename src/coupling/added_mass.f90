@@ -5,7 +5,7 @@ module added_mass_m
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use buoyancy_m, only: buoyancy_t, displaced_t, displaced_fluid
+  use buoyancy_m, only: displaced_t, displaced_fluid
   use rigid_body_m, only: blocks_t
   implicit none
   private
@@ -18,29 +18,31 @@ contains
   !!
   !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
   !! no part. Too large a mass would swing from step to step, hence the limit.
-  subroutine know_added_mass(grid, fluid, solid, bodies, c, buoyancy, blocks)
+  subroutine know_added_mass(grid, fluid, solid, bodies, c, blocks)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
-    type(buoyancy_t), intent(inout) :: buoyancy
     type(blocks_t), intent(inout) :: blocks
     real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
-    type(displaced_t) :: displaced
+    type(displaced_t) :: displaced(bodies%n)
+    logical :: moved(bodies%n)
     real(wp) :: push
     integer :: b
 
-    blocks%added_mass = 0.0_wp
+    moved = .false.
     do b = 1, blocks%n
-      if (.not. blocks%present(b)) cycle
       push = norm2(blocks%contact_force(:, b))
-      if (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity)) cycle
-      displaced = displaced_fluid(grid, fluid, solid, bodies, c, b, buoyancy)
-      blocks%added_mass(b) = min(coefficient*displaced%mass, largest*blocks%mass(b))
+      moved(b) = blocks%present(b) .and. .not. blocks%fixed(b) .and. &
+        .not. (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity))
+    end do
+    displaced = displaced_fluid(grid, fluid, solid, bodies, c, moved)
+    do b = 1, blocks%n
+      blocks%added_mass(b) = min(coefficient*displaced(b)%mass, largest*blocks%mass(b))
     end do
   end subroutine know_added_mass
 

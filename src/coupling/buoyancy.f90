@@ -11,8 +11,7 @@
 !! The same terms make weight and inertia of the fluid those of its true volume, so they close the
 !! momentum of fluid and bodies.
 module buoyancy_m
-  use kinds_m, only: wp
-  use growing_m, only: ensure_rows
+  use kinds_m, only: wp, i8
   use vectors_m, only: cross
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, unit_step
@@ -26,15 +25,11 @@ module buoyancy_m
   use surface_normal_m, only: surface_normal, vertical_of
   use polyhedron_m, only: polyhedron_t, polyhedron_of_box, polyhedron_moments_below, &
                           box_clip_moments_below
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: bin_size, no_terms, exact_add_columns, exact_totals, &
+    terms_at_once
   implicit none
   private
-  public :: buoyancy_t, displaced_t, buoyancy_init
-  public :: displaced_force, displaced_fluid, uncounted_fluid
-
-  type :: buoyancy_t
-    real(wp), allocatable :: work(:, :)   !! (*, 12) terms of the sums
-  end type buoyancy_t
+  public :: displaced_t, displaced_force, displaced_fluid, uncounted_fluid
 
   !> Fluid in the true place of a body.
   type :: displaced_t
@@ -44,32 +39,22 @@ module buoyancy_m
 
 contains
 
-  !> Allocate; the work array grows when a body covers more cells than any before.
-  subroutine buoyancy_init(self)
-    type(buoyancy_t), intent(out) :: self
-
-    allocate (self%work(0, 12))
-  end subroutine buoyancy_init
-
   !> Archimedes' force and torque: minus the weight of the fluid in the true place of each body.
-  subroutine displaced_force(grid, fluid, solid, bodies, c, self, force)
+  subroutine displaced_force(grid, fluid, solid, bodies, c, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
-    type(buoyancy_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies), torque about the centre of mass [N, N m]
-    type(displaced_t) :: displaced
+    type(displaced_t) :: displaced(bodies%n)
     integer :: b
 
-    force = 0.0_wp
+    displaced = displaced_fluid(grid, fluid, solid, bodies, c, bodies%present)
     do b = 1, bodies%n
-      if (.not. bodies%present(b)) cycle
-      displaced = displaced_fluid(grid, fluid, solid, bodies, c, b, self)
-      force(1:3, b) = -displaced%mass*fluid%gravity
-      force(4:6, b) = -cross(displaced%moment, fluid%gravity)
+      force(1:3, b) = -displaced(b)%mass*fluid%gravity
+      force(4:6, b) = -cross(displaced(b)%moment, fluid%gravity)
     end do
   end subroutine displaced_force
 
@@ -77,74 +62,98 @@ contains
   !!
   !! Column d belongs to an acceleration along d: to the pressures at the faces, which it makes,
   !! `lack(:, d)` times it is to be added for the force and torque on the true body.
-  function uncounted_fluid(grid, fluid, solid, bodies, flux, flow, self) result(lack)
+  function uncounted_fluid(grid, fluid, solid, bodies, flux, flow) result(lack)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     type(flow_t), intent(in) :: flow
-    type(buoyancy_t), intent(inout) :: self
     real(wp) :: lack(6, 3, bodies%n)   !! [kg, kg m]
-    type(displaced_t) :: displaced
-    real(wp) :: counted(12)
-    integer :: b, d, n
+    type(displaced_t) :: displaced(bodies%n)
+    real(wp) :: counted(4, 3, bodies%n)
+    integer :: b, d
 
+    displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, bodies%present)
+    counted = mass_at_faces(grid, solid, bodies, flux, flow%rho)
     lack = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, b, self)
-      call ensure_rows(solid%body_face(b + 1) - solid%body_face(b), self%work)
-      n = mass_at_faces(grid, solid, flux, flow%rho, b, self%work)
-      counted = exact_sums(self%work(1:n, :))
       do d = 1, 3
-        lack(1:3, d, b) = (displaced%mass - counted(d))*unit_step(:, d)
-        lack(4:6, d, b) = cross(displaced%moment, real(unit_step(:, d), wp)) &
-                          - counted(3*d + 1:3*d + 3)
+        lack(1:3, d, b) = (displaced(b)%mass - counted(1, d, b))*unit_step(:, d)
+        lack(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) - counted(2:4, d, b)
       end do
     end do
   end function uncounted_fluid
 
-  !> Fluid in the true place of body b.
-  function displaced_fluid(grid, fluid, solid, bodies, c, b, self) result(displaced)
+  !> Fluid in the true place of each body asked for.
+  function displaced_fluid(grid, fluid, solid, bodies, c, wanted) result(displaced)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
-    integer, intent(in) :: b
-    type(buoyancy_t), intent(inout) :: self
-    type(displaced_t) :: displaced
-    real(wp) :: liquid, liquid_moment(3), share, total(4)
-    integer :: m, n, i(3)
+    logical, intent(in) :: wanted(:)   !! (bodies)
+    type(displaced_t) :: displaced(bodies%n)
+    integer(i8) :: bins(bin_size, 4*bodies%n)
+    real(wp) :: term(terms_at_once, 4), total(4*bodies%n)
+    integer :: b, m, n, from, i(3)
 
-    call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), self%work)
-    n = 0
-    do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-      i = solid%cell(:, m)
-      if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
-      share = c(i(1), i(2), i(3))
-      n = n + 1
-      associate (volume => solid%cell_alpha(m)*grid%volume, &
-                 arm => nearest_arm(grid, solid%cell_centroid(:, m), bodies%x(:, b)), &
-                 gas => fluid%gas_density, more => fluid%liquid_density - fluid%gas_density)
-        if (share > pure_share .and. share < 1.0_wp - pure_share) then
-          call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
-                                                       c, i(1), i(2), i(3)), &
-                           share, m, liquid, liquid_moment)
-          liquid_moment = liquid_moment - liquid*(solid%cell_centroid(:, m) - arm)   ! about x
-        else
-          liquid = share*volume
-          liquid_moment = liquid*arm
-        end if
-        self%work(n, 1) = gas*volume + more*liquid
-        self%work(n, 2:4) = gas*volume*arm + more*liquid_moment
-      end associate
+    bins = spread(no_terms, 2, 4*bodies%n)
+    !$omp parallel private(b, m, n, i, term)
+    do b = 1, bodies%n
+      if (.not. wanted(b)) cycle
+      !$omp do schedule(dynamic, 1)
+      do from = solid%body_cell(b), solid%body_cell(b + 1) - 1, terms_at_once
+        n = 0
+        do m = from, min(from + terms_at_once, solid%body_cell(b + 1)) - 1
+          i = solid%cell(:, m)
+          if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+          n = n + 1
+          term(n, :) = fluid_in_cell(grid, fluid, solid, bodies%x(:, b), c, m)
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 4*b - 3:4*b))
+      end do
+      !$omp end do nowait
     end do
-    total = exact_sums(self%work(1:n, 1:4))
-    displaced = displaced_t(total(1), total(2:4))
+    !$omp end parallel
+    call exact_totals(bins, total)
+    do b = 1, bodies%n
+      displaced(b) = displaced_t(total(4*b - 3), total(4*b - 2:4*b))
+    end do
   end function displaced_fluid
+
+  !> Mass and first moment about x of the fluid in entry m of the cells by body.
+  pure function fluid_in_cell(grid, fluid, solid, x, c, m) result(total)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: x(3)   !! centre of mass of the body [m]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: m
+    real(wp) :: total(4)           !! [kg, kg m]
+    real(wp) :: liquid, liquid_moment(3), volume, arm(3), share
+    integer :: i(3)
+
+    i = solid%cell(:, m)
+    share = c(i(1), i(2), i(3))
+    volume = solid%cell_alpha(m)*grid%volume
+    arm = nearest_arm(grid, solid%cell_centroid(:, m), x)
+    if (share > pure_share .and. share < 1.0_wp - pure_share) then
+      call liquid_part(grid, solid, surface_normal(grid, solid, vertical_of(fluid%gravity), &
+                                                   c, i(1), i(2), i(3)), &
+                       share, m, liquid, liquid_moment)
+      liquid_moment = liquid_moment - liquid*(solid%cell_centroid(:, m) - arm)   ! about x
+    else
+      liquid = share*volume
+      liquid_moment = liquid*arm
+    end if
+    associate (gas => fluid%gas_density, more => fluid%liquid_density - fluid%gas_density)
+      total(1) = gas*volume + more*liquid
+      total(2:4) = gas*volume*arm + more*liquid_moment
+    end associate
+  end function fluid_in_cell
 
   !> Volume and first moment in space of what lies below the liquid plane in entry m of the cells by
   !! body: of the tetrahedra that reach into a cut cell, of the whole cell where the body fills it.
@@ -179,37 +188,59 @@ contains
     end if
   end subroutine liquid_part
 
-  !> What the faces count of the fluid in the place of body b, rho_f h times the flux of the unit
-  !! motions: masses along x, y, z, then the torque of a unit acceleration along each.
-  function mass_at_faces(grid, solid, flux, rho, b, term) result(n)
+  !> What the faces count of the fluid in the place of each body present, rho_f h times the flux of
+  !! the unit motions: for an acceleration along each direction mass and torque.
+  function mass_at_faces(grid, solid, bodies, flux, rho) result(counted)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(in) :: b
-    real(wp), intent(inout) :: term(:, :)
-    integer :: n
-    integer :: m, d, f(3), low(3)
-    real(wp) :: column   !! rho_f h: mass per area between two pressures [kg/m2]
+    real(wp) :: counted(4, 3, bodies%n)   !! [kg, kg m]
+    integer(i8) :: bins(bin_size, 12*bodies%n)
+    real(wp) :: term(terms_at_once, 4), total(12*bodies%n)
+    integer :: b, d, m, n, from, row
 
-    n = 0
-    do m = solid%body_face(b), solid%body_face(b + 1) - 1
-      d = solid%face(4, m)
-      f = solid%face(1:3, m)
-      if (.not. flux%mine(m)) cycle
-      low = f - unit_step(:, d)
-      if (low(d) == 0 .and. gives_pressure(grid%side(1, d))) then
-        column = 0.5_wp*rho(f(1), f(2), f(3))*grid%h(d)
-      else if (f(d) == grid%n(d) + 1 .and. gives_pressure(grid%side(2, d))) then
-        column = 0.5_wp*rho(low(1), low(2), low(3))*grid%h(d)
-      else
-        column = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*grid%h(d)
-      end if
-      n = n + 1
-      term(n, :) = 0.0_wp
-      term(n, d) = column*flux%s(d, m)
-      term(n, 3*d + 1:3*d + 3) = column*flux%s(4:6, m)
+    bins = spread(no_terms, 2, 12*bodies%n)
+    !$omp parallel private(b, d, m, n, row, term)
+    do b = 1, bodies%n
+      if (.not. bodies%present(b)) cycle
+      !$omp do schedule(static)
+      do from = solid%body_face(b), solid%body_face(b + 1) - 1, terms_at_once
+        do d = 1, 3
+          n = 0
+          do m = from, min(from + terms_at_once, solid%body_face(b + 1)) - 1
+            if (solid%face(4, m) /= d .or. .not. flux%mine(m)) cycle
+            n = n + 1
+            term(n, :) = mass_between(grid, rho, solid%face(1:3, m), d)*flux%s([d, 4, 5, 6], m)
+          end do
+          row = 12*(b - 1) + 4*(d - 1)
+          call exact_add_columns(term(:n, :), bins(:, row + 1:row + 4))
+        end do
+      end do
+      !$omp end do nowait
     end do
+    !$omp end parallel
+    call exact_totals(bins, total)
+    counted = reshape(total, shape(counted))
   end function mass_at_faces
+
+  !> rho_f h at the lower face of cell f: mass per area between two pressures [kg/m2].
+  pure function mass_between(grid, rho, f, d) result(column)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: f(3), d
+    real(wp) :: column
+    integer :: low(3)
+
+    low = f - unit_step(:, d)
+    if (low(d) == 0 .and. gives_pressure(grid%side(1, d))) then
+      column = 0.5_wp*rho(f(1), f(2), f(3))*grid%h(d)
+    else if (f(d) == grid%n(d) + 1 .and. gives_pressure(grid%side(2, d))) then
+      column = 0.5_wp*rho(low(1), low(2), low(3))*grid%h(d)
+    else
+      column = face_mean(rho(low(1), low(2), low(3)), rho(f(1), f(2), f(3)))*grid%h(d)
+    end if
+  end function mass_between
 
 end module buoyancy_m

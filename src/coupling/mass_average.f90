@@ -53,8 +53,7 @@ contains
     integer :: pass
 
     associate (bodies => stage%bodies, system => stage%pressure%system)
-      call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%buoyancy, &
-                           stage%from_level)
+      call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%from_level)
       call push_bodies(dt, stage%from_level, bodies)
       stage%total = stage%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, stage%rho_mixture)

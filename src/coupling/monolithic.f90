@@ -97,7 +97,7 @@ contains
       call force_from_faces(grid, solid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
       call force_from_tension(grid, solid, bodies, flux, stage%tension, stage%terms, &
                               stage%from_pressure)
-      stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow, stage%buoyancy)
+      stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
       call push_bodies(dt, stage%from_pressure + stage%from_level, bodies)
     end associate

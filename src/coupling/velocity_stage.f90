@@ -13,7 +13,6 @@ module velocity_stage_m
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
                              cell_mean_of_faces
   use momentum_return_m, only: momentum_debt_t, momentum_debt_init
-  use buoyancy_m, only: buoyancy_t, buoyancy_init
   use surface_tension_m, only: surface_tension_t, add_tension
   use film_velocity_m, only: films_t, films_init
   use rigid_body_m, only: blocks_t, space_tensor
@@ -36,7 +35,6 @@ module velocity_stage_m
     logical :: implicit_momentum = .false.         !! advection by C-ISMAC, in the predictor
     type(c_ismac_t) :: c_ismac                     !! allocated for it only
     type(pressure_t) :: pressure
-    type(buoyancy_t) :: buoyancy
     type(surface_tension_t) :: tension
     type(films_t) :: films
     type(acceleration_t) :: acceleration
@@ -75,7 +73,6 @@ contains
     if (stage%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, stage%c_ismac)
     call pressure_init(grid, n, numerics, stage%pressure)
     call acceleration_init(grid, stage%acceleration)
-    call buoyancy_init(stage%buoyancy)
     call films_init(stage%films)
     allocate (stage%from_pressure(6, n), source=0.0_wp)
     allocate (stage%from_level, stage%total, stage%dry_motion, source=stage%from_pressure)

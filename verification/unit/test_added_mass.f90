@@ -1,7 +1,6 @@
 !> Fluid that moves along in an impact: of what is displaced, limited, and none at rest.
 program test_added_mass
   use kinds_m, only: wp
-  use buoyancy_m, only: buoyancy_t, buoyancy_init
   use added_mass_m, only: know_added_mass
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -9,14 +8,12 @@ program test_added_mass
   character(8), parameter :: sides(2, 3) = 'slip'
   real(wp), parameter :: length(3) = [0.12_wp, 0.12_wp, 0.12_wp]   !! [m]
   type(one_body_t) :: block
-  type(buoyancy_t) :: buoyancy
   real(wp) :: displaced, weight
 
   call describe([12, 12, 12], length, sides, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 0.5_wp*length, &
                 block%case)
   block%case%shape(1)%density = 2500.0_wp
   call place(block)
-  call buoyancy_init(buoyancy)
   displaced = block%case%fluid%liquid_density*block%bodies%volume(1)
   weight = block%blocks%mass(1)*norm2(block%case%fluid%gravity)
 
@@ -41,7 +38,7 @@ contains
 
     block%blocks%contact_force(:, 1) = weights*weight*[0.6_wp, 0.0_wp, 0.8_wp]
     call know_added_mass(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         buoyancy, block%blocks)
+                         block%blocks)
     call check(name, block%blocks%added_mass(1), expected, 1.0e-12_wp*displaced)
   end subroutine push
 

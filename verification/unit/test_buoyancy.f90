@@ -7,7 +7,7 @@ program test_buoyancy
   use boundary_m, only: fill_scalar_halo
   use polyhedron_m, only: box_clip_moments_below
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
-  use buoyancy_m, only: buoyancy_t, buoyancy_init, displaced_force, uncounted_fluid
+  use buoyancy_m, only: displaced_force, uncounted_fluid
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -17,7 +17,6 @@ program test_buoyancy
   real(wp), parameter :: length(3) = [0.16_wp, 0.12_wp, 0.18_wp]   !! [m]
   real(wp), parameter :: level = 0.0913_wp                         !! inside a cell [m]
   type(one_body_t) :: block
-  type(buoyancy_t) :: buoyancy
 
   call submerged('hexapod', [0.03_wp, 0.0_wp, 0.0_wp], [0.0771_wp, 0.0611_wp, 0.0829_wp])
   call submerged('box', [0.05_wp, 0.031_wp, 0.043_wp], [0.0771_wp, 0.0037_wp, 0.0829_wp])
@@ -44,7 +43,6 @@ contains
     end do
     call fill_scalar_halo(block%grid, block%flow%c)
     call mix_fluid(block%case%fluid, block%flow)
-    call buoyancy_init(buoyancy)
   end subroutine build
 
   !> All liquid: -rho V g whatever the pose, the direction of gravity and the period; no torque.
@@ -57,13 +55,13 @@ contains
     block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
     weight = block%case%fluid%liquid_density*block%bodies%volume(1)*block%case%fluid%gravity
     call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         buoyancy, force)
+                         force)
     call check(kind//': force', force(1:3, 1), -weight, 1.0e-12_wp*norm2(weight))
     call check(kind//': no torque', norm2(force(4:6, 1)), 0.0_wp, &
                1.0e-12_wp*norm2(weight)*0.05_wp)
     block%bodies%present = .false.
     call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         buoyancy, force)
+                         force)
     call check(kind//': nothing before its release', all(abs(force) <= 0.0_wp))
   end subroutine submerged
 
@@ -78,7 +76,7 @@ contains
     mass = size(1)*size(2)*(block%case%fluid%liquid_density*depth &
                             + block%case%fluid%gas_density*(size(3) - depth))
     call displaced_force(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         buoyancy, force)
+                         force)
     call check('floating box: force', force(1:3, 1), [0.0_wp, 0.0_wp, 9.81_wp*mass], &
                1.0e-12_wp*9.81_wp*mass)
     call check('floating box: no torque', norm2(force(4:6, 1)), 0.0_wp, 1.0e-14_wp)
@@ -110,7 +108,7 @@ contains
       end do
       expected = [-mass*fluid%gravity, -cross(moment, fluid%gravity)]
       weight = norm2(expected(1:3))
-      call displaced_force(block%grid, fluid, solid, block%bodies, block%flow%c, buoyancy, force)
+      call displaced_force(block%grid, fluid, solid, block%bodies, block%flow%c, force)
       call check('through the level: force', force(1:3, 1), expected(1:3), 1.0e-10_wp*weight)
       call check('through the level: torque', force(4:6, 1), expected(4:6), &
                  1.0e-10_wp*weight*0.03_wp)
@@ -124,7 +122,7 @@ contains
       call rigid_flux_init(block%grid, 1, flux)
       call build_rigid_flux(block%grid, solid, block%bodies, active, flux)
       call force_from_faces(block%grid, solid, block%bodies, flux, block%flow%p, by_faces)
-      lack = uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow, buoyancy)
+      lack = uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow)
       force(:, 1) = -matmul(lack(:, :, 1), fluid%gravity)
       call check('faces and correction: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
                  1.0e-10_wp*weight)
