@@ -3,12 +3,12 @@ module painting_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces, clear_legs
   use share_lists_m, only: body_shares_t
   implicit none
   private
-  public :: painting_t, painting_init, find_images, ensure_lists, place_bodies, paint_body
-  public :: shorten_leg
+  public :: painting_t, painting_init, find_images, ensure_lists, place_bodies
+  public :: paint_cells, paint_faces, paint_legs, shorten_leg
 
   real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
 
@@ -16,6 +16,9 @@ module painting_m
   type :: painting_t
     logical, allocatable :: near(:)               !! (n) present and in the cells kept here
     integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by
+    !> Images of body b: `first_image(b):first_image(b+1)-1`; of each (4, *) the cell in the place
+    !! of the body's cell 0, and the number of its first tetrahedron less one.
+    integer, allocatable :: first_image(:), image(:, :)
     !> First and last cell where the solids are kept: own cells and halo, less what is outside.
     integer :: low(3) = 1, high(3) = 0
     !> (2, cells listed) place in the list of the body; number of its first tetrahedron less one.
@@ -34,7 +37,8 @@ contains
     self%high = merge(grid%last, min(grid%last, grid%n), grid%periodic)
     allocate (self%near(n), source=.false.)
     allocate (self%first(3, n), self%last(3, n), source=0)
-    allocate (self%source(2, 0))
+    allocate (self%first_image(n + 1), source=1)
+    allocate (self%image(4, 0), self%source(2, 0))
   end subroutine painting_init
 
   !> Images of body b, a ball at most, that touch the cells kept here.
@@ -81,15 +85,14 @@ contains
     type(body_shares_t), intent(in) :: body(:)
     type(painting_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b, copies, cells, faces, legs, tets, n
+    integer :: b, copies, images, cells, faces, legs, tets, n
 
     n = size(body) + 1
     if (size(solid%body_cell) /= n) then
       deallocate (solid%body_cell, solid%body_face, solid%tets%of_body)
-      allocate (solid%body_cell(n), solid%body_face(n), solid%tets%of_body(n))
+      allocate (solid%body_cell(n), solid%body_face(n), solid%tets%of_body(n), source=1)
     end if
-    solid%body_cell(1) = 1
-    solid%body_face(1) = 1
+    images = 0
     cells = 0
     faces = 0
     legs = 0
@@ -97,11 +100,13 @@ contains
     do b = 1, n - 1
       if (.not. self%near(b)) cycle
       copies = product(self%last(:, b) - self%first(:, b) + 1)
+      images = images + copies
       cells = cells + copies*body(b)%n_cell
       faces = faces + copies*body(b)%n_face
       legs = legs + copies*(body(b)%n_hit + 6*body(b)%n_cell)
       tets = tets + (1 + copies)*size(body(b)%corner, 3)
     end do
+    call ensure_room(images, self%image, rows=4)
     call ensure_room(cells, solid%cell)
     call ensure_room(cells, solid%cell_alpha)
     call ensure_room(cells, solid%cell_centroid)
@@ -121,13 +126,14 @@ contains
     end if
   end subroutine ensure_lists
 
-  !> Tetrahedra of the bodies where they are, in space; those of images elsewhere will follow.
+  !> List the images, and put the tetrahedra in space: first of all bodies where they are, then of
+  !! their images elsewhere.
   pure subroutine place_bodies(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(in) :: self
+    type(painting_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b
+    integer :: b, i, j, k, m, first_tet
 
     solid%tets%of_body(1) = 1
     solid%tets%n = 0
@@ -135,6 +141,27 @@ contains
       if (self%near(b)) call place_tets(grid, body(b), body(b)%base, solid)
       solid%tets%of_body(b + 1) = solid%tets%n + 1
     end do
+    m = 0
+    do b = 1, size(body)
+      self%first_image(b) = m + 1
+      if (.not. self%near(b)) cycle
+      do k = self%first(3, b), self%last(3, b)
+        do j = self%first(2, b), self%last(2, b)
+          do i = self%first(1, b), self%last(1, b)
+            associate (offset => body(b)%base + [i, j, k]*grid%n)
+              first_tet = solid%tets%of_body(b)
+              if (any([i, j, k] /= 0)) then
+                first_tet = solid%tets%n + 1
+                call place_tets(grid, body(b), offset, solid)
+              end if
+              m = m + 1
+              self%image(:, m) = [offset, first_tet - 1]
+            end associate
+          end do
+        end do
+      end do
+    end do
+    self%first_image(size(body) + 1) = m + 1
   end subroutine place_bodies
 
   !> Append the tetrahedra of a body at the place of one image.
@@ -154,86 +181,65 @@ contains
     end do
   end subroutine place_tets
 
-  !> Add one body with all its images.
-  subroutine paint_body(grid, b, body, self, solid)
+  !> Shares of cells, and the centres that are inside.
+  pure subroutine paint_cells(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: b
-    type(body_shares_t), intent(in) :: body
+    type(body_shares_t), intent(in) :: body(:)
     type(painting_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: i, j, k, first_tet
+    integer :: b, image, m, n, i(3)
 
-    solid%body_cell(b + 1) = solid%body_cell(b)
-    solid%body_face(b + 1) = solid%body_face(b)
-    if (.not. self%near(b)) return
-    do k = self%first(3, b), self%last(3, b)
-      do j = self%first(2, b), self%last(2, b)
-        do i = self%first(1, b), self%last(1, b)
-          associate (offset => body%base + [i, j, k]*grid%n)
-            first_tet = solid%tets%of_body(b)
-            if (any([i, j, k] /= 0)) then
-              first_tet = solid%tets%n + 1
-              call place_tets(grid, body, offset, solid)
-            end if
-            call paint_cells(grid, b, body, offset, first_tet, self, solid)
-            call paint_faces(grid, b, body, offset, self, solid)
-            call paint_legs(grid, b, body, offset, self, solid)
-          end associate
+    call clear_cells(solid)
+    n = 0
+    do b = 1, size(body)
+      solid%body_cell(b) = n + 1
+      do image = self%first_image(b), self%first_image(b + 1) - 1
+        do m = 1, body(b)%n_cell
+          i = self%image(1:3, image) + body(b)%cell(:, m)
+          if (any(i < self%low) .or. any(i > self%high)) cycle
+          n = n + 1
+          self%source(:, n) = [m, self%image(4, image)]
+          solid%cell(:, n) = i
+          solid%cell_alpha(n) = body(b)%alpha(m)
+          solid%cell_centroid(:, n) = grid%origin + &
+                                      (real(i - 1, wp) + body(b)%centroid(:, m))*grid%h
+          solid%alpha(i(1), i(2), i(3)) = solid%alpha(i(1), i(2), i(3)) + body(b)%alpha(m)
+          if (body(b)%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) then
+            solid%inside(i(1), i(2), i(3)) = b
+          end if
         end do
       end do
     end do
-  end subroutine paint_body
-
-  !> Shares of cells, and the centres that are inside.
-  subroutine paint_cells(grid, b, body, offset, first_tet, self, solid)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: b
-    type(body_shares_t), intent(in) :: body
-    integer, intent(in) :: offset(3), first_tet
-    type(painting_t), intent(inout) :: self
-    type(solid_geometry_t), intent(inout) :: solid
-    integer :: m, n, i(3)
-
-    n = solid%body_cell(b + 1) - 1
-    do m = 1, body%n_cell
-      i = offset + body%cell(:, m)
-      if (any(i < self%low) .or. any(i > self%high)) cycle
-      n = n + 1
-      self%source(:, n) = [m, first_tet - 1]
-      solid%cell(:, n) = i
-      solid%cell_alpha(n) = body%alpha(m)
-      solid%cell_centroid(:, n) = grid%origin + (real(i - 1, wp) + body%centroid(:, m))*grid%h
-      solid%alpha(i(1), i(2), i(3)) = solid%alpha(i(1), i(2), i(3)) + body%alpha(m)
-      if (body%inside(m) .and. solid%inside(i(1), i(2), i(3)) == 0) then
-        solid%inside(i(1), i(2), i(3)) = b
-      end if
-    end do
-    solid%body_cell(b + 1) = n + 1
+    solid%body_cell(size(body) + 1) = n + 1
   end subroutine paint_cells
 
   !> Shares of faces, with those on the far sides of the domain.
-  subroutine paint_faces(grid, b, body, offset, self, solid)
+  pure subroutine paint_faces(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: b
-    type(body_shares_t), intent(in) :: body
-    integer, intent(in) :: offset(3)
+    type(body_shares_t), intent(in) :: body(:)
     type(painting_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: m, n, f(4)
+    integer :: b, image, m, n, f(4)
 
-    n = solid%body_face(b + 1) - 1
-    do m = 1, body%n_face
-      f = body%face(:, m)
-      f(1:3) = f(1:3) + offset
-      if (.not. kept_face(self, grid, f)) cycle
-      n = n + 1
-      solid%face(:, n) = f
-      solid%face_beta(n) = body%beta(m)
-      solid%face_centroid(:, n) = grid%origin + &
-                                  (real(f(1:3) - 1, wp) + body%face_centroid(:, m))*grid%h
-      solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body%beta(m)
+    call clear_faces(grid, solid)
+    n = 0
+    do b = 1, size(body)
+      solid%body_face(b) = n + 1
+      do image = self%first_image(b), self%first_image(b + 1) - 1
+        do m = 1, body(b)%n_face
+          f = body(b)%face(:, m)
+          f(1:3) = f(1:3) + self%image(1:3, image)
+          if (.not. kept_face(self, grid, f)) cycle
+          n = n + 1
+          solid%face(:, n) = f
+          solid%face_beta(n) = body(b)%beta(m)
+          solid%face_centroid(:, n) = grid%origin + &
+                                      (real(f(1:3) - 1, wp) + body(b)%face_centroid(:, m))*grid%h
+          solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body(b)%beta(m)
+        end do
+      end do
     end do
-    solid%body_face(b + 1) = n + 1
+    solid%body_face(size(body) + 1) = n + 1
   end subroutine paint_faces
 
   !> Is the lower face f of a cell kept? Those on the far sides of the domain are.
@@ -249,29 +255,32 @@ contains
   end function kept_face
 
   !> Nearest hits from both ends of the legs; what lies behind a side of the domain does not count.
-  subroutine paint_legs(grid, b, body, offset, self, solid)
+  pure subroutine paint_legs(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: b
-    type(body_shares_t), intent(in) :: body
-    integer, intent(in) :: offset(3)
+    type(body_shares_t), intent(in) :: body(:)
     type(painting_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: m, f(4)
+    integer :: b, image, m, f(4)
 
-    do m = 1, body%n_hit
-      f = body%hit(:, m)
-      f(1:3) = f(1:3) + offset
-      if (.not. kept_face(self, grid, f)) cycle
-      if (.not. grid%periodic(f(4))) then
-        if (f(f(4)) == 1 .and. body%at(m) < 0.5_wp) cycle
-        if (f(f(4)) == grid%n(f(4)) + 1 .and. body%at(m) > 0.5_wp) cycle
-      end if
-      call shorten_leg(f, body%at(m), b, solid)
+    call clear_legs(solid)
+    do b = 1, size(body)
+      do image = self%first_image(b), self%first_image(b + 1) - 1
+        do m = 1, body(b)%n_hit
+          f = body(b)%hit(:, m)
+          f(1:3) = f(1:3) + self%image(1:3, image)
+          if (.not. kept_face(self, grid, f)) cycle
+          if (.not. grid%periodic(f(4))) then
+            if (f(f(4)) == 1 .and. body(b)%at(m) < 0.5_wp) cycle
+            if (f(f(4)) == grid%n(f(4)) + 1 .and. body(b)%at(m) > 0.5_wp) cycle
+          end if
+          call shorten_leg(f, body(b)%at(m), b, solid)
+        end do
+      end do
     end do
   end subroutine paint_legs
 
   !> Body b meets a leg at a place between 0 (lower centre) and 1.
-  subroutine shorten_leg(f, at, b, solid)
+  pure subroutine shorten_leg(f, at, b, solid)
     integer, intent(in) :: f(4), b
     real(wp), intent(in) :: at
     type(solid_geometry_t), intent(inout) :: solid

@@ -110,11 +110,13 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer :: m, n_stack, d, s, i(3), n(3), f(3)
 
+    !$omp parallel do schedule(static)
+    do m = 1, solid%n_cut
+      self%reached(m) = self%reached(m) .or. &
+                        touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
+    end do
     n_stack = 0
     do m = 1, solid%n_cut
-      if (.not. self%reached(m)) then
-        self%reached(m) = touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
-      end if
       if (.not. self%reached(m)) cycle
       n_stack = n_stack + 1
       self%stack(n_stack) = m

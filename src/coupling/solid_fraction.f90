@@ -7,7 +7,7 @@ module solid_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, clear_solid
+  use solid_geometry_m, only: solid_geometry_t
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_t
@@ -18,7 +18,7 @@ module solid_fraction_m
   use cut_tets_m, only: cut_tets_t, list_cut_tets
   use subcell_shares_m, only: subcell_work_t, count_subcells
   use painting_m, only: painting_t, painting_init, find_images, ensure_lists, place_bodies, &
-    paint_body
+    paint_cells, paint_faces, paint_legs
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
   use pockets_m, only: pockets_t, pockets_init, close_pockets
   implicit none
@@ -70,20 +70,27 @@ contains
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b
 
-    call clear_solid(grid, solid)
     call find_shares(grid, blocks, self)
     call ensure_lists(self%body, self%painting, solid)
     call place_bodies(grid, self%body, self%painting, solid)
-    do b = 1, size(self%body)
-      call paint_body(grid, b, self%body(b), self%painting, solid)
-    end do
+    !$omp parallel sections
+    !$omp section
+    call paint_faces(grid, self%body, self%painting, solid)
     if (self%has_bed) call make_way(size(self%body), solid)
     call finish_faces(solid)
+    !$omp section
+    call paint_cells(grid, self%body, self%painting, solid)
+    !$omp section
+    call paint_legs(grid, self%body, self%painting, solid)
+    !$omp end parallel sections
+    !$omp parallel sections
+    !$omp section
     call finish_cells(grid, solid)
-    call guard_legs(self%painting, solid)
     call tets_of_cut_cells(self%body, self%painting%source, solid)
+    !$omp section
+    call guard_legs(self%painting, solid)
+    !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
   end subroutine update_solid
 

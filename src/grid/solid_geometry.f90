@@ -7,7 +7,8 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, clear_solid, set_faces, no_hit
+  public :: solid_geometry_t, solid_geometry_init, set_faces, no_hit
+  public :: clear_cells, clear_faces, clear_legs
 
   real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
 
@@ -87,25 +88,42 @@ contains
     allocate (solid%leg(4, 0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
-  !> Take away what the lists of the last time say was there.
-  subroutine clear_solid(grid, solid)
-    type(grid_t), intent(in) :: grid
+  !> Take away what the lists of the last time say was there: what bodies fill of cells.
+  pure subroutine clear_cells(solid)
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: m, n
+    integer :: m
 
-    n = size(solid%body_cell)
-    do m = 1, solid%body_cell(n) - 1
+    do m = 1, solid%body_cell(size(solid%body_cell)) - 1
       associate (i => solid%cell(:, m))
         solid%alpha(i(1), i(2), i(3)) = 0.0_wp
         solid%inside(i(1), i(2), i(3)) = 0
         solid%cut(i(1), i(2), i(3)) = 0
       end associate
     end do
-    do m = 1, solid%body_face(n) - 1
+  end subroutine clear_cells
+
+  !> The same of faces, with those of cells closed all round.
+  pure subroutine clear_faces(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m
+
+    do m = 1, solid%body_face(size(solid%body_face)) - 1
       associate (i => solid%face(:, m))
         solid%open(i(1), i(2), i(3), i(4)) = 1.0_wp
       end associate
     end do
+    do m = 1, solid%n_closed
+      call set_faces(grid, solid%closed_cell(:, m), 1.0_wp, solid)
+    end do
+    solid%n_closed = 0
+  end subroutine clear_faces
+
+  !> The same of legs.
+  pure subroutine clear_legs(solid)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m
+
     do m = 1, solid%n_leg
       associate (i => solid%leg(:, m))
         solid%leg_low(i(1), i(2), i(3), i(4)) = no_hit
@@ -114,12 +132,8 @@ contains
         solid%leg_body_high(i(1), i(2), i(3), i(4)) = 0
       end associate
     end do
-    do m = 1, solid%n_closed
-      call set_faces(grid, solid%closed_cell(:, m), 1.0_wp, solid)
-    end do
     solid%n_leg = 0
-    solid%n_closed = 0
-  end subroutine clear_solid
+  end subroutine clear_legs
 
   !> Give the six faces of a cell an open share, as far as they are in the arrays.
   pure subroutine set_faces(grid, cell, open, solid)

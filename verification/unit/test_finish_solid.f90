@@ -2,7 +2,8 @@
 program test_finish_solid
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_solid, no_hit
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces, &
+    no_hit
   use painting_m, only: painting_t, painting_init
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs
   use box_solid_m, only: simple_grid
@@ -37,7 +38,8 @@ program test_finish_solid
              + solid%open(c(1) + 1, c(2), c(3), 1) + solid%open(c(1), c(2) + 1, c(3), 2) &
              + solid%open(c(1), c(2), c(3) + 1, 3), 0.0_wp, 0.0_wp)
   call check('not cut', solid%n_cut, 0)
-  call clear_solid(grid, solid)
+  call clear_cells(solid)
+  call clear_faces(grid, solid)
   call check('nothing is left of it', all(solid%open >= 1.0_wp) .and. all(solid%alpha <= 0.0_wp))
   call shared_cell(0.6_wp, 0.2_wp)
   call finish_cells(grid, solid)
