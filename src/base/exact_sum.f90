@@ -46,30 +46,33 @@ contains
   end function exact_sums
 
   !> Sum of x*y over the inner cells of all processes.
-  function exact_dot(x, y, width) result(s)
+  function exact_dot(x, y, width, line) result(s)
     real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)   !! blocks with halos
     integer, intent(in) :: width   !! halo cells on every side of both
+    integer, intent(in), contiguous, optional :: line(:, :, :)
+      !! (2, j, k) first and last cell of each line that take part, from 1; all if not given
     real(wp) :: s
     integer(i8) :: bins(bin_size, 1)
     real(wp) :: total(1)
 
     bins(:, 1) = no_terms
-    call add_products(x, y, width, bins(:, 1))
+    call add_products(x, y, width, line, bins(:, 1))
     call exact_totals(bins, total)
     s = total(1)
   end function exact_dot
 
   !> Sums of x1*y1 and of x2*y2 over the inner cells of all processes, with one message.
-  function exact_dots(x1, y1, x2, y2, width) result(s)
+  function exact_dots(x1, y1, x2, y2, width, line) result(s)
     real(wp), intent(in), contiguous :: x1(:, :, :), y1(:, :, :), x2(:, :, :), y2(:, :, :)
     integer, intent(in) :: width   !! halo cells on every side of all four
+    integer, intent(in), contiguous, optional :: line(:, :, :)   !! see `exact_dot`
     real(wp) :: s(2)
     integer(i8) :: bins(bin_size, 2)
 
     bins(:, 1) = no_terms
     bins(:, 2) = no_terms
-    call add_products(x1, y1, width, bins(:, 1))
-    call add_products(x2, y2, width, bins(:, 2))
+    call add_products(x1, y1, width, line, bins(:, 1))
+    call add_products(x2, y2, width, line, bins(:, 2))
     call exact_totals(bins, s)
   end function exact_dots
 
@@ -138,20 +141,25 @@ contains
   end subroutine add_column
 
   !> Add the products of the inner cells, plane by plane, on all threads if there are many.
-  subroutine add_products(x, y, width, bins)
+  subroutine add_products(x, y, width, line, bins)
     real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)
     integer, intent(in) :: width
+    integer, intent(in), contiguous, optional :: line(:, :, :)
     integer(i8), intent(inout) :: bins(bin_size)
     integer(i8) :: mine(bin_size)
-    integer :: k, first(3), last(3)
+    integer :: k, first(3), last(3), range(2, size(x, 2))
 
     first = width + 1
     last = shape(x) - width
-    !$omp parallel private(mine) if (product(last - first + 1) > worth_threads)
+    range(1, :) = first(1)
+    range(2, :) = last(1)
+    !$omp parallel private(mine) firstprivate(range) &
+    !$omp if (product(last - first + 1) > worth_threads)
     mine = no_terms
     !$omp do schedule(static)
     do k = first(3), last(3)
-      call add_plane(x(:, :, k), y(:, :, k), first, last, mine)
+      if (present(line)) range = line(:, :, k)
+      call add_plane(x(:, :, k), y(:, :, k), range(:, first(2):last(2)), width, mine)
     end do
     !$omp end do nowait
     !$omp critical (merge_products)
@@ -161,17 +169,19 @@ contains
   end subroutine add_products
 
   !> Add the products of one plane, gathered row by row into chunks.
-  pure subroutine add_plane(x, y, first, last, bins)
+  pure subroutine add_plane(x, y, range, above, bins)
     real(wp), intent(in), contiguous :: x(:, :), y(:, :)
-    integer, intent(in) :: first(3), last(3)   !! inner cells
+    integer, intent(in), contiguous :: range(:, :)   !! (2, rows) first and last cell of each row
+    integer, intent(in) :: above                     !! rows of the halo before them
     integer(i8), intent(inout) :: bins(bin_size)
     real(wp) :: p(chunk_size)
-    integer :: i, j, start, n, held
+    integer :: i, j, row, start, n, held
 
     held = 0
-    do j = first(2), last(2)
-      do start = first(1), last(1), chunk_size
-        n = min(chunk_size, last(1) - start + 1)
+    do row = 1, size(range, 2)
+      j = above + row
+      do start = range(1, row), range(2, row), chunk_size
+        n = min(chunk_size, range(2, row) - start + 1)
         if (held + n > chunk_size) then
           call add_terms(p(:held), bins)
           held = 0

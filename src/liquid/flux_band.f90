@@ -1,6 +1,7 @@
 !> The band of cells around the bodies as a graph: lists of its cells, sorted by connected part.
 !!
-!! Cells are joined by the conductance k of the face between them. A part that a wall or another
+!! Cells are joined by the conductance k of the face between them; as a linear operator the band is
+!! `y_c = sum_f k_f (x_c - x_nb)`. A part that a wall or another
 !! body separates from the rest has a volume balance of its own. Parts reach across processes; they
 !! are numbered by the smallest cell number in them, so the numbering does not depend on the
 !! processes.
@@ -10,16 +11,18 @@ module flux_band_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side
   use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
+  use linear_operator_m, only: linear_operator_t
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
+  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, drop_part, &
+            find_open_lines
 
   !> Work of finding and sorting the parts.
   type :: part_finder_t
     integer, allocatable :: root(:)          !! of a cell: the first of its part on this process
-    integer, allocatable :: group(:)         !! of a cell: 2c - 1 red, 2c black in part c
-    integer, allocatable :: order(:)         !! the cells by group
+    integer, allocatable :: part(:)          !! of a cell: number of its part
+    integer, allocatable :: order(:)         !! the cells by part
     integer, allocatable :: spare(:)
     real(wp), allocatable :: moved(:)
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
@@ -27,31 +30,30 @@ module flux_band_m
     integer(i8), allocatable :: bins(:, :)   !! of the sums
   end type part_finder_t
 
-  type :: flux_band_t
+  type, extends(linear_operator_t) :: flux_band_t
     ! Arrays over cells with one halo cell.
     integer, allocatable :: marked(:, :, :)  !! 1: in the band; 2 while it is marked: holds solid
+    integer, allocatable :: line(:, :, :)    !! (2, j, k) first and last cell of a line that has
+                                             !! an open face, counted from 1 with the halo
     integer, allocatable :: number(:, :, :)  !! place in the list as found, 0: not in it
     integer, allocatable :: label(:, :, :)   !! smallest global cell number of the connected part
     real(wp), allocatable :: k(:, :, :, :)   !! conductance of the lower faces, largest face = 1 [-]
-    real(wp), allocatable :: p(:, :, :)      !! search direction, in the end the potential [V]
 
-    !> The cells, sorted by part; in each part those that the solver eliminates ("red": no two of
-    !! them are neighbours) come first: red cells of part c are `first(2c-1):first(2c)-1`, the
-    !! others, black, `first(2c):first(2c+1)-1`.
+    !> The cells, sorted by part: those of part c are `first(c):first(c+1)-1`.
     integer :: n = 0
     integer, allocatable :: at(:)            !! place in the arrays above with their halo, from 1
     real(wp), allocatable :: r(:)            !! volume balance of the cell [V]
-    real(wp), allocatable :: diagonal(:)     !! sum of the conductances of its faces
     real(wp), allocatable :: open(:)         !! its open volume at the end of the step [V]
 
     !> The connected parts, of all processes.
     integer :: parts = 0
-    integer, allocatable :: first(:)         !! (2 parts + 1)
+    integer, allocatable :: first(:)         !! (parts + 1)
     integer(i8), allocatable :: vents(:)     !! (parts) cells at an open side
+    real(wp), allocatable :: largest(:)      !! (parts) largest |r|, for the user of the band [V]
     real(wp), allocatable :: total(:)        !! (2 parts) sums of r, then of the open volume [V]
-    real(wp), allocatable :: largest(:)      !! (parts) largest |r| [V]
-    logical, allocatable :: active(:)        !! (parts) still to be solved
     type(part_finder_t) :: finder
+  contains
+    procedure :: apply => apply_band
   end type flux_band_t
 
 contains
@@ -67,8 +69,8 @@ contains
     b = grid%hi + 1
     allocate (self%marked(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%number, self%label, source=self%marked)
-    allocate (self%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%line(2, size(self%k, 2), size(self%k, 3)), source=0)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
     allocate (self%at(0))
     call grow_lists(self)
@@ -79,7 +81,7 @@ contains
     integer, intent(in) :: n
     type(flux_band_t), intent(inout) :: self
 
-    allocate (self%first(2*n + 1), self%vents(n), self%total(2*n), self%largest(n), self%active(n))
+    allocate (self%first(n + 1), self%vents(n), self%largest(n), self%total(2*n))
     allocate (self%finder%home(n), self%finder%bins(bin_size, 2*n))
   end subroutine allocate_parts
 
@@ -91,11 +93,10 @@ contains
     call ensure_room(self%n + 1, self%at)
     n = size(self%at)
     call ensure_room(n, self%r)
-    call ensure_room(n, self%diagonal)
     call ensure_room(n, self%open)
     associate (f => self%finder)
       call ensure_room(n, f%root)
-      call ensure_room(n, f%group)
+      call ensure_room(n, f%part)
       call ensure_room(n, f%order)
       call ensure_room(n, f%spare)
       call ensure_room(n, f%moved)
@@ -103,10 +104,10 @@ contains
   end subroutine grow_lists
 
   !> Append a cell to the list; call in the order of the grid.
-  subroutine add_cell(grid, cell, r, diagonal, open, self)
+  subroutine add_cell(grid, cell, r, open, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: cell(3)
-    real(wp), intent(in) :: r, diagonal, open
+    real(wp), intent(in) :: r, open
     type(flux_band_t), intent(inout) :: self
 
     if (self%n == size(self%at)) call grow_lists(self)
@@ -114,7 +115,6 @@ contains
     self%number(cell(1), cell(2), cell(3)) = self%n
     self%at(self%n) = place(grid, cell)
     self%r(self%n) = r
-    self%diagonal(self%n) = diagonal
     self%open(self%n) = open
   end subroutine add_cell
 
@@ -153,15 +153,66 @@ contains
     g = c(1) + grid%n(1)*(c(2) - 1 + grid%n(2)*(c(3) - 1))
   end function global_number
 
-  !> May the solver eliminate this cell? No two such cells are neighbours, periodic ones included.
-  pure function is_red(grid, c) result(red)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: c(3)
-    logical :: red
+  !> y = A x of the conductances; zero outside the sides of the domain.
+  subroutine apply_band(self, x, y)
+    class(flux_band_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: x(:, :, :)
+    real(wp), intent(inout), contiguous :: y(:, :, :)
 
-    red = modulo(sum(c), 2) == 0 .and. &
-          .not. any(grid%periodic .and. modulo(grid%n, 2) == 1 .and. c == grid%n)
-  end function is_red
+    call halo_exchange(x, 1)
+    call seven_points(self%line, self%k, x, y)
+  end subroutine apply_band
+
+  subroutine seven_points(line, cf, x, y)
+    integer, intent(in), contiguous :: line(:, :, :)
+    real(wp), intent(in), contiguous :: cf(:, :, :, :)
+    real(wp), intent(in), contiguous :: x(:, :, :)
+    real(wp), intent(inout), contiguous :: y(:, :, :)
+    integer :: i, j, k
+
+    !$omp parallel do private(i, j) schedule(static)
+    do k = 2, size(x, 3) - 1
+      do j = 2, size(x, 2) - 1
+        do i = line(1, j, k), line(2, j, k)
+          y(i, j, k) = cf(i, j, k, 1)*(x(i, j, k) - x(i - 1, j, k)) &
+                       + cf(i + 1, j, k, 1)*(x(i, j, k) - x(i + 1, j, k)) &
+                       + cf(i, j, k, 2)*(x(i, j, k) - x(i, j - 1, k)) &
+                       + cf(i, j + 1, k, 2)*(x(i, j, k) - x(i, j + 1, k)) &
+                       + cf(i, j, k, 3)*(x(i, j, k) - x(i, j, k - 1)) &
+                       + cf(i, j, k + 1, 3)*(x(i, j, k) - x(i, j, k + 1))
+        end do
+      end do
+    end do
+  end subroutine seven_points
+
+  !> The range of each line in which cells conduct, for the operator and its solver.
+  subroutine find_open_lines(cf, line)
+    real(wp), intent(in), contiguous :: cf(:, :, :, :)   !! of the lower faces, one halo cell
+    integer, intent(inout), contiguous :: line(:, :, :)
+    integer :: i, j, k, n
+
+    n = size(cf, 1) - 1
+    !$omp parallel do private(i, j) schedule(static)
+    do k = 2, size(cf, 3) - 1
+      do j = 2, size(cf, 2) - 1
+        do i = 2, n
+          if (is_open(i, j, k)) exit
+        end do
+        line(1, j, k) = i
+        do i = n, line(1, j, k), -1
+          if (is_open(i, j, k)) exit
+        end do
+        line(2, j, k) = i
+      end do
+    end do
+  contains
+    pure logical function is_open(i, j, k)
+      integer, intent(in) :: i, j, k
+
+      is_open = cf(i, j, k, 1) + cf(i + 1, j, k, 1) + cf(i, j, k, 2) + cf(i, j + 1, k, 2) &
+                + cf(i, j, k, 3) + cf(i, j, k + 1, 3) > 0.0_wp
+    end function is_open
+  end subroutine find_open_lines
 
   !> Find the connected parts, on all processes, and sort the list by them.
   subroutine find_parts(grid, self)
@@ -174,11 +225,10 @@ contains
     call list_parts(grid, self)
     do l = 1, self%n
       c = cell_at(grid, self%at(l))
-      self%finder%group(l) = 2*position(int(self%label(c(1), c(2), c(3)), i8), &
-                                        self%finder%home(1:self%parts))
-      if (is_red(grid, c)) self%finder%group(l) = self%finder%group(l) - 1
+      self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &
+                                     self%finder%home(1:self%parts))
     end do
-    call sort_by_group(self)
+    call sort_by_part(self)
   end subroutine find_parts
 
   !> Join cells of this process across faces with a conductance: `root` of each cell of the list.
@@ -284,7 +334,7 @@ contains
     call global_sum(self%finder%held)
     self%parts = int(sum(self%finder%held))
     if (self%parts > size(self%finder%home)) then
-      deallocate (self%first, self%vents, self%total, self%largest, self%active)
+      deallocate (self%first, self%vents, self%largest, self%total)
       deallocate (self%finder%home, self%finder%bins)
       call allocate_parts(2*self%parts, self)
     end if
@@ -345,37 +395,35 @@ contains
     end do
   end function position
 
-  !> Stable sort of the lists by group; `first` marks where each begins.
-  subroutine sort_by_group(self)
+  !> Stable sort of the lists by part; `first` marks where each begins.
+  subroutine sort_by_part(self)
     type(flux_band_t), intent(inout) :: self
-    integer :: l, g, groups
+    integer :: l, c
 
-    groups = 2*self%parts
-    self%first(1:groups + 1) = 0
+    self%first(1:self%parts + 1) = 0
     do l = 1, self%n
-      self%first(self%finder%group(l) + 1) = self%first(self%finder%group(l) + 1) + 1
+      self%first(self%finder%part(l) + 1) = self%first(self%finder%part(l) + 1) + 1
     end do
     self%first(1) = 1
-    do g = 1, groups
-      self%first(g + 1) = self%first(g + 1) + self%first(g)
+    do c = 1, self%parts
+      self%first(c + 1) = self%first(c + 1) + self%first(c)
     end do
-    do l = self%n, 1, -1   ! from the back, so that a group keeps its order
-      g = self%finder%group(l)
-      self%first(g + 1) = self%first(g + 1) - 1
-      self%finder%order(self%first(g + 1)) = l
+    do l = self%n, 1, -1   ! from the back, so that a part keeps its order
+      c = self%finder%part(l)
+      self%first(c + 1) = self%first(c + 1) - 1
+      self%finder%order(self%first(c + 1)) = l
     end do
-    do g = 1, groups       ! the ends have moved down to the begins
-      self%first(g) = self%first(g + 1)
+    do c = 1, self%parts       ! the ends have moved down to the begins
+      self%first(c) = self%first(c + 1)
     end do
-    self%first(groups + 1) = self%n + 1
+    self%first(self%parts + 1) = self%n + 1
     do l = 1, self%n
       self%finder%spare(l) = self%at(self%finder%order(l))
     end do
     self%at(1:self%n) = self%finder%spare(1:self%n)
     call reorder(self%finder%order(1:self%n), self%finder%moved, self%r)
-    call reorder(self%finder%order(1:self%n), self%finder%moved, self%diagonal)
     call reorder(self%finder%order(1:self%n), self%finder%moved, self%open)
-  end subroutine sort_by_group
+  end subroutine sort_by_part
 
   !> Put a list in a new order.
   pure subroutine reorder(order, moved, list)
@@ -400,7 +448,7 @@ contains
     self%vents(1:n) = 0_i8
     associate (bins => self%finder%bins)
       do c = 1, n
-        associate (a => self%first(2*c - 1), b => self%first(2*c + 1) - 1)
+        associate (a => self%first(c), b => self%first(c + 1) - 1)
           do l = a, b
             if (at_open_side(cell_at(grid, self%at(l)))) self%vents(c) = self%vents(c) + 1_i8
           end do
@@ -429,5 +477,23 @@ contains
       end do
     end function at_open_side
   end subroutine sum_by_part
+
+  !> Take a part out of the system: its faces conduct nothing.
+  subroutine drop_part(grid, c, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c
+    type(flux_band_t), intent(inout) :: self
+    integer :: l, d, at(3), f(3)
+
+    do l = self%first(c), self%first(c + 1) - 1
+      self%r(l) = 0.0_wp
+      at = cell_at(grid, self%at(l))
+      do d = 1, 3
+        f = at + unit_step(:, d)
+        self%k(at(1), at(2), at(3), d) = 0.0_wp
+        self%k(f(1), f(2), f(3), d) = 0.0_wp
+      end do
+    end do
+  end subroutine drop_part
 
 end module flux_band_m

@@ -15,9 +15,11 @@ module open_flux_m
   use boundary_kinds_m, only: is_wall, gives_pressure
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part
-  use flux_potential_m, only: flux_potential_t, solve_potential
-  use solve_control_m, only: solve_control_t
+  use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, &
+                         drop_part, find_open_lines
+  use krylov_m, only: krylov_work_t, krylov_init, conjugate_gradient
+  use multigrid_m, only: multigrid_t
+  use solve_control_m, only: solve_control_t, solve_report_t
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
@@ -26,13 +28,16 @@ module open_flux_m
   real(wp), parameter :: least_open = 1.0e-9_wp   !! mean open share below which a face is closed
 
   type :: open_flux_t
-    type(solve_control_t) :: control = solve_control_t(tolerance=1.0e-12_wp, max_iterations=5000)
+    type(solve_control_t) :: control = solve_control_t(tolerance=1.0e-12_wp, max_iterations=200)
       !! of the volume balance of a cell [V]
     integer :: iterations = 0            !! of the last step
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
     type(flux_band_t) :: band
-    type(flux_potential_t) :: potential
+    type(multigrid_t) :: multigrid
+    type(krylov_work_t) :: work
+    real(wp), allocatable :: rest(:, :, :)   !! r of the cells [V]
+    real(wp), allocatable :: phi(:, :, :)    !! potential, halo filled [V]
   end type open_flux_t
 
 contains
@@ -43,6 +48,10 @@ contains
     type(open_flux_t), intent(out) :: self
 
     call flux_band_init(grid, self%band)
+    call self%multigrid%init(grid)
+    call krylov_init(grid, self%work)
+    allocate (self%rest, source=self%work%r)
+    allocate (self%phi, source=self%work%r)
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
@@ -67,9 +76,8 @@ contains
     if (cells(1) < 0.5_wp) return
     call find_parts(grid, self%band)
     call balance_parts(grid, self)
-    call solve_potential(self%control, self%band, self%potential, self%iterations)
-    self%residual = maxval(self%band%largest(1:self%band%parts))
-    call correct_flux(grid, self%band, q)
+    call solve_potential(self)
+    call correct_flux(grid, self%band, self%phi, q)
   end subroutine find_open_flux
 
   !> Cells with solid at the begin or the end of the step, and the ring around them.
@@ -167,7 +175,7 @@ contains
           outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
                     + (q(i, j, k + 1, 3) - q(i, j, k, 3))
           room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
-          call add_cell(grid, [i, j, k], (room_left - outflow)/grid%volume, diagonal, &
+          call add_cell(grid, [i, j, k], (room_left - outflow)/grid%volume, &
                         1.0_wp - new%alpha(i, j, k), band)
         end do
       end do
@@ -192,20 +200,53 @@ contains
         end if
         self%unmatched = max(self%unmatched, abs(share))
         band%largest(c) = 0.0_wp
-        do l = band%first(2*c - 1), band%first(2*c + 1) - 1
+        do l = band%first(c), band%first(c + 1) - 1
           band%r(l) = band%r(l) - share*band%open(l)
           band%largest(c) = max(band%largest(c), abs(band%r(l)))
         end do
       end do
       call global_max(band%largest(1:band%parts))
-      band%active(1:band%parts) = band%largest(1:band%parts) > self%control%tolerance
+      do c = 1, band%parts
+        if (band%largest(c) <= self%control%tolerance) call drop_part(grid, c, band)
+      end do
     end associate
   end subroutine balance_parts
 
+  !> Solve `sum_f k_f (phi_c - phi_nb) = r_c` on the band; the potential is zero elsewhere.
+  subroutine solve_potential(self)
+    type(open_flux_t), intent(inout) :: self
+    type(solve_report_t) :: report   ! the next step makes good what is left
+
+    self%rest = 0.0_wp
+    self%phi = 0.0_wp
+    call put_list(self%band%n, self%band%at, self%band%r, size(self%rest), self%rest)
+    call find_open_lines(self%band%k, self%band%line)
+    self%work%line = self%band%line
+    call self%multigrid%setup(self%band%k)
+    call conjugate_gradient(self%band, self%multigrid, self%rest, self%phi, self%control, &
+                            report, self%work)
+    call halo_exchange(self%phi, 1)
+    self%iterations = report%iterations
+    self%residual = report%residual
+  end subroutine solve_potential
+
+  !> Put the balances of the cells of the band on the grid.
+  pure subroutine put_list(n, at, list, m, a)
+    integer, intent(in) :: n, at(n), m
+    real(wp), intent(in) :: list(n)
+    real(wp), intent(inout) :: a(m)
+    integer :: l
+
+    do l = 1, n
+      a(at(l)) = list(l)
+    end do
+  end subroutine put_list
+
   !> Take the gradient of the potential from the volumes.
-  subroutine correct_flux(grid, band, q)
+  subroutine correct_flux(grid, band, phi, q)
     type(grid_t), intent(in) :: grid
     type(flux_band_t), intent(in) :: band
+    real(wp), intent(in), contiguous :: phi(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: d, i, j, k, e(3)
 
@@ -215,9 +256,8 @@ contains
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
-            if (.not. band%k(i, j, k, d) > 0.0_wp) cycle
             q(i, j, k, d) = q(i, j, k, d) - grid%volume*band%k(i, j, k, d) &
-                            *(band%p(i, j, k) - band%p(i - e(1), j - e(2), k - e(3)))
+                            *(phi(i, j, k) - phi(i - e(1), j - e(2), k - e(3)))
           end do
         end do
       end do

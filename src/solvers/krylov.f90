@@ -21,6 +21,9 @@ module krylov_m
     real(wp), allocatable, dimension(:, :, :) :: r, z   !! residual, M r
     real(wp), allocatable, dimension(:, :, :) :: p, q   !! direction, A p or A M p
     real(wp), allocatable, dimension(:, :, :) :: shadow, y, t   !! BiCGSTAB: first r, M p, A M r
+    !> First and last cell of each line that take part, (2, j, k), from 1: all if not set otherwise.
+    !! What stands in the others is not touched and must be finite.
+    integer, allocatable :: line(:, :, :)
     logical :: singular = .false.                !! constants are in the null space of the operator
     real(wp), allocatable :: is_open(:, :, :)    !! 1 in own cells with an open face, else 0
     real(wp) :: n_open = 0.0_wp                  !! cells of all processes with an open face
@@ -44,6 +47,9 @@ contains
     allocate (work%y, source=work%r)
     allocate (work%t, source=work%r)
     allocate (work%is_open, source=work%r)
+    allocate (work%line(2, size(work%r, 2), size(work%r, 3)))
+    work%line(1, :, :) = 2
+    work%line(2, :, :) = size(work%r, 1) - 1
   end subroutine krylov_init
 
   !> Find out whether constants are in the null space: no side of the domain with p given.
@@ -76,7 +82,7 @@ contains
         end do
       end do
     end do
-    work%n_open = exact_dot(work%is_open, work%is_open, 1)
+    work%n_open = exact_dot(work%is_open, work%is_open, 1, work%line)
   end subroutine find_null_space
 
   !> Solve A x = b with A and M symmetric and positive (constants excepted, see `find_null_space`).
@@ -99,17 +105,17 @@ contains
       report%info = broken_down
       rz_before = rz
       call prec%apply(work%r, report%residual, work%z)
-      rz = exact_dot(work%r, work%z, 1)
+      rz = exact_dot(work%r, work%z, 1, work%line)
       if (.not. rz > 0.0_wp) exit
       if (report%iterations == 0) then
-        call copy(work%z, work%p)
+        call copy(work%line, work%z, work%p)
       else
-        call new_direction(work%z, rz/rz_before, work%p)
+        call new_direction(work%line, work%z, rz/rz_before, work%p)
       end if
       call op%apply(work%p, work%q)
-      pq = exact_dot(work%p, work%q, 1)
+      pq = exact_dot(work%p, work%q, 1, work%line)
       if (.not. pq > 0.0_wp) exit
-      call step(rz/pq, work%p, work%q, x, work%r, report%residual)
+      call step(work%line, rz/pq, work%p, work%q, x, work%r, report%residual)
       report%iterations = report%iterations + 1
       report%info = solved
     end do
@@ -140,39 +146,40 @@ contains
       if (report%iterations == control%max_iterations) exit
       report%info = broken_down
       ! rho = shadow . r, against the norms of both
-      sums = exact_dots(work%shadow, work%r, work%r, work%r, 1)
+      sums = exact_dots(work%shadow, work%r, work%r, work%r, 1, work%line)
       if (.not. fresh) fresh = abs(sums(1)) <= orthogonal*sqrt(norms(1)*sums(2))
       if (fresh) then
-        call copy(work%r, work%shadow)
-        call copy(work%r, work%p)
+        call copy(work%line, work%r, work%shadow)
+        call copy(work%line, work%r, work%p)
         rho = sums(2)
         norms(1) = sums(2)
         p_max = report%residual
       else
         rho = sums(1)
-        call next_direction(rho/rho_before*alpha/omega, omega, work%r, work%q, work%p, p_max)
+        call next_direction(work%line, rho/rho_before*alpha/omega, omega, work%r, work%q, &
+                            work%p, p_max)
       end if
       if (.not. abs(rho) > 0.0_wp) exit
       call prec%apply(work%p, p_max, work%y)
       call op%apply(work%y, work%q)
-      sums = exact_dots(work%shadow, work%q, work%q, work%q, 1)
+      sums = exact_dots(work%shadow, work%q, work%q, work%q, 1, work%line)
       if (.not. abs(sums(1)) > orthogonal*sqrt(norms(1)*sums(2))) then
         if (fresh) exit
         fresh = .true.
         cycle
       end if
       alpha = rho/sums(1)
-      call step(alpha, work%y, work%q, x, work%r, report%residual)
+      call step(work%line, alpha, work%y, work%q, x, work%r, report%residual)
       report%iterations = report%iterations + 1
       report%info = solved
       if (report%residual <= bound) exit
       report%info = broken_down
       call prec%apply(work%r, report%residual, work%z)
       call op%apply(work%z, work%t)
-      sums = exact_dots(work%t, work%r, work%t, work%t, 1)
+      sums = exact_dots(work%t, work%r, work%t, work%t, 1, work%line)
       if (.not. sums(2) > 0.0_wp) exit
       omega = sums(1)/sums(2)
-      call step(omega, work%z, work%t, x, work%r, report%residual)
+      call step(work%line, omega, work%z, work%t, x, work%r, report%residual)
       fresh = .not. abs(omega) > 0.0_wp
       rho_before = rho
       report%info = solved
@@ -189,18 +196,18 @@ contains
     real(wp), intent(out) :: r_max
     real(wp) :: largest(2)
 
-    largest = [largest_inside(b), largest_inside(x)]
+    largest = [largest_inside(work%line, b), largest_inside(work%line, x)]
     call global_max(largest)
     r_max = largest(1)
-    call copy(b, work%r)
+    call copy(work%line, b, work%r)
     if (largest(2) > 0.0_wp) then
-      call copy(x, work%p)
+      call copy(work%line, x, work%p)
       call op%apply(work%p, work%q)
-      call subtract(1.0_wp, work%q, work%r)
+      call subtract(work%line, 1.0_wp, work%q, work%r)
     end if
     if (work%singular) call remove_mean(work, work%r)
     if (.not. (largest(2) > 0.0_wp .or. work%singular)) return
-    largest(1) = largest_inside(work%r)
+    largest(1) = largest_inside(work%line, work%r)
     call global_max(largest(:1))
     r_max = largest(1)
   end subroutine first_residual
@@ -211,12 +218,14 @@ contains
     real(wp), intent(inout), contiguous :: a(:, :, :)
 
     if (work%n_open > 0.0_wp) then
-      call subtract(exact_dot(a, work%is_open, 1)/work%n_open, work%is_open, a)
+      call subtract(work%line, exact_dot(a, work%is_open, 1, work%line)/work%n_open, &
+                    work%is_open, a)
     end if
   end subroutine remove_mean
 
   !> Largest magnitude in the own cells of this process.
-  function largest_inside(a) result(largest)
+  function largest_inside(line, a) result(largest)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in), contiguous :: a(:, :, :)
     real(wp) :: largest
     integer :: j, k
@@ -226,20 +235,20 @@ contains
     !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
-        largest = max(largest, largest_of(size(a, 1) - 2, a(2:size(a, 1) - 1, j, k)))
+        largest = max(largest, largest_of(a(line(1, j, k):line(2, j, k), j, k)))
       end do
     end do
   end function largest_inside
 
   !> Largest magnitude of a line, in several lanes: a single maximum waits for the one before.
-  pure function largest_of(n, a) result(largest)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: a(n)
+  pure function largest_of(a) result(largest)
+    real(wp), intent(in), contiguous :: a(:)
     real(wp) :: largest
     integer, parameter :: lanes = 16
     real(wp) :: lane(lanes)
-    integer :: i, l
+    integer :: i, l, n
 
+    n = size(a)
     lane = 0.0_wp
     do i = 0, n - lanes, lanes
       do l = 1, lanes
@@ -253,7 +262,8 @@ contains
   end function largest_of
 
   !> b = a in the own cells.
-  subroutine copy(a, b)
+  subroutine copy(line, a, b)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in), contiguous :: a(:, :, :)
     real(wp), intent(inout), contiguous :: b(:, :, :)
     integer :: i, j, k
@@ -262,7 +272,7 @@ contains
     !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
-        do i = 2, size(a, 1) - 1
+        do i = line(1, j, k), line(2, j, k)
           b(i, j, k) = a(i, j, k)
         end do
       end do
@@ -270,7 +280,8 @@ contains
   end subroutine copy
 
   !> b = b - s a in the own cells.
-  subroutine subtract(s, a, b)
+  subroutine subtract(line, s, a, b)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in) :: s
     real(wp), intent(in), contiguous :: a(:, :, :)
     real(wp), intent(inout), contiguous :: b(:, :, :)
@@ -280,7 +291,7 @@ contains
     !$omp if (size(a) > worth_threads)
     do k = 2, size(a, 3) - 1
       do j = 2, size(a, 2) - 1
-        do i = 2, size(a, 1) - 1
+        do i = line(1, j, k), line(2, j, k)
           b(i, j, k) = b(i, j, k) - s*a(i, j, k)
         end do
       end do
@@ -288,7 +299,8 @@ contains
   end subroutine subtract
 
   !> x = x + s p and r = r - s q in the own cells, and the largest |r| of all processes.
-  subroutine step(s, p, q, x, r, r_max)
+  subroutine step(line, s, p, q, x, r, r_max)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in) :: s
     real(wp), intent(in), contiguous :: p(:, :, :), q(:, :, :)
     real(wp), intent(inout), contiguous :: x(:, :, :), r(:, :, :)
@@ -301,11 +313,11 @@ contains
     !$omp if (size(x) > worth_threads)
     do k = 2, size(x, 3) - 1
       do j = 2, size(x, 2) - 1
-        do i = 2, size(x, 1) - 1
+        do i = line(1, j, k), line(2, j, k)
           x(i, j, k) = x(i, j, k) + s*p(i, j, k)
           r(i, j, k) = r(i, j, k) - s*q(i, j, k)
         end do
-        largest = max(largest, largest_of(size(r, 1) - 2, r(2:size(r, 1) - 1, j, k)))
+        largest = max(largest, largest_of(r(line(1, j, k):line(2, j, k), j, k)))
       end do
     end do
     of_all = largest
@@ -314,7 +326,8 @@ contains
   end subroutine step
 
   !> p = z + beta p in the own cells.
-  subroutine new_direction(z, beta, p)
+  subroutine new_direction(line, z, beta, p)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in), contiguous :: z(:, :, :)
     real(wp), intent(in) :: beta
     real(wp), intent(inout), contiguous :: p(:, :, :)
@@ -324,7 +337,7 @@ contains
     !$omp if (size(p) > worth_threads)
     do k = 2, size(p, 3) - 1
       do j = 2, size(p, 2) - 1
-        do i = 2, size(p, 1) - 1
+        do i = line(1, j, k), line(2, j, k)
           p(i, j, k) = z(i, j, k) + beta*p(i, j, k)
         end do
       end do
@@ -332,7 +345,8 @@ contains
   end subroutine new_direction
 
   !> p = r + beta (p - omega q) in the own cells, and the largest |p| of all processes.
-  subroutine next_direction(beta, omega, r, q, p, p_max)
+  subroutine next_direction(line, beta, omega, r, q, p, p_max)
+    integer, intent(in), contiguous :: line(:, :, :)   !! (2, j, k) first and last cell
     real(wp), intent(in) :: beta, omega
     real(wp), intent(in), contiguous :: r(:, :, :), q(:, :, :)
     real(wp), intent(inout), contiguous :: p(:, :, :)
@@ -345,10 +359,10 @@ contains
     !$omp if (size(p) > worth_threads)
     do k = 2, size(p, 3) - 1
       do j = 2, size(p, 2) - 1
-        do i = 2, size(p, 1) - 1
+        do i = line(1, j, k), line(2, j, k)
           p(i, j, k) = r(i, j, k) + beta*(p(i, j, k) - omega*q(i, j, k))
         end do
-        largest = max(largest, largest_of(size(p, 1) - 2, p(2:size(p, 1) - 1, j, k)))
+        largest = max(largest, largest_of(p(line(1, j, k):line(2, j, k), j, k)))
       end do
     end do
     of_all = largest

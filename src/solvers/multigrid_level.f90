@@ -8,6 +8,9 @@
 !! odd and m = 2 for the even cell, so the cells of one colour of a line lie side by side: colour 0
 !! is m = 1 in lines with even j+k and m = 2 in the others. Lines are filled up with empty pairs to
 !! a multiple of eight. All indices are global, so the colours do not depend on the processes.
+!!
+!! Work goes from the first to the last open cell of a line, in whole vectors: a system on few cells
+!! costs what these cost.
 module multigrid_level_m
   use kinds_m, only: wp, sp
   use parallel_m, only: halo_exchange
@@ -29,6 +32,7 @@ module multigrid_level_m
     logical :: paired(3) = .false.     !! directions in which two cells make one of the next level
     logical :: many = .false.          !! cells enough for several threads
     integer :: a(3) = 1, z(3) = 0      !! bounds of the arrays over (p, j, k)
+    integer, allocatable :: line(:, :, :)     !! (2, j, k) first and last pair with work; halo: none
     real(wp), allocatable :: ratio(:, :)      !! (coarse face, d) centre distance to the next one's
     real(wp), allocatable :: cf(:, :, :, :)   !! coefficients of the lower faces; not on the finest
     real(sp), allocatable :: f(:, :, :)       !! cells lo:hi, right side, later the correction
@@ -53,6 +57,8 @@ contains
     pairs = (self%hi(1) + 1)/2 - self%a(1)
     self%z(1) = self%a(1) + vector*((pairs + vector - 1)/vector) + 1
     associate (a => self%a, z => self%z)
+      allocate (self%line(2, a(2):z(2), a(3):z(3)), source=0)
+      self%line(1, :, :) = 1
       allocate (self%x(a(1):z(1), 2, a(2):z(2), a(3):z(3)), source=0.0_sp)
       allocate (self%b, source=self%x)
       allocate (self%s, source=self%x)
@@ -80,7 +86,7 @@ contains
     end do
   end subroutine set_equations
 
-  !> Roots of the diagonal in plane k.
+  !> Roots of the diagonal in plane k, and where its lines have open cells.
   subroutine set_diagonal(self, cf, unit, k)
     type(level_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: cf(self%lo(1) - 1:, self%lo(2) - 1:, self%lo(3) - 1:, :)
@@ -105,8 +111,26 @@ contains
           self%s(p, m, j, k) = merge(1.0_sp/root, 0.0_sp, diagonal > 0.0_sp)
         end do
       end do
+      self%line(:, j, k) = range_of_work(self%a(1), self%t(:, :, j, k))
     end do
   end subroutine set_diagonal
+
+  !> First and last pair of the vectors that hold the open cells of a line; first > last: none.
+  pure function range_of_work(a, t) result(range)
+    integer, intent(in) :: a
+    real(sp), intent(in) :: t(a:, :)   !! roots of the diagonal; pair a lies in the halo
+    integer :: range(2)
+    integer :: p, from, to
+
+    from = ubound(t, 1)
+    to = a
+    do p = a + 1, ubound(t, 1) - 1, vector
+      if (all(t(p:p + vector - 1, :) <= 0.0_sp)) cycle
+      from = min(from, p)
+      to = p + vector - 1
+    end do
+    range = [from, to]
+  end function range_of_work
 
   !> Scaled coefficients of the lower faces of plane k, upper sides of the last cells included.
   !!
@@ -235,6 +259,7 @@ contains
     integer, intent(in) :: j, k
     integer :: m
 
+    if (self%line(1, j, k) > self%line(2, j, k)) return
     call split_line(size(line)/2, line, self%s(:, :, j, k), self%b(:, :, j, k))
     m = 1 + modulo(j + k, 2)
     self%x(:, m, j, k) = self%b(:, m, j, k)
@@ -261,7 +286,11 @@ contains
     real(sp), intent(inout), contiguous :: line(:)   !! two cells for each pair
     integer, intent(in) :: j, k
 
-    call join_line(size(line)/2, self%s(:, :, j, k), self%x(:, :, j, k), line)
+    if (self%line(1, j, k) > self%line(2, j, k)) then
+      line = 0.0_sp
+    else
+      call join_line(size(line)/2, self%s(:, :, j, k), self%x(:, :, j, k), line)
+    end if
   end subroutine unload_line
 
   !> Odd and even cells into one line, scaled.
@@ -283,26 +312,29 @@ contains
     type(level_t), intent(inout) :: self
     integer, intent(in) :: colour, k
 
-    call relax_lines(self%a, self%z, colour, k, self%c, self%b, self%x)
+    call relax_lines(self%a, self%z, colour, k, self%line(:, :, k), self%c, self%b, self%x)
   end subroutine relax_plane
 
-  subroutine relax_lines(a, z, colour, k, c, b, x)
+  subroutine relax_lines(a, z, colour, k, line, c, b, x)
     integer, intent(in) :: a(3), z(3), colour, k
+    integer, intent(in) :: line(2, a(2):z(2))
     real(sp), intent(in) :: c(a(1):z(1), 2, a(2):z(2), a(3):z(3), 3)
     real(sp), intent(in) :: b(a(1):z(1), 2, a(2):z(2), a(3):z(3))
     real(sp), intent(inout) :: x(a(1):z(1), 2, a(2):z(2), a(3):z(3))
-    integer :: p, m, o, j
+    integer :: p, q, m, o, j
 
     do j = a(2) + 1, z(2) - 1
       m = 1 + modulo(j + k + colour, 2)
       o = 3 - m
-      !$omp simd
-      do p = a(1) + 1, z(1) - 1
-        x(p, m, j, k) = b(p, m, j, k) &
-          + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
-          + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
-          + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
-          + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1)
+      do q = line(1, j), line(2, j), vector
+        !$omp simd
+        do p = q, q + vector - 1
+          x(p, m, j, k) = b(p, m, j, k) &
+            + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
+            + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
+            + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
+            + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1)
+        end do
       end do
     end do
   end subroutine relax_lines
@@ -317,7 +349,7 @@ contains
     o = 3 - m
     associate (c => self%c, b => self%b, x => self%x, t => self%t)
       !$omp simd
-      do p = self%a(1) + 1, self%z(1) - 1
+      do p = self%line(1, j, k), self%line(2, j, k)
         r(p) = r(p) + t(p, m, j, k)*((b(p, m, j, k) - x(p, m, j, k)) &
           + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
           + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
@@ -338,18 +370,24 @@ contains
     real(sp), intent(inout) :: f(lo(1):hi(1), lo(2):hi(2), lo(3):hi(3))
     real(sp) :: r(self%a(1):self%z(1), 2)
     integer :: i, jc, j, k, m, colour
+    logical :: empty
 
     do jc = lo(2), hi(2)
       r = 0.0_sp
+      empty = .true.
       do k = first_of(kc, self%paired(3)), last_of(kc, self%paired(3), self%hi(3))
         do j = first_of(jc, self%paired(2)), last_of(jc, self%paired(2), self%hi(2))
+          if (self%line(1, j, k) > self%line(2, j, k)) cycle
+          empty = .false.
           do colour = 0, merge(1, 0, self%seam)
             m = 1 + modulo(j + k + colour, 2)
             call add_residual(self, m, j, k, r(:, m))
           end do
         end do
       end do
-      if (self%paired(1)) then
+      if (empty) then
+        f(:, jc, kc) = 0.0_sp
+      else if (self%paired(1)) then
         do i = lo(1), hi(1)
           f(i, jc, kc) = r(i, 1) + r(i, 2)
         end do
@@ -373,6 +411,7 @@ contains
 
     kc = merge((k + 1)/2, k, self%paired(3))
     do j = self%lo(2), self%hi(2)
+      if (self%line(1, j, k) > self%line(2, j, k)) cycle
       jc = merge((j + 1)/2, j, self%paired(2))
       do colour = 0, merge(1, 0, self%seam)
         m = 1 + modulo(j + k + colour, 2)

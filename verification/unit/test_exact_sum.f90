@@ -147,6 +147,7 @@ contains
     s = exact_sum([x(w + 1:w + m(1), w + 1:w + m(2), w + 1:w + m(3)) &
       *y(w + 1:w + m(1), w + 1:w + m(2), w + 1:w + m(3))])
     call check('dot product of the inner cells', exact_dot(x, y, w), s, 0.0_wp)
+    call test_lines(x, y, w)
     do i = 1, 3
       call set_threads(i)
       pair = exact_dots(x, y, x, x, w)
@@ -154,6 +155,25 @@ contains
       call check('second of two dot products', pair(2), exact_dot(x, x, w), 0.0_wp)
     end do
   end subroutine test_dots
+
+  !> Only a part of each line takes part: the rest zero in one of the two gives the same.
+  subroutine test_lines(x, y, w)
+    real(wp), intent(in) :: x(:, :, :), y(:, :, :)
+    integer, intent(in) :: w
+    real(wp) :: z(size(x, 1), size(x, 2), size(x, 3))
+    integer :: line(2, size(x, 2), size(x, 3)), j, k
+
+    z = 0.0_wp
+    do k = 1, size(x, 3)
+      do j = 1, size(x, 2)
+        line(:, j, k) = [w + 1 + modulo(j, 3), size(x, 1) - w - modulo(j + k, 3)]
+        if (modulo(j*k, 5) == 0) line(2, j, k) = line(1, j, k) - 1
+        z(line(1, j, k):line(2, j, k), j, k) = x(line(1, j, k):line(2, j, k), j, k)
+      end do
+    end do
+    call check('dot product of parts of lines', exact_dot(x, y, w, line), exact_dot(z, y, w), &
+               0.0_wp)
+  end subroutine test_lines
 
   subroutine test_not_a_number()
     real(wp) :: bad, s
