@@ -24,8 +24,10 @@ PYTHON := .venv/bin/python
 CASE := input/blocks.nml
 
 parallel := $(if $(MPI),mpi,serial)
-variant := $(parallel)$(if $(DEBUG),-debug)$(if $(SAN),-san)
-B := build/$(variant)
+checked := $(if $(DEBUG),-debug)$(if $(SAN),-san)
+# C: what knows neither HDF5 nor MPI, compiled once for both variants; B: all else, and the programs.
+C := build/common$(checked)
+B := build/$(parallel)$(checked)
 binary := mics$(if $(MPI),_mpi)$(if $(DEBUG),_debug)$(if $(SAN),_san)
 compiler := $(if $(MPI),$(FC_MPI),$(FC_SERIAL))
 checks := $(if $(SAN),$(OPT_SAN),$(if $(DEBUG),$(OPT_DEBUG)))
@@ -34,14 +36,14 @@ flags := $(FFLAGS) $(or $(checks),$(OPT) $(LTO))
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
 unit_sources := $(wildcard verification/unit/*.f90)
-unit_objects := $(patsubst verification/unit/%.f90,$(B)/%.o,$(unit_sources))
+unit_objects := $(foreach folder,$(B) $(C),$(unit_sources:verification/unit/%.f90=$(folder)/%.o))
 tests := $(wildcard verification/unit/test_*.f90)
 drivers := $(wildcard verification/drivers/*.f90)
 unit_sources += $(drivers)
 program = $(patsubst %.f90,$(B)/%,$(notdir $(1)))
 # What verification/test_units.py and the cases run of this variant.
 run_here := $(if $(MPI),$(shell grep -l '^! ranks:' $(tests)),$(tests) $(if $(DEBUG),,$(drivers)))
-vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(B)
+vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
@@ -77,10 +79,11 @@ $(binary): $$(OBJECTS_mics)
 
 units: $(call program,$(run_here))
 
-# Every variant that `make test` runs, side by side.
+# Every variant that `make test` runs, side by side but for the two that share objects.
 variants := serial-variant mpi-variant debug-variant
 .PHONY: $(variants)
 everything: $(variants)
+mpi-variant: serial-variant
 serial-variant:
 	@$(MAKE) --no-print-directory all units
 mpi-variant:
@@ -92,38 +95,45 @@ $(call program,$(tests) $(drivers)): $(B)/%: $$(OBJECTS_$$*)
 	$(call say,LD $@)$(compiler) $(flags) -fno-lto -o $@ $^
 
 # The tests themselves need no speed, what they test does.
-$(unit_objects): $(B)/%.o: %.f90 $(B)/settings
-	$(call say,FC $@)$(compiler) $(FFLAGS) $(or $(checks),-O0) -J$(B) -c -o $@ $<
-
+flags_here = $(if $(filter $(unit_objects),$@),$(FFLAGS) $(or $(checks),-O0),$(flags))
+compile = $(call say,FC $@)$(compiler) $(flags_here) -I$(C) -J$(@D) -c -o $@ $<
 $(B)/%.o: %.f90 $(B)/settings
-	$(call say,FC $@)$(compiler) $(flags) -J$(B) -c -o $@ $<
+	$(compile)
+$(C)/%.o: %.f90 $(C)/settings
+	$(compile)
 
 # Compiler and flags; a change rebuilds everything. The compiler is tried, not trusted to exist.
+keep = @mkdir -p $(@D); echo '$(1)' | cmp -s - $@ || echo '$(1)' > $@
 tried = $(shell echo '$(compiler) $(flags)' | cmp -s - $@ || \
   tools/try_compiler.sh $(parallel) $(compiler) || echo no)
 $(B)/settings: FORCE
 	$(if $(tried),$(error $(compiler) cannot build a Fortran program with HDF5; run: make deps))
-	@mkdir -p $(B)
-	@echo '$(compiler) $(flags)' | cmp -s - $@ || echo '$(compiler) $(flags)' > $@
+	$(call keep,$(compiler) $(flags))
+# h5fc and h5pfc are scripts around a compiler, as a rule the same one.
+$(C)/settings: $(B)/settings FORCE
+	$(call keep,$(shell $(compiler) --version | head -n 1) $(flags))
 
-$(B)/build_info.f90: FORCE
-	@mkdir -p $(B)
+$(C)/build_info.f90: FORCE
+	@mkdir -p $(C)
 	@awk -v version='$(VERSION)' -v flags='$(flags)' \
 	  -v revision="$$(git describe --always --dirty --abbrev=12 2>/dev/null || echo unknown)" \
 	  -f tools/build_info.awk < /dev/null > $@.new
 	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
 
 $(B)/sources: FORCE
-	@mkdir -p $(B)
-	@echo '$(sources) $(unit_sources)' | cmp -s - $@ || echo '$(sources) $(unit_sources)' > $@
+	$(call keep,$(sources) $(unit_sources))
 
-$(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(B)/build_info.f90
-	@awk -v B=$(B) -f tools/depend.awk $(sources) $(unit_sources) $(B)/build_info.f90 > $@
+$(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
+	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@
 
 no_build := deps lint clean help run test verify mutate soak bench bench-contact docs reference \
   everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
+# What a source left in the other folder when it began or ceased to use HDF5 is not to be found.
+ifneq ($(wildcard $(ELSEWHERE)),)
+$(shell rm -f $(ELSEWHERE) $(ELSEWHERE:.o=_m.mod))
+endif
 endif
 
 deps:

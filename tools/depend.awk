@@ -1,15 +1,18 @@
 # Dependencies of Fortran sources from their `use` lines, as make rules.
 #
-# awk -v B=build/serial -f tools/depend.awk src/*.f90 src/*/*.f90 verification/unit/*.f90
+# awk -v B=build/serial -v C=build/common -f tools/depend.awk src/*.f90 src/*/*.f90 ...
 #
-# For each source: the objects whose modules it uses. For each program: the variable OBJECTS_name
-# with every object it needs, found by following the uses, with the submodules of what is used.
-# Unknown modules (intrinsic, HDF5, MPI) come with the compiler.
-function object(file) {
+# For each source: the objects whose modules it uses, in C if neither it nor any of them uses HDF5
+# or MPI, else in B. For each program: the variable OBJECTS_name with every object it needs, found
+# by following the uses, with the submodules of what is used. ELSEWHERE: all objects, in the folder
+# where they are not. Other unknown modules come with the compiler.
+function name(file) {
   sub(/.*\//, "", file)
   sub(/\.f90$/, "", file)
-  return B "/" file ".o"
+  return file ".o"
 }
+
+function object(file) { return (bound(file) ? B : C) "/" name(file) }
 
 FNR == 1 { files[++n] = FILENAME }
 
@@ -36,6 +39,17 @@ line ~ /^[ \t]*use([ \t]|,|::)/ {
   sub(/^.*::[ \t]*/, "", line)
   split(line, word, /[ \t,]/)
   uses[FILENAME] = uses[FILENAME] " " word[1]
+}
+
+# Does a source know HDF5 or MPI, by itself or through what it uses?
+function bound(file, list, i, count) {
+  if (file in known) return known[file]
+  known[file] = uses[file] " " ~ / (hdf5|mpi_f08) /
+  count = split(uses[file], list, " ")
+  for (i = 1; i <= count; i++) {
+    if (list[i] in home && bound(home[list[i]])) known[file] = 1
+  }
+  return known[file]
 }
 
 function follow(file, list, i, count) {
@@ -67,5 +81,7 @@ END {
       follow(files[i])
       print "OBJECTS_" program[files[i]] " :=" needed
     }
+    elsewhere = elsewhere " " (bound(files[i]) ? C : B) "/" name(files[i])
   }
+  print "ELSEWHERE :=" elsewhere
 }
