@@ -25,6 +25,7 @@ module flux_band_m
     integer, allocatable :: order(:)         !! the cells by part
     integer, allocatable :: spare(:)
     real(wp), allocatable :: moved(:)
+    integer, allocatable :: moved_cell(:, :)
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
     integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
     integer(i8), allocatable :: bins(:, :)   !! of the sums
@@ -32,7 +33,7 @@ module flux_band_m
 
   type, extends(linear_operator_t) :: flux_band_t
     ! Arrays over cells with one halo cell.
-    integer, allocatable :: marked(:, :, :)  !! 1: in the band; 2 while it is marked: holds solid
+    integer, allocatable :: marked(:, :, :)  !! 1: in the band, else 0
     integer, allocatable :: line(:, :, :)    !! (2, j, k) first and last cell of a line that has
                                              !! an open face, counted from 1 with the halo
     integer, allocatable :: number(:, :, :)  !! place in the list as found, 0: not in it
@@ -41,7 +42,7 @@ module flux_band_m
 
     !> The cells, sorted by part: those of part c are `first(c):first(c+1)-1`.
     integer :: n = 0
-    integer, allocatable :: at(:)            !! place in the arrays above with their halo, from 1
+    integer, allocatable :: cell(:, :)       !! (3, n)
     real(wp), allocatable :: r(:)            !! volume balance of the cell [V]
     real(wp), allocatable :: open(:)         !! its open volume at the end of the step [V]
 
@@ -72,7 +73,7 @@ contains
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%line(2, size(self%k, 2), size(self%k, 3)), source=0)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
-    allocate (self%at(0))
+    allocate (self%cell(3, 0))
     call grow_lists(self)
     call allocate_parts(first_parts, self)
   end subroutine flux_band_init
@@ -90,8 +91,8 @@ contains
     type(flux_band_t), intent(inout) :: self
     integer :: n
 
-    call ensure_room(self%n + 1, self%at)
-    n = size(self%at)
+    call ensure_room(self%n + 1, self%cell)
+    n = size(self%cell, 2)
     call ensure_room(n, self%r)
     call ensure_room(n, self%open)
     associate (f => self%finder)
@@ -100,49 +101,23 @@ contains
       call ensure_room(n, f%order)
       call ensure_room(n, f%spare)
       call ensure_room(n, f%moved)
+      call ensure_room(n, f%moved_cell)
     end associate
   end subroutine grow_lists
 
   !> Append a cell to the list; call in the order of the grid.
-  subroutine add_cell(grid, cell, r, open, self)
-    type(grid_t), intent(in) :: grid
+  subroutine add_cell(cell, r, open, self)
     integer, intent(in) :: cell(3)
     real(wp), intent(in) :: r, open
     type(flux_band_t), intent(inout) :: self
 
-    if (self%n == size(self%at)) call grow_lists(self)
+    if (self%n == size(self%cell, 2)) call grow_lists(self)
     self%n = self%n + 1
     self%number(cell(1), cell(2), cell(3)) = self%n
-    self%at(self%n) = place(grid, cell)
+    self%cell(:, self%n) = cell
     self%r(self%n) = r
     self%open(self%n) = open
   end subroutine add_cell
-
-  !> Place of a cell in the arrays with one halo cell, counted from 1.
-  pure function place(grid, cell) result(m)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: cell(3)
-    integer :: m
-    integer :: c(3), extent(3)
-
-    extent = grid%hi - grid%lo + 3
-    c = cell - grid%lo + 1
-    m = 1 + c(1) + extent(1)*(c(2) + extent(2)*c(3))
-  end function place
-
-  !> Cell of a place.
-  pure function cell_at(grid, m) result(c)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: m
-    integer :: c(3)
-    integer :: extent(3)
-
-    extent = grid%hi - grid%lo + 3
-    c(1) = modulo(m - 1, extent(1))
-    c(2) = modulo((m - 1)/extent(1), extent(2))
-    c(3) = (m - 1)/(extent(1)*extent(2))
-    c = c + grid%lo - 1
-  end function cell_at
 
   !> Number of a cell in the whole domain, from 1.
   pure function global_number(grid, c) result(g)
@@ -220,11 +195,11 @@ contains
     type(flux_band_t), intent(inout) :: self
     integer :: l, c(3)
 
-    call join_neighbours(grid, self)
+    call join_neighbours(self)
     call join_processes(grid, self)
     call list_parts(grid, self)
     do l = 1, self%n
-      c = cell_at(grid, self%at(l))
+      c = self%cell(:, l)
       self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &
                                      self%finder%home(1:self%parts))
     end do
@@ -232,8 +207,7 @@ contains
   end subroutine find_parts
 
   !> Join cells of this process across faces with a conductance: `root` of each cell of the list.
-  subroutine join_neighbours(grid, self)
-    type(grid_t), intent(in) :: grid
+  subroutine join_neighbours(self)
     type(flux_band_t), intent(inout) :: self
     integer :: l, d, c(3), e(3), m, a, b
 
@@ -241,7 +215,7 @@ contains
       self%finder%root(l) = l
     end do
     do l = 1, self%n
-      c = cell_at(grid, self%at(l))
+      c = self%cell(:, l)
       do d = 1, 3
         if (.not. self%k(c(1), c(2), c(3), d) > 0.0_wp) cycle
         e = c - unit_step(:, d)
@@ -280,18 +254,18 @@ contains
 
     associate (smallest => self%finder%spare)
       do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
-        smallest(l) = global_number(grid, cell_at(grid, self%at(l)))
+        smallest(l) = global_number(grid, self%cell(:, l))
       end do
       self%label = 0
       do
         do l = 1, self%n
-          c = cell_at(grid, self%at(l))
+          c = self%cell(:, l)
           self%label(c(1), c(2), c(3)) = smallest(self%finder%root(l))
         end do
         call halo_exchange(self%label, 1)
         changes = 0_i8
         do l = 1, self%n
-          c = cell_at(grid, self%at(l))
+          c = self%cell(:, l)
           if (all(c > grid%lo .and. c < grid%hi)) cycle
           call look_across(c, smallest(self%finder%root(l)))
         end do
@@ -343,7 +317,7 @@ contains
     do l = 1, self%n
       if (.not. is_home(l)) cycle
       n = n + 1
-      c = cell_at(grid, self%at(l))
+      c = self%cell(:, l)
       self%finder%home(n) = int(global_number(grid, c), i8)
     end do
     call global_sum(self%finder%home(1:self%parts))
@@ -354,7 +328,7 @@ contains
       integer, intent(in) :: l
       integer :: c(3)
 
-      c = cell_at(grid, self%at(l))
+      c = self%cell(:, l)
       is_home = self%label(c(1), c(2), c(3)) == global_number(grid, c)
     end function is_home
   end subroutine list_parts
@@ -418,9 +392,9 @@ contains
     end do
     self%first(self%parts + 1) = self%n + 1
     do l = 1, self%n
-      self%finder%spare(l) = self%at(self%finder%order(l))
+      self%finder%moved_cell(:, l) = self%cell(:, self%finder%order(l))
     end do
-    self%at(1:self%n) = self%finder%spare(1:self%n)
+    self%cell(:, 1:self%n) = self%finder%moved_cell(:, 1:self%n)
     call reorder(self%finder%order(1:self%n), self%finder%moved, self%r)
     call reorder(self%finder%order(1:self%n), self%finder%moved, self%open)
   end subroutine sort_by_part
@@ -450,7 +424,7 @@ contains
       do c = 1, n
         associate (a => self%first(c), b => self%first(c + 1) - 1)
           do l = a, b
-            if (at_open_side(cell_at(grid, self%at(l)))) self%vents(c) = self%vents(c) + 1_i8
+            if (at_open_side(self%cell(:, l))) self%vents(c) = self%vents(c) + 1_i8
           end do
           bins(:, c) = no_terms
           bins(:, n + c) = no_terms
@@ -479,15 +453,14 @@ contains
   end subroutine sum_by_part
 
   !> Take a part out of the system: its faces conduct nothing.
-  subroutine drop_part(grid, c, self)
-    type(grid_t), intent(in) :: grid
+  subroutine drop_part(c, self)
     integer, intent(in) :: c
     type(flux_band_t), intent(inout) :: self
     integer :: l, d, at(3), f(3)
 
     do l = self%first(c), self%first(c + 1) - 1
       self%r(l) = 0.0_wp
-      at = cell_at(grid, self%at(l))
+      at = self%cell(:, l)
       do d = 1, 3
         f = at + unit_step(:, d)
         self%k(at(1), at(2), at(3), d) = 0.0_wp

@@ -87,35 +87,45 @@ contains
     type(flux_band_t), intent(inout) :: band
     integer :: i, j, k
 
-    band%marked = 0
     !$omp parallel do private(i, j) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          if (old%alpha(i, j, k) > 0.0_wp .or. new%alpha(i, j, k) > 0.0_wp) band%marked(i, j, k) = 2
+          band%marked(i, j, k) = merge(1, 0, old%alpha(i, j, k) > 0.0_wp &
+                                       .or. new%alpha(i, j, k) > 0.0_wp)
         end do
       end do
     end do
     call halo_exchange(band%marked, 1)
-    !$omp parallel do private(i, j) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          band%label(i, j, k) = 0
-          if (any(band%marked(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) == 2)) band%label(i, j, k) = 1
-        end do
-      end do
-    end do
-    !$omp parallel do private(i, j) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          band%marked(i, j, k) = band%label(i, j, k)
-        end do
-      end do
-    end do
+    call widen(1, band%marked, band%label)
+    call widen(2, band%label, band%number)
+    call widen(3, band%number, band%marked)
     call halo_exchange(band%marked, 1)
   end subroutine mark_band
+
+  !> Marks of cells and their neighbours in direction d. Called for the directions in their order,
+  !! it treats own cells in those up to d, and the halo in those that follow.
+  subroutine widen(d, mark, wide)
+    integer, intent(in) :: d
+    integer, intent(in), contiguous :: mark(:, :, :)      !! with one halo cell
+    integer, intent(inout), contiguous :: wide(:, :, :)
+    integer :: i, j, k, e(3), a(3), b(3)
+
+    e = unit_step(:, d)
+    a = 1
+    b = shape(mark)
+    a(1:d) = 2
+    b(1:d) = b(1:d) - 1
+    !$omp parallel do private(i, j) schedule(static)
+    do k = a(3), b(3)
+      do j = a(2), b(2)
+        do i = a(1), b(1)
+          wide(i, j, k) = max(mark(i, j, k), mark(i - e(1), j - e(2), k - e(3)), &
+                              mark(i + e(1), j + e(2), k + e(3)))
+        end do
+      end do
+    end do
+  end subroutine widen
 
   !> Volumes of the velocity through the faces as they are at the begin of the step, and the
   !! conductances of the band.
@@ -126,31 +136,43 @@ contains
     real(wp), intent(in) :: dt
     type(flux_band_t), intent(inout) :: band
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: d, i, j, k, e(3), side
-    real(wp) :: w, size_of_face
-    logical :: coupled
+    integer :: d, s, a(3), b(3)
 
     do d = 1, 3
+      call faces_between(2, grid%lo, grid%hi + unit_step(:, d))
+      do s = 1, 2
+        call grid%side_faces(s, d, a, b)
+        if (is_wall(grid%side(s, d))) then
+          q(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+          band%k(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+        else if (gives_pressure(grid%side(s, d))) then
+          call faces_between(1, a, b)
+        end if
+      end do
+    end do
+  contains
+    !> Faces a..b of direction d; they conduct if this many of their two cells are in the band.
+    subroutine faces_between(cells, a, b)
+      integer, intent(in) :: cells, a(3), b(3)
+      integer :: i, j, k, e(3)
+      real(wp) :: w, open_area, size_of_face
+
       e = unit_step(:, d)
+      open_area = dt*grid%area(d)
       size_of_face = grid%area(d)/maxval(grid%area)
-      !$omp parallel do private(i, j, w, side, coupled) schedule(static)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          do i = grid%lo(1), grid%hi(1) + e(1)
+      !$omp parallel do private(i, j, w) schedule(static)
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
             w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
-            side = grid%side_of_face(i*e(1) + j*e(2) + k*e(3), d)
-            q(i, j, k, d) = dt*grid%area(d)*old%open(i, j, k, d)*uf(i, j, k, d)
-            if (w < least_open .or. is_wall(side)) q(i, j, k, d) = 0.0_wp
-            coupled = band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == 2
-            if (gives_pressure(side)) then
-              coupled = band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == 1
-            end if
-            band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, coupled .and. w >= least_open &
-                                       .and. .not. is_wall(side))
+            q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
+                                  w >= least_open)
+            band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, w >= least_open .and. &
+              band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == cells)
           end do
         end do
       end do
-    end do
+    end subroutine faces_between
   end subroutine flux_of_velocity
 
   !> Cells of the band with a way out, in the order of the grid, and their volume balance r.
@@ -175,7 +197,7 @@ contains
           outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
                     + (q(i, j, k + 1, 3) - q(i, j, k, 3))
           room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
-          call add_cell(grid, [i, j, k], (room_left - outflow)/grid%volume, &
+          call add_cell([i, j, k], (room_left - outflow)/grid%volume, &
                         1.0_wp - new%alpha(i, j, k), band)
         end do
       end do
@@ -207,7 +229,7 @@ contains
       end do
       call global_max(band%largest(1:band%parts))
       do c = 1, band%parts
-        if (band%largest(c) <= self%control%tolerance) call drop_part(grid, c, band)
+        if (band%largest(c) <= self%control%tolerance) call drop_part(c, band)
       end do
     end associate
   end subroutine balance_parts
@@ -219,7 +241,7 @@ contains
 
     self%rest = 0.0_wp
     self%phi = 0.0_wp
-    call put_list(self%band%n, self%band%at, self%band%r, size(self%rest), self%rest)
+    call put_balances(self%band, lbound(self%rest), self%rest)
     call find_open_lines(self%band%k, self%band%line)
     self%work%line = self%band%line
     call self%multigrid%setup(self%band%k)
@@ -231,16 +253,18 @@ contains
   end subroutine solve_potential
 
   !> Put the balances of the cells of the band on the grid.
-  pure subroutine put_list(n, at, list, m, a)
-    integer, intent(in) :: n, at(n), m
-    real(wp), intent(in) :: list(n)
-    real(wp), intent(inout) :: a(m)
+  pure subroutine put_balances(band, first, r)
+    type(flux_band_t), intent(in) :: band
+    integer, intent(in) :: first(3)
+    real(wp), intent(inout), contiguous :: r(first(1):, first(2):, first(3):)
     integer :: l
 
-    do l = 1, n
-      a(at(l)) = list(l)
+    do l = 1, band%n
+      associate (c => band%cell(:, l))
+        r(c(1), c(2), c(3)) = band%r(l)
+      end associate
     end do
-  end subroutine put_list
+  end subroutine put_balances
 
   !> Take the gradient of the potential from the volumes.
   subroutine correct_flux(grid, band, phi, q)

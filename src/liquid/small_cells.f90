@@ -66,18 +66,14 @@ contains
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
     integer :: i, j, k, n
-    real(wp) :: outflow, open
 
+    call mark_small_cells(grid, old, volumes, self%number)
     n = 0
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
+        if (maxval(self%number(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
         do i = grid%lo(1), grid%hi(1)
-          self%number(i, j, k) = 0
-          outflow = max(volumes%q(i + 1, j, k, 1), 0.0_wp) + max(-volumes%q(i, j, k, 1), 0.0_wp) &
-                    + max(volumes%q(i, j + 1, k, 2), 0.0_wp) + max(-volumes%q(i, j, k, 2), 0.0_wp) &
-                    + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
-          open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
-          if (outflow <= most_outflow*open .and. open >= least_volume*grid%volume) cycle
+          if (self%number(i, j, k) == 0) cycle
           n = n + 1
           call ensure_room(n, self%cell)
           self%number(i, j, k) = n
@@ -93,6 +89,30 @@ contains
     call find_late_faces(grid, volumes, self)
   end subroutine find_small_cells
 
+  !> One for small cells, zero for others.
+  subroutine mark_small_cells(grid, old, volumes, mark)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    type(carried_volumes_t), intent(in) :: volumes
+    integer, intent(inout), contiguous :: mark(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k
+    real(wp) :: outflow, open
+
+    !$omp parallel do private(i, j, outflow, open) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do i = grid%lo(1), grid%hi(1)
+          outflow = max(volumes%q(i + 1, j, k, 1), 0.0_wp) + max(-volumes%q(i, j, k, 1), 0.0_wp) &
+                    + max(volumes%q(i, j + 1, k, 2), 0.0_wp) + max(-volumes%q(i, j, k, 2), 0.0_wp) &
+                    + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
+          open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
+          mark(i, j, k) = merge(0, 1, outflow <= most_outflow*open &
+                                      .and. open >= least_volume*grid%volume)
+        end do
+      end do
+    end do
+  end subroutine mark_small_cells
+
   !> Faces with a small donor: listed, and taken out of the sweeps.
   subroutine find_late_faces(grid, volumes, self)
     type(grid_t), intent(in) :: grid
@@ -105,6 +125,10 @@ contains
       e = unit_step(:, d)
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
+          associate (a => grid%lo(1), b => grid%hi(1))
+            if (maxval(self%number(a - e(1):b + e(1), j, k)) == 0 .and. &
+                maxval(self%number(a:b, j - e(2), k - e(3))) == 0) cycle
+          end associate
           do i = grid%lo(1), grid%hi(1) + e(1)
             if (.not. abs(volumes%q(i, j, k, d)) > 0.0_wp) cycle
             up = [i, j, k]
