@@ -267,23 +267,13 @@ contains
   function courant_rate(sim) result(rate)
     type(simulation_t), intent(in) :: sim
     real(wp) :: rate
-    integer :: i, j, k, b
+    integer :: b
     real(wp) :: largest(1)
 
     rate = 0.0_wp
     if (.not. sim%wet) return
-    largest = 0.0_wp
     associate (grid => sim%grid)
-      !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            largest = max(largest, max(face(i, j, k, 1), face(i + 1, j, k, 1))/grid%h(1) &
-                                   + max(face(i, j, k, 2), face(i, j + 1, k, 2))/grid%h(2) &
-                                   + max(face(i, j, k, 3), face(i, j, k + 1, 3))/grid%h(3))
-          end do
-        end do
-      end do
+      largest = fluid_rate(grid, sim%flow%uf, sim%solid%open)
       call global_max(largest)
       rate = largest(1)
       do b = 1, sim%blocks%n
@@ -292,14 +282,39 @@ contains
                           *sim%blocks%shapes(sim%blocks%shape(b))%radius)/minval(grid%h))
       end do
     end associate
-  contains
-    !> Speed at a lower face, zero where the face is mostly closed.
-    pure function face(i, j, k, d) result(speed)
-      integer, intent(in) :: i, j, k, d
-      real(wp) :: speed
-
-      speed = merge(abs(sim%flow%uf(i, j, k, d)), 0.0_wp, sim%solid%open(i, j, k, d) >= least_open)
-    end function face
   end function courant_rate
+
+  !> That of the fluid of this process.
+  function fluid_rate(grid, uf, open) result(largest)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):, :) &
+      :: uf, open   !! velocity [m/s] and open share of the lower faces
+    real(wp) :: largest
+    integer :: i, j, k
+
+    largest = 0.0_wp
+    !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        !$omp simd reduction(max: largest)
+        do i = grid%lo(1), grid%hi(1)
+          largest = max(largest, max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
+                                     speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1) &
+                               + max(speed(uf(i, j, k, 2), open(i, j, k, 2)), &
+                                     speed(uf(i, j + 1, k, 2), open(i, j + 1, k, 2)))/grid%h(2) &
+                               + max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
+                                     speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3))
+        end do
+      end do
+    end do
+  end function fluid_rate
+
+  !> Speed at a face, zero where it is mostly closed.
+  elemental function speed(u, open)
+    real(wp), intent(in) :: u, open
+    real(wp) :: speed
+
+    speed = merge(abs(u), 0.0_wp, open >= least_open)
+  end function speed
 
 end module time_step_m
