@@ -6,7 +6,7 @@ module contacts_m
   use kinds_m, only: wp
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers
   use walls_m, only: walls_t
-  use sleep_m, only: know_stillness, note_quiet, stop_sleepers, hold_or_wake, all_still
+  use sleep_m, only: know_stillness, note_poses, note_quiet, stop_sleepers, hold_or_wake, all_still
   use lubrication_m, only: lubricate
   use contact_partners_m, only: know_partners, know_motion
   use touching_m, only: find_touches
@@ -38,6 +38,7 @@ contains
     real(wp) :: left, dt_b, limit
 
     call begin_step(blocks)
+    if (contacts%sleep%active) call note_poses(blocks, contacts%sleep)
     call share_with_fluid(blocks, contacts%share, contacts%steady)
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
@@ -65,6 +66,7 @@ contains
     end do
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
+    if (contacts%sleep%active) call note_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
     call count_partners(contacts%met, blocks)
     call find_touches(walls, blocks, 0.0_wp, contacts%touching)
@@ -138,9 +140,7 @@ contains
       call stretch_springs(0.5_wp*dt_b, touching, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)
-    if (.not. contacts%sleep%active) return
-    if (any(contacts%woken)) call rouse(blocks, contacts)
-    call note_quiet(gravity, dt_b, blocks, contacts%sleep)
+    if (contacts%sleep%active .and. any(contacts%woken)) call rouse(blocks, contacts)
   end subroutine finish_substep
 
   !> The part of a contact force that moves a body, and what else acts on it all through the step.

@@ -6,7 +6,7 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use springs_m, only: move_springs
-  use sleep_m, only: know_loads, note_quiet_end, is_tired, balanced, put_to_sleep, hold_or_wake, &
+  use sleep_m, only: know_loads, is_tired, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
   use contact_partners_m, only: partners_t, wrench_t, know_motion, motion_between
@@ -42,7 +42,6 @@ contains
       changed = any(contacts%woken)
       if (changed) call rouse(blocks, contacts)
     else
-      call note_quiet_end(gravity, blocks, contacts%sleep)
       changed = .false.
       do b = 1, blocks%n
         contacts%sleep%tired(b) = is_tired(gravity, b, blocks, contacts%sleep)

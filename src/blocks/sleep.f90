@@ -15,7 +15,7 @@ module sleep_m
   use springs_m, only: springs_t, reserve_springs
   implicit none
   private
-  public :: sleep_t, sleep_init, know_stillness, know_loads, note_quiet, note_quiet_end, is_tired
+  public :: sleep_t, sleep_init, know_stillness, know_loads, note_poses, note_quiet, is_tired
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
@@ -26,6 +26,7 @@ module sleep_m
     logical :: active = .false.
     real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
+    real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
     type(springs_t) :: rest                    !! touches at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
@@ -85,46 +86,38 @@ contains
     end do
   end subroutine know_loads
 
-  !> Count the time for which each block has been slow, by a substep.
-  pure subroutine note_quiet(gravity, dt, blocks, sleep)
-    real(wp), intent(in) :: gravity(3), dt     !! [m/s2, s]
+  !> Note where the blocks are when a fluid step begins.
+  pure subroutine note_poses(blocks, sleep)
     type(blocks_t), intent(in) :: blocks
     type(sleep_t), intent(inout) :: sleep
+
+    sleep%x = blocks%x
+    sleep%q = blocks%q
+  end subroutine note_poses
+
+  !> Count the time for which each block has been slow, by a fluid step.
+  !!
+  !! What counts is how far it has come in the step. The velocity at the end of a step has the
+  !! change of the fluid force in it, to which contact answers only in the next one: under waves a
+  !! block that its supports hold has 50 times the velocity with which it moves.
+  pure subroutine note_quiet(gravity, dt, blocks, sleep)
+    real(wp), intent(in) :: gravity(3), dt     !! [m/s2], the fluid step [s]
+    type(blocks_t), intent(in) :: blocks
+    type(sleep_t), intent(inout) :: sleep
+    real(wp) :: way
     integer :: b
 
     do b = 1, blocks%n
-      if (is_slow(gravity, b, blocks, sleep)) then
+      way = norm(blocks%x(:, b) - sleep%x(:, b)) &
+        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%reach(b)
+      if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
+          way <= slow*sqrt(norm(gravity)*sleep%reach(b))*dt) then
         sleep%quiet(b) = sleep%quiet(b) + dt
       else
         sleep%quiet(b) = 0.0_wp
       end if
     end do
   end subroutine note_quiet
-
-  !> Begin to count anew for blocks that the fluid has made faster at the end of a step.
-  pure subroutine note_quiet_end(gravity, blocks, sleep)
-    real(wp), intent(in) :: gravity(3)         !! [m/s2]
-    type(blocks_t), intent(in) :: blocks
-    type(sleep_t), intent(inout) :: sleep
-    integer :: b
-
-    do b = 1, blocks%n
-      if (.not. is_slow(gravity, b, blocks, sleep)) sleep%quiet(b) = 0.0_wp
-    end do
-  end subroutine note_quiet_end
-
-  !> Whether no point of a free block is faster than some share of the speed of a fall by its size.
-  pure function is_slow(gravity, b, blocks, sleep) result(yes)
-    real(wp), intent(in) :: gravity(3)         !! [m/s2]
-    integer, intent(in) :: b
-    type(blocks_t), intent(in) :: blocks
-    type(sleep_t), intent(in) :: sleep
-    logical :: yes
-
-    yes = blocks%present(b) .and. .not. blocks%fixed(b)
-    if (yes) yes = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*sleep%reach(b) &
-      <= slow*sqrt(norm(gravity)*sleep%reach(b))
-  end function is_slow
 
   !> Whether a block has been slow for long: several times that of a fall by its size.
   pure function is_tired(gravity, b, blocks, sleep) result(yes)
@@ -174,15 +167,14 @@ contains
     end do
   end subroutine stop_sleepers
 
-  !> Wake body b.
-  pure subroutine wake(b, blocks, sleep)
+  !> Wake body b. If it hardly moves then, it may sleep again once it is in balance: under waves a
+  !! pile wakes for a step, leans into its supports, and sleeps on.
+  pure subroutine wake(b, blocks)
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
-    type(sleep_t), intent(inout) :: sleep
 
     blocks%asleep(b) = .false.
     blocks%still(b) = .false.
-    sleep%quiet(b) = 0.0_wp
   end subroutine wake
 
   !> Complete the contact forces by those of the touches at rest, and wake who is out of balance.
@@ -210,7 +202,7 @@ contains
       woken(b) = .not. balanced(1.0_wp, force(:, b), torque(:, b), other, &
         blocks%fluid_torque(:, b), sleep%reach(b))
       if (woken(b)) then
-        call wake(b, blocks, sleep)
+        call wake(b, blocks)
       else
         force(:, b) = -other
         torque(:, b) = -blocks%fluid_torque(:, b)

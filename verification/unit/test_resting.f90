@@ -113,7 +113,11 @@ contains
     world%contacts%steady(3, 1) = 0.0102_wp*load
     call start_step(world)
     call check('wakes', .not. world%blocks%asleep(1))
-    call check('and has to rest anew', world%contacts%sleep%quiet(1), 0.0_wp, 0.0_wp)
+    call start_step(world)
+    call check('not until it is in balance', .not. world%blocks%asleep(1))
+    world%contacts%steady(3, 1) = 0.0049_wp*load
+    call start_step(world)
+    call check('sleeps again, for it has not moved', world%blocks%asleep(1))
   end subroutine check_balance
 
   !> What is not tired, or touches nothing, or what is moved, stays awake.

@@ -2,6 +2,7 @@
 !! rules one by one, and worlds beside others without sleep.
 program test_sleep
   use kinds_m, only: wp
+  use vectors_m, only: quaternion_from_axis, quaternion_product
   use check_m, only: check, finish_checks
   use case_types_m, only: case_t
   use tet_mesh_m, only: shape_t
@@ -10,7 +11,7 @@ program test_sleep
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
   use springs_m, only: reserve_springs
-  use sleep_m, only: sleep_t, sleep_init, balanced, note_quiet, note_quiet_end, is_tired, know_loads
+  use sleep_m, only: sleep_t, sleep_init, balanced, note_poses, note_quiet, is_tired, know_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -90,36 +91,48 @@ contains
   subroutine check_quiet()
     type(world_t) :: world
     type(sleep_t) :: sleep
-    real(wp) :: slow, fall
+    real(wp) :: way, fall
     integer :: b, n
     real(wp), parameter :: reach = 0.3_wp
 
     call new_world(.true., 4, world)
     call start(world)
     call sleep_init(.true., spread(reach, 1, 4), sleep)
-    slow = 5.0e-4_wp*sqrt(g*reach)
     fall = sqrt(reach/g)
+    way = 5.0e-4_wp*sqrt(g*reach)*0.101_wp*fall
     associate (blocks => world%blocks)
-      blocks%v(1, 1) = 0.99_wp*slow
-      blocks%v(1, 2) = 0.5_wp*slow
-      blocks%omega(2, 2) = 0.49_wp*slow/reach
+      blocks%v = 1.0_wp   ! does not count, but how far it comes
       blocks%fixed(3) = .true.
       blocks%present(4) = .false.
       do n = 1, 49
-        call note_quiet(world%gravity, 0.101_wp*fall, blocks, sleep)
+        call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
       end do
       call check('not yet', .not. any([(is_tired(world%gravity, b, blocks, sleep), b=1, 4)]))
-      call note_quiet(world%gravity, 0.101_wp*fall, blocks, sleep)
+      call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
       call check('tired', all([(is_tired(world%gravity, b, blocks, sleep), b=1, 4)] &
         .eqv. [.true., .true., .false., .false.]))
-      blocks%omega(2, 2) = 0.51_wp*slow/reach
-      call note_quiet_end(world%gravity, blocks, sleep)
-      call check('turns too fast', sleep%quiet(:2), [5.05_wp*fall, 0.0_wp], 1.0e-13_wp)
-      blocks%v(1, 1) = 1.01_wp*slow
-      call note_quiet(world%gravity, fall, blocks, sleep)
+      call creep(world, way, [0.99_wp, 0.5_wp], 0.51_wp, sleep)
+      call check('turns too fast', sleep%quiet(:2), [51*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
+      call creep(world, way, [1.01_wp, 0.0_wp], 0.0_wp, sleep)
       call check('moves too fast', sleep%quiet(1), 0.0_wp, 0.0_wp)
     end associate
   end subroutine check_quiet
+
+  !> A step in which two blocks come so far, by the way of a slow one, and the second turns too.
+  subroutine creep(world, way, share, turn, sleep)
+    type(world_t), intent(inout) :: world
+    real(wp), intent(in) :: way           !! of a slow block in this step [m]
+    real(wp), intent(in) :: share(2), turn
+    type(sleep_t), intent(inout) :: sleep
+
+    associate (blocks => world%blocks)
+      call note_poses(blocks, sleep)
+      blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
+      blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
+        turn*way/sleep%reach(2)), blocks%q(:, 2))
+      call note_quiet(world%gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
+    end associate
+  end subroutine creep
 
   !> What rests bears on body and partner, on the partner the other way, and on no wall.
   subroutine check_loads()
