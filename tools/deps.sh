@@ -71,7 +71,7 @@ system() {
 
 requirements="requirements.txt requirements-lint.txt${1:+ requirements-$1.txt}"
 
-# Exit code 0 when .venv holds exactly the pinned versions.
+# Exit code 0 when .venv holds exactly the pinned versions, and `mics-tools`.
 python_packages_ready() {
   # shellcheck disable=SC2086
   [ -x .venv/bin/python ] && .venv/bin/python - $requirements <<'END' 2> /dev/null
@@ -85,6 +85,7 @@ for name in sys.argv[1:]:
             package, pin = line.split('==')
             if version(package) != pin:
                 sys.exit(1)
+sys.exit(not Path('.venv/bin/mics-tools').exists())
 END
 }
 
@@ -96,7 +97,8 @@ python_packages() {
   log=$(mktemp) || exit 1
   # shellcheck disable=SC2046
   if ! .venv/bin/python -m pip install --quiet --disable-pip-version-check --only-binary :all: \
-    $(printf -- '-r %s ' $requirements) > "$log" 2>&1; then
+    $(printf -- '-r %s ' $requirements) > "$log" 2>&1 || ! .venv/bin/python -m pip install --quiet \
+    --disable-pip-version-check --no-deps --no-build-isolation --editable . >> "$log" 2>&1; then
     without_addresses < "$log" | tail -n 30 >&2
     rm -f "$log"
     stop 'pip install failed'

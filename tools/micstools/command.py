@@ -43,10 +43,12 @@ def open_run(path: Path) -> Run:
     return Run(results_of(path))
 
 
-def run_script(main: Callable[[], None]) -> None:
+def run_script(main: Callable[[], None], name: str | None = None) -> None:
     """Call a script; trouble with what the user gave it is one line and the exit code 2."""
     try:
         main()
+    except KeyboardInterrupt:
+        raise SystemExit(130) from None
     except (BadRun, OSError, subprocess.SubprocessError) as problem:
-        print(f"{Path(sys.argv[0]).stem}: {problem}", file=sys.stderr)
+        print(f"{name or Path(sys.argv[0]).stem}: {problem}", file=sys.stderr)
         raise SystemExit(2) from problem

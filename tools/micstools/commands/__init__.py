@@ -1,0 +1,1 @@
+"""The commands of `mics-tools`, a module each: its arguments and its work."""

@@ -1,0 +1,76 @@
+"""Pictures of the blocks and diagrams of the history of a run."""
+
+import argparse
+from pathlib import Path
+
+from micstools import command, pile, plots, scene
+from micstools.commands.base import Command
+
+
+def picture_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to draw and where."""
+    parser.add_argument("run", type=Path, help=command.RUN_HELP)
+    parser.add_argument("--times", type=float, nargs="+", help="[s]; default: as in the paper")
+    parser.add_argument("--view", nargs="+", choices=scene.VIEWS)
+    parser.add_argument("--out", type=Path, help="folder for the pictures, default RUN/pictures")
+    parser.add_argument("--width", type=int, default=1200, help="of a picture [pixels]")
+
+
+def draw_pictures(given: argparse.Namespace) -> int:
+    """Draw every time and view, and the sheets."""
+    scene.require_libraries()
+    run = command.open_run(given.run)
+    out = given.out or run.folder / "pictures"
+    out.mkdir(parents=True, exist_ok=True)
+    times = given.times or pile.telling_times(run)
+    views = given.view or scene.telling_views(run)
+    speed = scene.arrow_speed(run, times, views)
+    style = scene.Style(width=given.width, speed=speed)
+    for view in views:
+        pictures = [
+            scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style) for t in times
+        ]
+        plots.contact_sheet(pictures, out / f"{view}.png", columns=min(4, len(pictures)))
+        print(f"{len(pictures)} pictures and a sheet: {out / f'{view}.png'}")
+    return 0
+
+
+def history_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which run and where to."""
+    parser.add_argument("run", type=Path, help=command.RUN_HELP)
+    parser.add_argument("--out", type=Path, help="default RUN/pictures/history.png")
+
+
+def draw_history(given: argparse.Namespace) -> int:
+    """Draw and save the diagrams."""
+    run = command.open_run(given.run)
+    out = given.out or run.folder / "pictures" / "history.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    plots.history(run).savefig(out, dpi=110)
+    print(out)
+    return 0
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    picture_arguments(parser)
+    parser.add_argument("--history", action="store_true", help="the diagrams only")
+
+
+def _plot(given: argparse.Namespace) -> int:
+    if not given.history:
+        draw_pictures(given)
+    given.out = given.out / "history.png" if given.out else None
+    return draw_history(given)
+
+
+PLOT = Command(
+    "plot",
+    "Draw the blocks and the water of a run, and its history.",
+    (
+        "plot mics-coarse",
+        "plot mics-coarse --times 0.2 5 --view front",
+        "plot mics-coarse --history",
+    ),
+    _arguments,
+    _plot,
+)

@@ -1,0 +1,64 @@
+"""Run a case, or check it."""
+
+import argparse
+import subprocess
+from contextlib import suppress
+from pathlib import Path
+
+from micstools import program
+from micstools.commands.base import Command
+
+
+def _run_arguments(parser: argparse.ArgumentParser) -> None:
+    program.add_case(parser)
+    parser.add_argument("--output", type=Path, help="folder for the results")
+    parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--quiet", action="store_true", help="no table")
+
+
+def _call(given: argparse.Namespace, options: list[str]) -> int:
+    """The program on the case; it reads the case as it is where nothing was set."""
+    path = program.find(given.program)
+    text = program.case_text(given.case, given.settings)
+    if not given.settings:
+        return _code(subprocess.Popen([path, *options, given.case], text=True))
+    with subprocess.Popen([path, *options], stdin=subprocess.PIPE, text=True) as process:
+        # The program has the signal, too, and ends in good order.
+        with suppress(KeyboardInterrupt, BrokenPipeError):
+            process.communicate(text)
+        return _code(process)
+
+
+def _code(process: subprocess.Popen[str]) -> int:
+    """Exit code of the program, as a shell would tell it; Ctrl-C reaches the program itself."""
+    while True:
+        try:
+            code = process.wait()
+        except KeyboardInterrupt:
+            continue
+        return code if code >= 0 else 128 - code
+
+
+def _run(given: argparse.Namespace) -> int:
+    options = ["--output", str(given.output)] if given.output else []
+    options += ["--threads", str(given.threads)] if given.threads is not None else []
+    return _call(given, options + (["--quiet"] if given.quiet else []))
+
+
+RUN = Command(
+    "run",
+    "Run a case.",
+    (
+        "run input/blocks_coarse.nml",
+        "run input/blocks_coarse.nml --set drop.seed=7 --set contact.friction=0.3 --output mics-7",
+    ),
+    _run_arguments,
+    _run,
+)
+CHECK = Command(
+    "check",
+    "Read and check a case, print its plan; nothing is written.",
+    ("check input/blocks.nml", "check input/blocks.nml --set grid.cells=120,40,80"),
+    program.add_case,
+    lambda given: _call(given, ["--check"]),
+)

@@ -1,0 +1,120 @@
+"""`mics-tools`: commands help, refuse wrong use in one line, and set variables of a case."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from micstools import cli, settings
+from micstools.reader import BadRun
+
+ROOT = Path(__file__).parents[2]
+CASE = """\
+! A case with a / and a & in a remark
+&run title = 'a / b & c' t_end = 1.0 /
+&grid cells = 1, 1, 1 length = 1.0, 1.0, 1.0 /
+&drop shape = 'a' position = 0,0,0 ! first / of two
+  seed = 3 /
+&drop shape = 'b' position = 0,0,0 /
+"""
+
+
+def call(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "micstools.cli", *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "tools")},
+    )
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    """In place of mics: says how it was called and the case it got, refuses friction 9."""
+    path = tmp_path / "a program"
+    path.write_text(
+        '#!/bin/sh\nread -r line\necho "$@: $line"\ngrep -q "friction = 9" && '
+        "{ echo 'mics: &contact friction = 9: too much' >&2; exit 2; }\nexit 0\n"
+    )
+    path.chmod(0o755)
+    return path
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_helps_with_examples(name: str, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main([name, "--help"])
+    said = capsys.readouterr().out
+    assert end.value.code == 0
+    assert f"mics-tools {name}" in said.split("examples:")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["dance"], "no command 'dance'; there are: run, check"),
+        (["run"], "the following arguments are required: case"),
+        (["check", "no such case.nml"], "no such case.nml"),
+        (["check", "CASE", "--set", "friction=3"], "'friction=3': must be group.variable=value"),
+        (["check", "CASE", "--program", "/"], "/: is no program"),
+        (["plot", "nowhere"], "nowhere: there is no such folder or file"),
+        (["pile", "CASE", "--nonsense"], "unrecognized arguments: --nonsense"),
+        (["shape", "no.stl", "--out", "a.txt"], "no such file"),
+    ],
+)
+def test_wrong_use_is_one_line(words: list[str], said: str, tmp_path: Path, capsys) -> None:
+    (tmp_path / "CASE").write_text(CASE)
+    with pytest.raises(SystemExit) as end:
+        cli.main([str(tmp_path / word) if word == "CASE" else word for word in words])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert end.value.code == 2
+    assert line.startswith("mics-tools") and said in line, line
+
+
+def test_settings_keep_the_rest_of_a_case() -> None:
+    words = [
+        "drop.seed=9",
+        "contact.friction=0.4",
+        "grid.cells=2,3,4",
+        "run.title=it's",
+        "run.x=true",
+    ]
+    text = settings.set_variables(CASE, map(settings.parse, words))
+    assert [name for name, _, _ in settings.groups(text)] == [
+        "run", "grid", "drop", "drop", "contact",
+    ]  # fmt: skip
+    assert text.count("seed = 9") == 2 and "seed = 3" not in text
+    assert "cells = 2, 3, 4 length" in text and "friction = 0.4" in text
+    assert "! first / of two" in text and '"it\'s"' in text and "x = .true." in text
+
+
+def test_one_group_of_several_is_set() -> None:
+    text = settings.set_group(CASE, "drop", {"seed": 8}, occurrence=1)
+    assert "seed = 3 /" in text and text.index("seed = 8") > text.index("'b'")
+
+
+@pytest.mark.parametrize("word", ["", "a", "a.b", "a.b=", "a b.c=1", "=3", "a.b.c=1"])
+def test_a_setting_has_a_form(word: str) -> None:
+    with pytest.raises(BadRun, match="must be group.variable=value"):
+        settings.parse(word)
+
+
+def test_choices_are_single_values() -> None:
+    found = settings.parse_choices("contact.friction=0.4,0.6")
+    assert [(s.name, s.value) for s in found] == [
+        ("contact.friction", 0.4),
+        ("contact.friction", 0.6),
+    ]
+
+
+def test_the_program_gets_the_case_as_set(tmp_path: Path, program: Path) -> None:
+    case = tmp_path / "my case.nml"
+    case.write_text(CASE)
+    words = ("check", case, "--program", program, "--set")
+    done = call(*words, "grid.cells=2,3,4")
+    assert (done.returncode, done.stdout) == (0, "--check: ! A case with a / and a & in a remark\n")
+    done = call(*words, "contact.friction=9")
+    assert (done.returncode, done.stderr) == (2, "mics: &contact friction = 9: too much\n")
