@@ -50,5 +50,8 @@ def run_script(main: Callable[[], None], name: str | None = None) -> None:
     except KeyboardInterrupt:
         raise SystemExit(130) from None
     except (BadRun, OSError, subprocess.SubprocessError) as problem:
-        print(f"{name or Path(sys.argv[0]).stem}: {problem}", file=sys.stderr)
+        said: object = problem
+        if isinstance(problem, OSError) and problem.strerror and problem.filename:
+            said = f"{problem.filename}: {problem.strerror}"
+        print(f"{name or Path(sys.argv[0]).stem}: {said}", file=sys.stderr)
         raise SystemExit(2) from problem

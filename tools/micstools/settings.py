@@ -113,3 +113,11 @@ def _patched(group: str, name: str, variables: dict[str, Any]) -> str:
         except Exception as error:  # f90nml raises what Python has for a text it cannot follow
             raise BadRun(f"&{name}: cannot be changed, write it anew ({error})") from error
         return after.read_text().rstrip("\n")
+
+
+def value(text: str, group: str, variable: str) -> Any:
+    """A variable of the first group of a name; none where the case does not give it."""
+    for name, start, end in groups(text):
+        if name == group:
+            return f90nml.Parser().reads(text[start:end] + "\n")[group].get(variable)
+    return None

@@ -1,0 +1,186 @@
+"""Many runs of one case that differ by chance, or in a variable."""
+
+import argparse
+import contextlib
+import fcntl
+import os
+import re
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, NoReturn
+
+from micstools import ensemble, ensemble_engine, ensemble_table, program, settings, slurm
+from micstools.commands.base import Command
+from micstools.ensemble import Member, Plan, State
+from micstools.reader import BadRun
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    program.add_case(parser)
+    add = parser.add_argument
+    add("--runs", type=int, required=True, help="number of runs, of each choice of --vary")
+    add("--jobs", type=int, default=os.cpu_count() or 1, help="at once, one core each")
+    add("--seed", type=int, default=1, help="the seeds of all runs follow from it, default 1")
+    add("--spread", type=float, help="random shift of each drop in x and y, up to +- this [m]")
+    add("--tilt", type=float, help="random tilt of each drop up to this [degrees]")
+    add("--vary", action="append", default=[], metavar="GROUP.VARIABLE=A,B",
+        help="runs for each value, with the same seeds; several: every combination")  # fmt: skip
+    add("--out", type=Path, help="folder, default mics-ensemble-CASE")
+    add("--slurm", nargs="*", metavar="OPTION", help="write a Slurm array script instead of "
+        "running, with options of sbatch such as time=2:00:00")  # fmt: skip
+
+
+def _plan(given: argparse.Namespace) -> Plan:
+    for name, least in (("runs", 1), ("jobs", 1), ("seed", 0), ("spread", 0), ("tilt", 0)):
+        value = getattr(given, name)
+        if value is not None and not value >= least:
+            raise BadRun(f"--{name} {value}: must be {least} or more")
+    text = program.case_text(given.case, given.settings)
+    choices = ensemble.product([settings.parse_choices(word) for word in given.vary])
+    folder = given.out or Path(f"mics-ensemble-{given.case.stem}")
+    return Plan(text, folder, given.runs, given.seed, given.spread, given.tilt, choices)
+
+
+def _differ(plan: Plan, members: list[Member]) -> None:
+    """Refuse runs that would all be the same."""
+    text = members[0].text
+    chance = any(
+        settings.value(text[start:end], "drop", name) not in (None, 0, 0.0, [0, 0, 0], "given")
+        for group, start, end in settings.groups(text)
+        if group == "drop"
+        for name in ("spread", "tilt_deg", "orientation")
+    )
+    if plan.runs > 1 and not chance:
+        raise BadRun("nothing is left to chance in this case: give --spread or --tilt")
+
+
+def _cost(program_path: Path, plan: Plan, members: list[Member]) -> str:
+    """Check the first run of each choice and say what one takes."""
+    said = [program.check(program_path, m.text) for m in members[: len(plan.choices)]]
+    found = re.search(r"time of the run\s+(.*)", said[0])
+    return found[1] if found else "unknown"
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[IO[str]]:
+    """Hold the folder, so that a second call there is refused; the system frees it after a kill."""
+    known = (folder / "ensemble.lock").exists()
+    if folder.exists() and not known and (not folder.is_dir() or any(folder.iterdir())):
+        raise BadRun(f"{folder} is there and is no ensemble: give another --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "ensemble.lock").open("a+") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            lock.seek(0)
+            raise BadRun(f"{folder} is in use by process {lock.read().strip()}") from error
+        lock.truncate(0)
+        lock.write(f"{os.getpid()} on {os.uname().nodename}\n")
+        lock.flush()
+        yield lock
+
+
+class _Live:
+    """Tells of the runs that end: a line that changes on a terminal, else a line each."""
+
+    def __init__(self, plan: Plan, table: dict[Member, State], jobs: int) -> None:
+        self.plan, self.table, self.jobs = plan, table, jobs
+        self.left = sum(not end.counts for end in table.values())
+        self.todo, self.start = self.left, time.monotonic()
+        self.terminal = sys.stdout.isatty()
+
+    def ended(self, member: Member, end: State) -> None:
+        """One run came to its end."""
+        self.table[member], self.left = end, self.left - 1
+        ensemble_table.write(self.plan, self.table)
+        if not end.counts:
+            self._say(f"run {member.number:04d} {end.outcome}: {end.reason or end.code}")
+        passed = time.monotonic() - self.start
+        left = passed / (self.todo - self.left) * self.left
+        done = sum(known.counts for known in self.table.values())
+        text = f"{done} of {len(self.table)} done"
+        text += f" | {ensemble_table.sentence(self.table)} | {left / 60:.1f} min left"
+        print(f"\r{text}\033[K" if self.terminal else text, end="" if self.terminal else "\n")
+        sys.stdout.flush()
+
+    def _say(self, text: str) -> None:
+        print(f"\r{text}\033[K" if self.terminal else text)
+
+    def close(self) -> None:
+        """Leave the last line standing."""
+        if self.terminal:
+            print()
+
+
+def _terminated(signum: int, _frame: object) -> NoReturn:
+    raise KeyboardInterrupt(signum)
+
+
+def _ensemble(given: argparse.Namespace) -> int:
+    path, plan = program.find(given.program), _plan(given)
+    members = list(ensemble.members(plan))
+    _differ(plan, members)
+    cost = _cost(path, plan, members)
+    with _alone(plan.folder):
+        for member in members:
+            ensemble.write_case(member)
+        table = {member: ensemble.state(member) for member in members}
+        waiting = [member for member, end in table.items() if not end.counts]
+        print(f"{len(members)} runs in {plan.folder}, {len(waiting)} of them to do; "
+              f"each takes {cost}; {min(given.jobs, len(waiting))} at once")  # fmt: skip
+        sys.stdout.flush()
+        ensemble_table.write(plan, table)
+        if given.slurm is not None:
+            return _write_slurm(plan, waiting, path, given.slurm)
+        return _compute(plan, table, waiting, path, given.jobs)
+
+
+def _write_slurm(plan: Plan, waiting: list[Member], path: Path, options: list[str]) -> int:
+    script = plan.folder / "array.sh"
+    script.write_text(slurm.script(plan.folder, [m.number for m in waiting], path, options))
+    print(f"sbatch {script}")
+    return 0
+
+
+def _compute(
+    plan: Plan, table: dict[Member, State], waiting: list[Member], path: Path, jobs: int
+) -> int:
+    live = _Live(plan, table, jobs)
+    signal.signal(signal.SIGTERM, _terminated)
+    stopped = False
+    try:
+        if waiting:
+            ensemble_engine.run_all(waiting, path, min(jobs, len(waiting)), live.ended)
+    except KeyboardInterrupt:
+        stopped = True
+    live.close()
+    for member in waiting:
+        table[member] = ensemble.state(member)
+    ensemble_table.write(plan, table)
+    print(f"{ensemble_table.sentence(table)}\n{plan.folder / 'ensemble.csv'}")
+    failed = [m.number for m, end in table.items() if not end.counts]
+    if stopped:
+        print("stopped; the same command goes on where each run stood", file=sys.stderr)
+        return 130
+    if failed:
+        names = ", ".join(f"{number:04d}" for number in failed)
+        print(f"mics-tools ensemble: failed: {names}; the same command tries again, "
+              f"{plan.folder}/{failed[0]:04d}/log.txt tells why", file=sys.stderr)  # fmt: skip
+    return 3 if failed else 0
+
+
+ENSEMBLE = Command(
+    "ensemble",
+    "Run a case many times with other random drops; call it again to run what is missing.",
+    (
+        "ensemble input/blocks_coarse.nml --runs 50",
+        "ensemble input/blocks_coarse.nml --runs 20 --spread 0.005 --tilt 5 --jobs 2",
+        "ensemble input/blocks_coarse.nml --runs 20 --vary contact.friction=0.4,0.6 --out mics-mu",
+        "ensemble input/blocks.nml --runs 50 --slurm time=2:00:00 partition=short",
+    ),
+    _arguments,
+    _ensemble,
+)

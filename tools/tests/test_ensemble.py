@@ -1,0 +1,146 @@
+"""An ensemble on a stand-in for the program: seeds, outcomes, second calls, the table."""
+
+import csv
+import fcntl
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from micstools import cli, ensemble, settings, shares, slurm
+from micstools.ensemble import Plan
+
+CASE = """\
+&run t_end = 1.0 /
+&drop shape = 'a' position = 0,0,0 spread = 0.1, 0.1, 0.0 /
+&drop shape = 'b' position = 0,0,0 /
+"""
+# A stand-in: the first seed finds no room, the second fails at its first try, others settle.
+PROGRAM = """\
+#!{python}
+import sys
+from pathlib import Path
+words = sys.argv[1:]
+if "--check" in words:
+    sys.stdin.read()
+    print("  time of the run         about 1 s")
+    sys.exit(0)
+import h5py
+text, folder = Path(words[-1]).read_text(), Path(words[words.index("--output") + 1])
+first = not folder.exists()
+if f"seed = {no_room}" in text:
+    code, time = 3, 1.0
+    print("mics: 2 due block(s) never found room", file=sys.stderr)
+elif f"seed = {fails}" in text and first:
+    code, time = 3, 0.2
+    print("mics: the velocity is not a number", file=sys.stderr)
+else:
+    code, time = 0, 0.5
+folder.mkdir(exist_ok=True)
+with h5py.File(folder / "run.h5", "w") as h5:
+    h5.create_group("provenance").attrs["exit_status"] = code
+    h5["series/time"] = [0.0, time]
+sys.exit(code)
+"""
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    path = tmp_path / "a mics"
+    seeds = {"no_room": ensemble.seed_of(1, 0), "fails": ensemble.seed_of(1, 1)}
+    path.write_text(PROGRAM.replace("{python}", sys.executable).replace(
+        "{no_room}", str(seeds["no_room"])).replace("{fails}", str(seeds["fails"])))  # fmt: skip
+    path.chmod(0o755)
+    (tmp_path / "case.nml").write_text(CASE)
+    return path
+
+
+def call(program: Path, *words: str) -> int:
+    case = str(program.parent / "case.nml")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["ensemble", case, "--program", str(program), *words])
+    return int(str(end.value.code))
+
+
+def outcomes(folder: Path) -> list[str]:
+    with (folder / "ensemble.csv").open() as file:
+        return [row["outcome"] for row in csv.DictReader(file)]
+
+
+def test_a_failed_run_is_named_and_run_again(tmp_path: Path, program: Path, capsys) -> None:
+    one, two = tmp_path / "in one", tmp_path / "in two"
+    assert call(program, "--runs", "3", "--jobs", "2", "--out", str(two)) == 3
+    said = capsys.readouterr()
+    assert "3 of them to do; each takes about 1 s; 2 at once" in said.out
+    assert "run 0002 failed: mics: the velocity is not a number" in said.out
+    assert "failed: 0002; the same command tries again" in said.err
+    assert outcomes(two) == ["no room", "failed", "settled"]
+    assert call(program, "--runs", "3", "--jobs", "2", "--out", str(two)) == 0
+    assert "1 of them to do" in capsys.readouterr().out
+    assert outcomes(two) == ["no room", "settled", "settled"]
+    assert call(program, "--runs", "3", "--jobs", "1", "--out", str(one)) == 3
+    assert call(program, "--runs", "3", "--jobs", "1", "--out", str(one)) == 0
+    for name in ("ensemble.csv", "ensemble.json"):
+        assert (one / name).read_bytes() == (two / name).read_bytes()
+
+
+def test_other_runs_and_strange_folders_are_left_alone(
+    tmp_path: Path, program: Path, capsys
+) -> None:
+    words = ("--runs", "2", "--slurm", "--out")
+    folder = tmp_path / "a b"
+    assert call(program, *words, str(folder)) == 0
+    assert call(program, "--seed", "2", *words, str(folder)) == 2
+    assert "another case, seed or setting" in capsys.readouterr().err
+    assert call(program, *words, str(tmp_path)) == 2
+    assert "is no ensemble" in capsys.readouterr().err
+    with (folder / "ensemble.lock").open("a+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert call(program, *words, str(folder)) == 2
+    assert "is in use by process" in capsys.readouterr().err
+
+
+def test_runs_without_chance_are_refused(tmp_path: Path, program: Path, capsys) -> None:
+    (tmp_path / "case.nml").write_text(CASE.replace("spread = 0.1, 0.1, 0.0", ""))
+    out = ("--slurm", "--out", str(tmp_path / "out"))
+    assert call(program, "--runs", "2", *out) == 2
+    assert "nothing is left to chance" in capsys.readouterr().err
+    assert call(program, "--runs", "2", "--tilt", "5", *out) == 0
+
+
+def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:
+    friction = ensemble.product([settings.parse_choices("contact.friction=0.4,0.6")])
+    small, large = (
+        list(ensemble.members(Plan(CASE, tmp_path, runs, 1, 0.005, 3.0, friction)))
+        for runs in (2, 5)
+    )
+    assert large[:4] == small and len(large) == 10
+    assert small[0].seed == small[1].seed != small[2].seed
+    assert "friction = 0.4" in small[0].text and "friction = 0.6" in small[1].text
+    assert small[0].text.count("spread = 0.005, 0.005, 0.0") == 2
+    assert f"seed = {ensemble.seed_of(1, 0, 1)}" in small[0].text  # drops differ from each other
+    assert "stop_when_settled = .true." in small[0].text
+
+
+def test_interval_of_a_share() -> None:
+    """Newcombe, Two-sided confidence intervals for the single proportion (1998), table I."""
+    assert shares.wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert shares.wilson(15, 148) == pytest.approx((0.0624, 0.1605), abs=5e-5)
+    assert shares.wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
+    assert shares.wilson(1, 29) == pytest.approx((0.0061, 0.1718), abs=5e-5)
+    assert shares.wilson(0, 0) == (0.0, 1.0)
+
+
+def test_the_slurm_script_is_a_script(tmp_path: Path) -> None:
+    text = slurm.script(tmp_path / "a b", [1, 4], Path("/bin/echo"), ["time=1:00:00"])
+    assert "#SBATCH --array=1,4\n" in text and "#SBATCH --time=1:00:00\n" in text
+    (tmp_path / "a b" / "0004" / "result").mkdir(parents=True)
+    done = subprocess.run(
+        ["sh"],
+        input=text.replace("cd ", "SLURM_ARRAY_TASK_ID=4; cd ", 1),
+        capture_output=True,
+        text=True,
+    )
+    folder = tmp_path / "a b" / "0004"
+    assert done.stdout == f"--quiet --output {folder}/result {folder}/case.nml\n"
