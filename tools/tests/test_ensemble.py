@@ -96,7 +96,7 @@ def test_other_runs_and_strange_folders_are_left_alone(
     assert call(program, *words, str(tmp_path)) == 2
     assert "is no ensemble" in capsys.readouterr().err
     with (folder / "ensemble.lock").open("a+") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        fcntl.flock(lock, fcntl.LOCK_SH)
         assert call(program, *words, str(folder)) == 2
     assert "is in use by process" in capsys.readouterr().err
 
