@@ -5,7 +5,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_Init_thread, MPI_Finalize, MPI_Abort, MPI_Comm_size, MPI_Comm_rank
   use mpi_f08, only: MPI_Type_contiguous, MPI_Type_commit, MPI_Type_free, MPI_Op_create, MPI_Op_free
   use mpi_f08, only: MPI_Isend, MPI_Irecv, MPI_Waitall, MPI_Allreduce, MPI_Allgather
-  use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request, operator(==)
+  use mpi_f08, only: MPI_Allgatherv, MPI_Bcast, MPI_Datatype, MPI_Op, MPI_Request
   use mpi_f08, only: MPI_COMM_WORLD, MPI_PROC_NULL, MPI_IN_PLACE, MPI_STATUSES_IGNORE
   use mpi_f08, only: MPI_Alloc_mem, MPI_Free_mem, MPI_ADDRESS_KIND
   use mpi_f08, only: MPI_DATATYPE_NULL, MPI_DOUBLE_PRECISION, MPI_REAL, MPI_INTEGER, MPI_INTEGER8
@@ -343,7 +343,7 @@ contains
     integer(i8), pointer :: part(:, :), bins(:, :)
     integer :: m
 
-    if (datatype == MPI_DATATYPE_NULL) return
+    if (datatype%MPI_VAL == MPI_DATATYPE_NULL%MPI_VAL) return
     call c_f_pointer(from, part, [bin_size, length])
     call c_f_pointer(into, bins, [bin_size, length])
     do m = 1, length

@@ -32,8 +32,9 @@ contains
     character(*), intent(in) :: kind
     real(wp), intent(in) :: size(3), position(3), angle, height
     integer :: k
+    type(one_body_t) :: fresh
 
-    block = one_body_t()
+    block = fresh
     call describe(cells, length, tank, kind, size, position, block%case)
     block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.4_wp, 0.3_wp], angle)
     call place(block)

@@ -40,9 +40,11 @@ contains
     integer, intent(in) :: cells
     character(*), intent(in) :: kind
     real(wp), intent(in) :: size(3), density
+    type(one_body_t) :: fresh
+    type(stage_t) :: fresh_stage
 
-    block = one_body_t()
-    stage = stage_t()
+    block = fresh
+    stage = fresh_stage
     call describe(spread(cells, 1, 3), spread(0.01_wp*cells, 1, 3), tank, kind, size, &
                   spread(0.005_wp*cells, 1, 3) + [0.0013_wp, -0.0007_wp, 0.0021_wp], block%case)
     block%case%run%dt = dt

@@ -44,8 +44,9 @@ contains
   subroutine build(sides, free)
     character(*), intent(in) :: sides(2, 3)
     logical, intent(in) :: free
+    type(one_body_t) :: fresh
 
-    box = one_body_t()
+    box = fresh
     call describe(cells, length, sides, 'box', [0.043_wp, 0.031_wp, 0.037_wp], &
                   [0.0613_wp, 0.0389_wp, 0.0571_wp], box%case)
     box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)

@@ -34,8 +34,9 @@ contains
     character(*), intent(in) :: sides(2, 3)
     real(wp), intent(in) :: position(3)
     logical, intent(in) :: turned
+    type(one_body_t) :: fresh
 
-    box = one_body_t()
+    box = fresh
     call describe(cells, tank, sides, 'box', edges, position, box%case)
     if (turned) box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 2.0_wp, -1.0_wp], &
                                                                   0.6_wp)

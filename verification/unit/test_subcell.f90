@@ -45,8 +45,9 @@ contains
   !> Solids by n sub-cells per direction.
   subroutine recount(n)
     integer, intent(in) :: n
+    type(solid_fraction_t) :: fresh
 
-    fraction = solid_fraction_t()
+    fraction = fresh
     call solid_geometry_init(block%grid, solid, 1)
     call solid_fraction_init(block%grid, block%blocks, fraction, n)
     call update_solid(fraction, block%grid, block%blocks, solid)
