@@ -1,0 +1,42 @@
+"""Numbers of a pile on arrangements that are known exactly."""
+
+import numpy as np
+import pytest
+
+from micstools import pile_numbers, shapes
+from synthetic import UPRIGHT, Motion
+
+EDGE = 0.02
+
+
+def test_stacked_cubes(make_run) -> None:
+    """Two towers of cubes on the floor, three and one high; the fixed blocks are cubes, too."""
+    half = EDGE / 2
+    towers = [(0.03, half), (0.03, 3 * half), (0.03, 5 * half), (0.27, half)]
+    places = [(np.array([x, 0.03, z]), UPRIGHT) for x, z in towers]
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    found = pile_numbers.numbers(run, step=0.001)
+    assert found.blocks == 7
+    assert found.on_floor == 2
+    assert found.top == pytest.approx(max(0.06, run.points(0, -1)[:, 2].max()))
+    assert found.coordination == pytest.approx(2 * 2 / 7)
+    assert found.spread[0] == pytest.approx(np.std([0.03] * 3 + [0.27, 0.09, 0.15, 0.21]))
+    assert 3.5 < found.time_to_rest < 4.0  # the last is dropped at 3 s and takes 0.8 s
+    area = np.linspace(0, 0.8, 17)
+    assert 0 < found.impact_speed < 1.5 * 0.2 / area[-1]
+
+
+def test_height_map_of_a_cube_and_a_tilted_one() -> None:
+    cube = shapes.cube(EDGE)
+    low, high = np.zeros(3), np.array([0.1, 0.1, 0.1])
+    upright = pile_numbers.Placed(cube, np.array([0.03, 0.05, 0.01]), UPRIGHT)
+    turned = np.array([np.cos(np.pi / 8), 0.0, np.sin(np.pi / 8), 0.0])  # 45 degrees about y
+    edge_up = pile_numbers.Placed(cube, np.array([0.07, 0.05, 0.03]), turned)
+    one = pile_numbers.height_map([upright], low, high, 0.001)
+    assert np.isfinite(one).sum() == 400 and np.nanmax(one) == np.nanmin(one) == EDGE
+    both = pile_numbers.height_map([upright, edge_up], low, high, 0.001)
+    x = (np.arange(100) + 0.5) * 0.001
+    roof = 0.03 + EDGE / np.sqrt(2) - np.abs(x - 0.07)
+    seen = np.isfinite(both[50]) & (x > 0.05)
+    assert seen.sum() == np.sum(np.abs(x - 0.07) < EDGE / np.sqrt(2))
+    assert both[50, seen] == pytest.approx(roof[seen])
