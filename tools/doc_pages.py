@@ -98,7 +98,7 @@ def with_links(page: Page, text: str, links: Links) -> str:
         return f"{found[1]}({links.url(file)}{'#' + part if part else ''})"
 
     def of_name(found: re.Match[str]) -> str:
-        if "NAME" in found[1]:  # stands for any name
+        if "NAME" in found[1] or found[1].startswith("build/"):  # any name; made, not kept
             return found[0]
         file = links.file(found[1], page.source.parent)
         if file is None:
