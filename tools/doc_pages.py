@@ -13,6 +13,10 @@ SEARCHED = ("", "docs/", "src/", "verification/", "tools/")
 """Folders from which texts name files; the one of the text itself comes first."""
 
 
+WRITTEN = {"build/bench.json", "ensemble.csv", "ensemble.json", "pile.json"}
+"""Files that the tools write, which texts name."""
+
+
 @dataclass(frozen=True)
 class Page:
     """A text of the project and its place in the site, without the ending."""
@@ -98,7 +102,7 @@ def with_links(page: Page, text: str, links: Links) -> str:
         return f"{found[1]}({links.url(file)}{'#' + part if part else ''})"
 
     def of_name(found: re.Match[str]) -> str:
-        if "NAME" in found[1] or found[1].startswith("build/"):  # any name; made, not kept
+        if "NAME" in found[1] or found[1] in WRITTEN:
             return found[0]
         file = links.file(found[1], page.source.parent)
         if file is None:
