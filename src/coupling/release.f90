@@ -66,14 +66,15 @@ contains
                   .and. blocks%release_time > time + same_time)
   end function next_release
 
-  !> Number of blocks whose time has come but whose place is taken.
+  !> Number of blocks whose time came before this moment but whose place was taken; one that is due
+  !! at this very moment has not been tried.
   pure function n_waiting(time, blocks) result(n)
     real(wp), intent(in) :: time   !! [s]
     type(blocks_t), intent(in) :: blocks
     integer :: n
 
     n = 0
-    if (blocks%n > 0) n = count(.not. blocks%present .and. blocks%release_time <= time + same_time)
+    if (blocks%n > 0) n = count(.not. blocks%present .and. blocks%release_time < time - same_time)
   end function n_waiting
 
 end module release_m

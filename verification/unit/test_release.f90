@@ -50,7 +50,8 @@ program test_release
 
   call try(0.0_wp)
   call check('no room: not released', .not. (released .or. blocks%present(3)))
-  call check('no room: it waits', waiting(3) .and. n_waiting(0.0_wp, blocks) == 1)
+  call check('no room: it waits', waiting(3) .and. n_waiting(0.1_wp, blocks) == 1)
+  call check('due at the very end: not waiting', n_waiting(0.0_wp, blocks), 0)
   call check('warned', warnings, 1)
   call try(0.1_wp)
   call check('warned once', warnings, 1)
@@ -75,7 +76,7 @@ program test_release
   call check('nobody waits', n_waiting(0.5_wp, blocks), 0)
 
   call try(0.75_wp)
-  call check('the next of the drop finds the one before', n_waiting(0.75_wp, blocks), 1)
+  call check('the next of the drop finds the one before', n_waiting(0.8_wp, blocks), 1)
   blocks%x(3, 3) = 0.3_wp
   call try(0.8_wp)
   call check('all there', all(blocks%present))
