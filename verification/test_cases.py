@@ -7,6 +7,8 @@ import pytest
 from run_cases import Machine, changed, names, planned, verify
 from verify import LEVELS
 
+pytestmark = pytest.mark.cost(10)
+
 COST = 20.0
 """Longest run [s] that is part of `make test`."""
 

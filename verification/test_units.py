@@ -37,7 +37,8 @@ def run(command: list[str | Path], folder: Path) -> None:
     assert re.search(r"^[1-9]\d* passed, 0 failed$", done.stdout, re.MULTILINE), done.stdout
 
 
-@pytest.mark.parametrize("build", ["serial", "serial-debug"])
+@pytest.mark.cost(5)
+@pytest.mark.parametrize("build", ["serial-debug", "serial"])
 @pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 def test_unit(source: Path, build: str, tmp_path: Path) -> None:
     run([ROOT / "build" / build / source.stem], tmp_path)
