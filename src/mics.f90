@@ -9,7 +9,7 @@ program mics
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, nproc, &
     set_threads
-  use patience_m, only: spin_briefly
+  use patience_m, only: choose_spin, share_cores
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
@@ -42,7 +42,7 @@ program mics
   integer :: code, signal = 0
   real(wp) :: began   !! wall clock at the start [s]
 
-  call spin_briefly()
+  call choose_spin()
   call parallel_init()
   began = wall_clock()
   call read_options()
@@ -56,6 +56,7 @@ program mics
   call write_due_output(sim%run_state_t, report, output)
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   do while (.not. sim%clock%finished())
+    call share_cores()
     call take_step(sim, report)
     call find_fault(sim, report, fault)
     signal = stop_asked(stop_requests)

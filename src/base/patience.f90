@@ -1,17 +1,31 @@
-!> How long a thread spins at a barrier before it goes to sleep.
+!> How threads wait for one another, and how many of them work while other programs want the cores.
 !!
-!! The OpenMP library of gfortran lets waiting threads spin for milliseconds. On a machine that
-!! others use too the thread waited for may not be running, and a step of many short loops takes up
-!! to a hundred times as long (measured: 28 to 101 s against 0.9 s at a load of 6 to 9 on two
-!! cores). The library reads its settings before the program begins, so the only way to choose a
-!! short spin is to begin again.
+!! A step is some hundreds of short loops. A thread that sleeps at the end of one must be woken for
+!! the next (measured, two threads on two idle cores: 105 ms a step, 57 with a spin of a
+!! millisecond, 82 with one thread). A thread that spins while the one waited for is not running
+!! keeps it from running (with two other programs there: 460 ms a step, 113 with one thread). So
+!! waiting threads spin for about a millisecond, and go on as fewer while there are more running
+!! threads on the machine than cores. The number of threads never changes a result.
+!!
+!! The OpenMP library of gfortran reads the length of the spin before the program begins, so the
+!! only way to choose it is to begin again.
 module patience_m
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_null_char, c_null_ptr, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_long, c_null_char, c_null_ptr, &
+    c_ptr
+  use kinds_m, only: wp
+  use timers_m, only: wall_clock
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
-  public :: spin_briefly
+  public :: choose_spin, share_cores, fair_threads, threads_used
 
-  character(*), parameter :: spin_count = '500'   !! about ten microseconds
+  character(*), parameter :: spin_count = '20000'   !! about a millisecond
+  real(wp), parameter :: look_interval = 1.0_wp     !! between two looks at the machine [s]
+
+  integer :: wanted = 0               !! threads that work when nobody else does; 0: not yet known
+  real(wp) :: last_look = 0.0_wp      !! wall clock [s]
+  real(wp) :: began = 0.0_wp          !! wall clock at the first look [s]
+  real(wp) :: thread_time = 0.0_wp    !! threads at work times wall time, up to the last look [s]
 
   interface
     integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
@@ -27,15 +41,21 @@ module patience_m
       character(kind=c_char), intent(in) :: path(*)
       type(c_ptr), intent(in) :: arguments(*)
     end function c_execv
+
+    integer(c_long) function c_sysconf(name) bind(c, name='sysconf')
+      import :: c_int, c_long
+      implicit none
+      integer(c_int), value :: name
+    end function c_sysconf
   end interface
 
 contains
 
-  !> Start the program again with a short spin, unless the user has chosen how threads wait.
+  !> Start the program again with the spin of above, unless the user has chosen how threads wait.
   !!
   !! Call it before anything else. It returns when the choice is made, or when the system cannot
   !! start the program again (no /proc): then threads wait as the library does.
-  subroutine spin_briefly()
+  subroutine choose_spin()
     character(kind=c_char), allocatable, target :: text(:, :)
     type(c_ptr), allocatable :: arguments(:)
     character(:), allocatable :: word
@@ -62,7 +82,74 @@ contains
     end do
     arguments(n + 1) = c_null_ptr
     if (c_execv('/proc/self/exe'//c_null_char, arguments) /= 0) return   ! it goes on as it is
-  end subroutine spin_briefly
+  end subroutine choose_spin
+
+  !> Let fewer threads work while other programs run on their cores, and all of them afterwards.
+  !! Call it now and then, outside parallel regions: once a second it looks at the machine.
+  subroutine share_cores()
+    integer, parameter :: sc_nprocessors_onln = 84   !! of sysconf, on Linux
+    integer :: n, cores, running
+    real(wp) :: now
+
+    n = omp_get_max_threads()
+    now = wall_clock()
+    if (wanted == 0) then
+      wanted = n
+      began = now
+    else if (now - last_look < look_interval) then
+      return
+    else
+      thread_time = thread_time + n*(now - last_look)
+    end if
+    last_look = now
+    if (wanted == 1) return
+    cores = int(c_sysconf(sc_nprocessors_onln))
+    running = running_threads()
+    if (cores == 0 .or. running == 0) return
+    call omp_set_num_threads(fair_threads(n, wanted, running, cores))
+  end subroutine share_cores
+
+  !> Threads that leave each other running thread a core: n of those now running are ours.
+  pure function fair_threads(n, wanted, running, cores) result(fair)
+    integer, intent(in) :: n         !! threads of this program now
+    integer, intent(in) :: wanted    !! most of them
+    integer, intent(in) :: running   !! threads that run or wait for a core, of all programs
+    integer, intent(in) :: cores
+    integer :: fair
+
+    fair = max(1, min(wanted, n + cores - running))
+  end function fair_threads
+
+  !> Threads of all programs that run or wait for a core, our own team among them; 0 where the
+  !! system does not tell.
+  function running_threads() result(running)
+    integer :: running, unit, info, slash
+    character(80) :: line
+
+    running = 0
+    open (newunit=unit, file='/proc/loadavg', action='read', status='old', iostat=info)
+    if (info /= 0) return
+    !$omp parallel
+    !$omp barrier   ! all of the team are awake, and spin while the file is read
+    !$omp end parallel
+    read (unit, '(a)', iostat=info) line
+    close (unit)
+    if (info /= 0) return
+    slash = index(line, '/')        ! 0.31 0.22 0.20 2/91 4711
+    if (slash == 0) return
+    read (line(index(line(:slash), ' ', back=.true.) + 1:slash - 1), *, iostat=info) running
+    if (info /= 0) running = 0
+  end function running_threads
+
+  !> How many threads worked since the first look, weighted by wall time, and how many were to.
+  subroutine threads_used(mean, most)
+    real(wp), intent(out) :: mean
+    integer, intent(out) :: most
+
+    most = merge(wanted, omp_get_max_threads(), wanted > 0)
+    mean = most
+    if (last_look > began) mean = thread_time/(last_look - began)
+  end subroutine threads_used
 
   !> Is there an environment variable of this name?
   function is_set(name) result(yes)

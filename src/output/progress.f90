@@ -5,6 +5,7 @@ module progress_m
   use errors_m, only: to_text
   use value_text_m, only: fixed_text
   use parallel_m, only: is_root
+  use patience_m, only: threads_used
   use timers_m, only: wall_clock
   use rigid_body_m, only: blocks_t
   use clock_m, only: clock_t
@@ -148,8 +149,8 @@ contains
     integer, intent(in) :: exit_code
     character(*), intent(in) :: folder
     character(:), allocatable :: how, line
-    real(wp) :: seconds
-    integer :: steps
+    real(wp) :: seconds, mean
+    integer :: steps, most
 
     if (.not. self%shown) return
     seconds = wall_clock() - self%began
@@ -161,6 +162,9 @@ contains
       //fixed_text(seconds, 1)//' s'
     if (self%fluid .and. steps > 0) line = line//', ' &
       //fixed_text(1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), 3)//' us per cell and step'
+    call threads_used(mean, most)
+    if (mean < 0.95_wp*most) line = line//', '//fixed_text(mean, 1)//' of '//to_text(most) &
+      //' threads (other programs ran too)'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
     call say('results in '//folder, self)

@@ -1,13 +1,17 @@
-!> The program begins again with a short spin and the same arguments, unless the user has chosen how
-!! threads wait. It calls itself: with arguments it is the program that begins again.
+!> The program begins again with its own spin and the same arguments, unless the user has chosen how
+!! threads wait, and leaves its cores to others. It calls itself: with arguments it is the program
+!! that begins again.
 program test_patience
+  use kinds_m, only: wp
+  use omp_lib, only: omp_get_max_threads
   use check_m, only: check, finish_checks
-  use patience_m, only: spin_briefly
+  use patience_m, only: choose_spin, share_cores, fair_threads, threads_used
   implicit none
 
   if (command_argument_count() > 0) then
     call begin_again()
   else
+    call check_shares()
     call check('a short spin', status_of('-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT', 'short'), 0)
     call check('the user''s policy', &
       status_of('-u GOMP_SPINCOUNT OMP_WAIT_POLICY=active', 'none'), 0)
@@ -16,6 +20,26 @@ program test_patience
   call finish_checks()
 
 contains
+
+  !> Each running thread of the machine has a core, as far as one thread of ours allows.
+  subroutine check_shares()
+    real(wp) :: mean
+    integer :: most, all_of_us
+
+    all_of_us = omp_get_max_threads()
+    call check('nobody else', fair_threads(2, 2, 2, 2), 2)
+    call check('one other', fair_threads(2, 2, 3, 2), 1)
+    call check('many others', fair_threads(8, 8, 30, 8), 1)
+    call check('the other has gone', fair_threads(1, 2, 1, 2), 2)
+    call check('the other is still there', fair_threads(1, 2, 2, 2), 1)
+    call check('never more than wanted', fair_threads(3, 4, 3, 64), 4)
+    call threads_used(mean, most)
+    call check('before the first look', mean, real(most, wp), 1.0e-12_wp)
+    call share_cores()
+    call threads_used(mean, most)
+    call check('all were wanted', most, all_of_us)
+    call check('at least one is left', omp_get_max_threads() >= 1)
+  end subroutine check_shares
 
   !> Exit code of this program with arguments, among them one with blanks and one without letters.
   function status_of(settings, wanted) result(status)
@@ -28,20 +52,20 @@ contains
       //' "two words" "" > /dev/null', exitstat=status)
   end function status_of
 
-  !> What a program finds once it has called spin_briefly: a spin that is set only where the user
+  !> What a program finds once it has called choose_spin: a spin that is set only where the user
   !! has said nothing, far below the 300000 of the library, and its arguments.
   subroutine begin_again()
     character(20) :: wanted, count
     integer :: length, info, spins
 
-    call spin_briefly()
+    call choose_spin()
     call get_command_argument(1, wanted)
     call get_environment_variable('GOMP_SPINCOUNT', count, status=info)
     select case (wanted)
     case ('short')
       call check('is set', info, 0)
       read (count, *) spins
-      call check('is short', spins > 0 .and. spins <= 3000)
+      call check('is short', spins > 0 .and. spins <= 30000)
     case ('none')
       call check('is not set', info, 1)
     case ('count')
