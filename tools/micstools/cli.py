@@ -14,6 +14,7 @@ COMMANDS = {
     "check": ("run", "CHECK", "check a case and print its plan"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "say what can be said of the pile of a run"),
+    "report": ("report", "REPORT", "make one page of a run"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
 }

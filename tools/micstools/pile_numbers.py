@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from micstools import block_numbers
 from micstools.geometry import Array
 from micstools.overlap import Placed, present_bodies, touches
 from micstools.pile import REACH
@@ -25,7 +26,9 @@ class PileNumbers:
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
 
 
-def numbers(run: Run, step: float, row: int = -1, rest_speed: float = 5e-3) -> PileNumbers:
+def numbers(
+    run: Run, step: float, row: int = -1, rest_speed: float = block_numbers.REST_SPEED
+) -> PileNumbers:
     """The numbers of a pile; its plan area is counted on squares of `step` [m]."""
     b = run.bodies
     if not b.n:
@@ -56,25 +59,34 @@ def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Ar
     top = np.full((n[1], n[0]), -np.inf)
     for body in bodies:
         for triangle in body.triangles:
-            _raise_to(top, triangle, low, step)
+            patch = under(triangle, low, step, top.shape)
+            if patch is not None:
+                rows, columns, heights = patch
+                np.maximum(top[rows, columns], heights, out=top[rows, columns])
     return np.where(np.isfinite(top), top, np.nan)
 
 
-def _raise_to(top: Array, triangle: Array, low: Array, step: float) -> None:
-    """Lift the map to a triangle, where a square's middle lies below or above it."""
+def under(
+    triangle: Array, low: Array, step: float, shape: tuple[int, ...]
+) -> tuple[slice, slice, Array] | None:
+    """Rows and columns of the squares of `step` [m] from the corner `low` whose middles lie below
+    or above a triangle (3, 3), and its height above each; -inf beside it, None for an upright
+    one."""
     a, u, v = triangle[0], triangle[1] - triangle[0], triangle[2] - triangle[0]
     area = u[0] * v[1] - u[1] * v[0]
     if area == 0:
-        return
+        return None
     first = np.ceil((triangle[:, :2].min(axis=0) - low[:2]) / step - 0.5).astype(int)
     last = np.floor((triangle[:, :2].max(axis=0) - low[:2]) / step - 0.5).astype(int)
-    first, last = np.maximum(first, 0), np.minimum(last, np.array(top.shape)[::-1] - 1)
+    first, last = np.maximum(first, 0), np.minimum(last, np.array(shape)[::-1] - 1)
+    if (last < first).any():
+        return None
     x = low[0] + (np.arange(first[0], last[0] + 1) + 0.5) * step - a[0]
     y = low[1] + (np.arange(first[1], last[1] + 1) + 0.5)[:, None] * step - a[1]
     s, t = (x * v[1] - y * v[0]) / area, (y * u[0] - x * u[1]) / area
     inside = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1 + 1e-12)
-    part = top[first[1] : last[1] + 1, first[0] : last[0] + 1]
-    np.maximum(part, np.where(inside, a[2] + s * u[2] + t * v[2], -np.inf), out=part)
+    heights = np.where(inside, a[2] + s * u[2] + t * v[2], -np.inf)
+    return slice(first[1], last[1] + 1), slice(first[0], last[0] + 1), heights
 
 
 def time_to_rest(run: Run, rest_speed: float) -> float:
@@ -89,9 +101,5 @@ def time_to_rest(run: Run, rest_speed: float) -> float:
 
 def impact_speed(run: Run) -> float:
     """Largest speed [m/s] of a dropped block in the row before its first touch; nan without one."""
-    b, found = run.bodies, []
-    for k in b.dropped:
-        touched = np.flatnonzero(b.contacts[:, k] > 0)
-        if touched.size and touched[0] > 0:
-            found.append(float(np.linalg.norm(b.velocity[touched[0] - 1, k])))
-    return max(found, default=float("nan"))
+    found = [block_numbers.impact_speed(run, int(k)) for k in run.bodies.dropped]
+    return max((speed for speed in found if speed == speed), default=float("nan"))

@@ -1,0 +1,62 @@
+"""Parts that the pages share."""
+
+from micstools.page.html import Markup, markup, tag
+
+_COLOURINGS = (("block", "block"), ("speed", "speed"), ("contacts", "contacts"))
+_VIEWS = ("corner", "front", "side", "top")
+_PACES = (("0.1", "1/10"), ("0.25", "1/4"), ("0.5", "1/2"), ("1", "1"), ("2", "2"))
+
+
+def player(name: str, label: str) -> Markup:
+    """A stage and its buttons; `name` is that of the element."""
+    moving = tag(
+        "div",
+        tag("button", "Play", class_="play", type="button"),
+        Markup('<input class="slider" type="range" min="0" max="1" value="0" aria-label="time">'),
+        tag("output", "0.00 s", class_="clock"),
+        tag("label", "speed", _select("pace", _PACES, "0.5")),
+        class_="row moving",
+    )
+    views = tag("span", *(
+        tag("button", view, type="button", data_view=view) for view in _VIEWS
+    ), class_="group", role="group", aria_label="point of view")  # fmt: skip
+    zoom = tag(
+        "span",
+        tag("button", "+", type="button", data_zoom=0.8, aria_label="nearer"),
+        tag("button", "−", type="button", data_zoom=1.25, aria_label="farther"),
+        class_="group",
+    )
+    water = tag("label", Markup('<input type="checkbox" class="wet" checked>'), "water")
+    settings = tag(
+        "div",
+        views,
+        zoom,
+        tag("label", "colour by", _select("colouring", _COLOURINGS, "block")),
+        tag("label", "follow", _select("follow", (("", "whole tank"),), ""), class_="moving"),
+        water,
+        class_="row",
+    )
+    canvas = tag("canvas", class_="stage", tabindex=0, role="img", aria_label=label)
+    legend = tag("ul", class_="legend")
+    sorry = tag("p", "This browser has no WebGL: the pictures below stand for it.", class_="sorry")
+    return tag("div", canvas, moving, settings, legend, sorry, class_="player", id=name)
+
+
+def _select(name: str, options: tuple[tuple[str, str], ...], chosen: str) -> Markup:
+    entries = [
+        tag("option", words, value=value, selected=True if value == chosen else None)
+        for value, words in options
+    ]
+    return tag("select", *entries, class_=name)
+
+
+def swatch(colour: str, words: object) -> Markup:
+    """Words after a square of a colour."""
+    return markup(tag("i", class_="swatch", style=f"background:{colour}"), words)
+
+
+def number(value: float, form: str = ".3g", unit: str = "") -> str:
+    """A figure with its unit, a dash where it is not known."""
+    if value != value:
+        return "–"
+    return f"{value:{form}}" + (f" {unit}" if unit else "")

@@ -1,0 +1,181 @@
+"""A pile seen from the front, the side and the top, in parallel and to one scale, as an engineer
+draws it; and maps of the plan. No OpenGL is needed."""
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from micstools.geometry import Array, IntArray
+from micstools.labels import round_below
+from micstools.overlap import Placed
+from micstools.page.charts import colour
+from micstools.page.html import Markup, tag
+from micstools.pile_numbers import under
+
+# What runs to the right, what runs up, what comes towards the viewer; as the pictures of `scene`.
+VIEWS = {
+    "front": (np.array([1, 0, 0]), np.array([0, 0, 1]), np.array([0, -1, 0])),
+    "side": (np.array([0, 1, 0]), np.array([0, 0, 1]), np.array([1, 0, 0])),
+    "top": (np.array([1, 0, 0]), np.array([0, 1, 0]), np.array([0, 0, 1])),
+}
+NAMES = {
+    "front": ("x", "z"),
+    "side": ("y", "z"),
+    "top": ("x", "y"),
+}
+_LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
+FIXED = "#8d8d8d"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of the blocks on squares of `step` [m], the first row at the bottom."""
+
+    block: IntArray  # (rows, columns) number of the block, from 1; 0: none
+    light: Array  # (rows, columns) 0 dark to 1
+    depth: Array  # (rows, columns) towards the viewer [m]
+    low: Array  # (2) corner [m]
+    step: float
+
+
+def look(bodies: dict[int, Placed], view: str, low: Array, high: Array, step: float) -> Seen:
+    """What is seen of the blocks, by their number from 0, in the box from `low` to `high` (3)."""
+    axes = np.array(VIEWS[view], float)
+    corner = np.minimum(axes @ low, axes @ high)
+    far = np.maximum(axes @ low, axes @ high)
+    n = np.maximum(1, np.ceil((far[:2] - corner[:2]) / step - 1e-9).astype(int))
+    depth = np.full((n[1], n[0]), -np.inf)
+    block, light = np.zeros(depth.shape, dtype=np.int64), np.zeros(depth.shape)
+    towards = _LIGHT / np.linalg.norm(_LIGHT)
+    for number, body in bodies.items():
+        triangles = body.triangles @ axes.T
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        seen = normals[:, 2] > 1e-9 * np.linalg.norm(normals, axis=1)
+        for triangle, normal in zip(triangles[seen], normals[seen], strict=True):
+            patch = under(triangle, corner, step, depth.shape)
+            if patch is None:
+                continue
+            rows, columns, heights = patch
+            here = heights > depth[rows, columns]
+            depth[rows, columns][here] = heights[here]
+            block[rows, columns][here] = number + 1
+            shade = float(normal @ towards / np.linalg.norm(normal))
+            light[rows, columns][here] = 0.5 + 0.5 * max(0.0, shade)
+    return Seen(block, light, depth, corner[:2], step)
+
+
+def paint(seen: Seen, colours: dict[int, str]) -> Image.Image:
+    """The picture: colours by the number of the block from 1, edges dark, nothing elsewhere."""
+    pixels = np.zeros((*seen.block.shape, 4))
+    for number in np.unique(seen.block[seen.block > 0]):
+        here = seen.block == number
+        rgb = [int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)]
+        pixels[here] = [*rgb, 255]
+        pixels[here, :3] = 255 - (255 - pixels[here, :3]) * 0.92
+    pixels[..., :3] *= seen.light[..., None]
+    pixels[_edges(seen)] = (28, 32, 38, 255)
+    flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
+    return Image.fromarray(flipped, "RGBA")
+
+
+def _edges(seen: Seen) -> NDArray[np.bool_]:
+    """Where one block ends before another or a face bends."""
+    found = np.zeros(seen.block.shape, dtype=bool)
+    for axis in (0, 1):
+        other = np.diff(seen.block, axis=axis) != 0
+        bend = np.abs(np.diff(seen.light, axis=axis)) > 0.02
+        with np.errstate(invalid="ignore"):
+            jump = np.abs(np.diff(seen.depth, axis=axis)) > 12 * seen.step
+        line = other | bend | jump
+        first, second = [slice(None)] * 2, [slice(None)] * 2
+        first[axis], second[axis] = slice(None, -1), slice(1, None)
+        found[tuple(first)] |= line & (seen.block[tuple(first)] > 0)
+        found[tuple(second)] |= other & (seen.block[tuple(first)] == 0)
+    return np.asarray(found & (seen.block > 0))
+
+
+def uri(picture: Image.Image, colours: int | None = 96) -> str:
+    """A picture as an address that holds it, with few colours to keep it small."""
+    file = io.BytesIO()
+    small = picture.quantize(colours, Image.Quantize.FASTOCTREE) if colours else picture
+    small.save(file, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+def block_colours(dropped: IntArray, n: int) -> dict[int, str]:
+    """Colour of each of `n` blocks, by its number from 1: grey where it is fixed, else by its
+    turn."""
+    order = {int(k): place for place, k in enumerate(dropped)}
+    return {k + 1: colour(order[k]) if k in order else FIXED for k in range(n)}
+
+
+def plain(bodies: dict[int, Placed], colours: dict[int, str], view: str, box: tuple[Array, Array],
+          pixels: int = 200) -> str:  # fmt: skip
+    """A small picture without words, `pixels` wide, as an address."""
+    wide = float(np.ptp([VIEWS[view][0] @ corner for corner in box]))
+    seen = look(bodies, view, *box, wide / pixels)
+    return uri(paint(seen, colours), 48)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The views of one pile: one scale for all of them."""
+
+    low: Array  # corner of what is shown (3) [m]
+    high: Array
+    pixels: float = 900.0  # of the longest side
+
+    @property
+    def step(self) -> float:
+        """A pixel [m]."""
+        return float((self.high - self.low).max()) / self.pixels
+
+    def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
+                level: float | None = None) -> Markup:  # fmt: skip
+        """One view with the numbers of the blocks, the tank, the water level and a length."""
+        seen = look(bodies, view, self.low, self.high, self.step)
+        rows, columns = seen.block.shape
+        picture = tag("image", href=uri(paint(seen, colours)), width=columns, height=rows)
+        drawn = [picture, tag("rect", class_="tank", x=0, y=0, width=columns, height=rows)]
+        if level is not None and view != "top":
+            at = f"{rows - (level - seen.low[1]) / self.step:.1f}"
+            drawn.append(tag("line", class_="level", x1=0, x2=columns, y1=at, y2=at))
+        drawn += _numbers(seen)
+        drawn += self._bar(rows)
+        across, up = NAMES[view]
+        margin = 8
+        box = f"{-margin} {-margin} {columns + 2 * margin} {rows + 2 * margin + 46}"
+        svg = tag("svg", *drawn, viewBox=box, role="img",
+                  aria_label=f"the pile from the {view}")  # fmt: skip
+        size = f"--share:{(columns + 2 * margin) / (self.pixels + 2 * margin):.4f}"
+        words = f"{view}: {across} to the right, {up} up"
+        return tag("figure", svg, tag("figcaption", words), class_="view", style=size)
+
+    def _bar(self, rows: int) -> list[Markup]:
+        """A bar of a round length under a view."""
+        length = round_below(0.3 * float((self.high - self.low)[:2].min()))
+        long, y = length / self.step, rows + 22
+        text = f"{length:g} m" if length >= 1 else f"{1e3 * length:g} mm"
+        return [
+            tag("path", class_="scale", d=f"M0 {y - 7}V{y + 7}M0 {y}H{long:.1f}M{long:.1f} "
+                f"{y - 7}V{y + 7}"),
+            tag("text", text, x=f"{long + 12:.1f}", y=y + 9, class_="large"),
+        ]  # fmt: skip
+
+
+def _numbers(seen: Seen) -> list[Markup]:
+    """The number of each block where it is seen, unless too little of it is."""
+    found = []
+    rows = seen.block.shape[0]
+    for number in np.unique(seen.block[seen.block > 0]):
+        y, x = np.nonzero(seen.block == number)
+        if len(x) < 500:
+            continue
+        nearest = int(((x - x.mean()) ** 2 + (y - y.mean()) ** 2).argmin())
+        found.append(tag("text", number, x=x[nearest], y=rows - y[nearest] + 10, class_="number",
+                         text_anchor="middle"))  # fmt: skip
+    return found

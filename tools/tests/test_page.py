@@ -1,0 +1,278 @@
+"""The page of a run: what is in it, that titles are text, and that it plays in a browser."""
+
+import base64
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from browser import MISSING, Browser
+from micstools import block_numbers, cli, shapes
+from micstools.overlap import Placed
+from micstools.page import charts, html, motion, run_page, run_words, views
+from micstools.page.charts import Curve
+from micstools.reader import Run
+from synthetic import UPRIGHT, Motion, write_run
+
+TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"
+in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+
+
+def retitle(folder: Path, title: str) -> Path:
+    """Gives a synthetic run another title."""
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        about = h5["provenance"].attrs
+        for name in ("namelist", "parameters"):
+            about[name] = str(about[name]).replace(
+                "'synthetic'", '"' + title.replace('"', '""') + '"'
+            )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a synthetic run with a title that looks like markup."""
+    folder = retitle(write_run(tmp_path_factory.mktemp("page") / "run"), TITLE)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["report", str(folder)])
+    assert end.value.code == 0
+    return folder / "report.html"
+
+
+def scene_of(page: Path) -> dict:
+    found = re.search(r'id="scene">(.*?)</script>', page.read_text(), re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def test_text_is_never_markup() -> None:
+    assert html.tag("p", "<b>", html.tag("i", "&"), title='"') == (
+        '<p title="&quot;">&lt;b&gt;<i>&amp;</i></p>'
+    )
+    assert "</script>" not in html.data("a", {"t": "</script>"})[:-9]
+
+
+def test_a_title_stays_a_title(report: Path) -> None:
+    text = report.read_text()
+    assert "&lt;b&gt;Reef&lt;/b&gt;" in text
+    assert (
+        "<b>Reef" not in text
+        and "document.title = "
+        not in text.replace("&#x27;", "'").split("&lt;script&gt;document.title = ")[0]
+    )
+
+
+def test_nothing_is_loaded_from_outside(report: Path) -> None:
+    text = report.read_text()
+    assert "default-src 'none'" in text
+    for found in re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\'>) ]{1,20})', text):
+        assert found.startswith("data:"), found
+
+
+def test_motions_are_those_of_the_run(loose_pile: Run) -> None:
+    scene, rows = motion.scene(loose_pile), motion.frames(loose_pile)
+    b = loose_pile.bodies
+    place = np.frombuffer(base64.b64decode(scene["place"]), "<f4").reshape(len(rows), b.n, 3)
+    turn = np.frombuffer(base64.b64decode(scene["turn"]), "<i2").reshape(len(rows), b.n, 4)
+    assert rows[0] == 0 and rows[-1] == len(b.time) - 1
+    assert place == pytest.approx(b.position[rows], abs=1e-7)
+    assert turn / 32767 == pytest.approx(b.quaternion[rows], abs=2e-5)
+    assert np.diff(b.time[rows]).max() <= 1.5 / motion.FRAMES_A_SECOND
+    assert [body["release"] for body in scene["bodies"]][:4] == [0.0, 0.0, 0.0, 0.0]
+
+
+def test_the_surface_is_that_of_the_fields(loose_pile: Run) -> None:
+    water = motion.water(loose_pile)
+    assert water is not None
+    height = np.frombuffer(base64.b64decode(water["height"]), np.uint8).reshape(-1, 20, 60)
+    found = water["low"] + water["span"] / 255 * height
+    assert found[0].mean() == pytest.approx(0.15, abs=1e-4)
+    assert found[-1].mean() == pytest.approx(0.1612, abs=1e-4)
+
+
+def test_a_peak_survives_in_a_chart() -> None:
+    y = np.zeros(10_000)
+    y[4321] = 7.0
+    x, kept = charts._thinned(Curve(np.arange(10_000.0), y))
+    assert len(x) < 700 and kept.max() == 7.0 and x[kept.argmax()] == 4321
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wanted"),
+    [(0.0, 10.0, [0, 2, 4, 6, 8, 10]), (-0.1, 0.31, [-0.1, 0, 0.1, 0.2, 0.3]), (3e-9, 5e-9, None)],
+)
+def test_ticks_are_round(low: float, high: float, wanted: list[float] | None) -> None:
+    found = charts.ticks(low, high)
+    assert 2 <= len(found) <= 7 and low - 1e-12 <= found[0] and found[-1] <= high + 1e-12
+    if wanted is not None:
+        assert found == pytest.approx(wanted, abs=1e-12)
+
+
+def test_views_show_what_stands_in_front() -> None:
+    """Two cubes, the second behind the first in y and half as high up in z."""
+    cube, low, high = shapes.cube(0.02), np.zeros(3), np.array([0.1, 0.1, 0.1])
+    places = ((0.05, 0.02, 0.01), (0.05, 0.06, 0.02))
+    bodies = {k: Placed(cube, np.array(p), UPRIGHT) for k, p in enumerate(places)}
+    front = views.look(bodies, "front", low, high, 0.001).block
+    assert (front == 1).sum() == 400 and (front == 2).sum() == 200
+    assert (front[:20, 40:60] == 1).all() and (front[20:30, 40:60] == 2).all()
+    side = views.look(bodies, "side", low, high, 0.001)
+    assert (side.block[:, 10:30] == 1).sum() == 400 and (side.block[:, 50:70] == 2).sum() == 400
+    top = views.look(bodies, "top", low, high, 0.001)
+    assert (top.block == 1).sum() == (top.block == 2).sum() == 400
+    assert top.depth[60, 50] == pytest.approx(0.03)
+
+
+def test_numbers_of_each_block(make_run) -> None:
+    """One block, let go at 0 and at rest after 0.8 s, touching from half way on."""
+    where = [(np.array([0.06, 0.05, 0.1]), UPRIGHT)]
+    run = make_run(Motion(places=where, t_end=2.0, field_step=2.0))
+    (found,) = block_numbers.of_blocks(run)
+    speed = np.linalg.norm(run.bodies.velocity[:, 3], axis=1)
+    assert (found.block, found.released) == (4, 0.0)
+    assert found.at_rest == pytest.approx(0.8, abs=0.05)
+    assert found.impact_speed == pytest.approx(speed[19])  # the row before t = 0.4 s
+    force = np.linalg.norm(run.bodies.contact_force[:, 3], axis=1).max()
+    assert found.contact_force == pytest.approx(force)
+    assert found.weight == pytest.approx(56e-6 * 2300 * 9.81)
+    assert found.turned == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_differs_from_the_defaults(make_run) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0))
+    assert run_words.differing(run) == []
+    folder = run.folder
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        about = h5["provenance"].attrs
+        about["parameters"] = (
+            str(about["parameters"]) + "&contact friction = 0.25 restitution = 0.3 /\n"
+        )
+    assert run_words.differing(Run(folder)) == [("contact.friction", "0.25", "0.6")]
+
+
+def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0))
+    (run.folder / "fields.vtkhdf").unlink()
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/fluid_force"][:] = np.nan
+        h5["series/liquid_volume_drift"][:] = np.nan
+        about = h5["provenance"].attrs
+        about["parameters"] = str(about["parameters"]).replace("&run", "&run physics = 'dry'")
+    text = run_page.page(Run(run.folder))
+    assert (
+        "and dry" in text
+        and '"water":null' in text
+        and "nan" not in text.lower().split("<style")[1].split("</style>")[1]
+    )
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+def wait_for(browser: Browser, condition: str) -> None:
+    """Until an expression is true."""
+    for _ in range(100):
+        if browser.run(f"Boolean({condition})"):
+            return
+        time.sleep(0.05)
+    raise AssertionError(condition)
+
+
+def settled(browser: Browser) -> None:
+    """Until what was asked for is drawn."""
+    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+@in_browser
+def test_the_page_plays(browser: Browser, report: Path) -> None:
+    browser.open(report)
+    assert browser.run("document.title") == TITLE
+    assert browser.run("document.querySelector('h1').textContent") == TITLE
+    assert browser.run("document.querySelectorAll('h1 *').length") == 0
+    start = browser.run("runPlayer.stage.time")
+    browser.run("document.querySelector('.play').click()")
+    wait_for(browser, f"runPlayer.stage.time > {start} + 0.1")
+    browser.run("document.querySelector('.play').click()")
+    at = browser.run("runPlayer.stage.time")
+    settled(browser)
+    assert browser.run("runPlayer.stage.time") == at
+    assert browser.errors == []
+    assert [url for url in browser.requests if not url.startswith("data:")] == [report.as_uri()]
+
+
+@in_browser
+def test_the_slider_moves_the_blocks(browser: Browser, report: Path, loose_pile: Run) -> None:
+    browser.open(report)
+    seen = []
+    for moment in (0.5, 7.0):
+        browser.run(
+            f"(s => {{ s.value = {moment}; s.dispatchEvent(new Event('input')); }})"
+            "(document.querySelector('.slider'))"
+        )
+        settled(browser)
+        place = browser.run("runPlayer.stage.pose(3).place")
+        row = loose_pile.bodies.row(moment)
+        assert place == pytest.approx(loose_pile.bodies.position[row, 3].tolist(), abs=1e-3)
+        seen.append(browser.picture())
+    assert seen[0] != seen[1]
+    assert browser.run("document.querySelector('.clock').textContent") == "7.00 s"
+    marks = browser.run(
+        "[...document.querySelectorAll('.now')].every(m => !m.hasAttribute('hidden'))"
+    )
+    assert marks and browser.errors == []
+
+
+@in_browser
+def test_keys_and_mouse_turn_and_zoom(browser: Browser, report: Path) -> None:
+    browser.open(report)
+    browser.run("document.querySelector('.stage').focus()")
+    yaw, far = browser.run("[runPlayer.stage.yaw, runPlayer.stage.fit]")
+    browser.key("ArrowRight")
+    browser.key("+")
+    assert browser.run("runPlayer.stage.yaw") != yaw
+    assert browser.run("runPlayer.stage.distance") < 0.95 * far
+    yaw = browser.run("runPlayer.stage.yaw")
+    x, y = browser.run("(r => [r.x + r.width / 2, r.y + 100])"
+                       "(document.querySelector('.stage').getBoundingClientRect())")  # fmt: skip
+    browser.mouse("mousePressed", x, y, button="left", buttons=1, clickCount=1)
+    browser.mouse("mouseMoved", x + 80, y, button="left", buttons=1)
+    browser.mouse("mouseReleased", x + 80, y, button="left")
+    assert browser.run("runPlayer.stage.yaw") == pytest.approx(yaw - 0.5)
+    browser.run("(s => { s.value = 5; s.dispatchEvent(new Event('change')); })"
+                "(document.querySelector('.follow'))")  # fmt: skip
+    assert browser.run("runPlayer.stage.followed") == 5
+    for colouring in ("speed", "contacts", "block"):
+        browser.run(f"(s => {{ s.value = '{colouring}'; s.dispatchEvent(new Event('change')); }})"
+                    "(document.querySelector('.colouring'))")  # fmt: skip
+        settled(browser)
+    browser.run("document.querySelector('.stage').focus()")
+    browser.key(" ")
+    assert browser.run("runPlayer.playing") is True
+    assert browser.errors == []
+
+
+@in_browser
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
+    browser.open(report, 360, 740, dark)
+    assert browser.run("document.documentElement.scrollWidth") <= 360
+    light = browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert light is not dark
+    assert browser.errors == []
+
+
+@in_browser
+def test_paper_has_pictures_and_no_buttons(browser: Browser, report: Path) -> None:
+    browser.open(report)
+    browser.look(794, 1123, media="print")
+    hidden = "getComputedStyle(document.querySelector('{}')).display === 'none'"
+    assert browser.run(hidden.format(".player")) and not browser.run(hidden.format(".views"))
+    assert browser.call("Page.printToPDF", preferCSSPageSize=True)["data"]
