@@ -13,7 +13,7 @@ COMMANDS = {
     "run": ("run", "RUN", "run a case"),
     "check": ("run", "CHECK", "check a case and print its plan"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
-    "pile": ("pile", "PILE", "say what can be said of the pile of a run"),
+    "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
     "report": ("report", "REPORT", "make one page of a run"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),

@@ -1,10 +1,11 @@
 """Numbers of a pile, of the true shapes at one row of a run: lengths in m, speeds in m/s."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
-from micstools import block_numbers
+from micstools import block_numbers, pile_form
 from micstools.geometry import Array
 from micstools.overlap import Placed, present_bodies, touches
 from micstools.pile import REACH
@@ -24,33 +25,58 @@ class PileNumbers:
     spread: tuple[float, float]  # standard deviation of the centroids in x and y [m]
     time_to_rest: float  # [s]; nan where the blocks still move
     impact_speed: float  # largest speed of a dropped block at its first touch [m/s]
+    contact_force: float  # largest on a dropped block, a mean over a step [N]
+    slopes: tuple[float, float, float, float]  # of the sides towards -x, +x, -y, +y [degrees]
+    attitude_randomness: float  # of the free blocks of the commonest shape; 0 alike, 1 random
+    porosity: float  # of the box; nan where a bed may fill part of it
+    box: tuple[float, ...]  # its low and its high corner [m]
 
 
 def numbers(
-    run: Run, step: float, row: int = -1, rest_speed: float = block_numbers.REST_SPEED
+    run: Run, step: float, row: int = -1, box: tuple[Array, Array] | None = None
 ) -> PileNumbers:
-    """The numbers of a pile; its plan area is counted on squares of `step` [m]."""
+    """The numbers of a pile; its plan area is counted on squares of `step` [m], its porosity in a
+    `box`, by default that around the pile."""
     b = run.bodies
     if not b.n:
         raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
     row = row % len(b.time)
     bodies, seen = present_bodies(run, row), touches(run, row, REACH)
-    covered = np.isfinite(height_map(list(bodies.values()), run.grid.low, run.grid.high, step))
+    blocks = list(bodies.values())
+    top = height_map(blocks, run.grid.low, run.grid.high, step)
     here = list(bodies)
     mass, place = b.mass[here], b.position[row, here]
-    spread = place[:, :2].std(axis=0)
-    centre = (mass[:, None] * place).sum(axis=0) / mass.sum()
+    x, y, z = (float(v) for v in (mass[:, None] * place).sum(axis=0) / mass.sum())
+    low, high = box or pile_form.around(blocks, run.grid.low, run.grid.high)
+    known = box is not None or not len(run.bed[1])
+    forces = [k.contact_force for k in block_numbers.of_blocks(run)]
     return PileNumbers(
         blocks=len(bodies),
         on_floor=sum("z_min" in seen.walls_of(int(k)) for k in b.dropped if int(k) in bodies),
-        plan_area=float(covered.sum() * step**2),
-        top=max(float(body.points[:, 2].max()) for body in bodies.values()),
+        plan_area=float(np.isfinite(top).sum() * step**2),
+        top=max(float(body.points[:, 2].max()) for body in blocks),
         coordination=2 * len(seen.blocks) / len(bodies),
-        centre=(float(centre[0]), float(centre[1]), float(centre[2])),
-        spread=(float(spread[0]), float(spread[1])),
-        time_to_rest=time_to_rest(run, rest_speed),
+        centre=(x, y, z),
+        spread=(float(place[:, 0].std()), float(place[:, 1].std())),
+        time_to_rest=time_to_rest(run, block_numbers.REST_SPEED),
         impact_speed=impact_speed(run),
+        contact_force=max(forces, default=float("nan")),
+        slopes=pile_form.slopes(top, float(run.grid.low[2]), step),
+        attitude_randomness=_randomness(run, row),
+        porosity=pile_form.porosity(blocks, low, high) if known else float("nan"),
+        box=tuple(float(v) for v in (*low, *high)),
     )
+
+
+def _randomness(run: Run, row: int) -> float:
+    """How differently the free blocks of the commonest shape lie."""
+    b = run.bodies
+    free = [int(k) for k in b.dropped if b.present(row)[k]]
+    if not free:
+        return float("nan")
+    ((name, _),) = Counter(b.shape[k] for k in free).most_common(1)
+    alike = [k for k in free if b.shape[k] == name]
+    return pile_form.attitude_randomness(run.shapes[name], b.quaternion[row, alike])
 
 
 def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Array:

@@ -24,6 +24,12 @@ def test_stacked_cubes(make_run) -> None:
     assert 3.5 < found.time_to_rest < 4.0  # the last is dropped at 3 s and takes 0.8 s
     area = np.linspace(0, 0.8, 17)
     assert 0 < found.impact_speed < 1.5 * 0.2 / area[-1]
+    assert found.attitude_randomness == pytest.approx(0.0, abs=1e-9)
+    forces = np.linalg.norm(run.bodies.contact_force[:, 3:], axis=2)
+    assert found.contact_force == pytest.approx(forces.max())
+    low, high = np.array(found.box[:3]), np.array(found.box[3:])
+    assert low == pytest.approx((0.02, 0.02, 0.0))
+    assert found.porosity == pytest.approx(1 - 7 * EDGE**3 / np.prod(high - low))
 
 
 def test_height_map_of_a_cube_and_a_tilted_one() -> None:

@@ -1,13 +1,21 @@
-"""What can be said of the pile of a run."""
+"""What can be said of the pile of a run, or of the piles of an ensemble."""
 
 import argparse
+import csv
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from micstools import command, pile, pile_numbers
+import h5py
+import numpy as np
+
+from micstools import block_numbers, command, pile, pile_ensemble, pile_numbers
 from micstools.commands.base import Command
+from micstools.geometry import Array
+from micstools.pile_ensemble import Ensemble
 from micstools.reader import BadRun
+from micstools.shares import in_words
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,33 +32,111 @@ def findings(given: argparse.Namespace) -> int:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    arguments(parser)
-    parser.add_argument("--step", type=float, default=0.001, help="of the plan area [m], 0.001")
+    add = parser.add_argument
+    add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
+    add("--paper", action="store_true", help="what the paper says, in any tank")
+    add("--step", type=float, help="of plan area and maps [m], default 0.001, "
+        "of an ensemble a 300th of the tank")  # fmt: skip
+    add("--box", type=float, nargs=6, metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+        help="of the porosity [m], default the box around the pile")  # fmt: skip
 
 
 def _pile(given: argparse.Namespace) -> int:
-    """Print the findings and the numbers, which go into `pile.json`."""
-    if not given.step > 0:
+    if given.step is not None and not given.step > 0:
         raise BadRun(f"--step {given.step}: must be positive")
+    if pile_ensemble.is_ensemble(given.run):
+        if given.paper:
+            raise BadRun("--paper: for one run, not for an ensemble")
+        return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, _box(given.box)))
+    return _of_run(given)
+
+
+def _box(values: list[float] | None) -> tuple[Array, Array] | None:
+    if values is None:
+        return None
+    low, high = np.array(values[:3]), np.array(values[3:])
+    if not (low < high).all():
+        raise BadRun(f"--box {' '.join(map(str, values))}: the first corner must be the lower one")
+    return low, high
+
+
+def _of_run(given: argparse.Namespace) -> int:
+    """Print the findings and the numbers, which go into `pile.json`."""
+    box = _box(given.box)
     findings(given)
     run = command.open_run(given.run)
-    found = asdict(pile_numbers.numbers(run, given.step))
-    known = {k: None if v != v else v for k, v in found.items()}  # JSON has no nan
-    path = run.folder / "pile.json"
-    path.write_text(json.dumps(known, indent=2) + "\n")
-    for name, value in known.items():
+    found = asdict(pile_numbers.numbers(run, given.step or 0.001, box=box))
+    for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
-        words = ["-" if v is None else f"{v:.5g}" for v in values]
-        print(f"     {name:14}{', '.join(words)}")
-    print(path)
+        words = ["-" if v != v else f"{v:.5g}" for v in values]
+        print(f"     {name:20}{', '.join(words)}")
+    found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
+    _write_json(run.folder / "pile.json", found)
     return 0
+
+
+def _of_ensemble(ensemble: Ensemble) -> int:
+    """Print shares and spread of the numbers; they go into `pile.json`, a row for each run into
+    `pile.csv`, the maps into `pile_maps.h5`."""
+    total = len(ensemble.piles)
+    for choice in ensemble.choices:
+        name = ", ".join(f"{k} = {v}" for k, v in choice.items())
+        shares = pile_ensemble.pattern_shares(ensemble.of(choice))
+        said = [f"{k} {in_words(s['count'], len(ensemble.of(choice)))}" for k, s in shares.items()]
+        print((f"{name}: " if name else "") + ", ".join(said))
+    print(f"numbers of the {len(ensemble.whole)} complete piles of {total}: median (5 to 95 %)")
+    content = pile_ensemble.summary(ensemble)
+    for name, spread in content["numbers"].items():
+        low, high = spread["5 %"], spread["95 %"]
+        print(f"     {name:20}{spread['median']:.5g} ({low:.5g} to {high:.5g})")
+    with (ensemble.folder / "pile.csv").open("w", newline="") as file:
+        rows = pile_ensemble.rows(ensemble)
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    if ensemble.whole:
+        _write_maps(ensemble)
+    print(f"{ensemble.folder / 'pile.csv'}")
+    _write_json(ensemble.folder / "pile.json", content)
+    return 0
+
+
+def _write_maps(ensemble: Ensemble) -> None:
+    found = asdict(pile_ensemble.maps(ensemble))
+    path = ensemble.folder / "pile_maps.h5"
+    with h5py.File(path, "w") as h5:
+        for name, values in found.items():
+            h5[name] = values
+            h5[name].attrs["units"] = "-" if name == "cover" else "m"
+    print(path)
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(_known(content), indent=2, allow_nan=False) + "\n")
+    print(path)
+
+
+def _known(value: Any) -> Any:
+    """The same without nan, which JSON has not."""
+    if isinstance(value, dict):
+        return {k: _known(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_known(v) for v in value]
+    return None if value != value else value
 
 
 PILE = Command(
     "pile",
-    "Say what can be said of the pile of a run, with its numbers in SI units (pile.json);\n"
-    "the exit code is 0 whatever is seen.",
-    ("pile mics-coarse", "pile mics-coarse --paper"),
+    "Say what can be said of the pile of a run, with its numbers in SI units (pile.json), or of\n"
+    "the piles of an ensemble: shares of the patterns, spread of the numbers (pile.json,\n"
+    "pile.csv), maps of the mean pile and of the probability of cover (pile_maps.h5).\n"
+    "The exit code is 0 whatever is seen.",
+    (
+        "pile mics-coarse",
+        "pile mics-coarse --paper",
+        "pile mics-coarse --box 0.05 0 0 0.25 0.1 0.1",
+        "pile mics-ensemble-blocks_coarse",
+    ),
     _arguments,
     _pile,
 )

@@ -1,0 +1,254 @@
+"""Piles of an ensemble: the numbers of each, shares of the patterns, and maps of the mean pile."""
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools import block_numbers, pile_numbers
+from micstools.block_numbers import BlockNumbers
+from micstools.ensemble import OUTCOMES
+from micstools.geometry import Array
+from micstools.overlap import present_bodies
+from micstools.pile_numbers import PileNumbers
+from micstools.reader import BadRun, Run
+from micstools.shares import wilson
+
+PATTERNS = ("A", "B", "neither")
+MEANING = {
+    "A": "every dropped block off the floor",
+    "B": "at least one more block on the floor",
+    "neither": "a block found no room or stays above the water",
+}
+_PARTS = {
+    "centre": ("x", "y", "z"),
+    "spread": ("x", "y"),
+    "slopes": ("x_min", "x_max", "y_min", "y_max"),
+    "box": ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max"),
+}
+
+
+@dataclass(frozen=True)
+class Pile:
+    """The pile of one run of an ensemble."""
+
+    row: dict[str, Any]  # of the table of the ensemble: run, seed, choices, outcome, folder
+    run: Run
+    pattern: str  # one of PATTERNS
+    numbers: PileNumbers
+    blocks: list[BlockNumbers]
+    top: Array  # height map (ny, nx) [m], nan where there is no block
+
+    @property
+    def number(self) -> int:
+        """Number of the run, from 1."""
+        return int(self.row["run"])
+
+    @property
+    def complete(self) -> bool:
+        """Are all blocks in it?"""
+        return bool(self.run.bodies.present(-1).all())
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """An ensemble and its piles."""
+
+    folder: Path
+    about: dict[str, Any]  # what ensemble.json says
+    piles: list[Pile]
+    step: float  # of the maps [m]
+    left_out: dict[int, str]  # runs without an outcome, and what they are instead
+
+    @property
+    def whole(self) -> list[Pile]:
+        """The piles with all their blocks: mean and spread are of these."""
+        return [p for p in self.piles if p.complete]
+
+    @property
+    def choices(self) -> list[dict[str, Any]]:
+        """The varied variables, a dictionary for each choice."""
+        found: list[dict[str, Any]] = self.about["choices"]
+        return found
+
+    def of(self, choice: dict[str, Any]) -> list[Pile]:
+        """The piles of a choice."""
+        return [p for p in self.piles if all(p.row[k] == v for k, v in choice.items())]
+
+
+@dataclass(frozen=True)
+class Maps:
+    """The mean pile over the plan, (ny, nx) each; where there is no block its height is 0."""
+
+    x: Array  # (nx) middles [m]
+    y: Array  # (ny)
+    cover: Array  # probability that a block lies over the point
+    mean: Array  # height above the floor [m]
+    low: Array  # 10 % of the piles are lower [m]
+    high: Array  # 10 % are higher [m]
+
+
+def is_ensemble(path: Path) -> bool:
+    """Is it the folder of an ensemble?"""
+    return (path / "ensemble.json").is_file()
+
+
+def open_ensemble(
+    folder: Path, step: float | None = None, box: tuple[Array, Array] | None = None
+) -> Ensemble:
+    """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
+    the tank; `box` is that of the porosity, by default the one around each pile."""
+    about = json.loads((folder / "ensemble.json").read_text())
+    table = about["table"]
+    done = [row for row in table if row["outcome"] in OUTCOMES]
+    left = {int(row["run"]): str(row["outcome"]) for row in table if row not in done}
+    if not done:
+        raise BadRun(f"{folder} holds no run that came to its end")
+    if step is None:
+        grid = Run(folder / str(done[0]["folder"]) / "result").grid
+        step = float((grid.high - grid.low)[:2].max()) / 300
+    piles = [_pile(folder, row, step, box) for row in done]
+    return Ensemble(folder, about, piles, step, left)
+
+
+def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
+    run = Run(folder / str(row["folder"]) / "result")
+    found = pile_numbers.numbers(run, step, box=box)
+    bodies = list(present_bodies(run, -1).values())
+    top = pile_numbers.height_map(bodies, run.grid.low, run.grid.high, step)
+    return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top)
+
+
+def pattern(run: Run, found: PileNumbers) -> str:
+    """The pattern of a pile by its contacts, see MEANING."""
+    b = run.bodies
+    level = run.value("fluid", "water_level", None)
+    if not b.present(-1).all():
+        return "neither"
+    wet = str(run.value("run", "physics", "coupled")).strip() != "dry" and level is not None
+    if wet and (b.position[-1, b.dropped, 2] > float(level or 0.0)).any():
+        return "neither"
+    return "B" if found.on_floor else "A"
+
+
+def pattern_shares(piles: Sequence[Pile]) -> dict[str, dict[str, Any]]:
+    """Count, share and its 95 % interval of each pattern."""
+    counted, total = Counter(p.pattern for p in piles), len(piles)
+    return {
+        name: {
+            "count": counted[name],
+            "share": counted[name] / total if total else None,
+            "interval_95": list(wilson(counted[name], total)),
+        }
+        for name in PATTERNS
+    }
+
+
+def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, float, float]]:
+    """After each run: how many there were, the share of a pattern, and its 95 % interval."""
+    count = 0
+    for total, p in enumerate(piles, start=1):
+        count += p.pattern == name
+        yield total, count / total, *wilson(count, total)
+
+
+def maps(ensemble: Ensemble) -> Maps:
+    """The mean pile of the complete ones, its spread, and where blocks are likely."""
+    whole = ensemble.whole
+    if not whole:
+        raise BadRun(f"{ensemble.folder} holds no pile with all its blocks")
+    tops = np.array([p.top for p in whole])
+    grid = whole[0].run.grid
+    height = np.nan_to_num(tops - grid.low[2], nan=0.0)
+    low, high = np.percentile(height, [10, 90], axis=0)
+    x, y = (grid.low[d] + (np.arange(tops.shape[2 - d]) + 0.5) * ensemble.step for d in (0, 1))
+    return Maps(x, y, np.isfinite(tops).mean(axis=0), height.mean(axis=0), low, high)
+
+
+def remarkable(ensemble: Ensemble) -> dict[int, list[str]]:
+    """What is special of some complete piles, by the number of their run: the one nearest to the
+    mean pile, the one farthest from it, the highest and the lowest."""
+    whole = ensemble.whole
+    if len(whole) < 3:
+        return {}
+    mean, floor = maps(ensemble).mean, float(whole[0].run.grid.low[2])
+    height = [np.nan_to_num(p.top - floor, nan=0.0) for p in whole]
+    away = np.array([np.sqrt(((h - mean) ** 2).mean()) for h in height])
+    tops = np.array([p.numbers.top for p in whole])
+    marks = {"most typical": away.argmin(), "least typical": away.argmax(),
+             "highest": tops.argmax(), "lowest": tops.argmin()}  # fmt: skip
+    found: dict[int, list[str]] = {}
+    for words, k in marks.items():
+        found.setdefault(whole[int(k)].number, []).append(words)
+    return found
+
+
+def spread_of(values: Sequence[float]) -> dict[str, float] | None:
+    """Median, 5 and 95 % of the known ones of some values; none where none is known."""
+    known = [v for v in values if v == v]
+    if not known:
+        return None
+    low, median, high = (float(v) for v in np.percentile(known, [5, 50, 95]))
+    return {"median": median, "5 %": low, "95 %": high, "known": len(known)}
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float]:
+    """95 % interval of the median of what the values are drawn from, whatever its form, from their
+    order; nan for fewer than six. Source: Conover, Practical nonparametric statistics, 3.2."""
+    n, ordered = len(values), sorted(values)
+    below, rank, weight = 0.0, 0, 0.5**n
+    while below + weight <= 0.025:
+        below += weight
+        rank += 1
+        weight *= (n - rank + 1) / rank
+    if rank == 0:
+        return float("nan"), float("nan")
+    return ordered[rank - 1], ordered[n - rank]
+
+
+def rows(ensemble: Ensemble) -> list[dict[str, Any]]:
+    """A row for each run with an outcome, its numbers included."""
+    return [
+        p.row | {"pattern": p.pattern, "complete": p.complete} | _flat(p.numbers)
+        for p in ensemble.piles
+    ]
+
+
+def _flat(found: PileNumbers) -> dict[str, Any]:
+    """The numbers, each for itself; empty where one is not known."""
+    values: dict[str, Any] = {}
+    for name, value in asdict(found).items():
+        if isinstance(value, tuple):
+            values |= {f"{name}_{part}": v for part, v in zip(_PARTS[name], value, strict=True)}
+        else:
+            values[name] = value
+    return {name: "" if v != v else v for name, v in values.items()}
+
+
+def summary(ensemble: Ensemble) -> dict[str, Any]:
+    """What `pile.json` holds of an ensemble; nan is left to the writer."""
+    flat = [_flat(p.numbers) for p in ensemble.whole]
+    spreads = {
+        name: spread_of([row[name] for row in flat if row[name] != ""])
+        for name in (flat[0] if flat else {})
+    }
+    return {
+        "format": "mics-ensemble-piles",
+        "format_version": 1,
+        "runs": len(ensemble.piles),
+        "complete": len(ensemble.whole),
+        "left_out": {str(k): v for k, v in ensemble.left_out.items()},
+        "step": ensemble.step,
+        "patterns": [
+            {"choice": choice, "meaning": MEANING, "shares": pattern_shares(ensemble.of(choice))}
+            for choice in ensemble.choices
+        ],
+        "convergence": {name: list(running(ensemble.piles, name)) for name in PATTERNS},
+        "numbers": {name: spread for name, spread in spreads.items() if spread},
+        "remarkable": {str(k): v for k, v in remarkable(ensemble).items()},
+        "table": rows(ensemble),
+    }

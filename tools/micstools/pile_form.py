@@ -1,0 +1,87 @@
+"""The form of a pile: how much of a box is void, how steep its sides are, how its blocks lie."""
+
+from itertools import permutations, product
+
+import numpy as np
+
+from micstools.geometry import Array, rotation_matrix, volume_in_box
+from micstools.overlap import Placed
+from micstools.shapes import Shape
+
+_CREST, _TOE = 0.9, 0.1  # of the height: a side runs between them
+_SAMPLES = 20_000  # random attitudes that tell what random is
+
+
+def around(bodies: list[Placed], low: Array, high: Array) -> tuple[Array, Array]:
+    """The box around blocks, no larger than the tank."""
+    points = np.concatenate([body.points for body in bodies])
+    return np.maximum(points.min(axis=0), low), np.minimum(points.max(axis=0), high)
+
+
+def porosity(bodies: list[Placed], low: Array, high: Array) -> float:
+    """Share of the box between `low` and `high` (3) [m] that no block fills. Exact; where blocks
+    overlap they count twice, and a bed is not looked at."""
+    filled = sum(volume_in_box(body.tets, low, high) for body in bodies)
+    return float(1 - filled / np.prod(high - low))
+
+
+def slopes(top: Array, floor: float, step: float) -> tuple[float, float, float, float]:
+    """Angles [degrees] of the sides of a pile towards -x, +x, -y, +y, from its height map (ny, nx)
+    [m]: of the line through the outermost squares that reach 90 % and 10 % of the height, seen
+    from the side. 90: upright; nan: the pile lies against the end of the map."""
+    height = np.nan_to_num(top - floor, nan=0.0)
+    along_x, along_y = height.max(axis=0), height.max(axis=1)
+    left, right, front, back = (
+        _slope(profile, step) for profile in (along_x, along_x[::-1], along_y, along_y[::-1])
+    )
+    return left, right, front, back
+
+
+def _slope(profile: Array, step: float) -> float:
+    """Angle [degrees] of the side at the beginning of a profile of heights."""
+    highest = profile.max()
+    if highest <= 0:
+        return float("nan")
+    toe = int(np.flatnonzero(profile >= _TOE * highest)[0])
+    crest = int(np.flatnonzero(profile >= _CREST * highest)[0])
+    if toe == 0:
+        return float("nan")
+    rise = float(profile[crest] - profile[toe])
+    return float(np.degrees(np.arctan2(rise, (crest - toe) * step))) if crest > toe else 90.0
+
+
+def symmetries(shape: Shape) -> Array:
+    """Turns (k, 3, 3) about axes of the body, by right angles, that leave a shape as it is."""
+    corners = shape.points[np.unique(shape.edges)]
+    found = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        turn = np.eye(3)[list(order)] * np.array(signs)[:, None]
+        if np.linalg.det(turn) > 0 and _same_points(corners @ turn.T, corners, shape.radius):
+            found.append(turn)
+    return np.array(found)
+
+
+def _same_points(one: Array, other: Array, size: float) -> bool:
+    near = np.linalg.norm(one[:, None] - other[None], axis=2).min(axis=1)
+    return bool(near.max(initial=0.0) < 1e-4 * size)
+
+
+def attitude_randomness(shape: Shape, quaternions: Array) -> float:
+    """How differently blocks of a shape lie, from their attitudes (n, 4): the mean angle between
+    two of them over that between random ones. 0: all alike; about 1: at random; nan: one block.
+    Attitudes that look the same, as a cube turned by 90 degrees, are the same."""
+    if len(quaternions) < 2:
+        return float("nan")
+    turns = symmetries(shape)
+    rotation = rotation_matrix(quaternions)
+    angles = [_angles(rotation[k], rotation[k + 1 :], turns) for k in range(len(rotation) - 1)]
+    draws = np.random.default_rng(1).normal(size=(_SAMPLES, 4))
+    usual = _angles(np.eye(3), rotation_matrix(draws), turns)
+    return float(np.concatenate(angles).mean() / usual.mean())
+
+
+def _angles(one: Array, others: Array, turns: Array) -> Array:
+    """Smallest angle [rad] of a turn from attitude `one` (3, 3) to each of `others` (n, 3, 3)."""
+    between = np.einsum("ji,njk->nik", one, others)
+    trace = np.einsum("nik,ski->ns", between, turns).max(axis=1)
+    return np.asarray(np.arccos(np.clip((trace - 1) / 2, -1, 1)))

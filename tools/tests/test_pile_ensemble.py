@@ -1,0 +1,127 @@
+"""Piles of a made-up ensemble: patterns, maps, shares and files are known exactly."""
+
+import csv
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from micstools import cli, pile_ensemble, shapes, shares
+from micstools.reader import BadRun
+from synthetic import UPRIGHT, Motion, write_run
+
+EDGE, HALF = 0.02, 0.01
+LEFT, RIGHT, HIGH, WAITING = 0.04, 0.26, 0.12, (0.15, 0.05, 0.16)
+# Where the one dropped cube of each run ends: on the floor left, right, again right, hanging, in
+# the air above the water, nowhere.
+ENDS = [(LEFT, 0.05, HALF), (RIGHT, 0.05, HALF), (RIGHT, 0.05, HALF), (RIGHT, 0.05, HIGH),
+        (RIGHT, 0.05, 0.17), WAITING]  # fmt: skip
+
+
+def write_ensemble(folder: Path, ends: list[tuple[float, float, float]] = ENDS) -> Path:
+    """An ensemble with a run for each end, and one more that failed."""
+    table = []
+    for number, end in enumerate(ends, start=1):
+        # Only what is due after the start can be seen to wait.
+        places = [(RIGHT, 0.05, HIGH), end] if end == WAITING else [end]
+        motion = Motion(
+            shape=shapes.cube(EDGE),
+            places=[(np.array(place), UPRIGHT) for place in places],
+            t_end=2.0,
+            history_step=0.05,
+            field_step=2.0,
+            cells=(12, 4, 8),
+        )
+        write_run(folder / f"{number:04d}" / "result", motion)
+        table.append(row(number, "no room" if end == WAITING else "settled"))
+    table.append(row(len(ends) + 1, "failed"))
+    about = {"format": "mics-ensemble", "runs": len(table), "seed": 1, "spread": 0.005,
+             "tilt_deg": None, "choices": [{}], "case": "&run title = 'a <b>' t_end = 2 /",
+             "table": table}  # fmt: skip
+    (folder / "ensemble.json").write_text(json.dumps(about))
+    return folder
+
+
+def row(number: int, outcome: str) -> dict:
+    return {"run": number, "seed": 100 + number, "outcome": outcome, "exit_code": 0,
+            "time_end": "2", "folder": f"{number:04d}"}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ensemble(tmp_path_factory: pytest.TempPathFactory) -> pile_ensemble.Ensemble:
+    folder = write_ensemble(tmp_path_factory.mktemp("ensemble"))
+    return pile_ensemble.open_ensemble(folder, 0.002)
+
+
+def test_patterns_and_their_shares(ensemble: pile_ensemble.Ensemble) -> None:
+    assert [p.pattern for p in ensemble.piles] == ["B", "B", "B", "A", "neither", "neither"]
+    assert ensemble.left_out == {7: "failed"}
+    found = pile_ensemble.pattern_shares(ensemble.piles)
+    assert [found[k]["count"] for k in ("A", "B", "neither")] == [1, 3, 2]
+    assert found["B"]["share"] == 0.5
+    assert found["B"]["interval_95"] == list(shares.wilson(3, 6))
+    steps = list(pile_ensemble.running(ensemble.piles, "B"))
+    assert [n for n, *_ in steps] == [1, 2, 3, 4, 5, 6]
+    assert [share for _, share, *_ in steps] == pytest.approx([1, 1, 1, 0.75, 0.6, 0.5])
+    assert steps[3][2:] == shares.wilson(3, 4)
+
+
+def test_maps_of_five_complete_piles(ensemble: pile_ensemble.Ensemble) -> None:
+    """The cube stands left in one of five piles, right on the floor in two, high up in two."""
+    assert len(ensemble.whole) == 5
+    found = pile_ensemble.maps(ensemble)
+
+    def at(values: np.ndarray, x: float) -> float:
+        return float(values[np.abs(found.y - 0.05).argmin(), np.abs(found.x - x).argmin()])
+
+    assert at(found.cover, LEFT) == pytest.approx(0.2)
+    assert at(found.cover, RIGHT) == pytest.approx(0.8)
+    assert at(found.cover, 0.12) == 0.0 and at(found.cover, 0.15) == 1.0
+    assert at(found.mean, LEFT) == pytest.approx(0.2 * EDGE)
+    heights = [0, EDGE, EDGE, HIGH + HALF, 0.17 + HALF]
+    assert at(found.mean, RIGHT) == pytest.approx(np.mean(heights))
+    assert at(found.low, RIGHT) == pytest.approx(np.percentile(heights, 10))
+    assert at(found.high, RIGHT) == pytest.approx(np.percentile(heights, 90))
+
+
+def test_remarkable_piles(ensemble: pile_ensemble.Ensemble) -> None:
+    found = pile_ensemble.remarkable(ensemble)
+    assert "highest" in found[5]
+    assert sorted(words for marks in found.values() for words in marks) == [
+        "highest", "least typical", "lowest", "most typical"]  # fmt: skip
+
+
+def test_the_command_writes_what_it_says(tmp_path: Path, capsys) -> None:
+    folder = write_ensemble(tmp_path / "e")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["pile", str(folder), "--step", "0.002", "--box", "0.25", "0.04", "0", "0.27",
+                  "0.06", "0.04"])  # fmt: skip
+    said = capsys.readouterr().out
+    assert end.value.code == 0
+    assert "A 1 of 6 (17 %, 3 to 56), B 3 of 6 (50 %, 19 to 81)" in said
+    content = json.loads((folder / "pile.json").read_text())
+    assert content["complete"] == 5 and content["left_out"] == {"7": "failed"}
+    assert content["convergence"]["A"][3][:2] == [4, 0.25]
+    with (folder / "pile.csv").open() as file:
+        table = list(csv.DictReader(file))
+    assert [line["pattern"] for line in table] == ["B", "B", "B", "A", "neither", "neither"]
+    voids = [float(line["porosity"]) for line in table]
+    assert voids == pytest.approx([1, 0.5, 0.5, 1, 1, 1])
+    assert content["numbers"]["porosity"]["median"] == pytest.approx(1.0)
+    with h5py.File(folder / "pile_maps.h5") as h5:
+        assert h5["cover"].shape == (50, 150) and h5["mean"].attrs["units"] == "m"
+
+
+def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadRun, match="no run that came to its end"):
+        pile_ensemble.open_ensemble(write_ensemble(tmp_path, []))
+
+
+def test_interval_of_a_median() -> None:
+    """Ranks 6 and 15 of 20: Conover, table A3 (binomial, 20, one half); none below six."""
+    assert pile_ensemble.median_interval(list(range(1, 21))) == (6, 15)
+    assert pile_ensemble.median_interval([3, 1, 2, 6, 5, 4]) == (1, 6)
+    assert np.isnan(pile_ensemble.median_interval([1, 2, 3, 4, 5])).all()
+    assert pile_ensemble.spread_of([float("nan")]) is None
