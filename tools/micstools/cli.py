@@ -14,7 +14,7 @@ COMMANDS = {
     "check": ("run", "CHECK", "check a case and print its plan"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
-    "report": ("report", "REPORT", "make one page of a run"),
+    "report": ("report", "REPORT", "make one page of a run or an ensemble"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
 }

@@ -68,10 +68,16 @@ def is_papers_tank(run: Run) -> bool:
 
 
 def has_level(run: Run) -> bool:
+    """Is the level known from the fields, and from the blocks?"""
+    return bool(run.field_times.size and level_follows(run))
+
+
+def level_follows(run: Run) -> bool:
     """Does the level follow from the blocks alone: still water, in a box, that cannot leave?"""
     ways_out = {"inflow", "outflow", "open"} & {k for s, k in run.sides.items() if s != "z_max"}
+    wet = str(run.value("run", "physics", "coupled")).strip() == "coupled"
     known = run.value("fluid", "water_level", None) is not None and not run.parameters.get("water")
-    return bool(run.field_times.size and known and not ways_out and not len(run.bed[1]))
+    return bool(wet and known and not ways_out and not len(run.bed[1]))
 
 
 def _named(blocks: list[int]) -> list[int]:

@@ -69,7 +69,7 @@ def test_a_title_stays_a_title(report: Path) -> None:
 
 def test_nothing_is_loaded_from_outside(report: Path) -> None:
     text = report.read_text()
-    assert "default-src 'none'" in text
+    assert 'content="default-src &#x27;none&#x27;;' in text
     for found in re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\'>) ]{1,20})', text):
         assert found.startswith("data:"), found
 

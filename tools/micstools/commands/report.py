@@ -3,21 +3,26 @@
 import argparse
 from pathlib import Path
 
-from micstools import command
+from micstools import command, pile_ensemble
 from micstools.commands.base import Command
+from micstools.page import ensemble_page, run_page
+from micstools.reader import Run
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("run", type=Path, help=command.RUN_HELP)
-    parser.add_argument("--out", type=Path, help="the file, default report.html in the folder")
+    add = parser.add_argument
+    add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
+    add("--out", type=Path, help="the file, default report.html in the folder")
 
 
 def _report(given: argparse.Namespace) -> int:
-    from micstools.page import run_page
-
-    run = command.open_run(given.run)
-    text = run_page.page(run)
-    path = given.out or run.folder / "report.html"
+    if pile_ensemble.is_ensemble(given.run):
+        folder = given.run
+        text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
+    else:
+        folder = command.results_of(given.run)
+        text = run_page.page(Run(folder))
+    path = given.out or folder / "report.html"
     path.write_text(text, encoding="utf-8")
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")
     return 0
@@ -25,9 +30,13 @@ def _report(given: argparse.Namespace) -> int:
 
 REPORT = Command(
     "report",
-    "Make one page of a run: the fall to play, the pile to scale, forces, health, provenance.\n"
-    "It is one file that loads nothing from outside.",
-    ("report mics-coarse", "report mics-coarse --out pile.html"),
+    "Make one page of a run: the fall to play, the pile to scale, forces, health, provenance; or\n"
+    "of an ensemble: shares, maps, histograms, every pile. It is one file that loads nothing.",
+    (
+        "report mics-coarse",
+        "report mics-coarse --out pile.html",
+        "report mics-ensemble-blocks_coarse",
+    ),
     _arguments,
     _report,
 )

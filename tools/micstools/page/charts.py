@@ -9,8 +9,8 @@ from micstools.page.html import Markup, markup, tag
 
 COLOURS = ("#d1495b", "#d98d1f", "#00879c", "#8560b8", "#5c9a78", "#e07a79", "#5b7aa6", "#a8727b")
 DASHES = (None, "7 3", "2 2.5", "9 3 2 3")
-WIDE, HIGH = 640, 250
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 12, 10, 40
+WIDE, HIGH = 640, 256
+_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 12, 10, 46
 _BINS = 300  # of a curve: more points than pixels show nothing
 
 
@@ -126,22 +126,26 @@ def _path(axes: Axes, x: Array, y: Array) -> str:
     return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(across, down, strict=True))
 
 
-def chart(axes: Axes, x: str, y: str, *drawn: Markup) -> Markup:
-    """A frame with ticks, the names of both axes and what is drawn in it."""
+def chart(axes: Axes, x: str, y: str, *drawn: Markup, whole: bool = False) -> Markup:
+    """A frame with ticks, the names of both axes and what is drawn in it; `whole`: what runs up is
+    counted."""
     grid = []
     for value in ticks(*axes.x):
         at = float(axes.across(np.array(value)))
-        grid += [_text(at, HIGH - _BOTTOM + 17, value, "middle")]
+        grid += [_text(at, HIGH - _BOTTOM + 18, value, "middle")]
     for value in ticks(*axes.y, most=5):
+        if whole and value % 1:
+            continue
         at = float(axes.down(np.array(value)))
         grid += [
             tag("line", class_="grid", x1=_LEFT, x2=WIDE - _RIGHT, y1=f"{at:.1f}", y2=f"{at:.1f}"),
             _text(_LEFT - 7, at + 4.5, value, "end"),
         ]
     frame = tag("path", class_="axis", d=f"M{_LEFT} {_TOP}V{HIGH - _BOTTOM}H{WIDE - _RIGHT}")
-    under = tag("text", x, x=(WIDE + _LEFT - _RIGHT) / 2, y=HIGH - 6, text_anchor="middle")
+    under = tag("text", x, x=(WIDE + _LEFT - _RIGHT) / 2, y=HIGH - 3, text_anchor="middle")
+    words = f"{y} against {x}" if x else f"histogram: {y}"
     picture = tag("svg", *grid, *drawn, frame, under, viewBox=f"0 0 {WIDE} {HIGH}", role="img",
-                  aria_label=f"{y} against {x}")  # fmt: skip
+                  aria_label=words)  # fmt: skip
     return tag("figure", tag("figcaption", y), picture, class_="chart")
 
 
@@ -159,8 +163,8 @@ def key(names: list[tuple[int, str]]) -> Markup:
     return tag("ul", *entries, class_="key")
 
 
-def histogram(values: Array, x: str, marks: list[tuple[float, str]]) -> Markup:
-    """How often values occur, with marked values, each named."""
+def histogram(values: Array, name: str, marks: list[tuple[float, str]]) -> Markup:
+    """How often values of a name occur, with marked values, each named."""
     low, high = spanning(np.concatenate([values, [m for m, _ in marks]]))
     bins = ticks(low, high, most=14)
     step = bins[1] - bins[0]
@@ -174,16 +178,17 @@ def histogram(values: Array, x: str, marks: list[tuple[float, str]]) -> Markup:
             y=f"{top[k]:.1f}", height=f"{floor - top[k]:.1f}")
         for k in range(len(counts)) if counts[k]
     ]  # fmt: skip
-    for value, name in marks:
+    for value, mark in marks:
         at = f"{float(axes.across(np.array(value))):.1f}"
-        bars.append(tag("line", tag("title", f"{name}: {value:.4g}"), x1=at, x2=at, y1=_TOP,
-                        y2=floor, class_="median" if name == "median" else "limit"))  # fmt: skip
-    return chart(axes, x, "number of piles", *bars)
+        bars.append(tag("line", tag("title", f"{mark}: {value:.4g}"), x1=at, x2=at, y1=_TOP,
+                        y2=floor, class_="median" if mark == "median" else "limit"))  # fmt: skip
+    return chart(axes, "", name, *bars, whole=True)
 
 
-def band(x: Array, middle: Array, low: Array, high: Array, names: tuple[str, str],
-         y_axis: tuple[float, float] | None = None) -> Markup:  # fmt: skip
-    """A curve within the interval around it; `names` of both axes."""
+def band(steps: Array, names: tuple[str, str], y_axis: tuple[float, float] | None = None) -> Markup:
+    """A curve within the interval around it: `steps` (n, 4) are x, the value, and its interval;
+    `names` are those of both axes."""
+    x, middle, low, high = steps.T
     axes = Axes(_bounds(x), y_axis or spanning(np.concatenate([low, high])))
     outline = _path(axes, np.concatenate([x, x[::-1]]), np.concatenate([low, high[::-1]]))
     drawn = markup(

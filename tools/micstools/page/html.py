@@ -8,6 +8,7 @@ from typing import Any
 
 # The page may load nothing at all; the browser itself refuses what this does not allow.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_EMPTY = ("img", "input", "meta")  # have no end
 
 
 class Markup(str):
@@ -22,7 +23,7 @@ def markup(*content: object) -> Markup:
     return Markup("".join(c if isinstance(c, Markup) else html.escape(str(c)) for c in said))
 
 
-def tag(name: str, *content: object, **attributes: object) -> Markup:
+def tag(name: str, /, *content: object, **attributes: object) -> Markup:
     """An element, as in `tag("p", "text", class_="note")`; an attribute that is None is left out,
     one that is True has no value."""
     said = [name]
@@ -32,7 +33,8 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
             said.append(word)
         elif value is not None:
             said.append(f'{word}="{html.escape(str(value))}"')
-    return Markup(f"<{' '.join(said)}>{markup(*content)}</{name}>")
+    opened = f"<{' '.join(said)}>"
+    return Markup(opened if name in _EMPTY else f"{opened}{markup(*content)}</{name}>")
 
 
 def section(name: str, title: str, *content: object) -> Markup:
@@ -80,10 +82,10 @@ def document(title: str, *content: object, script: str = "") -> str:
     player = (files("micstools.page") / "player.js").read_text()
     head = tag(
         "head",
-        Markup('<meta charset="utf-8">'),
-        Markup(f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'),
-        Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
-        Markup('<meta name="color-scheme" content="light dark">'),
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", name="color-scheme", content="light dark"),
         tag("title", title),
         Markup(f"<style>\n{style}</style>"),
     )

@@ -32,18 +32,26 @@ def frames(run: Run) -> IntArray:
 
 
 def scene(run: Run) -> dict[str, Any]:
-    """The fall of the blocks of a run, and the water where it was written."""
-    b, rows = run.bodies, frames(run)
+    """The fall of the blocks of a run, and the water."""
+    return tank(run) | blocks(run, frames(run)) | {"water": water(run)}
+
+
+def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
+    """Place, attitude, speed and contacts of the blocks at some rows."""
+    b = run.bodies
     names = list(run.shapes)
     speed = np.linalg.norm(b.velocity[rows], axis=2)
     fastest = float(speed.max(initial=0.0)) or 1.0
+    colours = block_colours(b.dropped, b.n)
     return {
-        "low": run.grid.low.tolist(),
-        "high": run.grid.high.tolist(),
-        "shapes": [shape_data(run, name) for name in names],
         "bodies": [
-            {"number": k + 1, "shape": names.index(b.shape[k]), "fixed": bool(b.fixed[k]),
-             "colour": block_colours(b.dropped, b.n)[k + 1], "release": _known(b.release_time[k])}
+            {
+                "number": k + 1,
+                "shape": names.index(b.shape[k]),
+                "fixed": bool(b.fixed[k]),
+                "colour": colours[k + 1],
+                "release": _known(b.release_time[k]),
+            }
             for k in range(b.n)
         ],
         "times": packed(b.time[rows], "f4"),
@@ -52,9 +60,7 @@ def scene(run: Run) -> dict[str, Any]:
         "speed": packed(np.round(255 * speed / fastest), "u1"),
         "fastest": fastest,
         "contacts": packed(b.contacts[rows].clip(0, 255), "u1"),
-        "water": water(run),
-        "bed": _bed(run),
-    }  # fmt: skip
+    }
 
 
 def _known(release: float) -> float | None:
@@ -67,33 +73,45 @@ def unit(quaternion: Array) -> Array:
     return np.asarray(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True))
 
 
-def shape_data(run: Run, name: str) -> dict[str, Any]:
-    """Corners, triangles and the edges at which a shape bends."""
-    shape = run.shapes[name]
+def tank(run: Run) -> dict[str, Any]:
+    """What stands still: the tank, the bed, and the shapes."""
+    points, triangles = run.bed
     return {
-        "points": packed(shape.points, "f4"),
-        "triangles": packed(shape.triangles, "u4"),
-        "edges": packed(shape.edges, "u4"),
+        "low": run.grid.low.tolist(),
+        "high": run.grid.high.tolist(),
+        "shapes": [_surface_of(s.points, s.triangles, s.edges) for s in run.shapes.values()],
+        "bed": _surface_of(points, triangles, triangles[:0]) if len(triangles) else None,
     }
 
 
-def _bed(run: Run) -> dict[str, Any] | None:
-    points, triangles = run.bed
-    if not len(triangles):
-        return None
-    return {"points": packed(points, "f4"), "triangles": packed(triangles, "u4"), "edges": ""}
+def _surface_of(points: Array, triangles: IntArray, edges: IntArray) -> dict[str, str]:
+    """Corners, triangles and the edges at which a surface bends."""
+    return {
+        "points": packed(points, "f4"),
+        "triangles": packed(triangles, "u4"),
+        "edges": packed(edges, "u4"),
+    }
 
 
 def water(run: Run) -> dict[str, Any] | None:
-    """The surface: its height over the plan at the written times, a byte each; without fields the
-    level of the start; none in a dry run, in one filled to the top or without a level."""
+    """The surface: its height over the plan at the written times, a byte each; without fields, or
+    where currents make it, a level; none in a dry run, a full one, or without a level."""
+    if pile.has_level(run):
+        return _surface(run)
+    level = still_level(run)
+    return None if level is None else {"level": level}
+
+
+def still_level(run: Run) -> float | None:
+    """Level [m] of the water when it has come to rest around the blocks of the last row; that of
+    the start where it does not follow from the blocks."""
     wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
     level = run.value("fluid", "water_level", None)
     if not wet or level is None or bool(run.value("fluid", "single_phase", False)):
         return None
-    if not run.field_times.size or not pile.has_level(run):
-        return {"level": float(level)}
-    return _surface(run)
+    if not pile.level_follows(run):
+        return float(level)
+    return pile.demanded_level(run, len(run.bodies.time) - 1)
 
 
 def _surface(run: Run) -> dict[str, Any]:

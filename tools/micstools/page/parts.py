@@ -12,7 +12,7 @@ def player(name: str, label: str) -> Markup:
     moving = tag(
         "div",
         tag("button", "Play", class_="play", type="button"),
-        Markup('<input class="slider" type="range" min="0" max="1" value="0" aria-label="time">'),
+        tag("input", class_="slider", type="range", min=0, max=1, value=0, aria_label="time"),
         tag("output", "0.00 s", class_="clock"),
         tag("label", "speed", _select("pace", _PACES, "0.5")),
         class_="row moving",
@@ -26,7 +26,7 @@ def player(name: str, label: str) -> Markup:
         tag("button", "−", type="button", data_zoom=1.25, aria_label="farther"),
         class_="group",
     )
-    water = tag("label", Markup('<input type="checkbox" class="wet" checked>'), "water")
+    water = tag("label", tag("input", type="checkbox", class_="wet", checked=True), "water")
     settings = tag(
         "div",
         views,

@@ -115,11 +115,8 @@ def _pile(run: Run) -> Markup:
 
 
 def _last_level(run: Run) -> float | None:
-    """The mean level of the water at the end; that of the start where no field was written."""
-    known = motion.water(run)
-    if known is None:
-        return None
-    return pile.water_level(run).found if "height" in known else float(known["level"])
+    """The mean level of the water at the end; the one it should have where no field was written."""
+    return pile.water_level(run).found if pile.has_level(run) else motion.still_level(run)
 
 
 def _blocks(run: Run, found: Found) -> Markup:

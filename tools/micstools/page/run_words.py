@@ -74,15 +74,23 @@ def drops(run: Run) -> list[str]:
         said = f"{count(n, 'block is', 'blocks are')} dropped at x = {1e3 * x:.4g}, "
         said += f"y = {1e3 * y:.4g}, z = {1e3 * z:.4g} mm"
         said += f", one every {drop.get('interval', 1.0):.3g} s" if n > 1 else ""
-        spread = [float(v) for v in np.ravel(drop.get("spread", 0.0))]
-        if any(spread):
-            sizes = ", ".join(f"{1e3 * v:.3g}" for v in spread)
-            said += f", moved by chance up to ± ({sizes}) mm (seed {drop.get('seed', 1)})"
-        if float(drop.get("tilt_deg", 0.0)):
-            said += f", tilted by chance up to {drop['tilt_deg']:.3g}°"
-        if str(drop.get("orientation", "given")).strip() == "random":
-            said += ", turned anyhow"
+        said += "".join(f", {words}" for words in chance(drop))
+        said += f" (seed {drop.get('seed', 1)})" if chance(drop) else ""
         found.append(said)
+    return found
+
+
+def chance(drop: dict[str, Any]) -> list[str]:
+    """What of a &drop is left to chance."""
+    found = []
+    spread = [float(v) for v in np.ravel(drop.get("spread", 0.0))]
+    if any(spread):
+        sizes = ", ".join(f"{1e3 * v:.3g}" for v in spread)
+        found.append(f"moved by chance up to ± ({sizes}) mm")
+    if float(drop.get("tilt_deg", 0.0)):
+        found.append(f"tilted by chance up to {drop['tilt_deg']:.3g}°")
+    if str(drop.get("orientation", "given")).strip() == "random":
+        found.append("turned anyhow")
     return found
 
 

@@ -1,0 +1,104 @@
+"""The page of an ensemble: its sentence, its maps, and that every pile opens in a browser."""
+
+import base64
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from browser import MISSING, Browser
+from micstools import cli, pile_ensemble
+from micstools.page import charts, ensemble_page
+from micstools.reader import BadRun
+from test_pile_ensemble import ENDS, WAITING, write_ensemble
+
+in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_ensemble(tmp_path_factory.mktemp("page") / "piles", ENDS * 2)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["report", str(folder)])
+    assert end.value.code == 0
+    return folder / "report.html"
+
+
+def test_the_sentence_has_shares_and_heights(report: Path) -> None:
+    found = pile_ensemble.open_ensemble(report.parent, 0.002)
+    said = ensemble_page.sentence(found)
+    assert said.startswith("In 2 of 12 (17 %, 5 to 45) runs every dropped block ends off the floor")
+    assert "in 6 of 12 (50 %, 25 to 75) at least one more" in said
+    assert "Half of the 10 complete piles are higher than" in said
+    assumed = ensemble_page.assumptions(found)
+    assert "friction of blocks 0.6" in assumed and "runs 13 (failed)" in assumed
+
+
+def test_the_page_holds_every_pile(report: Path) -> None:
+    text = report.read_text()
+    found = re.search(r'id="piles">(.*?)</script>', text, re.DOTALL)
+    assert found
+    piles = json.loads(found[1])
+    assert list(piles["runs"]) == [str(k) for k in range(1, 13)]
+    place = np.frombuffer(base64.b64decode(piles["runs"]["1"]["scene"]["place"]), "<f4")
+    assert place.reshape(-1, 3)[3] == pytest.approx(ENDS[0])
+    assert text.count("data-pile=") == 12
+    for mark in ("most typical", "least typical", "highest", "lowest"):
+        assert f"<b>{mark}</b>" in text
+
+
+def test_what_is_taken_along_is_whole(report: Path) -> None:
+    text = report.read_text()
+    (table,) = re.findall(r'data:text/csv;base64,([^"]*)', text)
+    assert len(base64.b64decode(table).decode().splitlines()) == 13
+    (content,) = re.findall(r'data:application/json;base64,([^"]*)', text)
+    assert json.loads(base64.b64decode(content))["complete"] == 10
+
+
+def test_an_ensemble_without_a_complete_pile_has_no_page(tmp_path: Path) -> None:
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, [WAITING]), 0.002)
+    with pytest.raises(BadRun, match="no pile with all its blocks"):
+        ensemble_page.page(found)
+
+
+def test_a_histogram_counts_every_value() -> None:
+    drawn = charts.histogram(np.array([1.0, 1.1, 2.0, 5.0]), "a", [(1.5, "median")])
+    heights = [float(h) for h in re.findall(r'class="bar"[^>]* height="([\d.]+)"', drawn)]
+    unit = min(heights)
+    assert sum(round(h / unit) for h in heights) == 4
+    assert "0.5" not in re.findall(r">([\d.]+)</text>", drawn)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+@in_browser
+def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
+    browser.open(report)
+    for number in (1, 4):
+        browser.run(f"document.querySelector('[data-pile=\"{number}\"]').click()")
+        assert browser.run("dialog.open")
+        assert f"Run {number}:" in browser.run("dialog.querySelector('h3').textContent")
+        place = browser.run("pilePlayer.stage.pose(3).place")
+        assert place == pytest.approx(ENDS[number - 1], abs=1e-6)
+        browser.run("dialog.querySelector('.close').click()")
+        assert not browser.run("dialog.open")
+    browser.run("document.querySelector('[data-pile]').click()")
+    row = "getComputedStyle(dialog.querySelector('.row.moving')).display"
+    assert browser.run(row) == "none"  # nothing moves
+    assert browser.errors == []
+    assert [url for url in browser.requests if not url.startswith("data:")] == [report.as_uri()]
+
+
+@in_browser
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
+    browser.open(report, 360, 740, dark)
+    assert browser.run("document.documentElement.scrollWidth") <= 360
+    assert browser.errors == []
