@@ -15,6 +15,7 @@ COMMANDS = {
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
     "report": ("report", "REPORT", "make one page of a run or an ensemble"),
+    "export": ("export", "EXPORT", "write a run for other programs: glb, stl, obj, csv, pvd"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
 }

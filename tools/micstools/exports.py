@@ -1,0 +1,172 @@
+"""A run in the formats of other programs: a named object per block, SI units, z up."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from micstools import gltf
+from micstools.geometry import Array, IntArray
+from micstools.overlap import present_bodies
+from micstools.reader import BadRun, Run
+
+FILMED = 30  # frames a second
+Writer = Callable[[Run, int, Path], Path]
+
+
+def to_csv(run: Run, _row: int, folder: Path) -> Path:
+    """Place, attitude and velocity of every block at every row."""
+    path, b = folder / "blocks.csv", run.bodies
+    heads = ["time", "block", "shape", "released", "x", "y", "z", "qw", "qx", "qy", "qz",
+             "vx", "vy", "vz", "wx", "wy", "wz"]  # fmt: skip
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        for row, time in enumerate(b.time):
+            present = b.present(row)
+            for k in range(b.n):
+                values = np.concatenate(
+                    [b.position[row, k], b.quaternion[row, k], b.velocity[row, k],
+                     b.angular_velocity[row, k]]
+                )  # fmt: skip
+                named = [repr(float(time)), k + 1, b.shape[k], int(present[k])]
+                writer.writerow(named + [repr(float(v)) for v in values])
+    return path
+
+
+def to_stl(run: Run, row: int, folder: Path) -> Path:
+    """The released blocks at a row, a solid each, as text."""
+    path = folder / "pile.stl"
+    with path.open("w") as file:
+        for k, body in present_bodies(run, row).items():
+            corners = body.triangles
+            normals = _normals(corners)
+            file.write(f"solid block-{k + 1}\n")
+            for normal, triangle in zip(normals, corners, strict=True):
+                file.write(f"facet normal {_words(normal)}\nouter loop\n")
+                file.writelines(f"vertex {_words(corner)}\n" for corner in triangle)
+                file.write("endloop\nendfacet\n")
+            file.write(f"endsolid block-{k + 1}\n")
+    return path
+
+
+def to_obj(run: Run, row: int, folder: Path) -> Path:
+    """The released blocks at a row, an object each."""
+    path, first = folder / "pile.obj", 1
+    with path.open("w") as file:
+        for k, body in present_bodies(run, row).items():
+            points = body.points
+            file.write(f"o block-{k + 1}\n")
+            file.writelines(f"v {_words(point)}\n" for point in points)
+            for triangle in body.shape.triangles + first:
+                file.write(f"f {' '.join(map(str, triangle))}\n")
+            first += len(points)
+    return path
+
+
+def to_glb(run: Run, _row: int, folder: Path) -> Path:
+    """The fall of all blocks."""
+    path = folder / "fall.glb"
+    gltf.write(run, _film_rows(run), path)
+    return path
+
+
+def to_pvd(run: Run, _row: int, folder: Path) -> Path:
+    """Blocks and water for ParaView before 5.12: a .vtp file, and a .vti file where there are
+    fields, for each time, and a list of each."""
+    times = run.field_times if run.field_times.size else run.bodies.time[_film_rows(run)]
+    parts: dict[str, list[tuple[float, str]]] = {}
+    for frame, time in enumerate(times):
+        if run.bodies.n:
+            name = f"blocks-{frame:05d}.vtp"
+            _polygons(run, float(time)).save(folder / name)
+            parts.setdefault("blocks", []).append((float(time), name))
+        if run.field_times.size:
+            name = f"fields-{frame:05d}.vti"
+            _image(run, float(time)).save(folder / name)
+            parts.setdefault("fields", []).append((float(time), name))
+    for what, files in parts.items():
+        (folder / f"{what}.pvd").write_text(_collection(files))
+    return folder / f"{next(iter(parts))}.pvd"
+
+
+def _film_rows(run: Run) -> IntArray:
+    """Rows evenly in time, first and last among them."""
+    time = run.bodies.time
+    wanted = np.linspace(time[0], time[-1], int(FILMED * (time[-1] - time[0])) + 2)
+    return np.unique(np.searchsorted(time, wanted).clip(0, len(time) - 1))
+
+
+def _polygons(run: Run, time: float) -> Any:
+    """The released blocks as a pyvista.PolyData; `body` is the number of the block of a face."""
+    import pyvista as pv
+
+    points, faces, numbers, first = [], [], [], 0
+    for k, body in present_bodies(run, run.bodies.row(time)).items():
+        points.append(body.points)
+        faces.append(np.insert(body.shape.triangles + first, 0, 3, axis=1))
+        numbers.append(np.full(len(faces[-1]), k + 1))
+        first += len(points[-1])
+    if not points:
+        return pv.PolyData()
+    mesh = pv.PolyData(np.concatenate(points), np.concatenate(faces).ravel())
+    mesh.cell_data["body"] = np.concatenate(numbers)
+    return mesh
+
+
+def _image(run: Run, time: float) -> Any:
+    """The water as a pyvista.ImageData with values of the cells."""
+    import pyvista as pv
+
+    grid, fields = run.grid, run.fields(time)
+    cells = [len(faces) for faces in grid.faces]
+    image = pv.ImageData(dimensions=cells, spacing=grid.spacing, origin=grid.low)
+    for name in ("liquid", "solid", "pressure"):
+        image.cell_data[name] = getattr(fields, name).ravel()
+    image.cell_data["velocity"] = fields.velocity.reshape(-1, 3)
+    return image
+
+
+def _collection(files: list[tuple[float, str]]) -> str:
+    """The text of a .pvd file."""
+    lines = [
+        f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n'
+        for time, name in files
+    ]
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        + "".join(lines)
+        + "  </Collection>\n</VTKFile>\n"
+    )
+
+
+def _normals(corners: Array) -> Array:
+    """Unit normals (m, 3) of triangles (m, 3, 3)."""
+    found = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
+def _words(values: Array) -> str:
+    return " ".join(f"{v:.9g}" for v in values)
+
+
+FORMATS: dict[str, Writer] = {
+    "glb": to_glb,
+    "stl": to_stl,
+    "obj": to_obj,
+    "csv": to_csv,
+    "pvd": to_pvd,
+}
+"""What can be written, by its ending."""
+
+
+def parse_formats(word: str) -> list[str]:
+    """The formats of a list such as `glb,csv`."""
+    wanted = [name.strip().lower() for name in word.split(",")]
+    unknown = [name for name in wanted if name not in FORMATS]
+    if unknown:
+        raise BadRun(f"--to {word}: '{unknown[0]}' is none of {', '.join(FORMATS)}")
+    return wanted
