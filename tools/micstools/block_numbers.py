@@ -61,6 +61,8 @@ def impact_speed(run: Run, k: int) -> float:
 
 def _rest(time: np.ndarray, speed: np.ndarray, limit: float) -> float:
     fast = np.flatnonzero(speed >= limit)
+    if len(time) < 2:
+        return float("nan")
     if not fast.size:
         return float(time[0])
     return float(time[fast[-1] + 1]) if fast[-1] + 1 < len(time) else float("nan")

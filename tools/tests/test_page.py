@@ -118,6 +118,7 @@ def test_views_show_what_stands_in_front() -> None:
     cube, low, high = shapes.cube(0.02), np.zeros(3), np.array([0.1, 0.1, 0.1])
     places = ((0.05, 0.02, 0.01), (0.05, 0.06, 0.02))
     bodies = {k: Placed(cube, np.array(p), UPRIGHT) for k, p in enumerate(places)}
+    bodies = views.surfaces_of(bodies)
     front = views.look(bodies, "front", low, high, 0.001).block
     assert (front == 1).sum() == 400 and (front == 2).sum() == 200
     assert (front[:20, 40:60] == 1).all() and (front[20:30, 40:60] == 2).all()
@@ -126,6 +127,20 @@ def test_views_show_what_stands_in_front() -> None:
     top = views.look(bodies, "top", low, high, 0.001)
     assert (top.block == 1).sum() == (top.block == 2).sum() == 400
     assert top.depth[60, 50] == pytest.approx(0.03)
+
+
+def test_a_bed_is_an_outline_from_the_side() -> None:
+    """A ramp from 0 to 0.1 m along x, a quarter of a square higher: of the squares of the front
+    view those on and below the diagonal; all of the side view."""
+    x, y = np.meshgrid([0.0, 0.1], [0.0, 0.1])
+    p = np.stack([x, y, x + 0.00025], axis=-1).reshape(-1, 3)
+    ramp = p[np.array([[0, 1, 3], [0, 3, 2]])]
+    low, high = np.zeros(3), np.full(3, 0.1)
+    shares = [
+        (np.asarray(views.ground(ramp, view, low, high, 0.001))[..., 3] > 0).mean()
+        for view in ("front", "side", "top")
+    ]
+    assert shares == pytest.approx([0.505, 1.0, 1.0])
 
 
 def test_numbers_of_each_block(make_run) -> None:
@@ -153,6 +168,15 @@ def test_what_differs_from_the_defaults(make_run) -> None:
             str(about["parameters"]) + "&contact friction = 0.25 restitution = 0.3 /\n"
         )
     assert run_words.differing(Run(folder)) == [("contact.friction", "0.25", "0.6")]
+
+
+def test_blocks_still_to_come_have_no_curves(make_run) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0))  # the third comes at the end itself
+    text = run_page.page(run)
+    assert "After 2 s three blocks are still to come and three blocks were let go" in text
+    assert 'd="M"' not in text and 'd=""' not in text
+    assert [k.block for k in block_numbers.of_blocks(run)] == [4, 5, 6]
+    assert np.isnan(block_numbers.of_blocks(run)[-1].at_rest)
 
 
 def test_a_dry_run_without_fields_has_a_page(make_run) -> None:

@@ -243,7 +243,8 @@ def _thumbnail(p: Pile, marks: list[str]) -> Markup:
     b, grid = p.run.bodies, p.run.grid
     bodies = present_bodies(p.run, -1)
     colours = views.block_colours(b.dropped, b.n)
-    address = views.plain(bodies, colours, "front", (grid.low, grid.high), _SMALL)
+    sheet = views.Sheet(grid.low, grid.high, views.bed_of(p.run), _SMALL)
+    address = views.uri(sheet.picture(bodies, colours, "front")[0], 48)
     words = f"run {p.number}, top {millimetres(p.numbers.top - float(grid.low[2]))}"
     image = tag("img", src=address, alt=f"pile of {words}")
     said = markup(image, words, *(tag("b", mark) for mark in marks))

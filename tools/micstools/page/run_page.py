@@ -8,13 +8,13 @@ import numpy as np
 from micstools import block_numbers, pile, pile_numbers
 from micstools.block_numbers import BlockNumbers
 from micstools.geometry import Array
-from micstools.overlap import Overlap, overlap, present_bodies
+from micstools.overlap import Overlap, Placed, overlap, present_bodies
 from micstools.page import charts, motion, run_words
 from micstools.page.charts import Curve
 from micstools.page.html import Markup, data, document, download, facts, markup, section, table, tag
 from micstools.page.parts import number, player, swatch
-from micstools.page.run_words import capital, count, millimetres
-from micstools.page.views import Sheet, block_colours
+from micstools.page.run_words import count, millimetres
+from micstools.page.views import Sheet, bed_of, block_colours
 from micstools.pile_numbers import PileNumbers
 from micstools.reader import BadRun, Run
 
@@ -68,8 +68,8 @@ def outcome(run: Run, found: Found) -> str:
     n, end = len(found.blocks), float(b.time[-1])
     missing = int((~b.fixed).sum()) - n
     if missing:
-        said = f"{capital(count(missing, 'block'))} never came in within {end:.3g} s. "
-        said += f"{capital(count(n, 'block was', 'blocks were'))} let go"
+        said = f"After {end:.3g} s {count(missing, 'block is', 'blocks are')} still to come and "
+        said += f"{count(n, 'block was', 'blocks were')} let go"
     elif found.numbers.time_to_rest == found.numbers.time_to_rest:
         said = f"After {found.numbers.time_to_rest:.3g} s {count(n, 'free block')} "
         said += "lies still" if n == 1 else "lie still"
@@ -104,14 +104,23 @@ def _facts(run: Run, found: Found) -> Markup:
 def _pile(run: Run) -> Markup:
     """The pile of the end from three sides."""
     bodies = present_bodies(run, -1)
-    sheet = Sheet(run.grid.low, run.grid.high)
-    colours = block_colours(run.bodies.dropped, run.bodies.n)
     level = _last_level(run)
+    sheet = Sheet(run.grid.low, _upper_corner(run, bodies, level), bed_of(run))
+    colours = block_colours(run.bodies.dropped, run.bodies.n)
     drawn = [sheet.drawing(bodies, colours, view, level) for view in ("front", "side", "top")]
     words = "All views have one scale; blocks bear their numbers, fixed ones are grey."
     words += " The dashed line is the water level." if level is not None else ""
     return section("pile", "The pile at the end", tag("div", *drawn, class_="views"),
                    tag("p", words, class_="note"))  # fmt: skip
+
+
+def _upper_corner(run: Run, bodies: dict[int, Placed], level: float | None) -> Array:
+    """Of what is shown: the tank, but for much air above the pile and the water."""
+    tops = [float(body.points[:, 2].max()) for body in bodies.values()]
+    low, high = run.grid.low, np.array(run.grid.high)
+    needed = max([*tops, *([level] if level is not None else [])], default=float(high[2]))
+    high[2] = min(high[2], max(needed, low[2]) + 0.1 * float((high - low).max()))
+    return high
 
 
 def _last_level(run: Run) -> float | None:
@@ -146,7 +155,7 @@ def _blocks(run: Run, found: Found) -> Markup:
 def _curves(run: Run) -> list[Markup]:
     """Charts against time and their key, of the first blocks where there are many."""
     b = run.bodies
-    shown = [int(k) for k in b.dropped if np.isfinite(b.release_time[k])][:_MANY]
+    shown = [int(k) for k in b.dropped if b.present(-1)[k]][:_MANY]
     if not shown:
         return []
     wanted = [

@@ -15,6 +15,7 @@ from micstools.overlap import Placed
 from micstools.page.charts import colour
 from micstools.page.html import Markup, tag
 from micstools.pile_numbers import under
+from micstools.reader import Run
 
 # What runs to the right, what runs up, what comes towards the viewer; as the pictures of `scene`.
 VIEWS = {
@@ -29,6 +30,8 @@ NAMES = {
 }
 _LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
 FIXED = "#8d8d8d"
+BED = "#b7a78c"
+_MANY = 20  # blocks: more have smaller numbers
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,9 @@ class Seen:
     step: float
 
 
-def look(bodies: dict[int, Placed], view: str, low: Array, high: Array, step: float) -> Seen:
-    """What is seen of the blocks, by their number from 0, in the box from `low` to `high` (3)."""
+def look(surfaces: dict[int, Array], view: str, low: Array, high: Array, step: float) -> Seen:
+    """What is seen of surfaces, triangles (m, 3, 3) by the number of their block from 0, in the
+    box from `low` to `high` (3)."""
     axes = np.array(VIEWS[view], float)
     corner = np.minimum(axes @ low, axes @ high)
     far = np.maximum(axes @ low, axes @ high)
@@ -51,11 +55,11 @@ def look(bodies: dict[int, Placed], view: str, low: Array, high: Array, step: fl
     depth = np.full((n[1], n[0]), -np.inf)
     block, light = np.zeros(depth.shape, dtype=np.int64), np.zeros(depth.shape)
     towards = _LIGHT / np.linalg.norm(_LIGHT)
-    for number, body in bodies.items():
-        triangles = body.triangles @ axes.T
+    for number, surface in surfaces.items():
+        triangles = surface @ axes.T
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        seen = normals[:, 2] > 1e-9 * np.linalg.norm(normals, axis=1)
-        for triangle, normal in zip(triangles[seen], normals[seen], strict=True):
+        normals *= np.sign(normals[:, 2:])  # an open surface is seen from behind, too
+        for triangle, normal in zip(triangles, normals, strict=True):
             patch = under(triangle, corner, step, depth.shape)
             if patch is None:
                 continue
@@ -68,7 +72,25 @@ def look(bodies: dict[int, Placed], view: str, low: Array, high: Array, step: fl
     return Seen(block, light, depth, corner[:2], step)
 
 
-def paint(seen: Seen, colours: dict[int, str]) -> Image.Image:
+def surfaces_of(bodies: dict[int, Placed]) -> dict[int, Array]:
+    """Triangles (m, 3, 3) of each block."""
+    return {k: body.triangles for k, body in bodies.items()}
+
+
+def ground(bed: Array, view: str, low: Array, high: Array, step: float) -> Image.Image:
+    """The bed, triangles (m, 3, 3): from the top as it is, from a side its highest outline."""
+    seen = look({0: bed}, "top", low, high, step)
+    if view != "top":
+        outline = seen.depth.max(axis=0 if view == "front" else 1)
+        rows = max(1, int(np.ceil((high[2] - low[2]) / step - 1e-9)))
+        middle = low[2] + (np.arange(rows)[:, None] + 0.5) * step
+        filled = (middle < outline).astype(np.int64)
+        corner = np.array([low[0 if view == "front" else 1], low[2]])
+        seen = Seen(filled, 0.95 * filled, np.zeros(filled.shape), corner, step)
+    return paint(seen, {1: BED}, edges=False)
+
+
+def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Image:
     """The picture: colours by the number of the block from 1, edges dark, nothing elsewhere."""
     pixels = np.zeros((*seen.block.shape, 4))
     for number in np.unique(seen.block[seen.block > 0]):
@@ -77,7 +99,8 @@ def paint(seen: Seen, colours: dict[int, str]) -> Image.Image:
         pixels[here] = [*rgb, 255]
         pixels[here, :3] = 255 - (255 - pixels[here, :3]) * 0.92
     pixels[..., :3] *= seen.light[..., None]
-    pixels[_edges(seen)] = (28, 32, 38, 255)
+    if edges:
+        pixels[_edges(seen)] = (28, 32, 38, 255)
     flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
     return Image.fromarray(flipped, "RGBA")
 
@@ -114,12 +137,10 @@ def block_colours(dropped: IntArray, n: int) -> dict[int, str]:
     return {k + 1: colour(order[k]) if k in order else FIXED for k in range(n)}
 
 
-def plain(bodies: dict[int, Placed], colours: dict[int, str], view: str, box: tuple[Array, Array],
-          pixels: int = 200) -> str:  # fmt: skip
-    """A small picture without words, `pixels` wide, as an address."""
-    wide = float(np.ptp([VIEWS[view][0] @ corner for corner in box]))
-    seen = look(bodies, view, *box, wide / pixels)
-    return uri(paint(seen, colours), 48)
+def bed_of(run: Run) -> Array:
+    """Triangles (m, 3, 3) of the bed; none without one."""
+    points, triangles = run.bed
+    return np.asarray(points[triangles]) if len(triangles) else np.empty((0, 3, 3))
 
 
 @dataclass(frozen=True)
@@ -128,6 +149,7 @@ class Sheet:
 
     low: Array  # corner of what is shown (3) [m]
     high: Array
+    bed: Array  # triangles (m, 3, 3) [m]
     pixels: float = 900.0  # of the longest side
 
     @property
@@ -135,13 +157,24 @@ class Sheet:
         """A pixel [m]."""
         return float((self.high - self.low).max()) / self.pixels
 
+    def picture(
+        self, bodies: dict[int, Placed], colours: dict[int, str], view: str
+    ) -> tuple[Image.Image, Seen]:
+        """One view without words, and what is seen in it."""
+        seen = look(surfaces_of(bodies), view, self.low, self.high, self.step)
+        picture = paint(seen, colours)
+        if len(self.bed):
+            below = ground(self.bed, view, self.low, self.high, self.step)
+            picture = Image.alpha_composite(below, picture)
+        return picture, seen
+
     def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
                 level: float | None = None) -> Markup:  # fmt: skip
         """One view with the numbers of the blocks, the tank, the water level and a length."""
-        seen = look(bodies, view, self.low, self.high, self.step)
+        picture, seen = self.picture(bodies, colours, view)
         rows, columns = seen.block.shape
-        picture = tag("image", href=uri(paint(seen, colours)), width=columns, height=rows)
-        drawn = [picture, tag("rect", class_="tank", x=0, y=0, width=columns, height=rows)]
+        image = tag("image", href=uri(picture), width=columns, height=rows)
+        drawn = [image, tag("rect", class_="tank", x=0, y=0, width=columns, height=rows)]
         if level is not None and view != "top":
             at = f"{rows - (level - seen.low[1]) / self.step:.1f}"
             drawn.append(tag("line", class_="level", x1=0, x2=columns, y1=at, y2=at))
@@ -171,13 +204,14 @@ class Sheet:
 def _numbers(seen: Seen) -> list[Markup]:
     """The number of each block where it is seen, unless too little of it is."""
     found = []
-    rows = seen.block.shape[0]
-    for number in np.unique(seen.block[seen.block > 0]):
+    rows, shown = seen.block.shape[0], np.unique(seen.block[seen.block > 0])
+    kind = "number" if len(shown) <= _MANY else "number many"
+    for number in shown:
         y, x = np.nonzero(seen.block == number)
         if len(x) < 500:
             continue
         nearest = int(((x - x.mean()) ** 2 + (y - y.mean()) ** 2).argmin())
-        found.append(tag("text", number, x=x[nearest], y=rows - y[nearest] + 10, class_="number",
+        found.append(tag("text", number, x=x[nearest], y=rows - y[nearest] + 10, class_=kind,
                          text_anchor="middle"))  # fmt: skip
     return found
 
