@@ -213,14 +213,14 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
 def rows(ensemble: Ensemble) -> list[dict[str, Any]]:
     """A row for each run with an outcome, its numbers included."""
     return [
-        p.row | {"pattern": p.pattern, "complete": p.complete} | _flat(p.numbers)
+        p.row | {"pattern": p.pattern, "complete": p.complete} | flat(p.numbers)
         for p in ensemble.piles
     ]
 
 
-def _flat(found: PileNumbers) -> dict[str, Any]:
+def flat(found: PileNumbers) -> dict[str, float | str]:
     """The numbers, each for itself; empty where one is not known."""
-    values: dict[str, Any] = {}
+    values: dict[str, float] = {}
     for name, value in asdict(found).items():
         if isinstance(value, tuple):
             values |= {f"{name}_{part}": v for part, v in zip(_PARTS[name], value, strict=True)}
@@ -231,10 +231,10 @@ def _flat(found: PileNumbers) -> dict[str, Any]:
 
 def summary(ensemble: Ensemble) -> dict[str, Any]:
     """What `pile.json` holds of an ensemble; nan is left to the writer."""
-    flat = [_flat(p.numbers) for p in ensemble.whole]
+    found = [flat(p.numbers) for p in ensemble.whole]
     spreads = {
-        name: spread_of([row[name] for row in flat if row[name] != ""])
-        for name in (flat[0] if flat else {})
+        name: spread_of([float(row[name]) for row in found if row[name] != ""])
+        for name in (found[0] if found else {})
     }
     return {
         "format": "mics-ensemble-piles",

@@ -1,0 +1,118 @@
+"""The same case on coarser and finer cells."""
+
+import argparse
+import csv
+import json
+import subprocess
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from micstools import pile_ensemble, pile_numbers, program, settings
+from micstools.commands.base import Command
+from micstools.convergence import Convergence, converge
+from micstools.reader import BadRun, Run
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    program.add_case(parser)
+    add = parser.add_argument
+    add("--cells", required=True, metavar="A,B,C", help="times the cells of the case, rising")
+    add("--threads", type=int, help="of each run, default: all cores")
+    add("--out", type=Path, help="folder, default mics-study-CASE")
+
+
+def _factors(word: str) -> list[float]:
+    try:
+        found = [float(part) for part in word.split(",")]
+    except ValueError:
+        raise BadRun(f"--cells {word}: must be numbers parted by commas") from None
+    if not all(a < b for a, b in zip([0.0, *found], found, strict=False)):
+        raise BadRun(f"--cells {word}: must be positive and rise")
+    return found
+
+
+def finer(text: str, factor: float) -> str:
+    """The case with `factor` times its cells in each direction that has more than one."""
+    cells = settings.value(text, "grid", "cells")
+    if cells is None:
+        raise BadRun("the case has no &grid cells: there is nothing to refine")
+    wanted = [n if n == 1 else max(1, round(factor * n)) for n in cells]
+    return settings.set_group(text, "grid", {"cells": wanted})
+
+
+def _run(path: Path, text: str, folder: Path, threads: int | None) -> Run:
+    """Run a case in a folder, unless it is there already."""
+    case, result = folder / "case.nml", folder / "result"
+    if case.exists() and case.read_text() != text:
+        raise BadRun(f"{case} is another case than asked for: give another --out")
+    done = case.exists() and (result / "run.h5").is_file()
+    if not done or int(Run(result).provenance.get("exit_status", -1)) != 0:
+        folder.mkdir(parents=True, exist_ok=True)
+        case.write_text(text)
+        words: list[str | Path] = [path, "--output", result, "--quiet", case]
+        words[1:1] = ["--threads", str(threads)] if threads is not None else []
+        code = subprocess.run(words).returncode
+        if code not in (0, 3):
+            raise BadRun(f"{case}: the run ended with code {code}")
+    return Run(result)
+
+
+def _study(given: argparse.Namespace) -> int:
+    factors, path = _factors(given.cells), program.find(given.program)
+    text = program.case_text(given.case, given.settings)
+    folder = given.out or Path(f"mics-study-{given.case.stem}")
+    cases = [finer(text, factor) for factor in factors]
+    for each in cases:
+        program.check(path, each)
+    found = []
+    for factor, each in zip(factors, cases, strict=True):
+        print(f"cells x {factor:g}: {folder}/{factor:g}", flush=True)
+        run = _run(path, each, folder / f"{factor:g}", given.threads)
+        step = float((run.grid.high - run.grid.low)[:2].max()) / 300
+        found.append(pile_ensemble.flat(pile_numbers.numbers(run, step)))
+    _tell(folder, factors, found)
+    return 0
+
+
+def _tell(folder: Path, factors: list[float], found: list[dict[str, float | str]]) -> None:
+    """Print a line for each number and write `study.csv` and `study.json`."""
+    rows: list[dict[str, object]] = []
+    for name in found[0]:
+        values = [float(numbers[name]) if numbers[name] != "" else np.nan for numbers in found]
+        told = converge(factors, values)
+        rows.append({"number": name} | dict(zip(map(_column, factors), values, strict=True))
+                    | asdict(told))  # fmt: skip
+        print(f"     {name:20}{', '.join(f'{v:.5g}' for v in values)}  {_words(told)}")
+    with (folder / "study.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    known = [{k: None if v != v else v for k, v in row.items()} for row in rows]
+    (folder / "study.json").write_text(json.dumps(known, indent=2) + "\n")
+    print(folder / "study.csv")
+
+
+def _column(factor: float) -> str:
+    return f"cells x {factor:g}"
+
+
+def _words(told: Convergence) -> str:
+    if told.words:
+        return f"({told.words})"
+    return f"order {told.order:.2f}, limit {told.limit:.5g}, error {told.error:+.2g}"
+
+
+STUDY = Command(
+    "study",
+    "Run a case on coarser and finer cells: each number of the pile, its observed order and an\n"
+    "estimate of its error (study.csv, study.json). A second call runs what is missing. Piles are\n"
+    "chaotic: what does not converge says so.",
+    (
+        "study input/blocks_coarse.nml --cells 1,1.5,2",
+        "study input/blocks.nml --cells 0.5,0.75,1 --set run.t_end=0.8 --set drop.count=1",
+    ),
+    _arguments,
+    _study,
+)

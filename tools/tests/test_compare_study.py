@@ -1,0 +1,144 @@
+"""Two runs beside each other, and a case on several grids: differences and orders are known."""
+
+import json
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from micstools import cli, comparison
+from micstools.commands.study import finer
+from micstools.convergence import converge
+from micstools.geometry import quaternion_from_axis
+from micstools.reader import Run
+from synthetic import UPRIGHT, Motion, write_run
+
+END = np.array([0.2, 0.05, 0.1])
+
+
+def call(capsys, *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as end:
+        cli.main(list(words))
+    said = capsys.readouterr()
+    return int(str(end.value.code)), said.out, said.err
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> tuple[Run, Run]:
+    """One block, in the second run 3 mm to the side and turned by 20 degrees in the end, on twice
+    the rows; its friction is another."""
+    turned = quaternion_from_axis(np.array([0.0, 0, 1]), 20)
+    aside = END + np.array([0, 0.003, 0])
+    motions = (
+        Motion(places=[(END, UPRIGHT)], t_end=2.0, field_step=2.0),
+        Motion(places=[(aside, turned)], t_end=2.0, field_step=2.0, history_step=0.01),
+    )
+    one, two = (write_run(tmp_path / str(k), motion) for k, motion in enumerate(motions))
+    with h5py.File(two / "run.h5", "r+") as h5:
+        about = h5["provenance"].attrs
+        about["parameters"] = str(about["parameters"]) + "&contact friction = 0.3 /\n"
+    return Run(one), Run(two)
+
+
+def test_blocks_part(pair: tuple[Run, Run]) -> None:
+    (found,) = comparison.blocks(*pair)
+    assert found.block == 4
+    assert found.distance == pytest.approx(0.003) and found.angle == pytest.approx(20.0)
+    # It slides aside by 3 mm as s^2 (3 - 2 s), s = t / 0.8 s, and parts at 1 % of its diameter.
+    radius = pair[0].shapes["hexapod"].radius
+    s = next(
+        t for t in pair[0].bodies.time if 0.003 * (t / 0.8) ** 2 * (3 - 2.5 * t) > 0.02 * radius
+    )
+    assert found.parted == pytest.approx(s)
+    assert np.isnan(comparison.blocks(pair[0], pair[0])[0].parted)
+
+
+def test_what_two_cases_differ_in(pair: tuple[Run, Run], capsys) -> None:
+    assert comparison.parameters(*pair) == [("contact.friction", "-", "0.3")]
+    assert comparison.same_bits(pair[0], pair[0]) and not comparison.same_bits(*pair)
+    code, out, _ = call(capsys, "compare", *(str(run.folder) for run in pair))
+    assert code == 0 and "contact.friction" in out and "bit by bit" not in out
+    code, out, _ = call(capsys, "compare", str(pair[0].folder), str(pair[0].folder))
+    assert "bit by bit" in out and "no difference" in out and "never" in out
+
+
+def test_dry_runs_can_be_the_same(pair: tuple[Run, Run]) -> None:
+    with h5py.File(pair[0].folder / "run.h5", "r+") as h5:
+        h5["bodies/fluid_force"][:] = np.nan
+    dry = Run(pair[0].folder)
+    assert comparison.same_bits(dry, dry)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 1.7, 4.0])
+@pytest.mark.parametrize("grids", [(1, 2, 4), (1, 1.5, 2), (0.3, 1, 1.2, 2)])
+def test_order_and_error_of_a_known_law(order: float, grids: tuple[float, ...]) -> None:
+    values = [3.0 - 2.0 * n**-order for n in grids]
+    found = converge(grids, values)
+    assert found.order == pytest.approx(order) and found.limit == pytest.approx(3.0)
+    assert found.error == pytest.approx(values[-1] - 3.0) and found.words == ""
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [((1, 2), "three grids"), ((1, 2, 1.5), "not monotone"), ((1, 2, 9), "no order fits"),
+     ((1, float("nan"), 2), "not known"), ((1, 2, 2), "the same")],
+)  # fmt: skip
+def test_what_does_not_converge_says_so(values: tuple[float, ...], words: str) -> None:
+    found = converge((1, 2, 4), values)
+    assert words in found.words and np.isnan(found.order)
+
+
+def test_cells_are_refined() -> None:
+    text = "&grid cells = 10, 1, 21 length = 1, 1, 1 / ! a slice\n"
+    assert "cells = 15, 1, 32" in finer(text, 1.5)
+
+
+PROGRAM = """\
+#!{python}
+import sys
+from pathlib import Path
+sys.path[:0] = [{tools!r}, {tests!r}]
+words = sys.argv[1:]
+if "--check" in words:
+    sys.exit("mics: &grid cells: too many" if "9999" in sys.stdin.read() else 0)
+import h5py
+import numpy as np
+from synthetic import UPRIGHT, Motion, write_run
+from micstools import settings
+n = settings.value(Path(words[-1]).read_text(), "grid", "cells")[0]
+folder = Path(words[words.index("--output") + 1])
+height = 0.08 + 0.4 / n**2
+write_run(folder, Motion(places=[(np.array([0.2, 0.05, height]), UPRIGHT)], t_end=1.0,
+                         history_step=0.05, field_step=1.0, cells=(12, 4, 8)))
+with h5py.File(folder / "run.h5", "r+") as h5:
+    h5["provenance"].attrs["exit_status"] = 0
+print("ran", n)
+"""
+
+
+def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
+    program, case = tmp_path / "mics", tmp_path / "case.nml"
+    tests = Path(__file__).parent
+    program.write_text(
+        PROGRAM.replace("{python}", sys.executable)
+        .replace("{tools!r}", repr(str(tests.parent)))
+        .replace("{tests!r}", repr(str(tests)))
+    )
+    program.chmod(0o755)
+    case.write_text("&run t_end = 1.0 /\n&grid cells = 10, 10, 10 length = 1, 1, 1 /\n")
+    words = ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out")]
+    code, out, _ = call(capfd, *words, "--cells", "1,1.5,2")
+    assert code == 0 and out.count("\nran ") == 3
+    rows = {row["number"]: row for row in json.loads((tmp_path / "out/study.json").read_text())}
+    assert rows["top"]["order"] == pytest.approx(2.0, abs=1e-6)
+    assert rows["top"]["limit"] == pytest.approx(0.08 + 0.03)
+    assert rows["top"]["error"] == pytest.approx(0.4 / 400)
+    assert call(capfd, *words, "--cells", "1,1.5,2")[1].count("\nran ") == 0
+    code, out, _ = call(capfd, *words, "--cells", "1,1.5,2,3")
+    assert out.count("\nran 30") == 1
+    code, _, err = call(capfd, *words, "--cells", "1,999.9")
+    assert code == 2 and "too many" in err
+    code, _, err = call(capfd, *words, "--cells", "2,1")
+    assert code == 2 and "must be positive and rise" in err
