@@ -16,6 +16,7 @@ COMMANDS = {
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
     "report": ("report", "REPORT", "make one page of a run or an ensemble"),
     "export": ("export", "EXPORT", "write a run for other programs: glb, stl, obj, csv, pvd"),
+    "movie": ("movie", "MOVIE", "make a film of a run: mp4 or gif"),
     "compare": ("compare", "COMPARE", "put two runs beside each other"),
     "study": ("study", "STUDY", "run a case on coarser and finer cells"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),

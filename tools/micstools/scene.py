@@ -25,6 +25,12 @@ BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
 DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
 VIEWS = ("front", "side")
+# Direction to the viewer, and tangent of half the angle of view across.
+_SIGHT = {
+    "front": (np.array([0.0, -1.0, 0.22]), 0.16),
+    "side": (np.array([1.0, 0.0, 0.12]), 0.06),
+    "top": (np.array([0.0, -0.02, 1.0]), 0.16),
+}
 ARROW = 0.12  # length of an arrow of the speed of a style, over the height of the tank
 STILL = 1e-4  # [m/s] below this no arrows are drawn
 HIGHEST = 2.6  # height of a picture over its width; a slice of a tank has room at its sides
@@ -94,17 +100,11 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     t = t if fields is None else fields.time
     camera = camera_for(run.grid.low, run.grid.high, view)
     width = style.width if view == "front" else int(0.55 * style.width)
-    plotter = _plotter(width, int(width * camera.aspect))
     row = run.bodies.row(t)
-    _add_blocks(plotter, run, row)
-    _add_tank(plotter, run.grid.low, run.grid.high)
-    _add_bed(plotter, run)
+    plotter = _stage(run, row, fields if style.water else None, width, camera)
     arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
-    if fields is not None:
-        if style.water:
-            _add_water(plotter, run, fields)
-        if style.arrows:
-            arrows = arrows_of(run, fields, view)
+    if fields is not None and style.arrows:
+        arrows = arrows_of(run, fields, view)
     speed = style.speed or usual_speed(arrows.velocity)
     height = float(run.grid.high[2] - run.grid.low[2])
     _add_arrows(plotter, arrows, speed, ARROW * height)
@@ -117,6 +117,26 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     plotter.close()
     image.save(path)
     return path
+
+
+def frame(run: Run, row: int, fields: Fields | None, width: int, camera: Camera) -> Image.Image:
+    """Blocks at a row in the water of some fields, without words, `width` pixels wide."""
+    plotter = _stage(run, row, fields, width, camera)
+    _look(plotter, camera)
+    image = Image.fromarray(plotter.screenshot(return_img=True)).convert("RGB")
+    plotter.close()
+    return image
+
+
+def _stage(run: Run, row: int, fields: Fields | None, width: int, camera: Camera) -> Plotter:
+    """Tank, bed, blocks at a row and the water of some fields."""
+    plotter = _plotter(width, int(width * camera.aspect))
+    _add_blocks(plotter, run, row)
+    _add_tank(plotter, run.grid.low, run.grid.high)
+    _add_bed(plotter, run)
+    if fields is not None:
+        _add_water(plotter, run, fields)
+    return plotter
 
 
 def arrow_speed(run: Run, times: list[float], views: list[str]) -> float:
@@ -346,11 +366,21 @@ def _add_arrows(plotter: Plotter, arrows: Arrows, unit: float, length: float) ->
     plotter.add_mesh(glyphs, color="#1d3557", ambient=0.5)
 
 
+def camera_around(low: Array, high: Array, angle_deg: float) -> Camera:
+    """Camera that goes round the box: from the front at 0, from +x at 90 degrees; it is always as
+    far away, and its picture three quarters as high as wide."""
+    turn, angle = np.radians(angle_deg), 26.0
+    towards = np.array([np.sin(turn), -np.cos(turn), 0.4])
+    towards = towards / np.linalg.norm(towards)
+    focus, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    distance = 0.92 * radius / np.sin(np.radians(angle / 2))
+    return Camera(focus, focus + distance * towards, angle, 0.75)
+
+
 def camera_for(low: Array, high: Array, view: str) -> Camera:
-    """Camera that sees the box from the `front` or the `side`, slightly from above."""
-    front = view == "front"
-    towards = np.array([0.0, -1.0, 0.22]) if front else np.array([1.0, 0.0, 0.12])
-    half_width = 0.16 if front else 0.06  # tangent of half the angle of view across
+    """Camera that sees the box from the `front` or the `side`, slightly from above, or from the
+    `top`."""
+    towards, half_width = _SIGHT[view]
     towards = towards / np.linalg.norm(towards)
     right = np.cross([0.0, 0.0, 1.0], towards)
     right = right / np.linalg.norm(right)
