@@ -59,6 +59,11 @@ def inside_tets(points: Array, corner: Array, tolerance: float = 1e-12) -> NDArr
     low, high = corner.min(axis=1), corner.max(axis=1)
     near = np.all((points >= low.min(axis=0)) & (points <= high.max(axis=0)), axis=1)
     left = np.flatnonzero(near)
+    if not left.size:
+        return inside
+    bounds = points[left].min(axis=0), points[left].max(axis=0)
+    reached = np.flatnonzero(np.all((low <= bounds[1]) & (high >= bounds[0]), axis=1))
+    corner, low, high = corner[reached], low[reached], high[reached]
     inverse = np.linalg.inv(np.swapaxes(corner[:, 1:] - corner[:, :1], 1, 2))
     for k in range(len(corner)):
         here = points[left]
