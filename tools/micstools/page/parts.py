@@ -14,7 +14,7 @@ def player(name: str, label: str) -> Markup:
         tag("button", "Play", class_="play", type="button"),
         tag("input", class_="slider", type="range", min=0, max=1, value=0, aria_label="time"),
         tag("output", "0.00 s", class_="clock"),
-        tag("label", "speed", _select("pace", _PACES, "0.5")),
+        tag("label", "pace", _select("pace", _PACES, "0.5")),
         class_="row moving",
     )
     views = tag("span", *(
