@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import full_disk, two_programs
+from soak import full_disk, memory, two_programs
 
 MICS = ROOT / "mics"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -45,3 +45,9 @@ def test_late_comers(shop: two_programs.Workshop, tmp_path: Path) -> None:
 
 def test_lock_of_a_killed_run(shop: two_programs.Workshop, tmp_path: Path) -> None:
     assert two_programs.killed(shop, tmp_path / "run") == []
+
+
+def test_memory_does_not_grow(tmp_path: Path) -> None:
+    """With a restart file after every step a run takes as much memory in the end as at its start."""
+    said, found = memory.growth(MICS, 600, tmp_path)
+    assert found == [], said

@@ -2,12 +2,14 @@
 module hdf5_reason_m
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_char, c_null_char, c_funptr, &
     c_funloc, c_loc, c_f_pointer, c_null_ptr, c_associated
-  use hdf5, only: h5open_f, h5close_f, h5eset_auto_f, h5dont_atexit_f
+  use hdf5, only: h5open_f, h5eset_auto_f, h5dont_atexit_f
   implicit none
   private
-  public :: hdf5_start, hdf5_stop, hdf5_reason
+  public :: hdf5_start, hdf5_reason
 
   integer, parameter :: longest_reason = 512
+
+  logical :: started = .false.
 
   !> What HDF5 notes about one level of a failed call.
   type, bind(c) :: record_t
@@ -38,24 +40,21 @@ module hdf5_reason_m
 contains
 
   !> Start HDF5: without file locks, so that a run can be read while it goes on; without its own
-  !! messages; without a routine at exit, because we close our files ourselves. May be called again.
+  !! messages; without a routine at exit, because we close our files ourselves. Further calls do
+  !! nothing: HDF5 would keep some 30 kB for each.
   subroutine hdf5_start(status)
     integer, intent(out) :: status   !! < 0: failed
     integer :: ignored
 
+    status = 0
+    if (started) return
     status = -1
     if (c_setenv('HDF5_USE_FILE_LOCKING'//c_null_char, 'FALSE'//c_null_char, 1_c_int) /= 0) return
     call h5dont_atexit_f(ignored)   ! fails when HDF5 is already there
     call h5open_f(status)
     if (status >= 0) call h5eset_auto_f(0, status)
+    started = status >= 0
   end subroutine hdf5_start
-
-  !> End HDF5; every file has been closed.
-  subroutine hdf5_stop(status)
-    integer, intent(out) :: status
-
-    call h5close_f(status)
-  end subroutine hdf5_stop
 
   !> Why the last call of HDF5 failed: the system's words if it was the system, else those of HDF5.
   function hdf5_reason() result(reason)
