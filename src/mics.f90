@@ -21,6 +21,7 @@ program mics
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
   use case_oddities_m, only: find_oddities
+  use memory_plan_m, only: require_memory, require_memory_to_start
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
@@ -46,7 +47,9 @@ program mics
   call parallel_init()
   began = wall_clock()
   call read_options()
+  call require_memory_to_start()
   call read_and_check()
+  call require_memory(case, shapes)
   call catch_signals()
   call simulation_init(case, shapes, bed, sim)
   if (len(options%restart) > 0) call go_on()

@@ -48,6 +48,6 @@ def test_lock_of_a_killed_run(shop: two_programs.Workshop, tmp_path: Path) -> No
 
 
 def test_memory_does_not_grow(tmp_path: Path) -> None:
-    """With a restart file after every step a run takes as much memory in the end as at its start."""
+    """With a restart file after every step a run takes no more memory in the end."""
     said, found = memory.growth(MICS, 600, tmp_path)
     assert found == [], said

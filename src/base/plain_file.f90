@@ -8,7 +8,7 @@ module plain_file_m
   use kinds_m, only: i8
   implicit none
   private
-  public :: plain_file_t, cut_file, delete_file, lock_taken, lock_refused, lock_unknown
+  public :: plain_file_t, cut_file, delete_file, is_special, lock_taken, lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
   integer, parameter :: lock_unknown = 2   !! the file system keeps no locks
@@ -160,6 +160,11 @@ contains
     self%path = path
     self%info = 0
     self%message = ''
+    if (is_special(path)) then
+      self%info = 1
+      self%message = path//': cannot open the file: it is a folder, a pipe or a device'
+      return
+    end if
     self%stream = c_fopen(path//c_null_char, mode//c_null_char)
     call self%check(c_associated(self%stream), 'open the file')
   end subroutine file_open
@@ -223,6 +228,18 @@ contains
     number = c_errno()
     outcome = merge(lock_refused, lock_unknown, any(number == would_wait))
   end subroutine file_lock
+
+  !> Is there something of this name that is no file with bytes of its own: a folder, a device, or a
+  !! pipe, which would keep the program waiting for somebody to write? Fortran's own word for a
+  !! file with bytes is that it may be read in any order.
+  function is_special(path) result(yes)
+    character(*), intent(in) :: path
+    logical :: yes
+    character(7) :: direct
+
+    inquire (file=path, exist=yes, direct=direct)
+    if (yes) yes = direct == 'NO'
+  end function is_special
 
   !> Make a file shorter, if that is possible.
   subroutine cut_file(path, length)

@@ -5,6 +5,7 @@ module case_file_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
     c_associated, c_loc
   use errors_m, only: problems_t
+  use plain_file_m, only: is_special
   implicit none
   private
   public :: read_text
@@ -57,7 +58,8 @@ contains
 
   !> Read a whole file, or standard input if `file` is empty, byte for byte.
   !!
-  !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound.
+  !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound. A named
+  !! pipe is refused, nobody may ever write to it; one of the shell (`/dev/fd/63`) has its writer.
   subroutine read_text(file, text, problems)
     character(*), intent(in) :: file
     character(:), allocatable, intent(out) :: text
@@ -78,6 +80,11 @@ contains
       end if
       stream = c_fdopen(0_c_int, 'r'//c_null_char)
     else
+      if (is_special(file) .and. index(file, '/dev/') /= 1 .and. index(file, '/proc/') /= 1) then
+        call problems%add_message(source//': is a folder, a pipe or a device; name a file, or ' &
+          //'use ./mics < '//source)
+        return
+      end if
       stream = c_fopen(file//c_null_char, 'r'//c_null_char)
     end if
     if (.not. c_associated(stream)) then

@@ -9,18 +9,14 @@ module case_plan_m
   use bed_m, only: bed_t
   use surface_tension_m, only: capillary_step
   use contact_sphere_placement_m, only: height_errors
+  use machine_memory_m, only: available_memory
+  use memory_plan_m, only: planned_memory, size_text
   implicit none
   private
   public :: print_plan
 
   integer, parameter :: label_width = 24      !! columns of the names
   real(wp), parameter :: speed = 1.0_wp       !! at which time-step limits are quoted [m/s]
-
-  !> Memory of one cell with all its arrays: fields, solids, work arrays of the solvers [B].
-  real(wp), parameter :: bytes_per_cell = 1500.0_wp
-  real(wp), parameter :: bytes_per_piece = 1000.0_wp   !! of a tetrahedron or a sphere [B]
-  real(wp), parameter :: bytes_at_rest = 3.0e7_wp      !! program and libraries [B]
-  integer, parameter :: halo = 3                       !! cells beside the domain, on each side
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
@@ -44,7 +40,7 @@ contains
     if (blocks) call print_shapes(unit, case, wet, shapes)
     if (blocks) call print_bodies(unit, case, shapes)
     call print_steps(unit, case, shapes, wet, blocks)
-    call print_memory(unit, case, shapes, wet)
+    call print_memory(unit, case, shapes)
     call print_files(unit, case, wet, blocks)
   end subroutine print_plan
 
@@ -296,30 +292,24 @@ contains
     end do
   end subroutine print_body_steps
 
-  !> Estimate of the memory of all processes together.
-  subroutine print_memory(unit, case, shapes, wet)
+  !> Estimate of the memory of all processes together, and what there is.
+  subroutine print_memory(unit, case, shapes)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    logical, intent(in) :: wet
-    real(wp) :: bytes, installed
-    integer :: s, pieces
+    character(:), allocatable :: there
+    integer(i8) :: planned, available
 
-    bytes = bytes_at_rest
-    if (wet) bytes = bytes + bytes_per_cell*product(real(case%grid%cells + 2*halo, wp))
-    do s = 1, size(shapes)
-      pieces = size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius)
-      bytes = bytes + bytes_per_piece*real(pieces, wp)
-    end do
+    planned = planned_memory(case, shapes)
+    available = available_memory()
+    there = size_text(real(available, wp))//' that this machine has left'
     call heading(unit, 'Memory')
-    installed = installed_memory()
-    if (installed <= 0.0_wp) then
-      call entry(unit, 'about', size_text(bytes))
-    else if (bytes > installed) then
-      call entry(unit, 'about', size_text(bytes)//', MORE than the '//size_text(installed) &
-                 //' of this machine')
+    if (available <= 0) then
+      call entry(unit, 'about', size_text(real(planned, wp)))
+    else if (planned > available) then
+      call entry(unit, 'about', size_text(real(planned, wp))//', MORE than the '//there)
     else
-      call entry(unit, 'about', size_text(bytes)//' of '//size_text(installed))
+      call entry(unit, 'about', size_text(real(planned, wp))//' of '//there)
     end if
   end subroutine print_memory
 
@@ -378,27 +368,6 @@ contains
     end do
   end function smallest_sphere
 
-  !> Memory of this machine [B]; 0 where the system does not tell.
-  function installed_memory() result(bytes)
-    real(wp) :: bytes
-    character(80) :: row
-    integer :: unit, status
-    integer(i8) :: kilobytes
-
-    bytes = 0.0_wp
-    open (newunit=unit, file='/proc/meminfo', action='read', status='old', iostat=status)
-    if (status /= 0) return
-    do
-      read (unit, '(a)', iostat=status) row
-      if (status /= 0) exit
-      if (index(row, 'MemTotal:') /= 1) cycle
-      read (row(10:), *, iostat=status) kilobytes
-      if (status == 0) bytes = 1024.0_wp*real(kilobytes, wp)
-      exit
-    end do
-    close (unit)
-  end function installed_memory
-
   subroutine heading(unit, text)
     integer, intent(in) :: unit
     character(*), intent(in) :: text
@@ -452,23 +421,5 @@ contains
     text = brief(x)
     if (x < 1.0e9_wp) text = to_text(int(x*(1.0_wp + 1.0e-9_wp)))
   end function count_text
-
-  !> An amount of memory or disk.
-  pure function size_text(bytes) result(text)
-    real(wp), intent(in) :: bytes
-    character(:), allocatable :: text
-    character(2), parameter :: prefix(4) = ['kB', 'MB', 'GB', 'TB']
-    real(wp) :: x
-    integer :: i
-
-    x = bytes/1.0e3_wp
-    do i = 1, 3
-      if (x < 999.5_wp) exit
-      x = x/1.0e3_wp
-    end do
-    text = brief(x)
-    if (x >= 10.0_wp) text = to_text(nint(x))
-    text = text//' '//prefix(min(i, 4))
-  end function size_text
 
 end module case_plan_m

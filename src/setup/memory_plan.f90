@@ -1,0 +1,110 @@
+!> How much memory a run will take, and whether it can have that.
+!!
+!! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
+!! and both couplings (gfortran 12): 1036 to 1500 B for a cell, those of the halo counted, 1750 B
+!! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods.
+module memory_plan_m
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use kinds_m, only: wp, i8
+  use errors_m, only: fatal, brief, to_text, exit_files
+  use parallel_m, only: nproc, is_root, global_max
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use machine_memory_m, only: available_memory, may_allocate
+  implicit none
+  private
+  public :: planned_memory, require_memory, require_memory_to_start, size_text
+
+  integer(i8), parameter :: bytes_per_cell = 1500      !! all arrays: fields, solids, solvers [B]
+  integer(i8), parameter :: bytes_of_c_ismac = 300     !! more for each cell [B]
+  integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
+  integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]
+  integer(i8), parameter :: bytes_at_rest = 30000000   !! program and libraries [B]
+  integer, parameter :: halo = 3                       !! cells beside the domain, on each side
+
+contains
+
+  !> Estimate of the memory of all processes together [B].
+  pure function planned_memory(case, shapes) result(bytes)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    integer(i8) :: bytes
+    integer(i8) :: each
+    integer :: s
+
+    bytes = bytes_at_rest
+    if (case%run%physics /= 'dry') then
+      each = bytes_per_cell
+      if (case%numerics%momentum == 'c_ismac') each = each + bytes_of_c_ismac
+      bytes = bytes + each*product(int(case%grid%cells, i8) + 2*halo)
+    end if
+    if (case%run%physics == 'fluid') return
+    bytes = bytes + bytes_per_body*(size(case%body) + sum(int(case%drop%count, i8)))
+    do s = 1, size(shapes)
+      bytes = bytes + bytes_per_piece*(size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius))
+    end do
+  end function planned_memory
+
+  !> End with code 4 if there is not even memory to read a case.
+  subroutine require_memory_to_start()
+    call insist(bytes_at_rest, 'the program takes '//size_text(real(bytes_at_rest, wp)) &
+      //' of memory')
+  end subroutine require_memory_to_start
+
+  !> End with code 4 if this process, or another one, cannot have its share of the memory that the
+  !! run will take; warn if it is more than the machine has. Call it before anything is written.
+  subroutine require_memory(case, shapes)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    character(:), allocatable :: asked
+    integer(i8) :: planned, available
+
+    planned = planned_memory(case, shapes)
+    asked = 'the run takes about '//size_text(real(planned, wp))//' of memory'
+    if (nproc() > 1) asked = asked//' in '//to_text(nproc())//' processes'
+    call insist(planned/nproc(), asked)
+    available = available_memory()
+    if (planned <= available .or. available == 0 .or. .not. is_root()) return
+    write (error_unit, '(a)') 'mics: warning: '//asked//what_is_left()//'; it may be killed'
+  end subroutine require_memory
+
+  !> End with code 4 if this process or another one cannot have that many bytes.
+  subroutine insist(bytes, asked)
+    integer(i8), intent(in) :: bytes
+    character(*), intent(in) :: asked
+    real(wp) :: refused(1)
+
+    refused = merge(0.0_wp, 1.0_wp, may_allocate(bytes))
+    call global_max(refused)
+    if (refused(1) > 0.0_wp) call fatal(exit_files, asked//what_is_left() &
+      //'; the system refuses it, or a limit does (ulimit -v)')
+  end subroutine insist
+
+  function what_is_left() result(text)
+    character(:), allocatable :: text
+    integer(i8) :: available
+
+    available = available_memory()
+    text = ''
+    if (available > 0) text = ', '//size_text(real(available, wp))//' are left'
+  end function what_is_left
+
+  !> An amount of memory or disk.
+  pure function size_text(bytes) result(text)
+    real(wp), intent(in) :: bytes
+    character(:), allocatable :: text
+    character(2), parameter :: prefix(4) = ['kB', 'MB', 'GB', 'TB']
+    real(wp) :: x
+    integer :: i
+
+    x = bytes/1.0e3_wp
+    do i = 1, 3
+      if (x < 999.5_wp) exit
+      x = x/1.0e3_wp
+    end do
+    text = brief(x)
+    if (x >= 10.0_wp .and. x < 1.0e6_wp) text = to_text(nint(x))
+    text = text//' '//prefix(min(i, 4))
+  end function size_text
+
+end module memory_plan_m

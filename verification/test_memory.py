@@ -1,0 +1,84 @@
+"""What a run will take in memory is planned; too much of it ends with a reason, nothing written."""
+
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from run_cases import ROOT
+
+MICS = ROOT / "mics"
+UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
+CASE = """&run t_end = 2.0e-3  dt = 1.0e-3  field_interval = 1 /
+&grid cells = {cells}  length = 0.1, 0.1, 0.1 /
+&boundary y_min = 'slip'  y_max = 'slip'  z_min = 'slip'  z_max = 'slip' /
+&fluid water_level = 0.05 /
+&numerics momentum = '{momentum}' /
+&shape name = 'unit'  kind = 'hexapod'  size = 0.02 /
+&body shape = 'unit'  position = 0.05, 0.05, 0.06 /
+"""
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+def mics(
+    work: Path, cells: str, *options: str, limit: float = -1, momentum: str = "conservative"
+) -> subprocess.CompletedProcess[str]:
+    """Run a case in a folder, with so many bytes of memory at most."""
+    (work / "case.nml").write_text(CASE.format(cells=cells, momentum=momentum))
+    return subprocess.run(
+        [str(MICS), "--threads", "1", *options, "case.nml"],
+        cwd=work,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(limit), -1)),
+    )
+
+
+def planned(plan: str) -> tuple[float, str]:
+    """Bytes of the plan, and all that it says of them."""
+    said = next(line for line in plan.splitlines() if re.match(r" +about +[-\d.e]+ [kMGT]B", line))
+    number, unit = said.split()[1:3]
+    return float(number) * UNITS[unit.rstrip(",")], said
+
+
+@pytest.mark.parametrize(
+    ("cells", "least"), [("2147483647, 1, 1", 1e14), ("1290, 1290, 1290", 3e12)]
+)
+def test_more_than_any_machine_has(cells: str, least: float, tmp_path: Path) -> None:
+    """The plan counts beyond 32 bits and says that it is too much; a run ends at once."""
+    case = CASE.replace("&body", "! body").replace("&shape", "! shape")
+    (tmp_path / "case.nml").write_text(case.format(cells=cells, momentum="conservative"))
+    done = subprocess.run(
+        [str(MICS), "--check", "case.nml"], cwd=tmp_path, capture_output=True, text=True
+    )
+    bytes_, said = planned(done.stdout)
+    assert bytes_ > least
+    if sys.platform == "linux":
+        assert "MORE than the" in said and "that this machine has left" in said
+    done = subprocess.run([str(MICS), "case.nml"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 4, done.stderr
+    assert re.match(r"mics: the run takes about \d[\d.e+]* TB of memory, ", done.stderr)
+    assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
+
+
+@pytest.mark.parametrize("limit", [15e6, 25e6, 50e6, 200e6, 350e6, 500e6])
+def test_limit_of_the_process(limit: float, tmp_path: Path) -> None:
+    """`ulimit -v`, as queues set it: code 4 with what was asked, nothing written."""
+    done = mics(tmp_path, "64, 64, 64", limit=limit)
+    assert done.returncode == 4, done.stderr
+    assert re.match(r"mics: the (run|program) takes .* MB of memory", done.stderr), done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
+
+
+@pytest.mark.parametrize("momentum", ["conservative", "c_ismac"])
+@pytest.mark.parametrize("cells", ["40, 40, 40", "128, 1, 128"])
+def test_what_is_planned_is_enough(cells: str, momentum: str, tmp_path: Path) -> None:
+    """A run that may have what the plan says, and a little for the program's code, has enough."""
+    plan, _ = planned(mics(tmp_path, cells, "--check", momentum=momentum).stdout)
+    done = mics(tmp_path, cells, "--quiet", limit=1.05 * plan + 10e6, momentum=momentum)
+    assert (done.returncode, done.stderr) == (0, "")
