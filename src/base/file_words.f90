@@ -2,7 +2,7 @@
 module file_words_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
-  use plain_file_m, only: is_special
+  use plain_file_m, only: is_pipe
   use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, &
     quoted_text, printable
   implicit none
@@ -32,8 +32,8 @@ contains
     words%problem = ''
     words%text = ''
     words%line = 0
-    if (is_special(file)) then
-      words%problem = 'is a folder, a pipe or a device, must be a file'
+    if (is_pipe(file)) then
+      words%problem = 'is a pipe, must be a file'
       return
     end if
     inquire (file=file, exist=there, size=length)

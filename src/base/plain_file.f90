@@ -8,7 +8,7 @@ module plain_file_m
   use kinds_m, only: i8
   implicit none
   private
-  public :: plain_file_t, cut_file, delete_file, is_special, lock_taken, lock_refused, lock_unknown
+  public :: plain_file_t, cut_file, delete_file, is_pipe, lock_taken, lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
   integer, parameter :: lock_unknown = 2   !! the file system keeps no locks
@@ -94,6 +94,26 @@ module plain_file_m
       character(kind=c_char), intent(in) :: path(*)
     end function c_unlink
 
+    integer(c_int) function c_open(path, flags) bind(c, name='open')
+      import :: c_char, c_int
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: flags
+    end function c_open
+
+    integer(c_long) function c_lseek(fd, offset, whence) bind(c, name='lseek')
+      import :: c_int, c_long
+      implicit none
+      integer(c_int), value :: fd, whence
+      integer(c_long), value :: offset   ! off_t
+    end function c_lseek
+
+    integer(c_int) function c_close(fd) bind(c, name='close')
+      import :: c_int
+      implicit none
+      integer(c_int), value :: fd
+    end function c_close
+
     integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
       import :: c_char, c_int, c_long
       implicit none
@@ -160,9 +180,9 @@ contains
     self%path = path
     self%info = 0
     self%message = ''
-    if (is_special(path)) then
+    if (is_pipe(path)) then
       self%info = 1
-      self%message = path//': cannot open the file: it is a folder, a pipe or a device'
+      self%message = path//': cannot open the file: it is a pipe'
       return
     end if
     self%stream = c_fopen(path//c_null_char, mode//c_null_char)
@@ -229,17 +249,21 @@ contains
     outcome = merge(lock_refused, lock_unknown, any(number == would_wait))
   end subroutine file_lock
 
-  !> Is there something of this name that is no file with bytes of its own: a folder, a device, or a
-  !! pipe, which would keep the program waiting for somebody to write? Fortran's own word for a
-  !! file with bytes is that it may be read in any order.
-  function is_special(path) result(yes)
+  !> Is this a named pipe, or a terminal? To open it, and to read it, would wait until somebody
+  !! writes, which may be never. (The number of `at_once` is that of Linux; elsewhere the question
+  !! itself may wait.)
+  function is_pipe(path) result(yes)
     character(*), intent(in) :: path
     logical :: yes
-    character(7) :: direct
+    integer(c_int), parameter :: at_once = 2048, from_here = 1   ! O_NONBLOCK, SEEK_CUR
+    integer(c_int) :: fd
 
-    inquire (file=path, exist=yes, direct=direct)
-    if (yes) yes = direct == 'NO'
-  end function is_special
+    yes = .false.
+    fd = c_open(path//c_null_char, at_once)
+    if (fd < 0) return
+    yes = c_lseek(fd, 0_c_long, from_here) < 0
+    if (c_close(fd) /= 0) return
+  end function is_pipe
 
   !> Make a file shorter, if that is possible.
   subroutine cut_file(path, length)

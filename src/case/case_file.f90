@@ -5,7 +5,7 @@ module case_file_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
     c_associated, c_loc
   use errors_m, only: problems_t
-  use plain_file_m, only: is_special
+  use plain_file_m, only: is_pipe
   implicit none
   private
   public :: read_text
@@ -80,8 +80,8 @@ contains
       end if
       stream = c_fdopen(0_c_int, 'r'//c_null_char)
     else
-      if (is_special(file) .and. index(file, '/dev/') /= 1 .and. index(file, '/proc/') /= 1) then
-        call problems%add_message(source//': is a folder, a pipe or a device; name a file, or ' &
+      if (is_pipe(file) .and. index(file, '/dev/') /= 1 .and. index(file, '/proc/') /= 1) then
+        call problems%add_message(source//': is a pipe; name a file, or ' &
           //'use ./mics < '//source)
         return
       end if

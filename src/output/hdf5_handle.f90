@@ -24,7 +24,7 @@ module hdf5_handle_m
   use parallel_m, only: is_root, my_rank, set_file_access, set_collective, global_max, global_min
   use parallel_m, only: broadcast, share_trouble
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
-  use plain_file_m, only: cut_file, delete_file, is_special
+  use plain_file_m, only: cut_file, delete_file, is_pipe
   use file_room_m, only: lengthen_file, shorten_file
   implicit none
   private
@@ -142,9 +142,9 @@ contains
     call begin_file(self, path, shared, access)
     self%writing = writing
     self%complete = .true.
-    if (is_special(path)) then
+    if (is_pipe(path)) then
       self%info = 1
-      self%message = path//': cannot open the file: it is a folder, a pipe or a device'
+      self%message = path//': cannot open the file: it is a pipe'
     end if
     if (self%info /= 0) return
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)

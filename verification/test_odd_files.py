@@ -1,0 +1,105 @@
+"""Files that are none: pipes that nobody writes, folders, devices. Nothing waits for ever."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from run_cases import ROOT
+
+MICS = ROOT / "mics"
+CASE = """&run t_end = 0.01  dt = 5.0e-3 /
+&grid cells = 8, 8, 8  length = 1, 1, 1 /
+&fluid {fluid} /
+{groups}
+"""
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+def mics(work: Path, *words: str, text: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the program in a folder; it has ten seconds."""
+    return subprocess.run(
+        [str(MICS), "--threads", "1", "--quiet", *words],
+        cwd=work,
+        capture_output=True,
+        text=True,
+        timeout=10,
+        check=False,
+        **({"stdin": subprocess.DEVNULL} if text is None else {"input": text}),
+    )
+
+
+def case(fluid: str = "water_level = 0.5", groups: str = "") -> str:
+    """A small tank."""
+    return CASE.format(fluid=fluid, groups=groups)
+
+
+def make(what: str, path: Path) -> str:
+    """Something in the place of a file; its name."""
+    if what == "device":
+        return "/dev/zero"
+    if what == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    return path.name
+
+
+@pytest.mark.parametrize("what", ["pipe", "folder", "device"])
+@pytest.mark.parametrize(
+    ("variable", "text"),
+    [
+        ("&shape file", case(groups="&shape name = 'a'  kind = 'file'  file = '{odd}' /")),
+        ("&bed file", case(groups="&bed file = '{odd}' /")),
+        ("&bed file", case(groups="&bed file = '{odd}'  kind = 'stl' /")),
+        ("&fluid initial_state", case(fluid="initial_state = '{odd}'")),
+    ],
+)
+def test_named_in_a_case(variable: str, text: str, what: str, tmp_path: Path) -> None:
+    """What a case names must be a file: code 2, at once, nothing written."""
+    odd = make(what, tmp_path / "odd")
+    (tmp_path / "case.nml").write_text(text.replace("{odd}", odd))
+    done = mics(tmp_path, "case.nml")
+    assert done.returncode == 2, done.stderr
+    assert f"{variable} = '{odd}'" in done.stderr
+    assert what != "pipe" or "is a pipe" in done.stderr
+    assert not (tmp_path / "mics-out").exists()
+
+
+@pytest.mark.parametrize("what", ["pipe", "folder"])
+@pytest.mark.parametrize("role", ["case", "restart"])
+def test_named_in_the_command(role: str, what: str, tmp_path: Path) -> None:
+    """The same for the case, code 2, and for the restart file, code 4."""
+    (tmp_path / "case.nml").write_text(case())
+    make(what, tmp_path / "odd")
+    words = ["odd"] if role == "case" else ["--restart", "odd", "case.nml"]
+    done = mics(tmp_path, *words)
+    assert done.returncode == (2 if role == "case" else 4), done.stderr
+    assert "odd: " in done.stderr and (what != "pipe" or "is a pipe" in done.stderr)
+    assert not (tmp_path / "mics-out").exists()
+
+
+def test_pipe_in_the_place_of_the_lock(tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(case())
+    assert mics(tmp_path, "case.nml").returncode == 0
+    os.mkfifo(tmp_path / "mics-out" / "run.lock")
+    done = mics(tmp_path, "--restart", "mics-out/restart-a.h5", "case.nml")
+    assert done.returncode == 4, done.stderr
+    assert "run.lock: cannot open the file: it is a pipe" in done.stderr
+
+
+def test_pipes_that_have_a_writer(tmp_path: Path) -> None:
+    """A case may come through a pipe: of the shell, or on standard input."""
+    (tmp_path / "case.nml").write_text(case())
+    assert mics(tmp_path, "--check", text=case()).returncode == 0
+    assert mics(tmp_path, "--check", "/dev/stdin", text=case()).returncode == 0
+    for command in (
+        "cat case.nml | {} --check",
+        "{} --check < case.nml",
+        "{} --check <(sleep 0.2; cat case.nml)",
+    ):
+        done = subprocess.run(
+            ["bash", "-c", command.format(MICS)], cwd=tmp_path, capture_output=True, timeout=10
+        )
+        assert done.returncode == 0, command
