@@ -103,3 +103,31 @@ def test_pipes_that_have_a_writer(tmp_path: Path) -> None:
             ["bash", "-c", command.format(MICS)], cwd=tmp_path, capture_output=True, timeout=10
         )
         assert done.returncode == 0, command
+
+
+CONTROLS = ["\x1b[31mred\x07", "\x1b]0;a title\x07", "caf\u00e9 \u009b31m", "\x01", "\x7f"]
+
+
+@pytest.mark.parametrize("bad", CONTROLS)
+@pytest.mark.parametrize("role", ["title", "output", "bed", "name", "option", "case", "restart"])
+def test_control_characters(role: str, bad: str, tmp_path: Path) -> None:
+    """They are refused, and the terminal, which would obey them, never sees them."""
+    text = case()
+    if role in ("title", "output"):
+        text = text.replace("&run ", f"&run {role} = '{bad}' ")
+    elif role == "bed":
+        text = case(groups=f"&bed file = '{bad}' /")
+    elif role == "name":
+        text = case(groups=f"&shape name = '{bad}'  kind = 'cube'  size = 0.1 /")
+    (tmp_path / "case.nml").write_text(text)
+    words = {"option": [f"--{bad}"], "case": [bad], "restart": ["--restart", bad, "case.nml"]}
+    done = mics(tmp_path, *words.get(role, ["case.nml"]))
+    assert done.returncode == 2, done.stderr
+    said = done.stdout + done.stderr.replace("\n", "")
+    assert done.stderr and said.isprintable(), said
+    assert not (tmp_path / "mics-out").exists()
+
+
+def test_letters_of_any_language(tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(case().replace("&run", "&run title = 'Blöcke\t消波 ≤ 1'"))
+    assert mics(tmp_path, "case.nml").returncode == 0

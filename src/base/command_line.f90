@@ -2,7 +2,7 @@
 module command_line_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text
-  use value_text_m, only: nearest_name, parse_integer, value_ok
+  use value_text_m, only: nearest_name, parse_integer, tame, value_ok
   implicit none
   private
   public :: options_t, argument_t, read_command_line, parse_arguments, print_help
@@ -42,6 +42,8 @@ contains
       call get_command_argument(i, length=length)
       allocate (character(length) :: arguments(i)%text)
       call get_command_argument(i, arguments(i)%text)
+      if (tame(arguments(i)%text) /= arguments(i)%text) call problems%add_message( &
+        'control characters in '//arguments(i)%text)
     end do
     call parse_arguments(arguments, options, problems)
   end subroutine read_command_line

@@ -6,6 +6,7 @@ module errors_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
   use parallel_m, only: is_root, parallel_abort, parallel_pause
+  use value_text_m, only: tame
   implicit none
   private
   public :: problems_t, fatal, to_text, brief
@@ -122,7 +123,7 @@ contains
     start = 'mics: '
     if (present(before)) start = before
     do i = 1, self%n
-      write (unit, '(a)') start//self%list(i)%text
+      write (unit, '(a)') start//tame(self%list(i)%text)
     end do
     flush (unit)
   end subroutine problems_report
@@ -154,10 +155,22 @@ contains
     real(wp), parameter :: patience = 1.0_wp   !! time for the root to end the others [s]
 
     if (.not. is_root()) call parallel_pause(patience)
-    if (len(message) > 0) write (error_unit, '(a)') 'mics: '//message
+    if (len(message) > 0) write (error_unit, '(a)') 'mics: '//lines_of(message)
     flush (error_unit)
     call parallel_abort(code)
   end subroutine fatal
+
+  !> A message without control characters, apart from the ends of its lines.
+  pure function lines_of(message) result(text)
+    character(*), intent(in) :: message
+    character(len(message)) :: text
+    integer :: i
+
+    text = tame(message)
+    do i = 1, len(message)
+      if (message(i:i) == new_line('a')) text(i:i) = new_line('a')
+    end do
+  end function lines_of
 
   !> An integer without blanks.
   pure function integer_text(value) result(text)

@@ -7,7 +7,7 @@ module value_text_m
   implicit none
   private
   public :: parse_real, parse_integer, parse_logical
-  public :: quoted_text, printable, fixed_text
+  public :: quoted_text, printable, tame, fixed_text
   public :: lower_case, nearest_name, edit_distance
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
@@ -135,7 +135,7 @@ contains
   pure function printable(raw) result(text)
     character(*), intent(in) :: raw
     character(:), allocatable :: text
-    integer :: i, n
+    integer :: n
 
     n = len(raw)
     if (n > longest_shown) then
@@ -145,12 +145,25 @@ contains
         n = n - 1
       end do
     end if
-    text = raw(:n)
-    do i = 1, n
-      if (ichar(text(i:i)) < 32 .or. ichar(text(i:i)) == 127) text(i:i) = '?'
-    end do
+    text = tame(raw(:n))
     if (n < len(raw)) text = text//'...'
   end function printable
+
+  !> A text as a terminal may see it: each control character, those that UTF-8 writes with two bytes
+  !! too, is a question mark, but for tabs. A terminal would obey them: change colours, its title.
+  pure function tame(raw) result(text)
+    character(*), intent(in) :: raw
+    character(len(raw)) :: text
+    integer :: i, byte
+
+    text = raw
+    do i = 1, len(raw)
+      byte = ichar(raw(i:i))
+      if ((byte < 32 .and. byte /= 9) .or. byte == 127) text(i:i) = '?'
+      if (i == 1 .or. byte < 128 .or. byte > 159) cycle
+      if (ichar(raw(i - 1:i - 1)) == 194) text(i - 1:i) = '??'
+    end do
+  end function tame
 
   !> Small letters for A to Z; every other byte stays.
   pure function lower_case(text) result(small)

@@ -18,7 +18,7 @@ module group_visitor_m
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
-    quoted_text, printable, value_ok, value_not_finite, value_too_large, value_not_whole
+    quoted_text, printable, tame, value_ok, value_not_finite, value_too_large, value_not_whole
   implicit none
   private
   public :: group_visitor_t, choices
@@ -324,6 +324,7 @@ contains
     call self%read_text(i, ok)
     if (.not. ok) return
     text = self%group%assignment(i)%value(1)%text
+    if (tame(text) /= text) call self%fault(i, 'must hold no control characters')
   end subroutine text_value
 
   !> The name of something the user made up: letters, digits and `_ - .`, at most `name_length`.
