@@ -2,24 +2,39 @@
 module faults_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
-  use errors_m, only: exit_ok, exit_numerics, to_text
+  use errors_m, only: exit_ok, exit_numerics, to_text, brief
   use grid_m, only: grid_t
   use boundary_kinds_m, only: is_wall
-  use time_step_m, only: simulation_t
+  use time_step_m, only: simulation_t, courant_rate
   use diagnostics_m, only: step_report_t
   use release_m, only: n_waiting
   implicit none
   private
-  public :: fault_t, find_fault, find_final_fault
+  public :: fault_t, note_places, find_fault, find_final_fault
 
   type :: fault_t
     integer :: code = exit_ok
     character(:), allocatable :: message
+    real(wp), allocatable, private :: place(:, :)   !! (3, n) of the blocks before the step [m]
+    real(wp), allocatable, private :: speed(:)      !! (n) of theirs [m/s]
   end type fault_t
+
+  !> A step that carries fluid through so many cells does not follow it: the water of a dam break
+  !! in steps of 18 cells still had its energy, in steps of 400 eight times as much.
+  real(wp), parameter :: highest_courant = 50.0_wp
 
 contains
 
-  !> The first fault of the step that just ended, if there is one.
+  !> Where the blocks are and how fast; call it before the first step, `find_fault` does it later.
+  subroutine note_places(sim, fault)
+    type(simulation_t), intent(in) :: sim
+    type(fault_t), intent(inout) :: fault
+
+    fault%place = sim%blocks%x(:, :sim%blocks%n)
+    fault%speed = norm2(sim%blocks%v(:, :sim%blocks%n), 1)
+  end subroutine note_places
+
+  !> The first fault of the step that just ended, if there is one. All processes call.
   subroutine find_fault(sim, report, fault)
     type(simulation_t), intent(in) :: sim
     type(step_report_t), intent(in) :: report
@@ -32,7 +47,45 @@ contains
                //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
     end if
     call look_at_blocks(sim, fault)
+    if (.not. sim%wet) return
+    call look_for_jumps(sim, fault)
+    call note_places(sim, fault)
+    if (sim%case%run%cfl_max <= 0.0_wp) call look_at_courant(sim, fault)
   end subroutine find_fault
+
+  !> A block moves as far as its speeds at both ends of the step and its weight let it. One that is
+  !! very much lighter than water is thrown by the buoyancy of its first step, as if there were no
+  !! water to push away; more than a cell of that is a fault.
+  subroutine look_for_jumps(sim, fault)
+    type(simulation_t), intent(in) :: sim
+    type(fault_t), intent(inout) :: fault
+    real(wp) :: moved, explained
+    integer :: b
+
+    do b = 1, sim%blocks%n
+      if (.not. sim%blocks%present(b)) cycle
+      associate (dt => sim%clock%dt, v => norm2(sim%blocks%v(:, b)))
+        moved = norm2(sim%blocks%x(:, b) - fault%place(:, b))
+        explained = dt*(fault%speed(b) + v + dt*norm2(sim%case%fluid%gravity)) &
+          + minval(sim%grid%h, sim%grid%n > 1)
+        if (moved > explained) call set(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
+          //' m in a step of '//brief(dt)//' s, though its speed is '//brief(v) &
+          //' m/s: its mass of '//brief(sim%blocks%mass(b))//' kg is too small for &run dt', fault)
+      end associate
+    end do
+  end subroutine look_for_jumps
+
+  !> With `cfl_max = 0` nothing shortens a step that is too long for the flow.
+  subroutine look_at_courant(sim, fault)
+    type(simulation_t), intent(in) :: sim
+    type(fault_t), intent(inout) :: fault
+    real(wp) :: courant
+
+    courant = sim%case%run%dt*courant_rate(sim)
+    if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
+      //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
+      //' keeps it', fault)
+  end subroutine look_at_courant
 
   !> Every block must have a place that is a number, inside the tank.
   subroutine look_at_blocks(sim, fault)

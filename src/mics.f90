@@ -29,7 +29,7 @@ program mics
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
   use time_step_m, only: simulation_t, simulation_init, resume, take_step
-  use faults_m, only: fault_t, find_fault, find_final_fault
+  use faults_m, only: fault_t, note_places, find_fault, find_final_fault
   implicit none
   type(options_t) :: options
   type(case_t) :: case
@@ -58,6 +58,7 @@ program mics
   call stop_on_trouble()
   call write_due_output(sim%run_state_t, report, output)
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
+  call note_places(sim, fault)
   do while (.not. sim%clock%finished())
     call share_cores()
     call take_step(sim, report)

@@ -39,7 +39,7 @@ module time_step_m
   use timers_m, only: timer, tic, toc
   implicit none
   private
-  public :: simulation_t, simulation_init, resume, take_step
+  public :: simulation_t, simulation_init, resume, take_step, courant_rate
 
   real(wp), parameter :: least_open = 0.5_wp   !! share of a face whose velocity limits the step
 

@@ -1,0 +1,73 @@
+"""Numbers that cannot be true end a run with code 3, a reason, and results that can be read."""
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from run_cases import ROOT
+
+MICS = ROOT / "mics"
+TANK = "&grid cells = 12, 12, 12  length = 1, 1, 1 /\n"
+LIGHT = """&run t_end = 0.03  dt = 0.01 /
+&fluid water_level = 0.5 /
+&shape name = 'a'  kind = 'cube'  size = 0.3  density = {density} /
+&body shape = 'a'  position = 0.5, 0.5, {height} /
+"""
+DAM = """&run t_end = {t_end}  dt = {dt}  cfl_max = {cfl_max} /
+&fluid gas_density = 1.2 /
+&water min = 0, 0, 0  max = 0.3, 1, 0.6 /
+"""
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+def mics(work: Path, groups: str) -> tuple[int, str]:
+    """Exit code and messages of a run."""
+    (work / "case.nml").write_text(TANK + groups)
+    done = subprocess.run(
+        [str(MICS), "--threads", "1", "--quiet", "case.nml"],
+        cwd=work,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, done.stderr
+
+
+def complete(work: Path, code: int) -> bool:
+    """Do the results say how the run ended, and is there a state to go on from?"""
+    with h5py.File(work / "mics-out" / "run.h5") as h5:
+        told = int(np.ravel(h5["provenance"].attrs["exit_status"])[0])
+        return told == code and (work / "mics-out" / "restart-a.h5").exists()
+
+
+def test_light_body_jumps(tmp_path: Path) -> None:
+    """A cube of 1 kg/m3 under water is thrown half a metre by the buoyancy of its first step."""
+    code, said = mics(tmp_path, LIGHT.format(density=1.0, height=0.3))
+    assert code == 3, said
+    assert "body 1 jumped 0.489" in said and "is too small for &run dt" in said
+    assert complete(tmp_path, 3)
+
+
+@pytest.mark.parametrize(("density", "height"), [(1.0, 0.8), (100.0, 0.3), (2300.0, 0.3)])
+def test_others_do_not(density: float, height: float, tmp_path: Path) -> None:
+    """Bodies in air, and such as there are, go on."""
+    assert mics(tmp_path, LIGHT.format(density=density, height=height)) == (0, "")
+
+
+@pytest.mark.parametrize(("dt", "t_end"), [(50.0, 50.0), (50.0, 500.0), (1.0, 3.0)])
+def test_fixed_step_too_long(dt: float, t_end: float, tmp_path: Path) -> None:
+    """A dam break in steps of seconds: the flow would be hundreds of metres a second fast."""
+    code, said = mics(tmp_path, DAM.format(dt=dt, t_end=t_end, cfl_max=0.0))
+    assert code == 3, said
+    assert "Courant number" in said and "&run dt is too long for this flow" in said
+    assert complete(tmp_path, 3)
+
+
+@pytest.mark.parametrize(("dt", "cfl_max"), [(0.02, 0.0), (1.0, 0.5)])
+def test_steps_that_follow_the_flow(dt: float, cfl_max: float, tmp_path: Path) -> None:
+    """A fixed step that is short enough, and one that may shrink, end as they should."""
+    assert mics(tmp_path, DAM.format(dt=dt, t_end=1.0, cfl_max=cfl_max)) == (0, "")
