@@ -1,4 +1,4 @@
-"""Files that are none: pipes that nobody writes, folders, devices. Nothing waits for ever."""
+"""Files that are none, pipes that nobody writes, control characters, threads beyond number."""
 
 import os
 import subprocess
@@ -131,3 +131,20 @@ def test_control_characters(role: str, bad: str, tmp_path: Path) -> None:
 def test_letters_of_any_language(tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(case().replace("&run", "&run title = 'Blöcke\t消波 ≤ 1'"))
     assert mics(tmp_path, "case.nml").returncode == 0
+
+
+@pytest.mark.parametrize(("given", "code"), [("2", 0), ("1024", 0), ("1025", 2), ("100000", 2)])
+def test_threads_of_the_environment(given: str, code: int, tmp_path: Path) -> None:
+    """OMP_NUM_THREADS has the bounds of --threads, which goes before it."""
+    (tmp_path / "case.nml").write_text(case())
+    for words, wanted in (([], code), (["--threads", "1"], 0)):
+        done = subprocess.run(
+            [str(MICS), "--check", *words, "case.nml"],
+            cwd=tmp_path,
+            env={**os.environ, "OMP_NUM_THREADS": given},
+            capture_output=True,
+            text=True,
+            timeout=10,
+        )
+        assert done.returncode == wanted, done.stderr
+        assert wanted == 0 or "OMP_NUM_THREADS = " in done.stderr

@@ -2,6 +2,7 @@
 module command_line_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text
+  use parallel_m, only: get_threads
   use value_text_m, only: nearest_name, parse_integer, tame, value_ok
   implicit none
   private
@@ -26,6 +27,9 @@ module command_line_m
     character(:), allocatable :: text
   end type argument_t
 
+  integer, parameter :: most_threads = 1024
+  character(*), parameter :: allowed_threads = 'must be a whole number from 1 to 1024'
+
   character(*), parameter :: known(8) = [character(10) :: '--check', '--restart', '--output', &
     '--threads', '--max-wall', '--quiet', '--version', '--help']
 
@@ -36,7 +40,7 @@ contains
     type(options_t), intent(out) :: options
     type(problems_t), intent(inout) :: problems
     type(argument_t) :: arguments(command_argument_count())
-    integer :: i, length
+    integer :: i, length, threads
 
     do i = 1, size(arguments)
       call get_command_argument(i, length=length)
@@ -46,6 +50,11 @@ contains
         'control characters in '//arguments(i)%text)
     end do
     call parse_arguments(arguments, options, problems)
+    call get_environment_variable('OMP_NUM_THREADS', length=length)
+    threads = get_threads()
+    if (options%threads == 0 .and. length > 0 .and. threads > most_threads) then
+      call problems%add('OMP_NUM_THREADS', threads, allowed_threads)
+    end if
   end subroutine read_command_line
 
   !> Options from the words of a command line.
@@ -162,13 +171,12 @@ contains
     character(*), intent(in) :: value
     type(options_t), intent(inout) :: options
     type(problems_t), intent(inout) :: problems
-    integer, parameter :: most = 1024
     integer :: n, info
 
     n = 0
     call parse_integer(value, n, info)
-    if (info /= value_ok .or. n < 1 .or. n > most) then
-      call problems%add('--threads', value, 'must be a whole number from 1 to 1024')
+    if (info /= value_ok .or. n < 1 .or. n > most_threads) then
+      call problems%add('--threads', value, allowed_threads)
     else
       options%threads = n
     end if

@@ -99,8 +99,9 @@ contains
     call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'3 NaN')
     call bad('a.txt', 'heightmap', 'line 3: ''NaN'' stands where a number should')
     call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'-9999 3')
-    call bad('a.txt', 'heightmap', 'line 3: is the height -9999 a mark of a missing one (NODATA)? ' &
-      //'Every point needs a height, fill the gaps first')
+    call bad('a.txt', 'heightmap', &
+      'line 3: is the height -9999 a mark of a missing one (NODATA)? Every point needs a ' &
+      //'height, fill the gaps first')
     call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3')
     call bad('a.txt', 'heightmap', 'line 2: the file ends where a number should stand')
     call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3 4 5')
