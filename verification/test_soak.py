@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import full_disk, memory, two_programs
+from soak import full_disk, memory, still_pile, two_programs
 
 MICS = ROOT / "mics"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -51,3 +51,10 @@ def test_memory_does_not_grow(tmp_path: Path) -> None:
     """With a restart file after every step a run takes no more memory in the end."""
     said, found = memory.growth(MICS, 600, tmp_path)
     assert found == [], said
+
+
+@pytest.mark.parametrize("sleep", [True, False])
+def test_still_pile(sleep: bool, tmp_path: Path) -> None:
+    """Blocks that lie on one another under water do not creep."""
+    said, still = still_pile.creep(MICS, 5.0, 5.0, sleep, tmp_path)
+    assert still, said
