@@ -8,7 +8,8 @@ module plain_file_m
   use kinds_m, only: i8
   implicit none
   private
-  public :: plain_file_t, cut_file, delete_file, is_pipe, lock_taken, lock_refused, lock_unknown
+  public :: plain_file_t, cut_file, delete_file, is_pipe, store_file
+  public :: lock_taken, lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
   integer, parameter :: lock_unknown = 2   !! the file system keeps no locks
@@ -87,6 +88,12 @@ module plain_file_m
       integer(c_int), value :: fd
       integer(c_long), value :: length   ! off_t
     end function c_ftruncate
+
+    integer(c_int) function c_fsync(fd) bind(c, name='fsync')
+      import :: c_int
+      implicit none
+      integer(c_int), value :: fd
+    end function c_fsync
 
     integer(c_int) function c_unlink(path) bind(c, name='unlink')
       import :: c_int, c_char
@@ -264,6 +271,21 @@ contains
     yes = c_lseek(fd, 0_c_long, from_here) < 0
     if (c_close(fd) /= 0) return
   end function is_pipe
+
+  !> Have the system write all that it still keeps of a closed file to the disk; only then is it
+  !! known that the file is there, and that it will be after a power cut.
+  subroutine store_file(path, info, message)
+    character(*), intent(in) :: path
+    integer, intent(out) :: info   !! 0: done
+    character(:), allocatable, intent(inout) :: message
+    type(plain_file_t) :: file
+
+    call file%open(path, 'a')
+    if (file%info == 0) call file%check(c_fsync(c_fileno(file%stream)) == 0, 'store')
+    call file%close()
+    info = file%info
+    if (info /= 0) message = file%message
+  end subroutine store_file
 
   !> Make a file shorter, if that is possible.
   subroutine cut_file(path, length)

@@ -1,9 +1,10 @@
 !> Restart files: the whole state in double precision, checksummed, exact on any number of
 !! processes.
 !!
-!! A file is written under a temporary name and renamed when it is complete, so a run that is killed
-!! while it writes leaves the older files whole. Layout (as h5py shows it; faces carry one layer
-!! more in each direction, element (d, k, j, i) is the lower face of cell (i, j, k) in direction d):
+!! A file is written under a temporary name and renamed when it is complete and on the disk, so a
+!! run that is killed while it writes, or a power cut, leaves the older files whole. Layout (as
+!! h5py shows it; faces carry one layer more in each direction, element (d, k, j, i) is the lower
+!! face of cell (i, j, k) in direction d):
 !!
 !!     /            @format = 'mics-restart' @format_version @checksum @version @git_revision
 !!                  @namelist @parameters
@@ -24,7 +25,7 @@ module restart_m
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: rename_file
-  use plain_file_m, only: delete_file
+  use plain_file_m, only: delete_file, store_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
   use state_visitors_m, only: checksum_visitor_t, size_visitor_t
   use file_room_m, only: room_for_change
@@ -100,11 +101,9 @@ contains
     info = file%info
     if (info /= 0) message = file%message
     if (is_root()) then
-      if (info == 0) then
-        call rename_file(unfinished, path, info, message)
-      else
-        call delete_file(unfinished)   ! the older files may need its room
-      end if
+      if (info == 0) call store_file(unfinished, info, message)
+      if (info == 0) call rename_file(unfinished, path, info, message)
+      if (info /= 0) call delete_file(unfinished)   ! the older files may need its room
     end if
     call broadcast(info)
   end subroutine finish_file
@@ -130,6 +129,7 @@ contains
     end if
     call read_state(path, parameters, state, info, message)
     call move_alloc(solid, state%solid)
+    if (info == 1) message = message//other_file(path)
     if (info /= 0) return
     if (state%clock%t_end < state%clock%t) then
       info = 2
@@ -138,6 +138,26 @@ contains
     end if
     call clock_resume(state%clock)
   end subroutine read_restart
+
+  !> Where to go on when a restart file is no good: with the one written before or after it.
+  function other_file(path) result(hint)
+    character(*), intent(in) :: path
+    character(:), allocatable :: hint
+    character(*), parameter :: last(2) = ['a.h5', 'b.h5']
+    character(:), allocatable :: other
+    logical :: there
+    integer :: i, n
+
+    hint = ''
+    n = len(path) - len(last)
+    do i = 1, 2
+      if (n < 0) exit
+      if (path(n + 1:) /= last(i)) cycle
+      other = path(:n)//last(3 - i)
+      inquire (file=other, exist=there)
+      if (there) hint = '; the other one is there: --restart '//other
+    end do
+  end function other_file
 
   !> Read all of a state, and check that it has its checksum.
   subroutine read_state(path, parameters, state, info, message)
