@@ -7,7 +7,7 @@ module hdf5_file_m
   use hdf5, only: hid_t, hsize_t, h5dopen_f, h5dread_f, h5dset_extent_f, h5dwrite_f
   use hdf5, only: h5dget_create_plist_f, h5pget_chunk_f, h5pget_nfilters_f, h5pclose_f
   use hdf5, only: h5pcreate_f, h5pset_chunk_f, h5pset_alloc_time_f, h5pset_deflate_f
-  use hdf5, only: h5pset_fill_value_f, h5pset_shuffle_f, H5D_ALLOC_TIME_EARLY_F
+  use hdf5, only: h5pset_fill_value_f, h5pset_fletcher32_f, h5pset_shuffle_f, H5D_ALLOC_TIME_EARLY_F
   use hdf5, only: H5P_DATASET_CREATE_F, H5T_NATIVE_REAL
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
@@ -108,6 +108,8 @@ contains
       call h5pset_shuffle_f(list, status)
       call self%check(status, what)
       call h5pset_deflate_f(list, deflate_level, status)
+      call self%check(status, what)
+      call h5pset_fletcher32_f(list, status)   ! a chunk that was changed on the disk is not read
       call self%check(status, what)
       call h5pset_alloc_time_f(list, H5D_ALLOC_TIME_EARLY_F, status)   ! as many processes need it
       call self%check(status, what)
