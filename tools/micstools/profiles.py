@@ -22,6 +22,27 @@ def cubic(at: Array, x: Array, values: Array) -> Array:
     return result
 
 
+def along_line(faces: tuple[Array, Array, Array], values: Array, points: Array) -> Array:
+    """Values at points (n, 3) [m] from those of the cells (nz, ny, nx, ...), linear between the
+    cell centres and constant beyond the outermost; `faces`: coordinates of the cell faces [m]."""
+    corners = []
+    for face, place in zip(faces, points.T, strict=True):
+        centre = (face[1:] + face[:-1]) / 2
+        index = np.interp(place, centre, np.arange(centre.size))
+        low = np.floor(index).astype(int)
+        corners.append((low, np.minimum(low + 1, centre.size - 1), index - low))
+    result = np.zeros((len(points), *values.shape[3:]))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.ones(len(points))
+        cell = []
+        for side, (low, high, share) in zip(corner, corners, strict=True):
+            weight *= share if side else 1 - share
+            cell.append(high if side else low)
+        part = values[cell[2], cell[1], cell[0]]
+        result += weight.reshape(-1, *[1] * (part.ndim - 1)) * part
+    return result
+
+
 def with_ends(low: float, values: Array, high: float) -> Array:
     """Values at cell centres along the last axis with those on the two walls around them."""
     ends = [np.full((*values.shape[:-1], 1), value) for value in (low, high)]

@@ -8,8 +8,9 @@ Everything is read when it is first asked for. The files may still be growing: r
 complete yet are left out, and `refresh` forgets what was read.
 """
 
+import csv
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from micstools.geometry import Array, IntArray, place
+from micstools.profiles import along_line
 from micstools.shapes import Shape
 
 T = TypeVar("T")
@@ -152,6 +154,25 @@ class Run:
         if not (self.folder / "run.h5").is_file():
             raise FileNotFoundError(f"{self.folder} holds no run.h5: is it the output of a run?")
 
+    def __str__(self) -> str:
+        """What there is, a line each; numbers of blocks count from 1."""
+        b, times = self.bodies, self.field_times
+        title = str(self.value("run", "title", "")).strip()
+        cells = " x ".join(str(len(f) - 1) for f in self.grid.faces)
+        size = " x ".join(f"{edge:g}" for edge in self.grid.high - self.grid.low)
+        fixed = ", ".join(str(k + 1) for k in np.flatnonzero(b.fixed)) or "none"
+        span = f"{b.time[0]:g} to {b.time[-1]:g} s" if b.time.size else "none yet"
+        frames = f"{times.size}, {times[0]:g} to {times[-1]:g} s" if times.size else "none"
+        names = ", ".join(f.name for f in fields(Fields) if f.name != "time")
+        lines = [
+            f"{self.folder}: {title or 'no title'}",
+            f"grid    {cells} cells, {size} m",
+            f"blocks  {b.n}, fixed: {fixed}; shapes: {', '.join(self.shapes) or 'none'}",
+            f"rows    {b.time.size}, {span}",
+            f"fields  {frames}" + (f" ({names})" if times.size else ""),
+        ]
+        return "\n".join(lines)
+
     def refresh(self) -> None:
         """Forget what was read, so that rows written since then are seen."""
         folder = self.folder
@@ -226,6 +247,33 @@ class Run:
             raise ValueError(f"{self.folder} holds no fields of the fluid")
         frame = int(np.abs(self.field_times - t).argmin())
         return self._read("fields.vtkhdf", lambda h5: _read_fields(h5, frame))
+
+    def profile(
+        self, p: Sequence[float], q: Sequence[float], name: str, t: float, n: int = 101
+    ) -> tuple[Array, Array]:
+        """Distance from `p` (n) [m] and a field (n, ...) at `n` places from `p` to `q` (3) [m], at
+        the written time nearest to `t` [s]; linear between the cell centres."""
+        known = [f.name for f in fields(Fields) if f.name != "time"]
+        if name not in known:
+            raise ValueError(f"{name}: no such field, there are {', '.join(known)}")
+        ends = np.array([p, q], dtype=float)
+        if (ends < self.grid.low).any() or (ends > self.grid.high).any():
+            low, high = self.grid.low.tolist(), self.grid.high.tolist()
+            raise ValueError(f"the line leaves the tank, which reaches from {low} to {high} m")
+        share = np.linspace(0.0, 1.0, n)
+        points = ends[0] + share[:, None] * (ends[1] - ends[0])
+        values = along_line(self.grid.faces, getattr(self.fields(t), name), points)
+        return share * float(np.linalg.norm(ends[1] - ends[0])), values
+
+    def series_to_csv(self, path: str | Path) -> Path:
+        """Write the numbers of every row as a table with the names of the result file."""
+        names = [f.name for f in fields(Series)]
+        with Path(path).open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(names)
+            columns = [getattr(self.series, name).tolist() for name in names]
+            writer.writerows(zip(*columns, strict=True))
+        return Path(path)
 
     @property
     def restart_files(self) -> list[str]:

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from micstools.profiles import along_line, table
 from micstools.reader import Run
 from synthetic import THREE_LEGS, Motion, write_run
 
@@ -95,3 +96,38 @@ def test_a_run_without_fluid_has_no_fields(tmp_path: Path, loose_pile: Run) -> N
     assert run.field_times.size == 0
     with pytest.raises(ValueError, match="no fields"):
         run.fields(0.0)
+
+
+def test_print_tells_what_is_there(loose_pile: Run) -> None:
+    text = str(loose_pile)
+    assert "60 x 20 x 40 cells, 0.3 x 0.1 x 0.2 m" in text
+    assert "9, fixed: 1, 2, 3; shapes: hexapod" in text
+    assert "rows    401" in text
+    assert "liquid, solid, pressure, velocity" in text
+
+
+def test_profile_is_exact_for_a_linear_field() -> None:
+    x, y, z = np.array([0.0, 1.0, 3.0, 4.0]), np.array([0.0, 2.0]), np.linspace(0.0, 1.0, 5)
+    cx, cz = (x[1:] + x[:-1]) / 2, (z[1:] + z[:-1]) / 2
+    values = np.broadcast_to(2 * cx + 3 * cz[:, None, None], (4, 1, 3))
+    points = np.array([[0.6, 0.1, 0.2], [2.0, 1.0, 0.5], [3.4, 1.9, 0.8]])
+    found = along_line((x, y, z), values, points)
+    assert found == pytest.approx(2 * points[:, 0] + 3 * points[:, 2])
+    both = along_line((x, y, z), np.stack([values, -values], axis=-1), points)
+    assert both == pytest.approx(np.stack([found, -found], axis=-1))
+
+
+def test_profile_reads_a_line_and_refuses_others(loose_pile: Run) -> None:
+    distance, velocity = loose_pile.profile((0, 0.05, 0.1), (0.3, 0.05, 0.1), "velocity", 2.0, 7)
+    assert distance == pytest.approx(np.linspace(0, 0.3, 7))
+    assert velocity.shape == (7, 3)
+    with pytest.raises(ValueError, match="no such field"):
+        loose_pile.profile((0, 0, 0), (0.1, 0, 0), "speed", 2.0)
+    with pytest.raises(ValueError, match="leaves the tank"):
+        loose_pile.profile((0, 0, 0), (9, 0, 0), "liquid", 2.0)
+
+
+def test_series_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
+    rows = table(loose_pile.series_to_csv(tmp_path / "series.csv"))
+    assert len(rows) == 401
+    assert float(rows[-1]["time"]) == loose_pile.series.time[-1]
