@@ -136,7 +136,9 @@ contains
     type(step_report_t), intent(out) :: report
     type(contact_report_t) :: contact
     type(stage_report_t) :: stage_report
+    real(wp) :: dt_before   !! of the last step [s]
 
+    dt_before = sim%clock%dt
     call release(sim, report)
     if (sim%wet) call first_force(sim)
     call choose_step(sim, report)
@@ -145,7 +147,7 @@ contains
       if (sim%wet) then
         call copy_motion(blocks, sim%stage%bodies)
         call know_added_mass(grid, case%fluid, sim%solid, sim%stage%bodies, flow%c, blocks)
-        call note_start(case, grid, sim%solid, flow, sim%stage)
+        call note_start(case, grid, sim%solid, dt, dt_before, flow, blocks, sim%stage)
       end if
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)

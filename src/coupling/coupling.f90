@@ -7,7 +7,8 @@ module coupling_m
   use solid_geometry_m, only: solid_geometry_t
   use surface_tension_m, only: find_tension
   use face_memory_m, only: note_deviation
-  use film_velocity_m, only: note_films
+  use linked_cells_m, only: link_cells
+  use mid_step_m, only: to_mid_step
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
@@ -19,19 +20,25 @@ module coupling_m
 
 contains
 
-  !> What the velocity stage will need of the start of the step: how films move along their walls;
-  !! for C-ISMAC the acceleration, else how the faces at the surface differ from the cells.
-  subroutine note_start(case, grid, solid, flow, stage)
+  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration, else
+  !! how the faces at the surface differ from the cells; and the first half of the old pressure.
+  subroutine note_start(case, grid, solid, dt, dt_before, flow, blocks, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(flow_t), intent(in) :: flow
+    real(wp), intent(in) :: dt, dt_before   !! of this step and of the one before, 0: none [s]
+    type(flow_t), intent(inout) :: flow
+    type(blocks_t), intent(in) :: blocks
     type(stage_t), intent(inout) :: stage   !! its bodies as they move at the start
 
     if (case%numerics%coupling == 'monolithic') then
-      call note_films(grid, solid, stage%bodies, flow%u, stage%films)
-      if (.not. stage%implicit_momentum) call note_deviation(grid, solid%alpha, flow%rho, flow%u, &
-                                                             flow%uf, stage%deviation)
+      call find_trend(dt, dt_before, blocks, stage)
+      call link_cells(grid, solid, stage%links_before)
+    end if
+    if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
+      call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
+      call to_mid_step(grid, case%fluid, solid, stage%links_before, dt, flow, stage%acceleration, &
+                       stage%mid_step)
     end if
     if (.not. stage%implicit_momentum) return
     call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
@@ -43,6 +50,25 @@ contains
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
     end if
   end subroutine note_start
+
+  !> What the motion changes by in this step if the bodies accelerate as in the step before, like
+  !! the fluid that gets the old pressure.
+  subroutine find_trend(dt, dt_before, blocks, stage)
+    real(wp), intent(in) :: dt, dt_before   !! [s]
+    type(blocks_t), intent(in) :: blocks
+    type(stage_t), intent(inout) :: stage
+    real(wp) :: before(6)
+    integer :: b
+
+    stage%trend = 0.0_wp
+    if (dt_before <= 0.0_wp) return
+    do b = 1, blocks%n
+      if (.not. stage%bodies%free(b)) cycle
+      before(1:3) = blocks%v_start(:, b)
+      before(4:6) = matmul(stage%bodies%inverse_inertia(:, :, b), blocks%l_start(:, b))
+      stage%trend(:, b) = dt/dt_before*(stage%bodies%motion(:, b) - before)
+    end do
+  end subroutine find_trend
 
   !> Velocity of the fluid and of the bodies at the end of the step.
   !!
@@ -69,7 +95,9 @@ contains
       call set_velocity()
       call overlay_bodies(grid, solid, flow, stage, report)
     else
+      stage%late(:, :blocks%n) = blocks%late_force
       call monolithic_stage(case, grid, solid, dt, flow, stage, report)
+      blocks%late_force = stage%late(:, :blocks%n)
       call set_velocity()
       call solid_face_flux(grid, solid, stage%bodies, stage%pressure%system%operator%flux, &
                            flow%solid_flux)

@@ -15,13 +15,15 @@ module monolithic_m
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, solid_face_flux, nearest_arm
   use viscous_legs_m, only: build_viscous
   use pressure_system_m, only: set_pressure_system
-  use pressure_m, only: solve_pressure
+  use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity, &
-                             face_velocity_at_walls
+                             face_velocity_at_walls, shorten_at_walls
   use buoyancy_m, only: uncounted_fluid
-  use film_velocity_m, only: shift_films, tie_films
-  use momentum_return_m, only: return_momentum
+  use linked_cells_m, only: linked_cells_t, link_cells, match_densities, share_momentum, &
+                            share_acceleration, follow_masters
+  use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
+    force_of_mid_step
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: find_tension, add_tension, force_from_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
@@ -44,25 +46,52 @@ contains
     type(stage_t), intent(inout) :: stage
     type(stage_report_t), intent(inout) :: report
 
-    stage%debt%u_before = flow%u
     stage%dry_motion = stage%bodies%motion
+    call link_cells(grid, solid, stage%links)
+    call begin_balance(case%fluid, stage%links, flow, stage%balance)
+    call find_inertia(grid, stage%links, stage%balance%mass, flow, stage%rho)
+    call match_densities(grid, stage%rho, stage%links)
+    call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, flow%u)
     associate (system => stage%pressure%system)
-      call set_pressure_system(grid, solid%open, flow%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%open, stage%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
     end associate
     call accelerate_fluid(case, grid, solid, dt, flow, stage)
     call push_by_known_forces(case, grid, solid, dt, flow, stage)
     call add_viscosity(grid, solid, dt, flow, stage)
     call predict_faces(grid, solid, dt, flow, stage)
-    call solve_pressure(grid, solid, flow%rho, dt, flow, stage%bodies, stage%pressure)
-    call correct_cells(case, grid, solid, dt, flow, stage)
+    call find_pressure(grid, solid, dt, flow, stage, report)
     call extend_pressure(grid, case%fluid%gravity, flow%rho, stage%pressure%system%active, &
                          stage%pressure%known, flow%p)
-    call sum_forces(grid, solid, dt, stage)
-    report%pressure = stage%pressure%report
+    call sum_forces(dt, stage)
     report%viscous_iterations = stage%viscous%iterations
     report%viscous_converged = stage%viscous%converged
   end subroutine monolithic_stage
+
+  !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
+  !! cell lies, bodies thought away, so that still water stays still; inertia in a cut cell that of
+  !! the fluid in its open part.
+  subroutine find_inertia(grid, links, mass, flow, rho)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: links
+    real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), parameter :: least_room = 1.0e-3_wp   !! of a cell with a density of its own
+    integer :: k, m
+
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      rho(:, :, k) = flow%rho(:, :, k)
+    end do
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        associate (room => flow%room(c(1), c(2), c(3)))
+          if (room > least_room*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/room
+        end associate
+      end associate
+    end do
+  end subroutine find_inertia
 
   !> Weight, old pressure, surface tension and surface stress into the velocity of the cells.
   subroutine accelerate_fluid(case, grid, solid, dt, flow, stage)
@@ -73,16 +102,57 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
 
-    associate (a => stage%acceleration)
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, a%face, &
+    associate (a => stage%acceleration, balance => stage%balance)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho, flow%p, a%face, &
                              flow%sides)
-      call add_tension(grid, flow%rho, stage%tension, a%face)
-      call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+      call add_tension(grid, stage%rho, stage%tension, a%face)
+      call accelerations_of_groups(grid, solid, dt, stage)
+      call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, stage%a_stress)
+      call accelerate_cells(grid, dt, flow, stage)
+      call add_product(grid, dt, stage%a_stress, flow%u)
+      if (stage%implicit_momentum) return
+      call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
+      call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
+                             flow, a%cell, stage%mid_step, balance, stage%from_mid_step)
     end associate
-    call surface_stress(grid, solid%alpha, flow%rho, flow%mu, flow%u, stage%a_stress)
-    call accelerate_cells(grid, dt, flow, stage)
-    call add_product(grid, dt, stage%a_stress, flow%u)
   end subroutine accelerate_fluid
+
+  !> Accelerations of the cells from those of the faces, and what groups make of them.
+  subroutine accelerations_of_groups(grid, solid, dt, stage)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(stage_t), intent(inout) :: stage
+
+    associate (a => stage%acceleration, balance => stage%balance)
+      call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+      call note_change(grid, stage%links, dt, a%cell, balance%pushed)
+      call halo_exchange(a%cell, n_halo)
+      call share_acceleration(grid, solid%open, stage%rho, stage%links, a%cell)
+      call note_change(grid, stage%links, dt, a%cell, balance%gained)
+    end associate
+  end subroutine accelerations_of_groups
+
+  !> Cells that got half a step of the old pressure before the transport need the other half only.
+  subroutine take_half_back(grid, dt, a, takes_part, u)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, d
+
+    !$omp parallel do private(i, j, d) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do d = 1, 3
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            if (takes_part(i, j, k)) u(i, j, k, d) = u(i, j, k, d) - 0.5_wp*dt*a(i, j, k, d)
+          end do
+        end do
+      end do
+    end do
+  end subroutine take_half_back
 
   !> The same forces on the bodies.
   subroutine push_by_known_forces(case, grid, solid, dt, flow, stage)
@@ -99,6 +169,7 @@ contains
                               stage%from_pressure)
       stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
+      stage%from_level = stage%from_level + stage%from_mid_step + stage%late
       call push_bodies(dt, stage%from_pressure + stage%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
@@ -112,14 +183,16 @@ contains
     type(stage_t), intent(inout) :: stage
 
     associate (bodies => stage%bodies, viscous => stage%viscous)
-      call build_viscous(grid, solid, bodies, flow%rho, flow%mu, dt, viscous)
-      call shift_films(grid, solid, stage%films, -1.0_wp, flow%u)
-      call predict_velocity(grid, flow%rho, flow, stage)
-      call shift_films(grid, solid, stage%films, 1.0_wp, flow%u)
+      call fill_velocity_halo(grid, flow%u)
+      call note_velocity(grid, stage%links, flow%u, stage%balance%before)
+      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, stage%links)
+      call predict_velocity(grid, stage%rho, flow, stage)
+      call fill_velocity_halo(grid, flow%u)
+      call follow_masters(grid, stage%links, stage%balance%before, flow%u)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = stage%dry_motion
       call push_bodies(dt, stage%from_pressure + stage%from_level + viscous%force, bodies)
-      call impose_rigid_velocity(grid, solid, bodies, viscous%mass, flow%u)
+      call impose_rigid_velocity(grid, solid, stage%links, bodies, flow%u)
     end associate
   end subroutine add_viscosity
 
@@ -131,16 +204,73 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
 
+    stage%foreseen%x = stage%bodies%x
+    stage%foreseen%motion = stage%at_start%motion + stage%trend
     call fill_velocity_halo(grid, flow%u)
     call halo_exchange(stage%acceleration%cell, n_halo)
-    call predict_face_velocity(grid, dt, flow%rho, stage%acceleration, flow, stage%deviation)
-    call face_velocity_at_walls(grid, solid, stage%at_start, dt, flow%rho, stage%acceleration, flow)
+    call predict_face_velocity(grid, dt, stage%rho, stage%acceleration, flow, stage%deviation)
+    call shorten_at_walls(grid, dt, stage%bodies, stage%links%cell(:, :stage%links%n), &
+                          stage%links%body, stage%links%number, stage%mid_step%takes_part, &
+                          stage%rho, stage%acceleration, flow)
+    call face_velocity_at_walls(grid, solid, stage%foreseen, dt, stage%mid_step%takes_part, &
+                                stage%rho, stage%acceleration, flow)
     call renew_acceleration(dt, flow, stage)
   end subroutine predict_faces
 
-  !> What the new pressure does to the cells, and what films and cut cells owe for it.
-  subroutine correct_cells(case, grid, solid, dt, flow, stage)
-    type(case_t), intent(in) :: case
+  !> Pressure and motion of the bodies in one solve. What the fluid at the walls owes the bodies
+  !! (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure follows in a
+  !! second solve; the little that this one changes of it is left to the next step.
+  subroutine find_pressure(grid, solid, dt, flow, stage, report)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(stage_t), intent(inout) :: stage
+    type(stage_report_t), intent(inout) :: report
+    real(wp) :: from_faces(6, stage%bodies%n), from_walls(6, stage%bodies%n)
+    integer :: solve, b
+
+    stage%total = 0.0_wp
+    associate (bodies => stage%bodies, links => stage%links, balance => stage%balance, &
+               pressure => stage%pressure)
+      do solve = 1, 2
+        call solve_pressure(grid, solid, stage%rho, dt, flow, bodies, pressure)
+        report%pressure = added(report%pressure, pressure%report)
+        call correct_cells(grid, solid, dt, flow, stage)
+        call force_from_faces(grid, solid, bodies, pressure%system%operator%flux, &
+                              pressure%phi_total, from_faces)
+        stage%total = stage%total + from_faces
+        call force_of_walls(grid, solid, links, bodies, stage%at_start, dt, stage%rho, balance, &
+                            from_walls)
+        if (solve == 1) then
+          stage%late = from_walls
+          if (.not. any(bodies%free)) exit
+          call push_bodies(dt, stage%late, bodies)
+        end if
+      end do
+      stage%total = stage%total + stage%late
+      do b = 1, bodies%n
+        stage%late(:, b) = merge(from_walls(:, b) - stage%late(:, b), 0.0_wp, bodies%free(b))
+      end do
+      call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
+      call fill_velocity_halo(grid, flow%u)
+      call share_momentum(grid, links, balance%mass, bodies, flow%u)
+      call fill_velocity_halo(grid, flow%u)
+    end associate
+  end subroutine find_pressure
+
+  !> Report of two solves of a step.
+  pure function added(first, second) result(both)
+    type(pressure_report_t), intent(in) :: first, second
+    type(pressure_report_t) :: both
+
+    both = second
+    both%passes = first%passes + second%passes
+    both%iterations = first%iterations + second%iterations
+  end function added
+
+  !> What the new pressure does to the cells.
+  subroutine correct_cells(grid, solid, dt, flow, stage)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -148,32 +278,22 @@ contains
     type(stage_t), intent(inout) :: stage
     real(wp), parameter :: weightless(3) = 0.0_wp
 
-    associate (bodies => stage%bodies, a => stage%acceleration, mass => stage%viscous%mass)
-      call face_acceleration(grid, weightless, flow%rho, flow%rho, stage%pressure%phi_total, &
+    associate (a => stage%acceleration)
+      call face_acceleration(grid, weightless, stage%rho, stage%rho, stage%pressure%phi_total, &
                              a%face, flow%sides)
-      call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+      call accelerations_of_groups(grid, solid, dt, stage)
       call add_product(grid, dt, a%cell, flow%u)
-      call impose_rigid_velocity(grid, solid, bodies, mass, flow%u)
-      call tie_films(grid, solid, bodies, mass, flow%uf, flow%u, stage%debt%tied)
-      if (case%numerics%momentum == 'conservative') then
-        call return_momentum(grid, case%fluid, solid, stage%at_start, bodies, stage%debt, flow)
-      end if
-      call fill_velocity_halo(grid, flow%u)
     end associate
   end subroutine correct_cells
 
   !> Force and torque of the step on each body, the inertia of the fluid that no face counts
   !! included, by the acceleration that the solve has found.
-  subroutine sum_forces(grid, solid, dt, stage)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
+  subroutine sum_forces(dt, stage)
     real(wp), intent(in) :: dt
     type(stage_t), intent(inout) :: stage
     integer :: b
 
     associate (bodies => stage%bodies)
-      call force_from_faces(grid, solid, bodies, stage%pressure%system%operator%flux, &
-                            stage%pressure%phi_total, stage%total)
       stage%total = stage%total + stage%from_pressure + stage%from_level + stage%viscous%force
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
@@ -238,12 +358,12 @@ contains
     end associate
   end subroutine start_flow
 
-  !> Cells inside a body move with it, in the components that no open face carries.
-  subroutine impose_rigid_velocity(grid, solid, bodies, mass, u)
+  !> Cells in a body that hold no film move with it.
+  subroutine impose_rigid_velocity(grid, solid, links, bodies, u)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(in) :: links
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, b
     real(wp) :: arm(3)
@@ -253,11 +373,10 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
-          if (b == 0) cycle
+          if (b == 0 .or. links%number(i, j, k) > 0) cycle
           arm = nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, 3)], &
                             bodies%x(:, b))
-          u(i, j, k, :) = merge(u(i, j, k, :), wall_velocity(bodies%motion(:, b), arm), &
-                                mass(i, j, k, :) > 0.0_wp)
+          u(i, j, k, :) = wall_velocity(bodies%motion(:, b), arm)
         end do
       end do
     end do

@@ -12,9 +12,10 @@ module velocity_stage_m
   use pressure_m, only: pressure_t, pressure_report_t, pressure_init
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
                              cell_mean_of_faces
-  use momentum_return_m, only: momentum_debt_t, momentum_debt_init
+  use linked_cells_m, only: linked_cells_t, linked_cells_init
+  use mid_step_m, only: mid_step_t, mid_step_init
+  use wall_balance_m, only: wall_balance_t, wall_balance_init
   use surface_tension_m, only: surface_tension_t, add_tension
-  use film_velocity_m, only: films_t, films_init
   use rigid_body_m, only: blocks_t, space_tensor
   implicit none
   private
@@ -36,7 +37,6 @@ module velocity_stage_m
     type(c_ismac_t) :: c_ismac                     !! allocated for it only
     type(pressure_t) :: pressure
     type(surface_tension_t) :: tension
-    type(films_t) :: films
     type(acceleration_t) :: acceleration
     real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
     real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
@@ -46,7 +46,15 @@ module velocity_stage_m
     real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
     real(wp), allocatable :: a_stress(:, :, :, :)  !! acceleration by the surface stress [m/s2]
     ! Of the monolithic coupling.
-    type(momentum_debt_t) :: debt
+    type(rigid_motion_t) :: foreseen               !! the motion at the end, by `trend`
+    real(wp), allocatable :: trend(:, :)
+      !! (6, n) change of the motion in this step if the acceleration of the last one goes on
+    type(linked_cells_t) :: links_before, links    !! of the surface at the start and at the end
+    type(mid_step_t) :: mid_step
+    type(wall_balance_t) :: balance
+    real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
+    real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
+    real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: deviation(:, :, :, :) !! of the faces at the start (`face_memory_m`)
     ! Of the mixture.
     type(solid_geometry_t) :: whole                !! the domain without solids
@@ -68,12 +76,12 @@ contains
     b = grid%last
     call rigid_motion_init(n, stage%bodies)
     call rigid_motion_init(n, stage%at_start)
+    call rigid_motion_init(n, stage%foreseen)
     call viscous_init(grid, n, stage%viscous)
     stage%implicit_momentum = numerics%momentum == 'c_ismac'
     if (stage%implicit_momentum) call c_ismac_init(grid, n, numerics%advection, stage%c_ismac)
     call pressure_init(grid, n, numerics, stage%pressure)
     call acceleration_init(grid, stage%acceleration)
-    call films_init(stage%films)
     allocate (stage%from_pressure(6, n), source=0.0_wp)
     allocate (stage%from_level, stage%total, stage%dry_motion, source=stage%from_pressure)
     allocate (stage%lack(6, 3, n), source=0.0_wp)
@@ -84,8 +92,13 @@ contains
       allocate (stage%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
       allocate (stage%u_before, source=stage%a_stress)
     else
-      call momentum_debt_init(grid, stage%debt)
+      call linked_cells_init(grid, stage%links_before)
+      call linked_cells_init(grid, stage%links)
+      call mid_step_init(grid, stage%mid_step)
+      call wall_balance_init(stage%balance)
+      allocate (stage%from_mid_step, stage%late, stage%trend, source=stage%total)
       allocate (stage%deviation, source=stage%a_stress)
+      allocate (stage%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if
   end subroutine stage_init
 

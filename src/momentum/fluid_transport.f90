@@ -10,7 +10,6 @@ module fluid_transport_m
     begin_part, finish_transport, transport_liquid
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
-  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, from_mid_step
   implicit none
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
@@ -21,7 +20,6 @@ module fluid_transport_m
   type :: fluid_transport_t
     type(liquid_transport_t) :: liquid
     type(momentum_t) :: momentum
-    type(mid_step_t) :: mid_step
   end type fluid_transport_t
 
   !> The step at hand.
@@ -46,7 +44,6 @@ contains
       self%liquid%sweeps%level = case%fluid%water_level
     end if
     call momentum_init(grid, self%momentum, case%numerics%advection)
-    call mid_step_init(grid, self%mid_step)
   end subroutine fluid_transport_init
 
   !> Carry liquid and momentum, direction by direction; new density and viscosity. With C-ISMAC
@@ -59,9 +56,7 @@ contains
     type(flow_t), intent(inout) :: flow   !! halos filled on entry and return
     type(fluid_transport_t), intent(inout) :: self
     integer :: n, part
-    logical :: halved   !! pressure and weight of half the step are carried, too
 
-    halved = case%numerics%coupling == 'monolithic'
     associate (fluid => case%fluid, liquid => self%liquid, momentum => self%momentum)
       liquid%parts = parts_of_step(span%courant)
       if (case%numerics%momentum == 'c_ismac') then
@@ -70,7 +65,6 @@ contains
         return
       end if
       call begin_transport(grid, before, after, span%dt, liquid, flow)
-      if (halved) call to_mid_step(grid, fluid, before, after, span%dt, flow, self%mid_step)
       do part = 1, liquid%parts
         call begin_part(grid, before, part, span%number, liquid)
         call momentum_begin(grid, fluid, liquid%volumes%w, liquid%volumes%v, liquid%volumes%c, &
@@ -81,7 +75,6 @@ contains
         call momentum_late(grid, fluid, liquid, flow%u, momentum)
       end do
       call finish_transport(grid, after, liquid, flow)
-      if (halved) call from_mid_step(grid, fluid, self%mid_step, flow)
       call mix_fluid(fluid, flow)
     end associate
   end subroutine carry_fluid

@@ -1,36 +1,36 @@
-!> Velocity of the middle of the step, which the transport carries.
+!> Half of the old pressure before the transport, half after it.
 !!
 !! With the velocity of the start carried and pressure and weight added after, what a fluid element
 !! gains while it is on its way is late by half a step: in front of a body in a stream, where
 !! pressure turns the stream, this is a false drag of the first order in the step (a sphere without
-!! viscosity, `docs/theory.md`, section 8). So before the transport the liquid gets
-!! \( (\Delta t/2)(g - \nabla p/\rho) \) of the start of the step, and afterwards each cell gives
-!! back the momentum it got; the velocity stage then adds the whole step.
+!! viscosity, `docs/theory.md`, section 8). So the liquid gets \( (\Delta t/2)(g - \nabla p/\rho) \)
+!! on the surface of the bodies at the start of the step, before the transport, and the other half
+!! in the velocity stage, on the surface at its end: the impulse of a pressure acts on the surface
+!! of the middle of the step, and each half is a gradient on its own surface.
 !!
-!! Only liquid away from the surface takes part: at the surface and in the gas beside it density and
-!! acceleration jump, and what a cell gives back would no longer be what it got. Cells at an outflow
-!! are left out, too: the pressure outside is known after the transport. Not for
-!! `coupling = 'mics'`, whose pressure near blocks is that of a mixture.
+!! Only liquid away from the free surface takes part: there and in the gas beside it density and
+!! acceleration jump. Cells at an outflow do not either: the drag of the side, half of which they
+!! take (`predict_face_velocity`), is no part of it.
 module mid_step_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
-  use grid_m, only: grid_t
+  use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
-  use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
   use momentum_conservative_m, only: mass_through
-  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
-                             cell_mean_of_faces
+  use linked_cells_m, only: linked_cells_t, share_acceleration
+  use solid_geometry_m, only: solid_geometry_t
+  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces
+  use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: mid_step_t, mid_step_init, to_mid_step, from_mid_step
+  public :: mid_step_t, mid_step_init, to_mid_step
 
   real(wp), parameter :: full = 1.0_wp - 1.0e-9_wp   !! liquid share of a cell without gas [-]
-  real(wp), parameter :: most_solid = 0.5_wp         !! share of a cell that takes part [-]
 
   type :: mid_step_t
-    type(acceleration_t) :: acceleration           !! by weight and pressure, at the start
-    real(wp), allocatable :: given(:, :, :, :)     !! momentum given to the cells [kg m/s]
+    logical, allocatable :: takes_part(:, :, :)    !! cells whose neighbours are all full of liquid
+    real(wp), allocatable :: given(:, :, :, :)     !! momentum given before the transport [kg m/s]
   end type mid_step_t
 
 contains
@@ -39,77 +39,88 @@ contains
   subroutine mid_step_init(grid, self)
     type(grid_t), intent(in) :: grid
     type(mid_step_t), intent(out) :: self
+    integer :: a(3), b(3)
 
-    call acceleration_init(grid, self%acceleration)
-    allocate (self%given, source=self%acceleration%cell)
+    a = grid%first
+    b = grid%last
+    allocate (self%takes_part(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
+    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
   end subroutine mid_step_init
 
-  !> Add half a step of weight and pressure to the velocity of the liquid, halo filled.
-  subroutine to_mid_step(grid, fluid, before, after, dt, flow, self)
+  !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
+  subroutine to_mid_step(grid, fluid, solid, links, dt, flow, a, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
+    type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
+    type(linked_cells_t), intent(in) :: links     !! likewise
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
+    type(acceleration_t), intent(inout) :: a      !! work
     type(mid_step_t), intent(inout) :: self
-    integer :: i, j, k, low(3), high(3)
+    integer :: i, j, k
     real(wp) :: mass
 
-    low = merge(2, 1, flow%sides(1, :)%active)
-    high = merge(grid%n - 1, grid%n, flow%sides(2, :)%active)
-    associate (a => self%acceleration)
-      call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
-      call cell_mean_of_faces(grid, before%open, a%face, a%cell)
-    end associate
+    call find_part(grid, flow, self%takes_part)
+    call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
+    call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+    call leave_out(grid, self%takes_part, a%cell)
+    call halo_exchange(a%cell, n_halo)
+    call share_acceleration(grid, solid%open, flow%rho, links, a%cell)
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          if (.not. takes_part(i, j, k)) then
+          if (.not. self%takes_part(i, j, k)) then
             self%given(i, j, k, :) = 0.0_wp
             cycle
           end if
           mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
-          associate (a => self%acceleration%cell(i, j, k, :))
-            flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a
-            self%given(i, j, k, :) = 0.5_wp*dt*mass*a
-          end associate
+          flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a%cell(i, j, k, :)
+          self%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
     call fill_velocity_halo(grid, flow%u)
-  contains
-    !> Away from outflows, full of liquid with all cells around, at least half open from start to
-    !! end.
-    pure function takes_part(i, j, k) result(answer)
-      integer, intent(in) :: i, j, k
-      logical :: answer
-
-      answer = max(before%alpha(i, j, k), after%alpha(i, j, k)) <= most_solid
-      if (answer) answer = all([i, j, k] >= low .and. [i, j, k] <= high)
-      if (answer) answer = all(flow%c(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) >= full)
-    end function takes_part
   end subroutine to_mid_step
 
-  !> After the transport: the cells give back the momentum they got, halo filled.
-  subroutine from_mid_step(grid, fluid, self, flow)
+  !> No acceleration of cells that do not take part.
+  subroutine leave_out(grid, takes_part, a)
     type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    type(mid_step_t), intent(in) :: self
-    type(flow_t), intent(inout) :: flow   !! carried
-    integer :: i, j, k
-    real(wp) :: mass
+    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, d
 
-    !$omp parallel do private(i, j, mass) schedule(static)
+    !$omp parallel do private(i, j, d) schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do i = grid%lo(1), grid%hi(1)
-          mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
-          if (mass > 0.0_wp) flow%u(i, j, k, :) = flow%u(i, j, k, :) - self%given(i, j, k, :)/mass
+      do d = 1, 3
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            if (.not. takes_part(i, j, k)) a(i, j, k, d) = 0.0_wp
+          end do
         end do
       end do
     end do
-    call fill_velocity_halo(grid, flow%u)
-  end subroutine from_mid_step
+  end subroutine leave_out
+
+  !> The cells that take part: away from outflows, full of liquid with all cells around.
+  subroutine find_part(grid, flow, takes_part)
+    type(grid_t), intent(in) :: grid
+    type(flow_t), intent(in) :: flow
+    logical, intent(inout), contiguous :: &
+      takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k, low(3), high(3)
+
+    low = merge(2, grid%first, flow%sides(1, :)%active)
+    high = merge(grid%n - 1, grid%last, flow%sides(2, :)%active)
+    !$omp parallel do private(i, j) schedule(static)
+    do k = grid%first(3) + 1, grid%last(3) - 1
+      do j = grid%first(2) + 1, grid%last(2) - 1
+        do i = grid%first(1) + 1, grid%last(1) - 1
+          takes_part(i, j, k) = all([i, j, k] >= low .and. [i, j, k] <= high) &
+            .and. all(flow%c(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) >= full)
+        end do
+      end do
+    end do
+  end subroutine find_part
 
 end module mid_step_m

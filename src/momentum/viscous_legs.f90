@@ -2,8 +2,8 @@
 !!
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
-!! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. A cell whose
-!! centre lies in a body but which has open faces (film cell) hangs on the wall alone.
+!! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
+!! that of its group (`linked_cells_m`). A film without a master hangs on the walls alone.
 module viscous_legs_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
@@ -12,8 +12,9 @@ module viscous_legs_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, add_wall, add_side, grow_work, open_share, unknown, wrench
+  use viscous_system_m, only: viscous_t, add_wall, add_side, grow_work, unknown, wrench
   use film_legs_m, only: film_legs
+  use linked_cells_m, only: linked_cells_t, is_alone
   use exact_sum_m, only: exact_sums
   implicit none
   private
@@ -25,7 +26,7 @@ module viscous_legs_m
 contains
 
   !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
-  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self)
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, links)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -33,15 +34,15 @@ contains
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
+    type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
     integer :: d
 
     self%dt = dt
     self%walls%n = 0
     self%sides%n = 0
     self%diagonal = 0.0_wp
-    do d = 1, 3
-      call unknown_masses(grid, solid, rho, dt, d, self)
-    end do
+    call unknown_masses(grid, solid, rho, dt, self)
+    if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
     do d = 1, 3
       call legs_of_direction(grid, solid, bodies, mu, d, self)
     end do
@@ -73,29 +74,60 @@ contains
     end do
   end subroutine finish_diagonal
 
-  !> Mass over dt of component d in each cell; zero where the velocity is the wall's.
-  subroutine unknown_masses(grid, solid, rho, dt, d, self)
+  !> Mass over dt of each cell with its centre in the fluid; none of the others.
+  subroutine unknown_masses(grid, solid, rho, dt, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
-    integer, intent(in) :: d
     type(viscous_t), intent(inout) :: self
-    integer :: i, j, k, e(3)
-    real(wp) :: m
+    integer :: i, j, k
 
-    e = unit_step(:, d)
-    !$omp parallel do private(i, j, m) schedule(static)
+    !$omp parallel do private(i, j) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          m = open_share(solid%open(i, j, k, d), solid%open(i + e(1), j + e(2), k + e(3), d))
-          if (m < least_mass) m = merge(least_mass, 0.0_wp, solid%inside(i, j, k) == 0)
-          self%mass(i, j, k, d) = rho(i, j, k)*m*grid%volume/dt
+          self%mass(i, j, k, :) = &
+            merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), least_mass)*grid%volume/dt, &
+                  0.0_wp, solid%inside(i, j, k) == 0)
         end do
       end do
     end do
   end subroutine unknown_masses
+
+  !> The films' mass goes to their masters; those without one are unknowns themselves.
+  subroutine masses_of_groups(grid, solid, rho, dt, links, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in) :: dt
+    type(linked_cells_t), intent(in) :: links
+    type(viscous_t), intent(inout) :: self
+    integer :: g, m
+
+    do g = 1, links%n_groups
+      associate (c => links%cell(:, links%leader(g)))
+        if (.not. grid%owns(c)) cycle
+        do m = links%first(g), links%first(g + 1) - 1
+          associate (film => links%part(1, m), master => links%part(2, m))
+            self%mass(c(1), c(2), c(3), :) = self%mass(c(1), c(2), c(3), :) &
+              + links%share(master, film)*film_mass(links%cell(:, film))
+          end associate
+        end do
+      end associate
+    end do
+    do m = 1, links%n_films
+      associate (c => links%cell(:, m))
+        if (is_alone(links, m) .and. grid%owns(c)) self%mass(c(1), c(2), c(3), :) = film_mass(c)
+      end associate
+    end do
+  contains
+    pure real(wp) function film_mass(c)
+      integer, intent(in) :: c(3)
+
+      film_mass = rho(c(1), c(2), c(3))*(1.0_wp - solid%alpha(c(1), c(2), c(3)))*grid%volume/dt
+    end function film_mass
+  end subroutine masses_of_groups
 
   !> Legs between neighbours in direction d: ordinary, or wall legs of one or both cells.
   subroutine legs_of_direction(grid, solid, bodies, mu, d, self)

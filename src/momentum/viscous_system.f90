@@ -7,7 +7,7 @@ module viscous_system_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: viscous_t, viscous_init, add_wall, add_side, grow_work, open_share, unknown, wrench
+  public :: viscous_t, viscous_init, add_wall, add_side, grow_work, unknown, wrench
 
   !> Legs between cells and bodies, grouped by body.
   type :: wall_legs_t
@@ -154,14 +154,6 @@ contains
     longer(1:size(self%walls%work, 1), :) = self%walls%work
     call move_alloc(longer, self%walls%work)
   end subroutine grow_work
-
-  !> Share of the cell's mass that moves with velocity component d: mean of its two open faces.
-  elemental function open_share(w_low, w_high) result(m)
-    real(wp), intent(in) :: w_low, w_high   !! open shares of the lower and upper face
-    real(wp) :: m
-
-    m = 0.5_wp*(w_low + w_high)
-  end function open_share
 
   !> Velocity components that are unknowns; the others move with the wall and pull on nothing.
   pure function unknown(mass, x) result(v)

@@ -153,6 +153,7 @@ contains
       call visitor%reals('/blocks/angular_momentum_at_start', 'kg m2/s', [3, n], blocks%l_start)
       call visitor%reals('/blocks/fluid_force', 'N', [3, n], blocks%fluid_force)
       call visitor%reals('/blocks/fluid_torque', 'N m', [3, n], blocks%fluid_torque)
+      call visitor%reals('/blocks/late_force', 'N, N m', [6, n], blocks%late_force)
       call visitor%reals('/blocks/contact_force', 'N', [3, n], blocks%contact_force)
       call visitor%reals('/blocks/contact_torque', 'N m', [3, n], blocks%contact_torque)
       call visitor%integers('/blocks/contacts', [n], blocks%contacts)

@@ -3,7 +3,7 @@ module face_velocity_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
-  use boundary_kinds_m, only: gives_pressure
+  use boundary_kinds_m, only: gives_pressure, no_side
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
   use solid_geometry_m, only: solid_geometry_t
@@ -13,7 +13,9 @@ module face_velocity_m
   implicit none
   private
   public :: acceleration_t, acceleration_init, face_acceleration, cell_mean_of_faces
-  public :: predict_face_velocity, face_velocity_at_walls
+  public :: predict_face_velocity, face_velocity_at_walls, shorten_at_walls, compact_time
+
+  real(wp), parameter :: compact_courant = 0.125_wp   !! Courant number of the longest compact_time
 
   !> Acceleration of the fluid by weight, pressure and surface tension.
   type :: acceleration_t
@@ -265,6 +267,19 @@ contains
     end do
   end subroutine add_deviation
 
+  !> Longest time for which the compact acceleration of a face counts [s].
+  !!
+  !! The term is a viscosity for pressure: it takes the energy dt' sum m (a_f^2 - mean(a)^2) per
+  !! time, which beside a body is a drag of the first order in the step; without it short steps
+  !! break up (docs/decisions/cut_cells.md).
+  elemental function compact_time(dt, courant) result(time)
+    real(wp), intent(in) :: dt        !! [s]
+    real(wp), intent(in) :: courant   !! largest Courant number of the step [-]
+    real(wp) :: time
+
+    time = dt*min(1.0_wp, compact_courant/max(courant, compact_courant))
+  end function compact_time
+
   !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
   elemental function face_step(dt, nu, reach) result(step)
     real(wp), intent(in) :: dt      !! [s]
@@ -275,6 +290,56 @@ contains
     step = dt/(1.0_wp + 2.0_wp*nu*dt*reach)
   end function face_step
 
+  !> Faces of the cells at walls: their compact acceleration counts for `compact_time` by the
+  !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
+  !! all of its damping and has no drag worth the name.
+  subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt                   !! [s]
+    type(rigid_motion_t), intent(in) :: bodies
+    integer, intent(in) :: wall_cell(:, :)       !! (3, *) those cells, of the halo too
+    integer, intent(in) :: body(:)               !! (*) whose wall it is
+    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of a wall cell in that list, 0: none
+    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    type(acceleration_t), intent(in) :: a
+    type(flow_t), intent(inout) :: flow
+    integer :: m, d, c(3)
+
+    do m = 1, size(wall_cell, 2)
+      do d = 1, 3
+        call shorten(wall_cell(:, m), d, body(m))
+        c = wall_cell(:, m) + unit_step(:, d)
+        if (number(c(1), c(2), c(3)) == 0) call shorten(c, d, body(m))
+      end do
+    end do
+  contains
+    !> The lower face of cell f in direction d, at the wall of body b.
+    subroutine shorten(f, d, b)
+      integer, intent(in) :: f(3), d, b
+      integer :: low(3)
+      real(wp) :: nu, reach, past(3), time
+
+      if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
+      if (grid%side_of_face(f(d), d) /= no_side) return
+      low = f - unit_step(:, d)
+      if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
+      reach = sum(1.0_wp/grid%h**2)
+      associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
+        nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
+        past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
+          - wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(i, 1), &
+            grid%centre(j, 2), grid%centre(k, 3)], bodies%x(:, b)))
+        time = compact_time(dt, dt*sum(abs(past)/grid%h))
+        flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
+          - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
+              - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
+      end associate
+    end subroutine shorten
+  end subroutine shorten_at_walls
+
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
   !! that of the cell to that of the wall, where the leg through the face ends; the rest is the
   !! cell's.
@@ -284,11 +349,12 @@ contains
   !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
   !! smaller (measured: docs/decisions/coupling.md). Along the wall the fluid slips past it: taking
   !! the wall's whole velocity there makes the added mass wrong by some per cent.
-  subroutine face_velocity_at_walls(grid, solid, bodies, dt, rho, a, flow)
+  subroutine face_velocity_at_walls(grid, solid, bodies, dt, in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(rigid_motion_t), intent(in) :: bodies   !! motion at the start of the step
+    type(rigid_motion_t), intent(in) :: bodies   !! motion as far as the old pressure makes it
     real(wp), intent(in) :: dt                   !! [s]
+    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
@@ -320,20 +386,38 @@ contains
     subroutine add_side(c, sense, theta, body)
       integer, intent(in) :: c(3), sense, body
       real(wp), intent(in) :: theta   !! [cells]
-      real(wp) :: x_wall(3), wall(3), n(3), u(3), nu, dt_face
+      real(wp) :: x_wall(3), wall(3), n(3), nu, time
 
       if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
-      dt_face = face_step(dt, nu, sum(1.0_wp/grid%h**2))
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))
-      u = flow%u(c(1), c(2), c(3), :) - dt_face*a%cell(c(1), c(2), c(3), :)
       n = wall_normal(low) + wall_normal(f)
+      n = n/max(norm2(n), tiny(1.0_wp))
       sides = sides + 1
-      total = total + u(d) + min(1.0_wp, 0.5_wp/theta)*n(d)*dot_product(n, wall - u) &
-              /max(dot_product(n, n), tiny(1.0_wp)) + dt_face*a%face(f(1), f(2), f(3), d)
+      associate (u => flow%u(c(1), c(2), c(3), :))
+        time = dt
+        if (in_liquid(c(1), c(2), c(3))) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
+        total = total + u(d) + near_wall(theta, n(d), solid%open(f(1), f(2), f(3), d))*n(d) &
+                               *dot_product(n, wall - u) &
+          + face_step(time, nu, sum(1.0_wp/grid%h**2))*(a%face(f(1), f(2), f(3), d) &
+                                                             - a%cell(c(1), c(2), c(3), d))
+      end associate
     end subroutine add_side
+
+    !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
+    !! centre of the cell is.
+    pure function near_wall(theta, n_d, open) result(b)
+      real(wp), intent(in) :: theta, n_d, open   !! leg [cells], normal along it, open share
+      real(wp) :: b
+      real(wp) :: cell, face   !! distances from the wall [cells]
+
+      cell = theta*abs(n_d)
+      face = 0.5_wp*open*sqrt(max(1.0_wp - n_d**2, 0.0_wp))
+      if (open >= 1.0_wp) face = (theta - 0.5_wp)*abs(n_d)
+      b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
+    end function near_wall
 
     !> Wall area of a cell as a vector into the fluid: what its open faces lack to close [m2].
     pure function wall_normal(c) result(area)

@@ -8,6 +8,7 @@ program test_viscous
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_legs_m, only: build_viscous
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
   use viscous_m, only: solve_viscous
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
@@ -17,11 +18,12 @@ program test_viscous
   type(solid_geometry_t) :: solid
   type(rigid_motion_t) :: wall
   type(viscous_t) :: viscous
+  type(linked_cells_t) :: links
   real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, &
     lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
-  real(wp) :: z, worst, momentum(2), film, drag
+  real(wp) :: z, worst, momentum(2), film
   integer :: k, n
 
   call parallel_init()
@@ -57,14 +59,15 @@ program test_viscous
   call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
              5.0_wp*viscous%force(1, 1), 1.0e-7_wp*momentum(1))
 
-  ! The film above the wall, centre inside: mass m, drag 2 mu A^2/V_o, nothing else.
+  ! The film above the wall, centre inside, gives its mass to the cell above it and has no legs.
   call make_wall(heights(2))
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
-  call solve_viscous(grid, wall, flow, viscous)
+  call linked_cells_init(grid, links)
+  call link_cells(grid, solid, links)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, links)
   film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
-  drag = 2.0_wp*mu*grid%area(3)**2/(film*grid%volume)
-  call check('film cell', flow%u(2, 2, 2, 1), speed*5.0_wp*drag/(rho*film*grid%volume &
-                                                               + 5.0_wp*drag), 1.0e-7_wp)
+  call check('mass of a group', viscous%mass(2, 2, 3, :), &
+             spread(rho*(1.0_wp + film)*grid%volume/5.0_wp, 1, 3), 1.0e-12_wp)
+  call check('the film is no unknown', maxval(viscous%mass(2, 2, 2, :)), 0.0_wp, 0.0_wp)
 
   ! The upper side moves too: shear flow between two moving walls.
   grid%side_velocity(1, 2, 3) = lid
@@ -85,7 +88,8 @@ program test_viscous
   grid%side_velocity = 0.0_wp
   call make_gap(3.65_wp*grid%h(3), 3.95_wp*grid%h(3), 2)
   flow%u(:, :, :, 1) = long_time/rho   ! a force of 1 N/m3 over the step
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+  call link_cells(grid, solid, links)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, links)
   call solve_viscous(grid, wall, flow, viscous)
   film = 0.3_wp*grid%h(3)
   call check('film between two walls', flow%u(2, 2, 4, 1), film**2/(12.0_wp*mu), &
@@ -94,7 +98,8 @@ program test_viscous
              0.5_wp*film*[1.0_wp, 1.0_wp], 1.0e-7_wp*film)
   call make_gap(0.0_wp, 0.3_wp*grid%h(3), 1)
   wall%motion(1, 1) = speed
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous)
+  call link_cells(grid, solid, links)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, links)
   call solve_viscous(grid, wall, flow, viscous)
   call check('film between a body and the floor', flow%u(2, 2, 1, 1), 0.5_wp*speed, 1.0e-7_wp)
   call finish_checks()

@@ -1,0 +1,202 @@
+!> What the fluid in the cells at walls and its faces disagree about, a force on the bodies.
+!!
+!! The faces of a cell move the share m_d of its mass, the mean of two open faces; the mass that is
+!! there is m. What the faces gave and the fluid did not get, the bodies have felt too little:
+!! $$ F = \frac{1}{\Delta t} \sum \left[ m_d (\delta u_f - \delta U) - m (\delta u - \delta U)
+!! \right] $$
+!! with delta u_f the change of velocity by the accelerations at the faces, delta u that which the
+!! group took and delta U that of the wall, whose part `uncounted_fluid` counts. It is the part of
+!! the pressure on the wall that the trapezoid rule of the faces misses. In the same way the half of
+!! the old pressure that acts before the transport (`mid_step_m`) does so on the surface of the
+!! start; the bodies get the difference. Fluid and bodies together keep their momentum.
+module wall_balance_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use case_types_m, only: fluid_t
+  use grid_m, only: grid_t
+  use fields_m, only: flow_t
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm
+  use linked_cells_m, only: linked_cells_t, open_shares
+  use mid_step_m, only: mid_step_t
+  use viscous_system_m, only: wrench
+  use momentum_conservative_m, only: mass_through
+  use exact_sum_m, only: exact_sums
+  implicit none
+  private
+  public :: wall_balance_t, wall_balance_init, begin_balance, note_change, note_velocity
+  public :: force_of_walls, force_of_mid_step
+
+  !> Of each wall cell of `linked_cells_t`.
+  type :: wall_balance_t
+    real(wp), allocatable :: mass(:)        !! of its fluid [kg]
+    real(wp), allocatable :: pushed(:, :)   !! (3, *) change of velocity by the faces [m/s]
+    real(wp), allocatable :: gained(:, :)   !! (3, *) that which the group took [m/s]
+    real(wp), allocatable :: before(:, :)   !! (3, *) velocity before the viscous stage [m/s]
+    real(wp), allocatable :: terms(:, :)    !! (*, 6) of the sums
+  end type wall_balance_t
+
+contains
+
+  !> Empty lists.
+  subroutine wall_balance_init(self)
+    type(wall_balance_t), intent(out) :: self
+
+    allocate (self%mass(0), self%pushed(3, 0), self%gained(3, 0), self%before(3, 0), &
+              self%terms(0, 6))
+  end subroutine wall_balance_init
+
+  !> The masses of the wall cells; nothing has changed yet.
+  subroutine begin_balance(fluid, links, flow, self)
+    type(fluid_t), intent(in) :: fluid
+    type(linked_cells_t), intent(in) :: links
+    type(flow_t), intent(in) :: flow
+    type(wall_balance_t), intent(inout) :: self
+    integer :: m
+
+    call ensure_room(links%n, self%mass)
+    call ensure_room(links%n, self%pushed)
+    call ensure_room(links%n, self%gained)
+    call ensure_room(links%n, self%before)
+    if (size(self%terms, 1) < links%n) then
+      deallocate (self%terms)
+      allocate (self%terms(2*links%n, 6))
+    end if
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        self%mass(m) = mass_through(fluid, flow%room(c(1), c(2), c(3)), &
+                                    flow%liquid(c(1), c(2), c(3)))
+      end associate
+    end do
+    self%pushed(:, :links%n) = 0.0_wp
+    self%gained(:, :links%n) = 0.0_wp
+  end subroutine begin_balance
+
+  !> Add dt a of each wall cell to a change of velocity.
+  subroutine note_change(grid, links, dt, a, change)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: links
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    real(wp), intent(inout) :: change(:, :)   !! (3, wall cells) [m/s]
+    integer :: m
+
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        change(:, m) = change(:, m) + dt*a(c(1), c(2), c(3), :)
+      end associate
+    end do
+  end subroutine note_change
+
+  !> Velocity of each wall cell.
+  subroutine note_velocity(grid, links, u, velocity)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: links
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    real(wp), intent(inout) :: velocity(:, :)   !! (3, wall cells) [m/s]
+    integer :: m
+
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        velocity(:, m) = u(c(1), c(2), c(3), :)
+      end associate
+    end do
+  end subroutine note_velocity
+
+  !> Force and torque on each body of what faces and masses disagree about [N, N m].
+  subroutine force_of_walls(grid, solid, links, bodies, at_start, dt, rho, self, force)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(in) :: links
+    type(rigid_motion_t), intent(in) :: bodies, at_start   !! motion at the end and the start
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
+    type(wall_balance_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer :: b, m, n
+    real(wp) :: arm(3), wall(3), moved(3)
+
+    do b = 1, bodies%n
+      n = 0
+      do m = 1, links%n
+        if (links%body(m) /= b) cycle
+        associate (c => links%cell(:, m))
+          if (.not. grid%owns(c)) cycle
+          arm = arm_of(grid, c, bodies%x(:, b))
+          wall = wall_velocity(bodies%motion(:, b) - at_start%motion(:, b), arm)
+          moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
+          n = n + 1
+          self%terms(n, :) = wrench((moved*(self%pushed(:, m) - wall) &
+                                     - self%mass(m)*(self%gained(:, m) - wall))/dt, arm)
+        end associate
+      end do
+      force(:, b) = exact_sums(self%terms(:n, :))
+    end do
+  end subroutine force_of_walls
+
+  !> Force and torque on each body by which the impulses of the old pressure on the surface of the
+  !! start (`mid_step%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
+  !! surface of the end, of groups.
+  subroutine force_of_mid_step(grid, fluid, before, links, bodies, dt, flow, a, mid_step, self, &
+                               force)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(linked_cells_t), intent(in) :: before, links   !! of the start and of the end
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    type(mid_step_t), intent(in) :: mid_step
+    type(wall_balance_t), intent(inout) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer :: b, m, n
+
+    if (size(self%terms, 1) < links%n + before%n) then
+      deallocate (self%terms)
+      allocate (self%terms(2*(links%n + before%n), 6))
+    end if
+    do b = 1, bodies%n
+      n = 0
+      do m = 1, links%n
+        if (links%body(m) == b) call add(links%cell(:, m))
+      end do
+      do m = 1, before%n
+        if (before%body(m) /= b) cycle
+        associate (c => before%cell(:, m))
+          if (links%number(c(1), c(2), c(3)) == 0) call add(c)
+        end associate
+      end do
+      force(:, b) = exact_sums(self%terms(:n, :))
+    end do
+  contains
+    subroutine add(c)
+      integer, intent(in) :: c(3)
+      real(wp) :: f(3), mass
+
+      if (.not. grid%owns(c)) return
+      f = -mid_step%given(c(1), c(2), c(3), :)
+      if (mid_step%takes_part(c(1), c(2), c(3))) then
+        mass = mass_through(fluid, flow%room(c(1), c(2), c(3)), flow%liquid(c(1), c(2), c(3)))
+        f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
+      end if
+      n = n + 1
+      self%terms(n, :) = wrench(f/dt, arm_of(grid, c, bodies%x(:, b)))
+    end subroutine add
+  end subroutine force_of_mid_step
+
+  !> From the centre of mass of a body to the centre of a cell [m].
+  pure function arm_of(grid, c, x) result(arm)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: x(3)
+    real(wp) :: arm(3)
+
+    arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], x)
+  end function arm_of
+
+end module wall_balance_m

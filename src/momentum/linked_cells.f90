@@ -1,0 +1,555 @@
+!> One owner for the fluid in cut cells: films belong to the cells beside them.
+!!
+!! A film is a cut cell whose centre lies in a body. What fluid it holds has no velocity of its own:
+!! it belongs to its masters, the cells with their centre in the fluid across its open faces, by
+!! shares that close with the face. A master and its parts of films are a group with one momentum.
+!! Along the wall all of a group have the velocity u of the master; normal to the wall a film has it
+!! linearly from the master to the wall,
+!! $$ u_{film} = T u + (1 - r)\, n\, n \cdot U_w, \qquad T = 1 - (1 - r)\, n\, n^T $$
+!! with r the distance of the middle of the film from the wall over that of the master, from the
+!! plane of the cut cell. A film without such a neighbour (a gap narrower than a cell) is a group
+!! of its own. Derivation and trials: docs/decisions/cut_cells.md.
+module linked_cells_m
+  use kinds_m, only: wp
+  use vectors_m, only: inverse3
+  use growing_m, only: ensure_room
+  use grid_m, only: grid_t, n_halo, unit_step
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm
+  use plic_m, only: unit_constant
+  implicit none
+  private
+  public :: linked_cells_t, linked_cells_init, link_cells
+  public :: match_densities, share_momentum, share_acceleration, follow_masters, is_alone
+  public :: open_shares
+
+  integer, parameter :: reach = 2            !! layers of the halo with films that are needed
+  integer, parameter :: masters_at_most = 3  !! of a film
+
+  !> The cells at walls, and the groups among them. A wall cell is a cut cell or a master.
+  type :: linked_cells_t
+    integer :: n = 0                             !! wall cells, films first
+    integer :: n_films = 0
+    integer, allocatable :: cell(:, :)           !! (3, *)
+    integer, allocatable :: body(:)              !! (*) body whose wall it is
+    integer, allocatable :: number(:, :, :)      !! number of a wall cell, else 0
+    real(wp), allocatable :: normal(:, :)        !! (3, films) of the wall, into the fluid
+    integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
+    real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
+    real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
+    integer :: n_groups = 0                      !! with a master beside an own cell
+    integer, allocatable :: leader(:)            !! (groups) number of the master
+    integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
+    integer, allocatable :: part(:, :)           !! (2, *) film, which of its masters
+  end type linked_cells_t
+
+contains
+
+  !> Allocate for a grid; no cells.
+  subroutine linked_cells_init(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    a = grid%first
+    b = grid%last
+    allocate (self%cell(3, 0), self%body(0), self%normal(3, 0), self%leader(0), self%part(2, 0))
+    allocate (self%master(masters_at_most, 0))
+    allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
+    allocate (self%first(1), source=1)
+    allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+  end subroutine linked_cells_init
+
+  !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to.
+  subroutine link_cells(grid, solid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(inout) :: self
+    integer :: m, c(3)
+
+    do m = 1, self%n
+      c = self%cell(:, m)
+      self%number(c(1), c(2), c(3)) = 0
+    end do
+    self%n = 0
+    do m = 1, solid%n_cut
+      c = solid%cut_cell(:, m)
+      if (is_film(grid, solid, c)) call add_cell(c, solid%inside(c(1), c(2), c(3)), self)
+    end do
+    self%n_films = self%n
+    call add_cut_cells(grid, solid, self)
+    call find_masters(grid, solid, self)
+    call group_films(grid, self)
+  end subroutine link_cells
+
+  !> Is a cut cell a film of this process or of the halo that matters?
+  pure function is_film(grid, solid, c) result(yes)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    logical :: yes
+    integer :: d, e(3)
+
+    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, reach)
+    if (.not. yes) return
+    yes = any(solid%open(c(1), c(2), c(3), :) > 0.0_wp)
+    do d = 1, 3
+      e = c + unit_step(:, d)
+      yes = yes .or. solid%open(e(1), e(2), e(3), d) > 0.0_wp
+    end do
+  end function is_film
+
+  !> In the domain, and an own cell or one of the layers of the halo that matter.
+  pure function is_near(grid, c, layers) result(yes)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c(3)
+    integer, intent(in) :: layers
+    logical :: yes
+
+    yes = all(c >= grid%lo - layers .and. c <= grid%hi + layers) .and. .not. grid%outside(c)
+  end function is_near
+
+  !> A wall cell more, if it is not in the list.
+  subroutine add_cell(c, body, self)
+    integer, intent(in) :: c(3), body
+    type(linked_cells_t), intent(inout) :: self
+
+    if (self%number(c(1), c(2), c(3)) > 0) return
+    self%n = self%n + 1
+    call ensure_room(self%n, self%cell)
+    call ensure_room(self%n, self%body)
+    self%cell(:, self%n) = c
+    self%body(self%n) = body
+    self%number(c(1), c(2), c(3)) = self%n
+  end subroutine add_cell
+
+  !> The cut cells with their centre in the fluid, each at the wall of the body that fills most of
+  !! it, and the cells at faces that a body fills in part.
+  subroutine add_cut_cells(grid, solid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(inout) :: self
+    real(wp), allocatable :: most(:)
+    integer :: b, m, n, c(3)
+
+    allocate (most(0))
+    do b = 1, size(solid%body_cell) - 1
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        c = solid%cell(:, m)
+        if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, reach)) cycle
+        n = self%number(c(1), c(2), c(3))
+        if (n == 0) then
+          call add_cell(c, b, self)
+          n = self%n
+          call ensure_room(n, most)
+          most(n) = 0.0_wp
+        end if
+        if (solid%cell_alpha(m) <= most(n)) cycle
+        most(n) = solid%cell_alpha(m)
+        self%body(n) = b
+      end do
+    end do
+    do b = 1, size(solid%body_face) - 1
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        call add_beside(solid%face(1:3, m))
+        call add_beside(solid%face(1:3, m) - unit_step(:, solid%face(4, m)))
+      end do
+    end do
+  contains
+    subroutine add_beside(c)
+      integer, intent(in) :: c(3)
+
+      if (.not. is_near(grid, c, reach)) return
+      if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell(c, b, self)
+    end subroutine add_beside
+  end subroutine add_cut_cells
+
+  !> Masters, normal and profile of each film.
+  subroutine find_masters(grid, solid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(inout) :: self
+    integer :: m, n, c(3), steps(3, masters_at_most), body
+    real(wp) :: share(masters_at_most)
+
+    call ensure_room(self%n_films, self%normal)
+    call ensure_room(self%n_films, self%master)
+    call ensure_room(self%n_films, self%share)
+    call ensure_room(self%n_films, self%nearer)
+    do m = 1, self%n_films
+      c = self%cell(:, m)
+      body = self%body(m)
+      self%normal(:, m) = wall_normal(grid, solid, c)
+      self%master(:, m) = 0
+      self%nearer(:, m) = 0.0_wp
+      call to_masters(grid, solid, c, self%normal(:, m), steps, share)
+      self%share(:, m) = share
+      do n = 1, masters_at_most
+        if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
+        self%nearer(n, m) = nearer_than(grid, solid, c, steps(:, n), self%normal(:, m))
+        call add_cell(c + steps(:, n), body, self)
+        self%master(n, m) = self%number(c(1) + steps(1, n), c(2) + steps(2, n), c(3) + steps(3, n))
+      end do
+    end do
+  end subroutine find_masters
+
+  !> Steps from film c to its masters, and their shares of it, zero where there is none: cells
+  !! across its open faces whose centre lies in the fluid, by open area along the normal; without
+  !! any the one of the 26 around it that is most along the normal.
+  pure subroutine to_masters(grid, solid, c, normal, steps, share)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: normal(3)   !! of the wall
+    integer, intent(out) :: steps(3, masters_at_most)
+    real(wp), intent(out) :: share(masters_at_most)
+    integer :: d, f(3), i, j, k
+    real(wp) :: along
+
+    do d = 1, 3
+      steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
+      f = c + max(steps(:, d), 0)
+      share(d) = 0.0_wp
+      if (is_fluid(steps(:, d))) share(d) = solid%open(f(1), f(2), f(3), d)*abs(normal(d))
+    end do
+    if (any(share > 0.0_wp)) then
+      share = share/sum(share)
+      return
+    end if
+    along = 0.0_wp
+    do k = -1, 1
+      do j = -1, 1
+        do i = -1, 1
+          if (.not. is_fluid([i, j, k])) cycle
+          if (dot_product(normal, real([i, j, k], wp))/norm2(real([i, j, k], wp)) <= along) cycle
+          along = dot_product(normal, real([i, j, k], wp))/norm2(real([i, j, k], wp))
+          steps(:, 1) = [i, j, k]
+          share(1) = 1.0_wp
+        end do
+      end do
+    end do
+  contains
+    pure logical function is_fluid(step)
+      integer, intent(in) :: step(3)
+      integer :: o(3)
+
+      o = c + step
+      is_fluid = .not. grid%outside(o)
+      if (is_fluid) is_fluid = solid%inside(o(1), o(2), o(3)) == 0
+    end function is_fluid
+  end subroutine to_masters
+
+  !> Normal of the wall in a cell, into the fluid, from what its open faces lack to close; zero
+  !! where the walls cancel.
+  pure function wall_normal(grid, solid, c) result(n)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: n(3)
+    real(wp), parameter :: least_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
+    integer :: d, f(3)
+
+    do d = 1, 3
+      f = c + unit_step(:, d)
+      n(d) = grid%area(d)*(solid%open(f(1), f(2), f(3), d) - solid%open(c(1), c(2), c(3), d))
+    end do
+    if (norm2(n) > least_wall*minval(grid%area)) then
+      n = n/norm2(n)
+    else
+      n = 0.0_wp
+    end if
+  end function wall_normal
+
+  !> 1 - r of film c and a master, zero without a normal.
+  pure function nearer_than(grid, solid, c, step, n) result(nearer)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3), step(3)   !! from the film to the master
+    real(wp), intent(in) :: n(3)           !! of the wall
+    real(wp) :: nearer
+    real(wp) :: cube(3), depth, far, level
+
+    nearer = 0.0_wp
+    if (all(abs(n) <= 0.0_wp)) return
+    cube = n*grid%h
+    associate (alpha => solid%alpha(c(1), c(2), c(3)))
+      ! the plane of a cell filled from below, along the normal; distances from the centre
+      depth = unit_constant(cube, alpha) - 0.5_wp*sum(cube)
+      level = unit_constant(cube, 0.5_wp*(1.0_wp + alpha)) - 0.5_wp*sum(cube)
+    end associate
+    far = dot_product(n, real(step, wp)*grid%h) - depth
+    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, (level - depth)/max(far, tiny(far))))
+  end function nearer_than
+
+  !> The parts of films of each master beside an own cell, in the order of their places around it,
+  !! so that sums over a group do not depend on the process.
+  subroutine group_films(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(inout) :: self
+    integer :: m, n, n_parts, i, j, k, f, c(3)
+
+    self%n_groups = 0
+    n_parts = 0
+    do m = self%n_films + 1, self%n
+      c = self%cell(:, m)
+      if (any(c < grid%lo - 1) .or. any(c > grid%hi + 1)) cycle
+      call ensure_room(self%n_groups + 1, self%leader)
+      call ensure_room(self%n_groups + 2, self%first)
+      self%first(self%n_groups + 1) = n_parts + 1
+      do k = c(3) - 1, c(3) + 1
+        do j = c(2) - 1, c(2) + 1
+          do i = c(1) - 1, c(1) + 1
+            f = self%number(i, j, k)
+            if (f < 1 .or. f > self%n_films) cycle
+            n = findloc(self%master(:, f), m, 1)
+            if (n == 0) cycle
+            n_parts = n_parts + 1
+            call ensure_room(n_parts, self%part)
+            self%part(:, n_parts) = [f, n]
+          end do
+        end do
+      end do
+      if (n_parts < self%first(self%n_groups + 1)) cycle
+      self%n_groups = self%n_groups + 1
+      self%leader(self%n_groups) = m
+    end do
+    self%first(self%n_groups + 1) = n_parts + 1
+  end subroutine group_films
+
+  !> Is this film a group of its own?
+  elemental function is_alone(self, film) result(yes)
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: film
+    logical :: yes
+
+    yes = all(self%master(:, film) == 0)
+  end function is_alone
+
+  !> Flatten the profile of films that are heavier than their master.
+  !!
+  !! What a heavy film does would else be extrapolated to the light cell beside it, which amplifies
+  !! it by up to 1/r. With 1 - r times the ratio of the densities a group of water under gas is
+  !! as well conditioned as one of gas alone.
+  subroutine match_densities(grid, rho, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of the fluid [kg/m3]
+    type(linked_cells_t), intent(inout) :: self
+    integer :: m, n
+
+    do m = 1, self%n_films
+      do n = 1, masters_at_most
+        if (self%master(n, m) == 0) cycle
+        associate (c => self%cell(:, m), p => self%cell(:, self%master(n, m)))
+          self%nearer(n, m) = self%nearer(n, m) &
+                              *min(1.0_wp, rho(p(1), p(2), p(3))/rho(c(1), c(2), c(3)))
+        end associate
+      end do
+    end do
+  end subroutine match_densities
+
+  !> Find the velocity of each group that keeps its momentum.
+  !!
+  !! `u` holds any velocities of the members, halo filled; on return those of the groups with a
+  !! master beside an own cell are shared, which makes all own cells right.
+  subroutine share_momentum(grid, self, mass, bodies, u)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    real(wp), intent(in) :: mass(:)              !! (wall cells) of the fluid [kg]
+    type(rigid_motion_t), intent(in) :: bodies   !! the walls
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    real(wp) :: matrix(3, 3), total(3), t(3, 3), wall(3), part
+    real(wp) :: excess(3, self%n_films)   !! of a film over the mean that its masters make it
+    integer :: g, m, d
+
+    !$omp parallel do private(total) schedule(static)
+    do m = 1, self%n_films
+      if (is_alone(self, m)) cycle
+      call film_velocity(grid, self, m, bodies, u, total)
+      associate (f => self%cell(:, m))
+        excess(:, m) = u(f(1), f(2), f(3), :) - total
+      end associate
+    end do
+    !$omp parallel do private(matrix, total, t, wall, part, m, d) schedule(static)
+    do g = 1, self%n_groups
+      associate (leader => self%leader(g), c => self%cell(:, self%leader(g)))
+        matrix = 0.0_wp
+        do d = 1, 3
+          matrix(d, d) = mass(leader)
+        end do
+        total = mass(leader)*u(c(1), c(2), c(3), :)
+        do m = self%first(g), self%first(g + 1) - 1
+          call profile(grid, self, self%part(:, m), bodies, t, wall)
+          associate (film => self%part(1, m))
+            part = self%share(self%part(2, m), film)*mass(film)
+            total = total + part*(matmul(t, u(c(1), c(2), c(3), :)) + excess(:, film))
+            matrix = matrix + part*t
+          end associate
+        end do
+        if (matrix(1, 1) + matrix(2, 2) + matrix(3, 3) > 0.0_wp) then
+          u(c(1), c(2), c(3), :) = matmul(inverse3(matrix), total)
+        end if
+      end associate
+    end do
+    !$omp parallel do private(total) schedule(static)
+    do m = 1, self%n_films
+      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      call film_velocity(grid, self, m, bodies, u, total)
+      associate (f => self%cell(:, m))
+        u(f(1), f(2), f(3), :) = total
+      end associate
+    end do
+  end subroutine share_momentum
+
+  !> Velocity of a film by those of its masters [m/s].
+  pure subroutine film_velocity(grid, self, film, bodies, u, velocity)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: film
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(out) :: velocity(3)
+    real(wp) :: t(3, 3), wall(3)
+    integer :: n
+
+    velocity = 0.0_wp
+    do n = 1, masters_at_most
+      if (self%master(n, film) == 0) cycle
+      call profile(grid, self, [film, n], bodies, t, wall)
+      associate (c => self%cell(:, self%master(n, film)))
+        velocity = velocity + self%share(n, film)*(matmul(t, u(c(1), c(2), c(3), :)) + wall)
+      end associate
+    end do
+  end subroutine film_velocity
+
+  !> T and (1 - r) n n.U_w of a part of a film.
+  pure subroutine profile(grid, self, part, bodies, t, wall)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: part(2)   !! film, which of its masters
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(out) :: t(3, 3), wall(3)
+    real(wp) :: v(3)
+    integer :: d
+
+    associate (m => part(1), n => self%normal(:, part(1)), s => self%nearer(part(2), part(1)))
+      associate (b => self%body(m), c => self%cell(:, m))
+        v = wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(c(1), 1), &
+          grid%centre(c(2), 2), grid%centre(c(3), 3)], bodies%x(:, b)))
+      end associate
+      wall = s*n*dot_product(n, v)
+      do d = 1, 3
+        t(:, d) = -s*n*n(d)
+        t(d, d) = t(d, d) + 1.0_wp
+      end do
+    end associate
+  end subroutine profile
+
+  !> Acceleration of each group: the mean over its cells by the mass that the faces move, component
+  !! by component. Halo filled on entry.
+  subroutine share_acceleration(grid, open, rho, self, a)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
+    type(linked_cells_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp) :: weight(3), total(3), w(3)
+    real(wp) :: excess(3, self%n_films)   !! of a film over the mean of its masters
+    integer :: g, m
+
+    do m = 1, self%n_films
+      if (is_alone(self, m)) cycle
+      call mean_of_masters(grid, self, m, a, total)
+      associate (f => self%cell(:, m))
+        excess(:, m) = a(f(1), f(2), f(3), :) - total
+      end associate
+    end do
+    !$omp parallel do private(weight, total, w, m) schedule(static)
+    do g = 1, self%n_groups
+      associate (c => self%cell(:, self%leader(g)))
+        weight = rho(c(1), c(2), c(3))*open_shares(grid, open, c)
+      end associate
+      total = 0.0_wp
+      do m = self%first(g), self%first(g + 1) - 1
+        associate (f => self%cell(:, self%part(1, m)))
+          w = self%share(self%part(2, m), self%part(1, m))*rho(f(1), f(2), f(3)) &
+              *open_shares(grid, open, f)
+          weight = weight + w
+          total = total + w*excess(:, self%part(1, m))
+        end associate
+      end do
+      associate (c => self%cell(:, self%leader(g)))
+        a(c(1), c(2), c(3), :) = a(c(1), c(2), c(3), :) + total/max(weight, tiny(1.0_wp))
+      end associate
+    end do
+    do m = 1, self%n_films
+      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      call mean_of_masters(grid, self, m, a, total)
+      associate (f => self%cell(:, m))
+        a(f(1), f(2), f(3), :) = total
+      end associate
+    end do
+  end subroutine share_acceleration
+
+  !> Mean of the masters of a film by shares.
+  pure subroutine mean_of_masters(grid, self, film, a, mean)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: film
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(out) :: mean(3)
+    integer :: n
+
+    mean = 0.0_wp
+    do n = 1, masters_at_most
+      if (self%master(n, film) == 0) cycle
+      associate (c => self%cell(:, self%master(n, film)))
+        mean = mean + self%share(n, film)*a(c(1), c(2), c(3), :)
+      end associate
+    end do
+  end subroutine mean_of_masters
+
+  !> Share of the cell's mass that moves with each velocity component: mean of its two open faces.
+  pure function open_shares(grid, open, c) result(w)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer, intent(in) :: c(3)
+    real(wp) :: w(3)
+    integer :: d, e(3)
+
+    do d = 1, 3
+      e = c + unit_step(:, d)
+      w(d) = 0.5_wp*(open(c(1), c(2), c(3), d) + open(e(1), e(2), e(3), d))
+    end do
+  end function open_shares
+
+  !> The own films change by what their masters have changed since the velocities `before`.
+  subroutine follow_masters(grid, self, before, u)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    real(wp), intent(in) :: before(:, :)   !! (3, wall cells) [m/s]
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! halo filled on entry [m/s]
+    real(wp) :: changed(3)
+    integer :: m, n
+
+    do m = 1, self%n_films
+      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      changed = before(:, m)
+      do n = 1, masters_at_most
+        if (self%master(n, m) == 0) cycle
+        associate (c => self%cell(:, self%master(n, m)))
+          changed = changed + self%share(n, m)*(u(c(1), c(2), c(3), :) &
+                                                - before(:, self%master(n, m)))
+        end associate
+      end do
+      associate (f => self%cell(:, m))
+        u(f(1), f(2), f(3), :) = changed
+      end associate
+    end do
+  end subroutine follow_masters
+
+end module linked_cells_m

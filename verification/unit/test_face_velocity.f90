@@ -1,0 +1,131 @@
+!> Faces beside a moving box: how long their compact acceleration counts, and that what is normal to
+!! the wall goes linearly from the velocity of the cell to that of the wall.
+program test_face_velocity
+  use kinds_m, only: wp
+  use grid_m, only: n_halo, unit_step
+  use boundary_m, only: fill_velocity_halo
+  use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity, &
+    face_velocity_at_walls, shorten_at_walls
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use rigid_motion_m, only: wall_velocity
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  integer, parameter :: cells(3) = [8, 8, 9]
+  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.9_wp]          !! cells of 0.1 m
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]      !! of the box [m]
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.43_wp]     !! x from 0.21 to 0.57
+  real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    !! of the box [m/s, rad/s]
+  real(wp), parameter :: stream(3) = [0.6_wp, -0.3_wp, 0.2_wp]       !! [m/s]
+  real(wp), parameter :: dt = 0.02_wp, nu = 0.01_wp                  !! [s], [m2/s]
+  real(wp), parameter :: tolerance = 1.0e-13_wp
+  type(one_body_t) :: box
+  type(linked_cells_t) :: links
+  type(acceleration_t) :: a
+  logical, dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                     1 - n_halo:cells(3) + n_halo) :: in_liquid
+  real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                      1 - n_halo:cells(3) + n_halo, 3) :: before
+  integer :: seed = 13, j, k, d
+
+  call describe(cells, tank, sides, 'box', edges, middle, box%case)
+  call place(box)
+  box%bodies%motion(:, 1) = motion
+  box%flow%mu = nu*box%flow%rho
+  call linked_cells_init(box%grid, links)
+  call link_cells(box%grid, box%solid, links)
+  call acceleration_init(box%grid, a)
+  do d = 1, 3
+    box%flow%u(:, :, :, d) = stream(d)
+    do k = lbound(a%face, 3), ubound(a%face, 3)
+      do j = lbound(a%face, 2), ubound(a%face, 2)
+        call random_numbers(seed, a%face(:, j, k, d))
+        call random_numbers(seed, a%cell(:, j, k, d))
+      end do
+    end do
+  end do
+  call fill_velocity_halo(box%grid, box%flow%u)
+  in_liquid = .true.
+  call short_times()
+  call normal_to_the_wall()
+  call finish_checks()
+
+contains
+
+  !> Faces of cells at walls, each once, in liquid only.
+  subroutine short_times()
+    integer :: i
+
+    in_liquid(7, 4, 5) = .false.
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
+    before = box%flow%uf
+    call shorten_at_walls(box%grid, dt, box%bodies, links%cell(:, :links%n), links%body, &
+                          links%number, in_liquid, box%flow%rho, a, box%flow)
+    do d = 1, 3
+      do k = 2, cells(3)
+        do j = 2, cells(2)
+          do i = 2, cells(1)
+            call check('face for the time of its Courant number', box%flow%uf(i, j, k, d), &
+                       merge(shortened([i, j, k], d), before(i, j, k, d), at_wall([i, j, k], d)), &
+                       tolerance)
+          end do
+        end do
+      end do
+    end do
+    call check('some change', maxval(abs(box%flow%uf - before)) > 1.0e-3_wp)
+    in_liquid = .true.
+  end subroutine short_times
+
+  !> Does a cell beside the lower face of cell f belong to a wall, both in liquid?
+  logical function at_wall(f, d)
+    integer, intent(in) :: f(3), d
+
+    associate (low => f - unit_step(:, d))
+      at_wall = max(links%number(f(1), f(2), f(3)), links%number(low(1), low(2), low(3))) > 0 &
+        .and. in_liquid(f(1), f(2), f(3)) .and. in_liquid(low(1), low(2), low(3))
+    end associate
+  end function at_wall
+
+  !> Its velocity with the time in which the flow past the wall goes an eighth of a cell [m/s].
+  real(wp) function shortened(f, d)
+    integer, intent(in) :: f(3), d
+    integer :: low(3)
+
+    low = f - unit_step(:, d)
+    shortened = stream(d) + time(0.1_wp*(f - 0.5_wp))*(a%face(f(1), f(2), f(3), d) &
+      - 0.5_wp*(a%cell(low(1), low(2), low(3), d) + a%cell(f(1), f(2), f(3), d)))
+  end function shortened
+
+  !> dt' of the stream past the wall at x [s].
+  real(wp) function time(x)
+    real(wp), intent(in) :: x(3)   !! [m]
+
+    time = min(dt, 0.125_wp*0.1_wp/sum(abs(stream - wall_velocity(motion, x - middle))))
+    time = time/(1.0_wp + 2.0_wp*nu*time*3.0_wp/0.1_wp**2)
+  end function time
+
+  !> The wall 0.8 cells below the centre of a cell, and 0.6 cells above that of another.
+  subroutine normal_to_the_wall()
+    real(wp) :: x(3)
+
+    call face_velocity_at_walls(box%grid, box%solid, box%bodies, dt, in_liquid, box%flow%rho, a, &
+                                box%flow)
+    x = [0.57_wp, 0.35_wp, 0.45_wp]
+    call check('face above a wall', box%flow%uf(7, 4, 5, 1), between(x, 0.3_wp/0.8_wp) &
+               + time(x)*(a%face(7, 4, 5, 1) - a%cell(7, 4, 5, 1)), tolerance)
+    x(1) = 0.21_wp
+    call check('face below a wall', box%flow%uf(3, 4, 5, 1), between(x, 0.1_wp/0.6_wp) &
+               + time(x)*(a%face(3, 4, 5, 1) - a%cell(2, 4, 5, 1)), tolerance)
+  end subroutine normal_to_the_wall
+
+  !> Velocity in x at a share of the way from the wall at x to the cell [m/s].
+  real(wp) function between(x, share)
+    real(wp), intent(in) :: x(3), share
+    real(wp) :: wall(3)
+
+    wall = wall_velocity(motion, x - middle)
+    between = share*stream(1) + (1.0_wp - share)*wall(1)
+  end function between
+end program test_face_velocity

@@ -1,0 +1,213 @@
+!> Films and their masters at a box, and what groups share: momentum is kept, a film moves between
+!! its master and the wall, what moves as one keeps moving as one.
+program test_linked_cells
+  use kinds_m, only: wp
+  use grid_m, only: n_halo
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities, &
+    share_momentum, share_acceleration, follow_masters, is_alone
+  use rigid_motion_m, only: wall_velocity
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  integer, parameter :: cells(3) = [8, 8, 7]
+  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.7_wp]         !! cells of 0.1 m
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]   !! x 0.21-0.57, y 0.22-0.58
+  integer, parameter :: top = 4                                     !! open share 0.3 above the box
+  real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    !! of the box [m/s, rad/s]
+  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top film over its master, from the wall
+  type(one_body_t) :: box
+  type(linked_cells_t) :: links
+  real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                      1 - n_halo:cells(3) + n_halo, 3) :: u, before
+  real(wp), allocatable :: mass(:)
+  real(wp) :: sums(3), total(3)
+  integer :: seed = 77, m
+
+  call describe(cells, tank, sides, 'box', edges, middle, box%case)
+  call place(box)
+  box%bodies%motion(:, 1) = motion
+  call linked_cells_init(box%grid, links)
+  do m = 1, 2   ! the second time from what the first has left
+    call link_cells(box%grid, box%solid, links)
+  end do
+  call the_links()
+  allocate (mass(links%n))
+  call random_numbers(seed, mass)
+  mass = 2.0_wp + mass
+  call the_shares()
+  call the_accelerations()
+  call the_rest()
+  call heavy_films()
+  call closing_face()
+  call finish_checks()
+
+contains
+
+  !> Who belongs to whom.
+  subroutine the_links()
+    call check('all know their body', all(links%body(:links%n) == 1))
+    call check('each cell once', count(links%number > 0) == links%n)
+    call check('films have their centre in the box', all([(centre_in_box(m), m=1, links%n_films)]))
+    call check('the top layer belongs to the cells above', &
+               all(master_of(4, 5, top) == [4, 5, top + 1]))
+    call check('at an edge to both beside it, most to the one along the normal', &
+               links%share(:, links%number(4, 6, top)), &
+               [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
+    call check('the normal of the top', links%normal(:, links%number(4, 5, top)), &
+               [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
+    call check('the middle of a film lies at half of it', &
+               1.0_wp - links%nearer(3, links%number(4, 5, top)), r, 1.0e-12_wp)
+    call check('no film is alone', .not. any([(is_alone(links, m), m=1, links%n_films)]))
+    call check('the shares of a film are one', sum(links%share(:, :links%n_films), 1), &
+               spread(1.0_wp, 1, links%n_films), 1.0e-13_wp)
+    call check('every part is in one group', links%first(links%n_groups + 1) - 1, &
+               count(links%master(:, :links%n_films) > 0))
+  end subroutine the_links
+
+  !> Momentum, profile, and a fluid that moves with the box.
+  subroutine the_shares()
+    call fill(u)
+    before = u
+    total = momentum(u)
+    call share_momentum(box%grid, links, mass, box%bodies, u)
+    sums = momentum(u)
+    call check('the momentum is kept', sums, total, 1.0e-11_wp*sum(mass))
+    call check('across the wall a film lies between wall and master', u(4, 5, top, 3), &
+               r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
+    call check('along it all move alike', u(4, 5, top, 1:2), u(4, 5, top + 1, 1:2), 1.0e-12_wp)
+    before = u
+    call share_momentum(box%grid, links, mass, box%bodies, u)
+    call check('sharing twice is sharing once', maxval(abs(u - before)), 0.0_wp, 1.0e-11_wp)
+    box%bodies%motion(4:6, 1) = 0.0_wp
+    do m = 1, 3
+      u(:, :, :, m) = motion(m)
+    end do
+    call share_momentum(box%grid, links, mass, box%bodies, u)
+    do m = 1, 3
+      u(:, :, :, m) = u(:, :, :, m) - motion(m)
+    end do
+    call check('what moves with the box goes on so', maxval(abs(u)), 0.0_wp, 1.0e-13_wp)
+    box%bodies%motion(:, 1) = motion
+  end subroutine the_shares
+
+  !> The mean by the mass that the faces move.
+  subroutine the_accelerations()
+    real(wp) :: w
+
+    box%flow%rho(4, 5, top) = 3.0_wp
+    box%flow%rho(4, 5, top + 1) = 1.0_wp
+    call fill(u)
+    before = u
+    call share_acceleration(box%grid, box%solid%open, box%flow%rho, links, u)
+    w = 3.0_wp*0.5_wp   ! its lower face is closed
+    call check('up: the film counts half', u(4, 5, top, 3), &
+               (w*before(4, 5, top, 3) + before(4, 5, top + 1, 3))/(w + 1.0_wp), 1.0e-13_wp)
+    w = 3.0_wp*0.3_wp
+    call check('along the wall by its open share', u(4, 5, top, 1), &
+               (w*before(4, 5, top, 1) + before(4, 5, top + 1, 1))/(w + 1.0_wp), 1.0e-13_wp)
+    call check('the master likewise', u(4, 5, top + 1, :), u(4, 5, top, :), 0.0_wp)
+    call check('others keep theirs', maxval(abs(u(1, 1, :, :) - before(1, 1, :, :))), 0.0_wp, &
+               0.0_wp)
+    box%flow%rho = box%case%fluid%liquid_density
+  end subroutine the_accelerations
+
+  !> Films follow what their masters do.
+  subroutine the_rest()
+    real(wp) :: noted(3, links%n)
+
+    call fill(u)
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        noted(:, m) = u(c(1), c(2), c(3), :)
+      end associate
+    end do
+    before = u
+    u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + [1.0_wp, 2.0_wp, 3.0_wp]
+    u(4, 5, top, :) = 99.0_wp
+    call follow_masters(box%grid, links, noted, u)
+    call check('films change as their master', u(4, 5, top, :) - before(4, 5, top, :), &
+               [1.0_wp, 2.0_wp, 3.0_wp], 1.0e-14_wp)
+    call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
+               1.0e-14_wp)
+  end subroutine the_rest
+
+  !> A film of water under gas is not extrapolated to the gas.
+  subroutine heavy_films()
+    integer :: film
+
+    film = links%number(4, 5, top)
+    box%flow%rho(4, 5, top) = 1000.0_wp
+    box%flow%rho(4, 5, top + 1) = 1.0_wp
+    call match_densities(box%grid, box%flow%rho, links)
+    call check('a heavy film moves with its master', links%nearer(3, film), &
+               1.0e-3_wp*(1.0_wp - r), 1.0e-12_wp)
+    call check('others keep their profile', links%nearer(3, links%number(5, 5, top)), 1.0_wp - r, &
+               1.0e-12_wp)
+  end subroutine heavy_films
+
+  !> The share of a master goes with the open part of the face to it.
+  subroutine closing_face()
+    associate (film => links%number(4, 6, top))
+      box%solid%open(4, 7, top, 2) = 0.5_wp
+      call link_cells(box%grid, box%solid, links)
+      call check('shares close with the face', links%share(:, film), &
+                 [0.0_wp, 0.5_wp*0.2_wp, 0.8_wp]/0.9_wp, 1.0e-12_wp)
+    end associate
+  end subroutine closing_face
+
+  logical function centre_in_box(m)
+    integer, intent(in) :: m
+
+    associate (c => links%cell(:, m))
+      centre_in_box = box%solid%inside(c(1), c(2), c(3)) == 1
+    end associate
+  end function centre_in_box
+
+  !> Cell of the master above film i, j, k.
+  function master_of(i, j, k) result(c)
+    integer, intent(in) :: i, j, k
+    integer :: c(3)
+
+    c = links%cell(:, links%master(3, links%number(i, j, k)))
+  end function master_of
+
+  !> Momentum of the wall cells [kg m/s].
+  function momentum(u) result(p)
+    real(wp), intent(in) :: u(1 - n_halo:, 1 - n_halo:, 1 - n_halo:, :)
+    real(wp) :: p(3)
+    integer :: n
+
+    p = 0.0_wp
+    do n = 1, links%n
+      associate (c => links%cell(:, n))
+        p = p + mass(n)*u(c(1), c(2), c(3), :)
+      end associate
+    end do
+  end function momentum
+
+  !> Component d of the velocity of the box at the centre of a cell of the top layer [m/s].
+  function wall(i, j, d) result(velocity)
+    integer, intent(in) :: i, j, d
+    real(wp) :: velocity, v(3)
+
+    v = wall_velocity(motion, 0.1_wp*([i, j, top] - 0.5_wp) - middle)
+    velocity = v(d)
+  end function wall
+
+  !> Numbers between -1 and 1.
+  subroutine fill(a)
+    real(wp), intent(out) :: a(:, :, :, :)
+    integer :: j, k, d
+
+    do d = 1, 3
+      do k = 1, size(a, 3)
+        do j = 1, size(a, 2)
+          call random_numbers(seed, a(:, j, k, d))
+        end do
+      end do
+    end do
+  end subroutine fill
+end program test_linked_cells

@@ -1,0 +1,271 @@
+!> What the faces and the masses of the cells at walls disagree about: none in still water or where
+!! they agree, for known changes the sum worked out by hand, and with the fluid no momentum is lost.
+program test_wall_balance
+  use kinds_m, only: wp
+  use vectors_m, only: cross
+  use grid_m, only: n_halo
+  use boundary_m, only: fill_scalar_halo
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+    cell_mean_of_faces
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
+  use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
+  use buoyancy_m, only: uncounted_fluid
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, share_acceleration, &
+    open_shares
+  use mid_step_m, only: mid_step_t, mid_step_init
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
+    force_of_walls, force_of_mid_step
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  integer, parameter :: cells(3) = [8, 8, 9]
+  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.9_wp]         !! cells of 0.1 m
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.43_wp]    !! z 0.245-0.615
+  real(wp), parameter :: dt = 0.02_wp                               !! [s]
+  real(wp), parameter :: gained(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    !! by the box in the step [m/s, rad/s]
+  type(one_body_t) :: box
+  type(linked_cells_t) :: links
+  type(wall_balance_t) :: balance
+  type(rigid_motion_t) :: at_start
+  type(acceleration_t) :: a
+  real(wp) :: force(6, 1)
+  integer :: seed = 91, m
+
+  call describe(cells, tank, sides, 'box', edges, middle, box%case)
+  call place(box)
+  box%flow%room = box%grid%volume*(1.0_wp - box%solid%alpha)
+  box%flow%liquid = box%flow%room
+  call linked_cells_init(box%grid, links)
+  call link_cells(box%grid, box%solid, links)
+  call acceleration_init(box%grid, a)
+  call wall_balance_init(balance)
+  at_start = box%bodies
+  call still_water()
+  call agreement()
+  call one_film()
+  call part_of_the_wall()
+  call momentum_of_all()
+  call two_halves()
+  call finish_checks()
+
+contains
+
+  subroutine begin()
+    call begin_balance(box%case%fluid, links, box%flow, balance)
+  end subroutine begin
+
+  !> Force on the box whose motion changes by `change` in the step [N, N m].
+  subroutine find(change)
+    real(wp), intent(in) :: change(6)
+
+    box%bodies%motion(:, 1) = at_start%motion(:, 1) + change
+    call force_of_walls(box%grid, box%solid, links, box%bodies, at_start, dt, box%flow%rho, &
+                        balance, force)
+    box%bodies%motion = at_start%motion
+  end subroutine find
+
+  !> The pressure that carries the water accelerates nothing.
+  subroutine still_water()
+    integer :: k
+
+    associate (grid => box%grid, fluid => box%case%fluid)
+      do k = 1, cells(3)
+        box%flow%p(:, :, k) = fluid%liquid_density*fluid%gravity(3)*grid%centre(k, 3)
+      end do
+      call fill_scalar_halo(grid, box%flow%p)
+      call face_acceleration(grid, fluid%gravity, box%flow%rho, box%flow%rho, box%flow%p, a%face)
+      call cell_mean_of_faces(grid, box%solid%open, a%face, a%cell)
+      call begin()
+      call check('mass of the fluid that is there', balance%mass(links%number(4, 4, 7)), &
+                 0.85_wp*fluid%liquid_density*grid%volume, 1.0e-9_wp)
+      call note_change(grid, links, dt, a%cell, balance%pushed)
+      call share_acceleration(grid, box%solid%open, box%flow%rho, links, a%cell)
+      call note_change(grid, links, dt, a%cell, balance%gained)
+      call find(spread(0.0_wp, 1, 6))
+      call check('still water: no force', norm2(force), 0.0_wp, &
+                 1.0e-12_wp*fluid%liquid_density*norm2(fluid%gravity)*product(tank))
+    end associate
+  end subroutine still_water
+
+  !> Faces and masses agree in one direction, or all moves as the box does.
+  subroutine agreement()
+    real(wp) :: w(3), velocity(3)
+
+    call begin()
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        w = open_shares(box%grid, box%solid%open, c)
+        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*w(3)
+        balance%pushed(3, m) = 0.1_wp*sum(c)
+        balance%gained(3, m) = 0.1_wp*sum(c)
+      end associate
+    end do
+    call find([0.0_wp, 0.0_wp, -0.7_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+    call check('equal masses: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
+
+    call begin()
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        velocity = wall_velocity(gained, box%grid%centre(c, [1, 2, 3]) - middle)
+        balance%pushed(:, m) = velocity
+        balance%gained(:, m) = velocity
+      end associate
+    end do
+    call find(gained)
+    call check('what gains as the box: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
+  end subroutine agreement
+
+  !> A film at the side of the box, which takes 0.7 of it, and known changes of velocity.
+  subroutine one_film()
+    real(wp), parameter :: pushed(3) = [0.2_wp, -0.1_wp, 0.3_wp]
+    real(wp), parameter :: taken(3) = [0.1_wp, 0.4_wp, 0.2_wp]
+    integer, parameter :: c(3) = [6, 4, 5]
+    real(wp) :: f(3)
+
+    call begin()
+    call check('its open shares', open_shares(box%grid, box%solid%open, c), &
+               [0.5_wp, 0.3_wp, 0.3_wp], 1.0e-12_wp)
+    m = links%number(c(1), c(2), c(3))
+    balance%pushed(:, m) = pushed
+    balance%gained(:, m) = taken
+    call find(spread(0.0_wp, 1, 6))
+    f = box%case%fluid%liquid_density*box%grid%volume &
+        *([0.5_wp, 0.3_wp, 0.3_wp]*pushed - 0.3_wp*taken)/dt
+    call check('one film: force', force(1:3, 1), f, 1.0e-10_wp)
+    call check('one film: torque', force(4:6, 1), cross([0.16_wp, -0.05_wp, 0.02_wp], f), &
+               1.0e-10_wp)
+  end subroutine one_film
+
+  !> What the wall's own change takes off is the inertia that `uncounted_fluid` counts.
+  subroutine part_of_the_wall()
+    logical :: active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                      1 - n_halo:cells(3) + n_halo)
+    type(rigid_flux_t) :: flux
+    real(wp) :: lack(6, 3, 1), change(6)
+    integer :: d
+
+    active = box%solid%alpha < 1.0_wp
+    call rigid_flux_init(box%grid, 1, flux)
+    call build_rigid_flux(box%grid, box%solid, box%bodies, active, flux)
+    lack = uncounted_fluid(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
+    call begin()
+    do d = 1, 3
+      change = 0.0_wp
+      change(d) = gained(d)
+      call find(change)
+      call check('the part of the wall is the uncounted fluid', force(1:3, 1), &
+                 -lack(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
+    end do
+    call check('it is not nothing', maxval(abs(lack(1:3, :, 1))) > 1.0_wp)
+  end subroutine part_of_the_wall
+
+  !> What the faces give, the fluid and the bodies get: fluid that shares accelerations, and two
+  !! bodies that share the walls.
+  subroutine momentum_of_all()
+    type(rigid_motion_t) :: two
+    real(wp) :: from_faces(3), of_fluid(3), forces(6, 2)
+
+    call begin()
+    call fill(a%cell)
+    call note_change(box%grid, links, dt, a%cell, balance%pushed)
+    from_faces = 0.0_wp
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        from_faces = from_faces + box%case%fluid%liquid_density*box%grid%volume*dt &
+          *open_shares(box%grid, box%solid%open, c)*a%cell(c(1), c(2), c(3), :)
+        if (modulo(sum(c), 3) == 0) links%body(m) = 2
+      end associate
+    end do
+    call share_acceleration(box%grid, box%solid%open, box%flow%rho, links, a%cell)
+    call note_change(box%grid, links, dt, a%cell, balance%gained)
+    of_fluid = matmul(balance%gained(:, :links%n), balance%mass(:links%n))
+    call rigid_motion_init(2, two)
+    two%x = spread(middle, 2, 2)
+    call force_of_walls(box%grid, box%solid, links, two, two, dt, box%flow%rho, balance, forces)
+    call check('momentum: fluid and bodies get what the faces give', &
+               of_fluid + dt*sum(forces(1:3, :), 2), from_faces, 1.0e-12_wp*sum(balance%mass))
+    call check('momentum: both bodies get some', all(norm2(forces(1:3, :), 1) > 1.0_wp))
+    links%body(:links%n) = 1
+  end subroutine momentum_of_all
+
+  !> The two halves of the old pressure: where they are the same, no force; else what was given on
+  !! the surface of the start less what would be on that of the end, wherever there was a wall.
+  subroutine two_halves()
+    type(linked_cells_t) :: before
+    type(mid_step_t) :: mid_step
+    real(wp) :: sums(3), mass
+    integer :: i, j, k
+
+    before = links
+    call mid_step_init(box%grid, mid_step)
+    mid_step%takes_part = .true.
+    call begin()
+    call fill(a%cell)
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          mass = box%case%fluid%liquid_density*box%flow%room(i, j, k)
+          mid_step%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+        end do
+      end do
+    end do
+    call find_halves(before, mid_step)
+    call check('equal halves: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
+
+    ! The box was elsewhere; a cell gets no second half.
+    call move_box(0.13_wp, before)
+    mid_step%takes_part(6, 4, 5) = .false.
+    sums = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          call random_numbers(seed, mid_step%given(i, j, k, :))
+          if (max(before%number(i, j, k), links%number(i, j, k)) == 0) cycle
+          sums = sums - mid_step%given(i, j, k, :)
+          if (.not. mid_step%takes_part(i, j, k)) cycle
+          sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%room(i, j, k) &
+                        *a%cell(i, j, k, :)
+        end do
+      end do
+    end do
+    call find_halves(before, mid_step)
+    call check('momentum of the halves goes to the body', dt*force(1:3, 1), sums, 1.0e-11_wp)
+  end subroutine two_halves
+
+  subroutine find_halves(before, mid_step)
+    type(linked_cells_t), intent(in) :: before
+    type(mid_step_t), intent(in) :: mid_step
+
+    call force_of_mid_step(box%grid, box%case%fluid, before, links, box%bodies, dt, box%flow, &
+                           a%cell, mid_step, balance, force)
+  end subroutine find_halves
+
+  !> The links of the box lifted by `way`.
+  subroutine move_box(way, lifted)
+    real(wp), intent(in) :: way   !! [m]
+    type(linked_cells_t), intent(out) :: lifted
+    type(one_body_t) :: other
+
+    call describe(cells, tank, sides, 'box', edges, middle + [0.0_wp, 0.0_wp, way], other%case)
+    call place(other)
+    call linked_cells_init(other%grid, lifted)
+    call link_cells(other%grid, other%solid, lifted)
+  end subroutine move_box
+
+  !> Numbers between -1 and 1.
+  subroutine fill(b)
+    real(wp), intent(out) :: b(:, :, :, :)
+    integer :: j, k, d
+
+    do d = 1, 3
+      do k = 1, size(b, 3)
+        do j = 1, size(b, 2)
+          call random_numbers(seed, b(:, j, k, d))
+        end do
+      end do
+    end do
+  end subroutine fill
+end program test_wall_balance
