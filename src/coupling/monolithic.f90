@@ -22,6 +22,7 @@ module monolithic_m
   use buoyancy_m, only: uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities, share_momentum, &
                             share_acceleration, follow_masters
+  use wall_layer_m, only: find_slip
   use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
     force_of_mid_step
   use surface_stress_m, only: surface_stress
@@ -51,6 +52,7 @@ contains
     call begin_balance(case%fluid, stage%links, flow, stage%balance)
     call find_inertia(grid, stage%links, stage%balance%mass, flow, stage%rho)
     call match_densities(grid, stage%rho, stage%links)
+    call find_slip(grid, solid, stage%at_start, flow%u, stage%links)
     call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, flow%u)
     associate (system => stage%pressure%system)
       call set_pressure_system(grid, solid%open, stage%rho, system, flow%sides)

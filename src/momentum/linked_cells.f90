@@ -3,9 +3,9 @@
 !! A film is a cut cell whose centre lies in a body. What fluid it holds has no velocity of its own:
 !! it belongs to its masters, the cells with their centre in the fluid across its open faces, by
 !! shares that close with the face. A master and its parts of films are a group with one momentum.
-!! Along the wall all of a group have the velocity u of the master; normal to the wall a film has it
-!! linearly from the master to the wall,
-!! $$ u_{film} = T u + (1 - r)\, n\, n \cdot U_w, \qquad T = 1 - (1 - r)\, n\, n^T $$
+!! Normal to the wall the velocity of a film is linear from its master to the wall; along the wall
+!! it has more of the master's, by the slip s of `wall_layer_m`,
+!! $$ u_{film} = T u + (1 - T) U_w, \qquad T = 1 - (1 - r) (1 - s + s\, n\, n^T) $$
 !! with r the distance of the middle of the film from the wall over that of the master, from the
 !! plane of the cut cell. A film without such a neighbour (a gap narrower than a cell) is a group
 !! of its own. Derivation and trials: docs/decisions/cut_cells.md.
@@ -22,7 +22,7 @@ module linked_cells_m
   private
   public :: linked_cells_t, linked_cells_init, link_cells
   public :: match_densities, share_momentum, share_acceleration, follow_masters, is_alone
-  public :: open_shares
+  public :: open_shares, velocity_at_wall, master_distance
 
   integer, parameter :: reach = 2            !! layers of the halo with films that are needed
   integer, parameter :: masters_at_most = 3  !! of a film
@@ -38,6 +38,7 @@ module linked_cells_m
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
     real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
+    real(wp), allocatable :: slip(:, :, :)       !! of the film in a cell, along the wall, 0 to 1
     integer :: n_groups = 0                      !! with a master beside an own cell
     integer, allocatable :: leader(:)            !! (groups) number of the master
     integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
@@ -59,6 +60,7 @@ contains
     allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine linked_cells_init
 
   !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to.
@@ -268,19 +270,37 @@ contains
     integer, intent(in) :: c(3), step(3)   !! from the film to the master
     real(wp), intent(in) :: n(3)           !! of the wall
     real(wp) :: nearer
-    real(wp) :: cube(3), depth, far, level
+    real(wp) :: middle, far
 
     nearer = 0.0_wp
     if (all(abs(n) <= 0.0_wp)) return
-    cube = n*grid%h
     associate (alpha => solid%alpha(c(1), c(2), c(3)))
-      ! the plane of a cell filled from below, along the normal; distances from the centre
-      depth = unit_constant(cube, alpha) - 0.5_wp*sum(cube)
-      level = unit_constant(cube, 0.5_wp*(1.0_wp + alpha)) - 0.5_wp*sum(cube)
+      middle = level_of(grid, n, 0.5_wp*(1.0_wp + alpha)) - level_of(grid, n, alpha)
     end associate
-    far = dot_product(n, real(step, wp)*grid%h) - depth
-    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, (level - depth)/max(far, tiny(far))))
+    far = master_distance(grid, solid, c, step, n)
+    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, middle/max(far, tiny(far))))
   end function nearer_than
+
+  !> Distance of the master of film c from the plane of the film [m].
+  pure function master_distance(grid, solid, c, step, n) result(distance)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3), step(3)   !! from the film to the master
+    real(wp), intent(in) :: n(3)           !! of the wall
+    real(wp) :: distance
+
+    distance = dot_product(n, real(step, wp)*grid%h) &
+               - level_of(grid, n, solid%alpha(c(1), c(2), c(3)))
+  end function master_distance
+
+  !> Place along the normal of the plane below which a share of a cell lies, from its centre [m].
+  pure function level_of(grid, n, share) result(level)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: n(3), share
+    real(wp) :: level
+
+    level = unit_constant(n*grid%h, share) - 0.5_wp*sum(n*grid%h)
+  end function level_of
 
   !> The parts of films of each master beside an own cell, in the order of their places around it,
   !! so that sums over a group do not depend on the process.
@@ -424,28 +444,45 @@ contains
     end do
   end subroutine film_velocity
 
-  !> T and (1 - r) n n.U_w of a part of a film.
+  !> T and (1 - T) U_w of a part of a film.
   pure subroutine profile(grid, self, part, bodies, t, wall)
     type(grid_t), intent(in) :: grid
     type(linked_cells_t), intent(in) :: self
     integer, intent(in) :: part(2)   !! film, which of its masters
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(out) :: t(3, 3), wall(3)
-    real(wp) :: v(3)
+    real(wp) :: v(3), less(3, 3), slip
     integer :: d
 
-    associate (m => part(1), n => self%normal(:, part(1)), s => self%nearer(part(2), part(1)))
-      associate (b => self%body(m), c => self%cell(:, m))
-        v = wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(c(1), 1), &
-          grid%centre(c(2), 2), grid%centre(c(3), 3)], bodies%x(:, b)))
-      end associate
-      wall = s*n*dot_product(n, v)
+    associate (m => part(1), n => self%normal(:, part(1)), c => self%cell(:, part(1)))
+      slip = self%slip(c(1), c(2), c(3))
+      v = velocity_at_wall(grid, self, m, bodies)
       do d = 1, 3
-        t(:, d) = -s*n*n(d)
-        t(d, d) = t(d, d) + 1.0_wp
+        less(:, d) = slip*n*n(d)
+        less(d, d) = less(d, d) + 1.0_wp - slip
       end do
+      less = self%nearer(part(2), m)*less
     end associate
+    wall = matmul(less, v)
+    t = -less
+    do d = 1, 3
+      t(d, d) = t(d, d) + 1.0_wp
+    end do
   end subroutine profile
+
+  !> Velocity of the wall of a film [m/s].
+  pure function velocity_at_wall(grid, self, film, bodies) result(v)
+    type(grid_t), intent(in) :: grid
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: film
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp) :: v(3)
+
+    associate (b => self%body(film), c => self%cell(:, film))
+      v = wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(c(1), 1), &
+        grid%centre(c(2), 2), grid%centre(c(3), 3)], bodies%x(:, b)))
+    end associate
+  end function velocity_at_wall
 
   !> Acceleration of each group: the mean over its cells by the mass that the faces move, component
   !! by component. Halo filled on entry.

@@ -69,6 +69,7 @@ contains
 
   !> Momentum, profile, and a fluid that moves with the box.
   subroutine the_shares()
+    links%slip = 1.0_wp
     call fill(u)
     before = u
     total = momentum(u)
@@ -77,7 +78,16 @@ contains
     call check('the momentum is kept', sums, total, 1.0e-11_wp*sum(mass))
     call check('across the wall a film lies between wall and master', u(4, 5, top, 3), &
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
-    call check('along it all move alike', u(4, 5, top, 1:2), u(4, 5, top + 1, 1:2), 1.0e-12_wp)
+    call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
+               u(4, 5, top + 1, 1:2), 1.0e-12_wp)
+    links%slip = 0.25_wp
+    call fill(u)
+    total = momentum(u)
+    call share_momentum(box%grid, links, mass, box%bodies, u)
+    call check('with a layer the momentum is kept too', momentum(u), total, 1.0e-11_wp*sum(mass))
+    call check('along the wall a film has more of the velocity of its master', u(4, 5, top, 1:2), &
+               [(wall(4, 5, m) + (r + (1.0_wp - r)*0.25_wp)*(u(4, 5, top + 1, m) - wall(4, 5, m)), &
+                 m=1, 2)], 1.0e-12_wp)
     before = u
     call share_momentum(box%grid, links, mass, box%bodies, u)
     call check('sharing twice is sharing once', maxval(abs(u - before)), 0.0_wp, 1.0e-11_wp)

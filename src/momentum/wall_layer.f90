@@ -1,0 +1,107 @@
+!> How fast the fluid of a film runs along the wall.
+!!
+!! Between the wall and the cell behind its master the velocity along the wall is taken as that of
+!! a layer, \( U (1 - e^{-y/\delta}) \), which is linear where the layer is thick against the cells
+!! and free slip where it is thin, as without viscosity. The two cells tell its thickness: with
+!! y_m and y_n their distances from the wall and a the ratio of their velocities along it,
+!! $$ E = e^{-y_m/\delta} = \frac{1 - a}{a} \frac{y_m}{y_n - y_m} $$
+!! (exact for y_n = 2 y_m and at both ends), and the film has \( (1 - E^r)/(1 - E) \) of its master's
+!! velocity, r the ratio of their distances. If films had all of it, the wall layer would carry
+!! momentum that no fluid has, and friction be too large (docs/decisions/cut_cells.md).
+module wall_layer_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, n_halo
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_motion_m, only: rigid_motion_t
+  use linked_cells_m, only: linked_cells_t, velocity_at_wall, master_distance
+  use parallel_m, only: halo_exchange
+  implicit none
+  private
+  public :: find_slip, layer_slip
+
+contains
+
+  !> The slip of each film: the mean over its masters with fluid behind them, by what each takes
+  !! off its velocity (share times 1 - r); none in gaps where there is no such master.
+  subroutine find_slip(grid, solid, bodies, u, links)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies   !! the walls
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! halo filled [m/s]
+    type(linked_cells_t), intent(inout) :: links
+    real(wp) :: slip, weight, weights
+    integer :: m, n
+
+    do m = 1, links%n_films
+      associate (f => links%cell(:, m))
+        if (.not. grid%owns(f)) cycle
+        slip = 0.0_wp
+        weights = 0.0_wp
+        do n = 1, size(links%master, 1)
+          if (links%master(n, m) == 0) cycle
+          if (.not. is_fluid(2*links%cell(:, links%master(n, m)) - f)) cycle
+          weight = links%share(n, m)*links%nearer(n, m)
+          slip = slip + weight*slip_beside(m, n)
+          weights = weights + weight
+        end do
+        links%slip(f(1), f(2), f(3)) = slip/max(weights, tiny(weights))
+      end associate
+    end do
+    call halo_exchange(links%slip, n_halo)
+  contains
+    !> Has a cell its centre in the fluid?
+    pure logical function is_fluid(c)
+      integer, intent(in) :: c(3)
+
+      is_fluid = .not. grid%outside(c)
+      if (is_fluid) is_fluid = solid%inside(c(1), c(2), c(3)) == 0
+    end function is_fluid
+
+    !> Slip of film m by its master number n and the cell behind that one.
+    pure real(wp) function slip_beside(m, n)
+      integer, intent(in) :: m, n
+      real(wp) :: wall(3), along(3), along_next(3), ratio, distance
+      integer :: next(3)
+
+      associate (f => links%cell(:, m), c => links%cell(:, links%master(n, m)), &
+                 normal => links%normal(:, m))
+        next = 2*c - f
+        wall = velocity_at_wall(grid, links, m, bodies)
+        along = along_wall(u(c(1), c(2), c(3), :) - wall, normal)
+        along_next = along_wall(u(next(1), next(2), next(3), :) - wall, normal)
+        ratio = dot_product(along, along_next) &
+                /max(dot_product(along_next, along_next), tiny(1.0_wp))
+        distance = master_distance(grid, solid, f, c - f, normal)
+        slip_beside = layer_slip(ratio, distance/(distance + dot_product(normal, (c - f)*grid%h)), &
+                                 1.0_wp - links%nearer(n, m))
+      end associate
+    end function slip_beside
+  end subroutine find_slip
+
+  !> Part of a velocity along a wall of normal n.
+  pure function along_wall(v, n) result(along)
+    real(wp), intent(in) :: v(3), n(3)
+    real(wp) :: along(3)
+
+    along = v - n*dot_product(n, v)
+  end function along_wall
+
+  !> Slip of a film in the layer: 0 if its velocity is linear to the wall, 1 if it has all of its
+  !! master's.
+  elemental function layer_slip(ratio, distances, r) result(slip)
+    real(wp), intent(in) :: ratio       !! of the velocities of the master and the next cell
+    real(wp), intent(in) :: distances   !! of their distances from the wall, below 1
+    real(wp), intent(in) :: r           !! of the distances of film and master
+    real(wp) :: slip
+    real(wp), parameter :: linear = 0.999_wp   !! E of a profile that is a line to round-off
+    real(wp) :: a, e
+
+    slip = 0.0_wp
+    a = min(1.0_wp, max(ratio, distances))
+    e = (1.0_wp - a)/a*distances/(1.0_wp - distances)
+    if (e > linear .or. r >= 1.0_wp) return
+    slip = ((1.0_wp - e**r)/(1.0_wp - e) - r)/(1.0_wp - r)
+  end function layer_slip
+
+end module wall_layer_m

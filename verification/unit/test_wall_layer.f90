@@ -1,0 +1,104 @@
+!> The layer at a wall: a line where it is thick, free slip where there is none, else exponential.
+program test_wall_layer
+  use kinds_m, only: wp
+  use grid_m, only: n_halo
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use wall_layer_m, only: find_slip, layer_slip
+  use rigid_motion_m, only: wall_velocity
+  use one_body_m, only: one_body_t, describe, place
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  integer, parameter :: cells(3) = [8, 8, 7]
+  real(wp), parameter :: tank(3) = [0.8_wp, 0.8_wp, 0.7_wp]         !! cells of 0.1 m
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]
+  integer, parameter :: top = 4                                     !! open share 0.3 above the box
+  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top film over its master, from the wall
+  real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
+    !! of the box [m/s, rad/s]
+  type(one_body_t) :: box
+  type(linked_cells_t) :: links
+  real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                      1 - n_halo:cells(3) + n_halo, 3) :: u
+
+  call the_formula()
+  call describe(cells, tank, sides, 'box', edges, middle, box%case)
+  call place(box)
+  box%bodies%motion(:, 1) = motion
+  call linked_cells_init(box%grid, links)
+  call link_cells(box%grid, box%solid, links)
+  call above_the_box()
+  call finish_checks()
+
+contains
+
+  !> Cells at distances 1 and 2 from the wall: the formula is exact.
+  subroutine the_formula()
+    integer :: m
+    real(wp) :: delta, film
+
+    do m = -2, 2
+      delta = 2.0_wp**m
+      film = velocity_in_layer(r, delta)/velocity_in_layer(1.0_wp, delta)
+      call check('exponential layer', r + (1.0_wp - r)*layer_slip( &
+        velocity_in_layer(1.0_wp, delta)/velocity_in_layer(2.0_wp, delta), 0.5_wp, r), film, &
+        1.0e-12_wp)
+    end do
+    call check('a line has no slip', layer_slip(0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
+    call check('nor has what is below it', layer_slip(-0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
+    call check('near a line it is small', layer_slip(0.5002_wp, 0.5_wp, r), 0.0_wp, 1.0e-3_wp)
+    call check('without a layer all slips', layer_slip(1.0_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
+    call check('faster at the wall: likewise', layer_slip(1.5_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
+    call check('a film as far as its master', layer_slip(0.7_wp, 0.4_wp, 1.0_wp), 0.0_wp, 0.0_wp)
+  end subroutine the_formula
+
+  !> Flows over the top of a box that moves and turns; the master lies 0.8 cells above it.
+  subroutine above_the_box()
+    call run_along(1.0e6_wp)
+    call check('shear: linear', slip(), 0.0_wp, 1.0e-5_wp)
+    call run_along(1.0e-3_wp)
+    call check('no layer: free slip', slip(), 1.0_wp, 1.0e-12_wp)
+    call run_along(8.0_wp)
+    call check('a layer of many cells: within 1 %', r + (1.0_wp - r)*slip(), &
+               velocity_in_layer(0.15_wp, 8.0_wp)/velocity_in_layer(0.8_wp, 8.0_wp), 0.002_wp)
+    call run_along(1.0_wp)
+    call check('a layer of one cell: velocity of the film within 5 % of the true one', &
+               r + (1.0_wp - r)*slip(), &
+               velocity_in_layer(0.15_wp, 1.0_wp)/velocity_in_layer(0.8_wp, 1.0_wp), 0.013_wp)
+  end subroutine above_the_box
+
+  !> A layer of thickness delta [cells] along x2, in the frame of the box at the film's centre.
+  subroutine run_along(delta)
+    real(wp), intent(in) :: delta
+    integer :: k
+
+    do k = lbound(u, 3), ubound(u, 3)
+      u(:, :, k, 1) = wall(1)
+      u(:, :, k, 2) = wall(2) + delta*velocity_in_layer(max(0.0_wp, k - top - 0.2_wp), delta)
+      u(:, :, k, 3) = wall(3) + 7.0_wp*k
+    end do
+    call find_slip(box%grid, box%solid, box%bodies, u, links)
+  end subroutine run_along
+
+  real(wp) function slip()
+    slip = links%slip(4, 5, top)
+  end function slip
+
+  !> Component d of the velocity of the box at the centre of the film [m/s].
+  function wall(d) result(velocity)
+    integer, intent(in) :: d
+    real(wp) :: velocity, v(3)
+
+    v = wall_velocity(motion, 0.1_wp*([4, 5, top] - 0.5_wp) - middle)
+    velocity = v(d)
+  end function wall
+
+  !> 1 - exp(-y/delta).
+  elemental function velocity_in_layer(y, delta) result(v)
+    real(wp), intent(in) :: y, delta
+    real(wp) :: v
+
+    v = 1.0_wp - exp(-y/delta)
+  end function velocity_in_layer
+end program test_wall_layer
