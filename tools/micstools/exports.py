@@ -3,12 +3,11 @@
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from micstools import gltf
+from micstools import gltf, vtk_data
 from micstools.geometry import Array, IntArray
 from micstools.overlap import present_bodies
 from micstools.reader import BadRun, Run
@@ -82,11 +81,11 @@ def to_pvd(run: Run, _row: int, folder: Path) -> Path:
     for frame, time in enumerate(times):
         if run.bodies.n:
             name = f"blocks-{frame:05d}.vtp"
-            _polygons(run, float(time)).save(folder / name)
+            vtk_data.all_blocks(run, run.bodies.row(time)).save(folder / name)
             parts.setdefault("blocks", []).append((float(time), name))
         if run.field_times.size:
             name = f"fields-{frame:05d}.vti"
-            _image(run, float(time)).save(folder / name)
+            vtk_data.cells(run, run.fields(time)).save(folder / name)
             parts.setdefault("fields", []).append((float(time), name))
     for what, files in parts.items():
         (folder / f"{what}.pvd").write_text(_collection(files))
@@ -98,36 +97,6 @@ def _film_rows(run: Run) -> IntArray:
     time = run.bodies.time
     wanted = np.linspace(time[0], time[-1], int(FILMED * (time[-1] - time[0])) + 2)
     return np.unique(np.searchsorted(time, wanted).clip(0, len(time) - 1))
-
-
-def _polygons(run: Run, time: float) -> Any:
-    """The released blocks as a pyvista.PolyData; `body` is the number of the block of a face."""
-    import pyvista as pv
-
-    points, faces, numbers, first = [], [], [], 0
-    for k, body in present_bodies(run, run.bodies.row(time)).items():
-        points.append(body.points)
-        faces.append(np.insert(body.shape.triangles + first, 0, 3, axis=1))
-        numbers.append(np.full(len(faces[-1]), k + 1))
-        first += len(points[-1])
-    if not points:
-        return pv.PolyData()
-    mesh = pv.PolyData(np.concatenate(points), np.concatenate(faces).ravel())
-    mesh.cell_data["body"] = np.concatenate(numbers)
-    return mesh
-
-
-def _image(run: Run, time: float) -> Any:
-    """The water as a pyvista.ImageData with values of the cells."""
-    import pyvista as pv
-
-    grid, fields = run.grid, run.fields(time)
-    cells = [len(faces) for faces in grid.faces]
-    image = pv.ImageData(dimensions=cells, spacing=grid.spacing, origin=grid.low)
-    for name in ("liquid", "solid", "pressure"):
-        image.cell_data[name] = getattr(fields, name).ravel()
-    image.cell_data["velocity"] = fields.velocity.reshape(-1, 3)
-    return image
 
 
 def _collection(files: list[tuple[float, str]]) -> str:

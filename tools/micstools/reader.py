@@ -265,6 +265,15 @@ class Run:
         values = along_line(self.grid.faces, getattr(self.fields(t), name), points)
         return share * float(np.linalg.norm(ends[1] - ends[0])), values
 
+    def vtk(self, t: float) -> Any:
+        """The scene at time `t` [s] as a pyvista.MultiBlock, to plot, clip and save: a surface
+        `block 1`, `block 2`, ... for each released block, the `bed` and the surface of the
+        `water` where there are any. All are those of the written time of the fields nearest to
+        `t`, of the nearest row in a run without; `field_data["time"]` tells which."""
+        from micstools import vtk_data
+
+        return vtk_data.at(self, t)
+
     def series_to_csv(self, path: str | Path) -> Path:
         """Write the numbers of every row as a table with the names of the result file."""
         names = [f.name for f in fields(Series)]

@@ -18,6 +18,7 @@ from micstools.geometry import Array, IntArray
 from micstools.overlap import present_bodies
 from micstools.reader import Fields, Run
 from micstools.shapes import Shape
+from micstools.vtk_data import shares_at_points, triangles_of, water_surface
 
 Plotter = Any  # pyvista.Plotter, which is imported late
 WATER = "#7fb8e6"
@@ -183,7 +184,7 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
     flat = {"lighting": False, "smooth_shading": False}
     for k, body in present_bodies(run, row).items():
         colour = [(k + 1) % 256, (k + 1) // 256 % 256, (k + 1) // 65536]
-        plotter.add_mesh(_surface(body.points, body.shape), color=colour, **flat)
+        plotter.add_mesh(triangles_of(body.points, body.shape.triangles), color=colour, **flat)
     _add_bed(plotter, run, color="white", **flat)
     _look(plotter, camera)
     seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
@@ -213,7 +214,7 @@ def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
             colour = FIXED[still % len(FIXED)]
             still += 1
         plotter.add_mesh(
-            _surface(body.points, body.shape),
+            triangles_of(body.points, body.shape.triangles),
             color=colour,
             smooth_shading=False,
             ambient=0.35,
@@ -221,13 +222,6 @@ def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
             specular=0.1,
         )
         plotter.add_mesh(_edges(body.points, body.shape), color="#303030", line_width=1.5)
-
-
-def _surface(points: Array, shape: Shape) -> Any:
-    import pyvista as pv
-
-    threes = np.full((len(shape.triangles), 1), 3)
-    return pv.PolyData(points, faces=np.hstack([threes, shape.triangles]).ravel())
 
 
 def _edges(points: Array, shape: Shape) -> Any:
@@ -258,8 +252,7 @@ def _add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
     if not len(triangles):
         return
     low, high = run.grid.low, run.grid.high
-    threes = np.full((len(triangles), 1), 3)
-    bed = pv.PolyData(points, faces=np.hstack([threes, triangles]).ravel())
+    bed = triangles_of(points, triangles)
     for d in range(2):
         for side, at in ((1, low), (-1, high)):
             normal = np.zeros(3)
@@ -284,25 +277,12 @@ def _add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
     plotter.add_mesh(walls, **look)
 
 
-def _point_grid(run: Run, fields: Fields) -> Any:
-    """The cell values on points: the centres of the cells and the sides of the tank."""
-    import pyvista as pv
-
-    faces = zip(run.grid.faces, run.grid.centres, strict=True)
-    grid = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) for f, c in faces))
-    for name in ("liquid", "solid"):
-        grid.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
-    return grid
-
-
 def _add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
     """The water surface where no solid is, and the body of water as a faint tint."""
-    grid = _point_grid(run, fields)
+    grid = shares_at_points(run, fields)
     if not fields.liquid.min() < 0.5 < fields.liquid.max():
         return
-    surface = grid.contour([0.5], scalars="liquid")
-    if surface.n_points:
-        surface = surface.clip_scalar(scalars="solid", value=0.5)
+    surface = water_surface(grid)
     if surface.n_points:
         plotter.add_mesh(
             surface,
@@ -418,7 +398,9 @@ def shape_picture(shape: Shape, path: Path, width: int = 1500) -> Path:
         plotter.set_background("white")
         plotter.add_text(title, position=(0.05, 0.92), viewport=True, font_size=11, color="black")
         if column == 0:
-            plotter.add_mesh(_surface(shape.points, shape), color="#c9a66b", ambient=0.25)
+            plotter.add_mesh(
+                triangles_of(shape.points, shape.triangles), color="#c9a66b", ambient=0.25
+            )
             plotter.add_mesh(_edges(shape.points, shape), color="#303030", line_width=2)
         elif column == 1:
             ends = np.sort(shape.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]], axis=2)

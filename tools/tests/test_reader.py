@@ -131,3 +131,40 @@ def test_series_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
     rows = table(loose_pile.series_to_csv(tmp_path / "series.csv"))
     assert len(rows) == 401
     assert float(rows[-1]["time"]) == loose_pile.series.time[-1]
+
+
+def test_the_scene_of_a_time(loose_pile: Run, tmp_path: Path) -> None:
+    """Blocks and water belong together: all are of the written time nearest to the wish."""
+    scene = loose_pile.vtk(2.2)  # fields every 0.5 s
+    assert scene.keys() == [f"block {k}" for k in range(1, 7)] + ["water"]
+    assert scene.field_data["time"] == pytest.approx([2.0])
+    row = loose_pile.bodies.row(2.0)
+    for k in range(6):
+        block = scene[f"block {k + 1}"]
+        assert block.points == pytest.approx(loose_pile.points(k, row))
+        assert set(block.cell_data["body"]) == {k + 1}
+        assert block.volume == pytest.approx(56e-6, rel=1e-5)
+    water = scene["water"].points
+    assert water[:, 2].mean() == pytest.approx(0.15 + 0.0112 / 3, abs=0.004)
+    assert water[:, :2].max(axis=0) == pytest.approx([0.3, 0.1])
+    scene.save(tmp_path / "scene.vtm")
+
+
+def test_the_scene_without_water_is_that_of_the_nearest_row(
+    loose_pile: Run, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(loose_pile.folder, tmp_path / "dry")
+    (folder / "fields.vtkhdf").unlink()
+    with h5py.File(folder / "run.h5", "a") as h5:
+        h5["bed/points"] = np.eye(3)
+        h5["bed/triangles"] = [[0, 1, 2]]
+    scene = Run(folder).vtk(2.205)
+    assert scene.keys() == [f"block {k}" for k in range(1, 7)] + ["bed"]
+    assert scene.field_data["time"] == pytest.approx([2.2])
+    assert scene["bed"].n_cells == 1
+
+
+@pytest.mark.parametrize("t", [-0.1, 8.1, float("nan")])
+def test_a_scene_outside_of_the_run_is_refused(loose_pile: Run, t: float) -> None:
+    with pytest.raises(ValueError, match=rf"t = {t:g} s: the run goes from 0 to 8 s"):
+        loose_pile.vtk(t)
