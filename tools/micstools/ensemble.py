@@ -22,7 +22,8 @@ from micstools.reader import BadRun
 from micstools.settings import Setting
 
 OUTCOMES = ("settled", "time over", "no room")
-QUIET = {"field_interval": 0.0, "stop_when_settled": True}
+NO_FIELDS = {"field_interval": 0.0}
+UNATTENDED = {"stop_when_settled": True}
 NO_ROOM = "never found room"
 _INTERRUPTED = (-1, 130, 143)
 
@@ -92,9 +93,10 @@ def seed_of(base: int, index: int, group: int = 0) -> int:
     return int(state[0]) & 0x7FFFFFFF
 
 
-def members(plan: Plan) -> Iterator[Member]:
+def members(plan: Plan, fields: bool = False) -> Iterator[Member]:
     """All runs; the same seeds for every choice, so that choices differ in nothing else. More runs
-    come after those that were there, so an ensemble may grow."""
+    come after those that were there, so an ensemble may grow. `fields`: write those of the water,
+    as often as the case says."""
     drops = sum(name == "drop" for name, _, _ in settings.groups(plan.text))
     if not drops and plan.runs > 1:
         raise BadRun("the case has no &drop: all runs would be the same")
@@ -102,7 +104,7 @@ def members(plan: Plan) -> Iterator[Member]:
         itertools.product(range(plan.runs), plan.choices), start=1
     ):
         text = settings.set_variables(plan.text, choice)
-        text = settings.set_group(text, "run", QUIET)
+        text = settings.set_group(text, "run", ({} if fields else NO_FIELDS) | UNATTENDED)
         for group in range(drops):
             drawn: dict[str, Any] = {"seed": seed_of(plan.seed, index, group)}
             if plan.spread is not None:

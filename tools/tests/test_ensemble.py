@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from micstools import cli, ensemble, settings, shares, slurm
+from micstools import cli, ensemble, ensemble_fields, settings, shares, slurm
 from micstools.ensemble import Plan
+from micstools.reader import BadRun, Run
+from synthetic import Motion, write_run
 
 CASE = """\
 &run t_end = 1.0 /
@@ -121,6 +123,98 @@ def test_an_ensemble_grows_without_changing_its_runs(tmp_path: Path) -> None:
     assert small[0].text.count("spread = 0.005, 0.005, 0.0") == 2
     assert f"seed = {ensemble.seed_of(1, 0, 1)}" in small[0].text  # drops differ from each other
     assert "stop_when_settled = .true." in small[0].text
+
+
+# A stand-in whose piles are the higher the larger the seed; it writes fields where it is to.
+PILES = """\
+#!{python}
+import re, sys
+from pathlib import Path
+words = sys.argv[1:]
+if "--check" in words:
+    sys.exit(0)
+sys.path[:0] = {folders}
+import h5py
+from synthetic import UPRIGHT, Motion, write_run
+text, folder = Path(words[-1]).read_text(), Path(words[words.index("--output") + 1])
+seed = int(re.search(r"seed = (\\d+)", text)[1])
+place = [([0.15, 0.05, 0.08 + 1e-11 * seed], UPRIGHT)]
+write_run(folder, Motion(t_end=1.0, history_step=0.5, cells=(6, 2, 4), places=place))
+if "field_interval = 0.0" in text:
+    (folder / "fields.vtkhdf").unlink()
+with h5py.File(folder / "run.h5", "a") as h5:
+    h5["provenance"].attrs["exit_status"] = 0
+"""
+
+
+@pytest.fixture
+def piles(tmp_path: Path) -> Path:
+    path, here = tmp_path / "mics", Path(__file__).parent
+    folders = repr([str(here), str(here.parent)])
+    path.write_text(PILES.replace("{python}", sys.executable).replace("{folders}", folders))
+    path.chmod(0o755)
+    (tmp_path / "case.nml").write_text(CASE)
+    return path
+
+
+def with_fields(folder: Path) -> list[str]:
+    return sorted(str(p.parent.relative_to(folder)) for p in folder.rglob("fields.vtkhdf"))
+
+
+def test_the_median_run_keeps_its_fields(tmp_path: Path, piles: Path, capsys) -> None:
+    seeds = [ensemble.seed_of(1, index) for index in range(4)]
+    median = seeds.index(sorted(seeds)[1]) + 1  # the lower of the two in the middle
+    out, again = tmp_path / "out", ("--runs", "4", "--jobs", "2", "--keep-fields")
+    assert call(piles, *again, "median", "--out", str(out)) == 0
+    said = capsys.readouterr().out
+    assert f"with fields: {median:04d}, 1 of them to do" in said
+    assert said.splitlines()[-1] == f"{out}/{median:04d}/fields/result"
+    assert with_fields(out) == [f"{median:04d}/fields/result"]
+    plain, full = (Run(out / f"{median:04d}" / name) for name in ("result", "fields/result"))
+    assert plain.bodies.position == pytest.approx(full.bodies.position, abs=0)
+    table = (out / "ensemble.csv").read_bytes()
+    assert call(piles, *again, "median", "--out", str(out)) == 0
+    assert f"with fields: {median:04d}, 0 of them to do" in capsys.readouterr().out
+    assert call(piles, *again, "1,3", "--out", str(out)) == 0
+    assert set(with_fields(out)) == {f"{n:04d}/fields/result" for n in {median, 1, 3}}
+    assert (out / "ensemble.csv").read_bytes() == table
+
+
+def test_each_choice_has_its_median(tmp_path: Path, piles: Path) -> None:
+    seeds = [ensemble.seed_of(1, index) for index in range(3)]
+    middle = 2 * seeds.index(sorted(seeds)[1])
+    words = ("--runs", "3", "--vary", "contact.friction=0.4,0.6", "--keep-fields", "median")
+    assert call(piles, *words, "--out", str(tmp_path / "out")) == 0
+    names = [f"{middle + k:04d}/fields/result" for k in (1, 2)]
+    assert with_fields(tmp_path / "out") == names
+
+
+def test_no_complete_pile_has_no_median(tmp_path: Path) -> None:
+    """The second block is still to come when the run ends."""
+    (member,) = ensemble.members(Plan(CASE, tmp_path, 1, 1))
+    write_run(member.result, Motion(t_end=0.5, cells=(6, 2, 4)))
+    with pytest.raises(BadRun, match="no run ended with a complete pile"):
+        ensemble_fields.medians({member: ensemble.State("time over")})
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--keep-fields", "mean"], "must be median, or numbers of runs as in 3,7"),
+        (["--keep-fields", "1,9"], "there is no run 9, they go from 1 to 2"),
+        (["--keep-fields", "0"], "there is no run 0"),
+        (["--keep-fields", "median", "--slurm"], "give it in the call without --slurm"),
+        (["--keep-fields", "1", "--set", "run.field_interval=0"], "the case writes none"),
+        (["--keep-fields", "1", "--set", "run.physics='dry'"], "the case is dry"),
+    ],
+)
+def test_a_wish_for_fields_that_cannot_be_is_one_line(
+    tmp_path: Path, program: Path, words: list[str], said: str, capsys
+) -> None:
+    assert call(program, "--runs", "2", "--out", str(tmp_path / "out"), *words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert not (tmp_path / "out").exists()
 
 
 def test_interval_of_a_share() -> None:

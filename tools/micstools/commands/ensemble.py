@@ -12,10 +12,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, NoReturn
 
-from micstools import ensemble, ensemble_engine, ensemble_table, program, settings, slurm
+from micstools import (
+    ensemble,
+    ensemble_engine,
+    ensemble_fields,
+    ensemble_table,
+    program,
+    settings,
+    slurm,
+)
 from micstools.commands.base import Command
 from micstools.ensemble import Member, Plan, State
 from micstools.reader import BadRun
+
+STOPPED = 130
+"""Exit code after Ctrl-C."""
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,6 +39,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--tilt", type=float, help="random tilt of each drop up to this [degrees]")
     add("--vary", action="append", default=[], metavar="GROUP.VARIABLE=A,B",
         help="runs for each value, with the same seeds; several: every combination")  # fmt: skip
+    add("--keep-fields", metavar="RUNS", help="median, or numbers as in 3,7: run these once more "
+        "with the fields of the water, in DIR/NNNN/fields; median: of the tops")  # fmt: skip
     add("--out", type=Path, help="folder, default mics-ensemble-CASE")
     add("--slurm", nargs="*", metavar="OPTION", help="write a Slurm array script instead of "
         "running, with options of sbatch such as time=2:00:00")  # fmt: skip
@@ -123,6 +136,7 @@ def _ensemble(given: argparse.Namespace) -> int:
     path, plan = program.find(given.program), _plan(given)
     members = list(ensemble.members(plan))
     _differ(plan, members)
+    wanted, again = _kept(given, plan, len(members))
     cost = _cost(path, plan, members)
     with _alone(plan.folder):
         for member in members:
@@ -135,7 +149,45 @@ def _ensemble(given: argparse.Namespace) -> int:
         ensemble_table.write(plan, table)
         if given.slurm is not None:
             return _write_slurm(plan, waiting, path, given.slurm)
-        return _compute(plan, table, waiting, path, given.jobs)
+        code = _compute(plan, table, waiting, path, given.jobs)
+        if again is None or code == STOPPED:
+            return code
+        numbers = wanted or ensemble_fields.medians(table)
+        return max(code, _run_again([again[number - 1] for number in numbers], path, given.jobs))
+
+
+def _kept(
+    given: argparse.Namespace, plan: Plan, runs: int
+) -> tuple[list[int], list[Member] | None]:
+    """Of --keep-fields the numbers of the runs, none for the median, and every run with fields."""
+    if given.keep_fields is None:
+        return [], None
+    if given.slurm is not None:
+        raise BadRun("--keep-fields comes after the runs: give it in the call without --slurm")
+    return ensemble_fields.parse(given.keep_fields, runs), ensemble_fields.with_fields(plan)
+
+
+def _run_again(chosen: list[Member], path: Path, jobs: int) -> int:
+    """Run members with their fields, as far as that is not done yet."""
+    for member in chosen:
+        ensemble.write_case(member)
+    waiting = [member for member in chosen if not ensemble.state(member).counts]
+    print(f"with fields: {ensemble_fields.numbered(m.number for m in chosen)}, "
+          f"{len(waiting)} of them to do", flush=True)  # fmt: skip
+    try:
+        if waiting:
+            ensemble_engine.run_all(waiting, path, min(jobs, len(waiting)), lambda *_: None)
+    except KeyboardInterrupt:
+        print("stopped; the same command goes on where each run stood", file=sys.stderr)
+        return STOPPED
+    failed = [member for member in chosen if not ensemble.state(member).counts]
+    for member in chosen:
+        if member not in failed:
+            print(member.result)
+    for member in failed:
+        print(f"mics-tools ensemble: {member.folder} failed: {ensemble.state(member).reason}",
+              file=sys.stderr)  # fmt: skip
+    return 3 if failed else 0
 
 
 def _write_slurm(plan: Plan, waiting: list[Member], path: Path, options: list[str]) -> int:
@@ -164,9 +216,9 @@ def _compute(
     failed = [m.number for m, end in table.items() if not end.counts]
     if stopped:
         print("stopped; the same command goes on where each run stood", file=sys.stderr)
-        return 130
+        return STOPPED
     if failed:
-        names = ", ".join(f"{number:04d}" for number in failed)
+        names = ensemble_fields.numbered(failed)
         print(f"mics-tools ensemble: failed: {names}; the same command tries again, "
               f"{plan.folder}/{failed[0]:04d}/log.txt tells why", file=sys.stderr)  # fmt: skip
     return 3 if failed else 0
@@ -178,6 +230,7 @@ ENSEMBLE = Command(
     (
         "ensemble input/blocks_coarse.nml --runs 50",
         "ensemble input/blocks_coarse.nml --runs 20 --spread 0.005 --tilt 5 --jobs 2",
+        "ensemble input/blocks_coarse.nml --runs 50 --keep-fields median",
         "ensemble input/blocks_coarse.nml --runs 20 --vary contact.friction=0.4,0.6 --out mics-mu",
         "ensemble input/blocks.nml --runs 50 --slurm time=2:00:00 partition=short",
     ),
