@@ -21,8 +21,9 @@ COMMANDS = {
     "study": ("study", "STUDY", "run a case on coarser and finer cells"),
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
+    "bed": ("bed", "BED", "make a bed from a map of measured ground"),
 }
-_SUMMARY = "Run cases of mics, look at the results, make blocks."
+_SUMMARY = "Run cases of mics, look at the results, make blocks and beds."
 
 
 def usage() -> str:

@@ -1,0 +1,229 @@
+"""Measured ground becomes a map of heights; what is missing or stands askew is refused."""
+
+import os
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image, TiffImagePlugin
+
+from micstools import cli, height_maps
+from micstools.reader import BadRun
+
+ROOT = Path(__file__).parents[2]
+# From y_min to y_max, x in each row.
+Z = np.array(
+    [[0.0, 1.0, 2.0, 3.0], [10.0, 11.0, 12.0, 13.0], [20.0, 21.0, 22.0, 23.0]]
+)  # from y_min
+ESRI = """\
+ncols 4
+nrows 3
+xllcorner 100.0
+yllcorner 200.0
+cellsize 2.0
+NODATA_value -99
+20 21 22 23
+10 11 12 13
+0 1 2 3
+"""
+
+
+def same(found: height_maps.HeightMap, z: np.ndarray = Z) -> None:
+    """The map of ESRI: middles of its cells."""
+    assert found.first == pytest.approx((101.0, 201.0))
+    assert found.spacing == pytest.approx((2.0, 2.0))
+    assert np.array_equal(found.z, z, equal_nan=True)
+
+
+def save(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_an_esri_raster(tmp_path: Path) -> None:
+    same(height_maps.load(save(tmp_path / "a.asc", ESRI)))
+    centre = ESRI.replace("xllcorner 100", "XLLCENTER 101").replace(
+        "yllcorner 200", "yllcenter 201"
+    )
+    same(height_maps.load(save(tmp_path / "b.asc", centre)))
+    oblong = ESRI.replace("cellsize 2.0", "dx 2.0\ndy 4.0")
+    assert height_maps.load(save(tmp_path / "c.ASC", oblong)).last == pytest.approx((107.0, 210.0))
+
+
+def test_points_in_any_order(tmp_path: Path) -> None:
+    x, y = np.meshgrid(101 + 2 * np.arange(4), 201 + 2 * np.arange(3))
+    rows = np.random.default_rng(1).permutation(np.column_stack([x.ravel(), y.ravel(), Z.ravel()]))
+    for separator, head in ((" ", ""), (",", "x,y,z\n"), (";\t", "# a remark\n")):
+        text = head + "\n".join(separator.join(map(str, row)) for row in rows)
+        same(height_maps.load(save(tmp_path / "a.xyz", text)))
+
+
+def test_points_with_rounded_figures_are_a_grid(tmp_path: Path) -> None:
+    text = "\n".join(f"{k / 3:.2f} {j / 7:.3f} {k}" for k in range(10) for j in range(8))
+    found = height_maps.load(save(tmp_path / "a.xyz", text))
+    assert found.z.shape == (8, 10) and not found.missing
+    assert found.spacing == pytest.approx((1 / 3, 1 / 7), rel=1e-3)
+
+
+def test_scattered_points_are_refused_or_drawn(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    x, y = rng.random((2, 400)) * [[10.0], [6.0]]
+    x[:4], y[:4] = [0, 10, 0, 10], [0, 0, 6, 6]
+    rows = np.column_stack([x, y, 3 + 2 * x - y])
+    path = save(tmp_path / "a.xyz", "\n".join(" ".join(map(repr, map(float, r))) for r in rows))
+    with pytest.raises(BadRun, match="--grid SPACING draws"):
+        height_maps.load(path)
+    found = height_maps.load(path, 0.5)
+    assert found.z.shape == (13, 21)
+    inside = found.z[1:-1, 1:-1]
+    gx, gy = np.meshgrid(0.5 * np.arange(1, 20), 0.5 * np.arange(1, 12))
+    assert inside == pytest.approx(3 + 2 * gx - gy, abs=1e-9)
+
+
+def geotiff(path: Path, z: np.ndarray, keys: tuple[int, ...], **more: object) -> Path:
+    """Rows from the north, as ESRI above."""
+    tags = TiffImagePlugin.ImageFileDirectory_v2()
+    tags.tagtype[33550] = tags.tagtype[33922] = tags.tagtype[34264] = 12
+    tags.tagtype[34735], tags.tagtype[42113] = 3, 2
+    if keys:
+        tags[34735] = keys
+    for number, value in more.pop("tags").items():  # type: ignore[attr-defined]
+        tags[number] = value
+    Image.fromarray(z[::-1]).save(path, tiffinfo=tags, **more)
+    return path
+
+
+AREA, POINT, DEGREES = ((1, 1, 0, 1, 1025, 0, 1, 1), (1, 1, 0, 1, 1025, 0, 1, 2),
+                        (1, 1, 0, 1, 1024, 0, 1, 2))  # fmt: skip
+SCALE = {33550: (2.0, 2.0, 0.0), 33922: (0.0, 0.0, 0.0, 100.0, 206.0, 0.0)}
+TURN = {34264: (2.0, 0, 0, 100.0, 0, -2.0, 0, 206.0, 0, 0, 0, 0, 0, 0, 0, 1.0)}
+
+
+@pytest.mark.parametrize("tags", [SCALE, TURN])
+@pytest.mark.parametrize("kind", [np.float32, np.uint16, np.uint8, np.int32])
+@pytest.mark.parametrize("compression", [None, "tiff_lzw"])
+def test_a_geotiff(tmp_path: Path, tags: dict, kind: type, compression: str | None) -> None:
+    path = geotiff(tmp_path / "a.tif", Z.astype(kind), AREA, tags=tags, compression=compression)
+    same(height_maps.load(path))
+
+
+def test_a_geotiff_of_points_and_gaps(tmp_path: Path) -> None:
+    tags = {33550: SCALE[33550], 33922: (1.0, 1.0, 0.0, 103.0, 203.0, 0.0), 42113: "21"}
+    found = height_maps.load(geotiff(tmp_path / "a.tif", Z.astype(np.float32), POINT, tags=tags))
+    same(found, np.where(Z == 21, np.nan, Z))
+
+
+@pytest.mark.parametrize(
+    ("keys", "tags", "said"),
+    [
+        ((), {}, "does not tell where it lies"),
+        (DEGREES, SCALE, "lies in degrees"),
+        (AREA, {34264: (2.0, 0.1, *TURN[34264][2:])}, "is turned"),
+    ],
+)
+def test_a_geotiff_without_its_place_is_refused(
+    tmp_path: Path, keys: tuple, tags: dict, said: str
+) -> None:
+    with pytest.raises(BadRun, match=said):
+        height_maps.load(geotiff(tmp_path / "a.tif", Z.astype(np.float32), keys, tags=tags))
+
+
+def test_a_picture_is_no_map(tmp_path: Path) -> None:
+    Image.new("RGB", (4, 3)).save(tmp_path / "a.tif")
+    warnings.simplefilter("error")
+    with pytest.raises(BadRun, match="holds colours"):
+        height_maps.load(tmp_path / "a.tif")
+    (tmp_path / "b.tif").write_bytes(b"II*\0 and nothing else")
+    with pytest.raises(BadRun, match="gdal_translate"):
+        height_maps.load(tmp_path / "b.tif")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.png", "", "must end in one of .asc, .xyz"),
+        ("a.asc", "", "no whole header"),
+        ("a.asc", ESRI.replace("cellsize 2.0\n", ""), "no whole header"),
+        ("a.asc", ESRI.replace("cellsize 2.0", "cellsize -2.0"), "no whole header"),
+        ("a.asc", ESRI.replace("23\n", "\n"), "holds 11 heights, 4 x 3 were announced"),
+        ("a.asc", ESRI.replace("12 13", "12,5 13"), "'12,5' stands where a number should"),
+        ("a.asc", re.sub(r"\b\d+ \d+ \d+ \d+\b", "-99 -99 -99 -99", ESRI), "holds no height"),
+        ("a.xyz", "", "must hold x, y and z"),
+        ("a.xyz", "1 2\n", "must hold x, y and z"),
+        ("a.xyz", "1 2 3\n1 3 4\n", "stand on one line"),
+        ("a.xyz", "0 0 1\n1 0 1\n0 1 1\n1 1 1\n1 1 2\n", "two points stand in the same place"),
+        ("a.asc", ESRI.replace("12", "-99"), "1 of 12 points have no height, the first at 105, 20"),
+    ],
+)  # fmt: skip
+def test_what_is_no_map_is_one_line(
+    tmp_path: Path, name: str, text: str, said: str, capsys
+) -> None:
+    words = [str(save(tmp_path / name, text)), "--out", str(tmp_path / "bed.txt")]
+    with pytest.raises(SystemExit) as end:
+        cli.main(["bed", *words])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert not (tmp_path / "bed.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--origin", "1,2"], "--origin 1,2: must be X,Y,Z"),
+        (["--scale", "0"], "--scale 0: must be positive"),
+        (["--grid", "1"], "is for scattered points"),
+        (["--window", "101,201,99,202"], "the lower corner first"),
+        (["--window", "101,201,109,202"], "covers x 101 to 107 and y 201 to 205 m only"),
+    ],
+)
+def test_wrong_wishes_are_one_line(tmp_path: Path, words: list[str], said: str, capsys) -> None:
+    path = save(tmp_path / "a.asc", ESRI)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words])
+    assert end.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+def test_the_program_reads_the_map(tmp_path: Path, capsys) -> None:
+    """A model at 1:50 of a part of the map, its gap filled, under a tank of 60 x 40 mm."""
+    path = save(tmp_path / "a.asc", ESRI.replace("12", "-99"))
+    words = ["--fill", "12.5", "--window", "101.5,201.5,104.5,203.5", "--origin", "101.5,201.5,0"]
+    with pytest.raises(SystemExit) as end:
+        cli.main(["bed", str(path), "--out", str(tmp_path / "bed.txt"), *words, "--scale", "0.02"])
+    assert end.value.code == 0
+    assert "filled    1 points with 12.5 m" in capsys.readouterr().out
+    lines = (tmp_path / "bed.txt").read_text().splitlines()
+    assert lines[1:] == [
+        "3 3 -0.01 -0.01 0.04 0.04",
+        "0 0.02 0.04",
+        "0.2 0.22 0.25",
+        "0.4 0.42 0.44",
+    ]
+    if not os.access(ROOT / "mics", os.X_OK):
+        pytest.skip("./mics is not built")
+    case = (
+        "&run t_end = 1 /\n&grid cells = 6, 4, 40  length = 0.06, 0.04, 0.4 /\n"
+        "&bed file = 'bed.txt' /\n"
+    )
+    plan = subprocess.run(
+        [ROOT / "mics", "--check"], cwd=tmp_path, input=case, capture_output=True, text=True
+    )
+    assert plan.returncode == 0, plan.stderr
+
+
+def test_maps_need_no_other_program(tmp_path: Path) -> None:
+    """The command starts without pyvista, gmsh or trimesh."""
+    code = (
+        "import sys; from micstools import cli\n"
+        f"try: cli.main(['bed', {str(save(tmp_path / 'a.asc', ESRI))!r}, '--out', "
+        f"{str(tmp_path / 'b.txt')!r}])\n"
+        "except SystemExit as end: assert end.code == 0\n"
+        "assert not {'pyvista', 'gmsh', 'trimesh', 'matplotlib'} & set(sys.modules)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tools")}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
