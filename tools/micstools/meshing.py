@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from micstools import holes
+from micstools import holes, solids
 from micstools.geometry import Array, IntArray, tet_volumes
 from micstools.shapes import Shape, from_tets
 
@@ -49,8 +49,10 @@ def load(path: Path, element: float = 0.0) -> Surface:
     if not path.is_file():
         raise BadSurface(f"{path}: there is no such file")
     if path.suffix.lower() in (".step", ".stp"):
-        points, triangles, volume = _step_surface(path, element)
-        return closed(points, triangles, volume)
+        points, triangles, volume, warnings = _step_surface(path, element)
+        surface = closed(points, triangles, volume)
+        surface.warnings[:0] = warnings
+        return surface
     import trimesh
 
     try:
@@ -61,7 +63,8 @@ def load(path: Path, element: float = 0.0) -> Surface:
 
 
 def closed(points: Array, triangles: IntArray, volume: float | None = None) -> Surface:
-    """A closed surface in one piece, seen from outside; warnings tell what was repaired.
+    """A closed surface in one piece, seen from outside; warnings tell what was repaired. Parts that
+    overlap are united.
 
     `volume` is that of the true form, if it is known. Only plane holes are filled: those have one
     filling, any other would guess the form of the block.
@@ -86,11 +89,14 @@ def closed(points: Array, triangles: IntArray, volume: float | None = None) -> S
         mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
         what = "1 plane hole was" if n_holes == 1 else f"{n_holes} plane holes were"
         warnings.append(f"the surface was open at {open_edges} edges; {what} filled")
-    if (pieces := _pieces(mesh)) > 1:
-        raise BadSurface(
-            f"the surface is in {pieces} pieces, a block is one without hollows; unite what "
-            "belongs together where it was drawn, and make a file of each block"
-        )
+    if len(parts := _parts(mesh)) > 1:
+        try:
+            surface = closed(*solids.united(parts))
+        except solids.NotOne as reason:
+            raise BadSurface(str(reason)) from reason
+        before = sum(abs(solids.volume(part)) for part in parts)
+        surface.warnings[:0] = [*warnings, solids.words(len(parts), before, surface.volume)]
+        return surface
     if not mesh.is_winding_consistent or mesh.volume < 0:
         trimesh.repair.fix_normals(mesh, multibody=False)  # type: ignore[no-untyped-call]
         warnings.append("some or all triangles were seen from inside; they were turned")
@@ -109,17 +115,40 @@ def closed(points: Array, triangles: IntArray, volume: float | None = None) -> S
     )
 
 
+def simplified(surface: Surface, faces: int) -> Surface:
+    """The surface with `faces` triangles at most; the change of volume is a warning."""
+    if faces < 4:
+        raise BadSurface(f"--simplify {faces}: a closed surface has 4 triangles at least")
+    if len(surface.triangles) <= faces:
+        return surface
+    few = BadSurface(f"--simplify {faces}: with so few the surface does not stay closed")
+    try:
+        found = closed(*solids.coarser((surface.points, surface.triangles), faces))
+    except BadSurface as reason:
+        raise few from reason
+    if found.warnings:  # something had to be repaired
+        raise few
+    said = (
+        f"{len(surface.triangles)} triangles were simplified to {len(found.triangles)}: "
+        f"{found.volume / surface.volume - 1:+.2%} of the volume"
+    )
+    found.warnings[:0] = [*surface.warnings, said]
+    return found
+
+
 def _open_edges(mesh: Any) -> int:
     _, count = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
     return int((count != 2).sum())
 
 
-def _pieces(mesh: Any) -> int:
-    """Parts of a surface that share no edge."""
+def _parts(mesh: Any) -> list[tuple[Array, IntArray]]:
+    """Points and triangles of the parts of a surface that share no edge."""
     from trimesh import graph
 
     nodes = np.arange(len(mesh.faces))
-    return len(graph.connected_components(mesh.face_adjacency, nodes=nodes, min_len=1))
+    found = graph.connected_components(mesh.face_adjacency, nodes=nodes, min_len=1)
+    faces = np.asarray(mesh.faces, np.int64)
+    return [(np.asarray(mesh.vertices, float), faces[part]) for part in found]
 
 
 def scale_of(surface: Surface, size: float | None, scale: float | None) -> float:
@@ -177,19 +206,27 @@ def fill(surface: Surface, element: float = 0.0) -> Array:
     return tets
 
 
-def _step_surface(path: Path, element: float) -> tuple[Array, IntArray, float]:
-    """Triangles of a STEP file and the exact volume of its solids."""
+def _step_surface(path: Path, element: float) -> tuple[Array, IntArray, float, list[str]]:
+    """Triangles of a STEP file, the exact volume of its solids, united, and warnings."""
     with _gmsh() as gmsh:
         try:
             gmsh.model.occ.importShapes(str(path))
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises plain exceptions
             raise BadSurface(f"{path}: cannot be read as STEP ({error})") from error
-        solids = gmsh.model.getEntities(3)
-        if len(solids) != 1:
-            raise BadSurface(f"{path}: holds {len(solids)} solids, a block is one")
-        volume = gmsh.model.occ.getMass(*solids[0])
-        low, high = np.split(np.array(gmsh.model.getBoundingBox(*solids[0])), 2)
+        found = gmsh.model.getEntities(3)
+        warnings = []
+        if len(found) > 1:
+            n, before = len(found), sum(gmsh.model.occ.getMass(*solid) for solid in found)
+            gmsh.model.occ.fuse(found[:1], found[1:])
+            gmsh.model.occ.synchronize()
+            found = gmsh.model.getEntities(3)
+            after = sum(gmsh.model.occ.getMass(*solid) for solid in found)
+            warnings = [solids.words(n, before, after)]
+        if len(found) != 1:
+            raise BadSurface(f"{path}: holds {len(found)} solids apart, a block is one")
+        volume = gmsh.model.occ.getMass(*found[0])
+        low, high = np.split(np.array(gmsh.model.getBoundingBox(*found[0])), 2)
         edge = element if element > 0 else float((high - low).max()) / 10
         gmsh.option.setNumber("Mesh.MeshSizeMax", edge)
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 12)
@@ -199,7 +236,7 @@ def _step_surface(path: Path, element: float) -> tuple[Array, IntArray, float]:
         place[node.astype(np.int64)] = np.arange(len(node))
         _, corners = gmsh.model.mesh.getElementsByType(2)
     triangles = place[corners.astype(np.int64)].reshape(-1, 3)
-    return np.asarray(x).reshape(-1, 3), triangles, float(volume)
+    return np.asarray(x).reshape(-1, 3), triangles, float(volume), warnings
 
 
 class _gmsh:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools import meshing
+from micstools import cli, meshing
 from micstools.shapes import hexapod
 
 trimesh = pytest.importorskip("trimesh")
@@ -127,14 +127,111 @@ def test_flipped_triangles_are_turned_with_a_warning(tmp_path: Path) -> None:
     assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
-def test_overlapping_parts_are_refused(tmp_path: Path) -> None:
-    boxes = [trimesh.creation.box((20, 20, 20)) for _ in range(2)]
-    boxes[1].apply_translation((10, 5, 3))
-    both = trimesh.util.concatenate(boxes)
-    with pytest.raises(meshing.BadSurface, match="2 pieces"):
-        meshing.load(save(both, tmp_path / "two.stl"))
+def boxes(*places: tuple[float, float, float]) -> "trimesh.Trimesh":
+    """Cubes of 20 mm in one file."""
+    found = [trimesh.creation.box((20, 20, 20)).apply_translation(place) for place in places]
+    return trimesh.util.concatenate(found)
+
+
+def test_overlapping_parts_are_united(tmp_path: Path) -> None:
+    both = boxes((0, 0, 0), (10, 5, 3))
+    surface = meshing.load(save(both, tmp_path / "two.stl"))
+    true = 2 * 20**3 - 10 * 15 * 17
+    assert surface.volume == pytest.approx(true, rel=1e-6)
+    assert surface.warnings == ["2 parts were united: -15.94% of their volumes together"]
+    assert np.abs(meshing.tet_volumes(meshing.fill(surface))).sum() == pytest.approx(true, rel=1e-6)
     with pytest.raises(meshing.BadSurface, match="meets itself"):
         meshing.fill(meshing.Surface(both.vertices, both.faces, both.volume))
+
+
+def test_parts_that_were_seen_from_inside_are_united_too() -> None:
+    both = boxes((0, 0, 0), (10, 5, 3))
+    whole, mixed = both.faces[:, ::-1], both.faces.copy()
+    mixed[::5] = mixed[::5, ::-1]
+    for faces in (whole, mixed):
+        surface = meshing.closed(both.vertices, faces)
+        assert surface.volume == pytest.approx(2 * 20**3 - 10 * 15 * 17, rel=1e-9)
+
+
+def test_round_parts_are_united(tmp_path: Path) -> None:
+    """Three bars through one another, each a prism of 24 sides, in any attitude."""
+    bar = trimesh.creation.cylinder(radius=8.0, height=60.0, sections=24)
+    turns = [np.eye(4), trimesh.transformations.rotation_matrix(1.2, (1, 0.3, 0)),
+             trimesh.transformations.rotation_matrix(1.4, (0.2, 1, 0.1))]  # fmt: skip
+    found = trimesh.util.concatenate([bar.copy().apply_transform(turn) for turn in turns])
+    surface = meshing.load(save(found, tmp_path / "cross.stl"))
+    rng = np.random.default_rng(1)
+    low, high = found.bounds
+    points = low + rng.random((400_000, 3)) * (high - low)
+    inside = np.zeros(len(points), dtype=bool)
+    for turn in turns:
+        own = np.abs((points @ turn[:3, :3])[:, 2]) < 30
+        inside |= own & (np.linalg.norm((points @ turn[:3, :3])[:, :2], axis=1) < 8)
+    share = float(inside.mean())
+    wanted = share * np.prod(high - low)
+    assert surface.volume == pytest.approx(
+        wanted, rel=4 * np.sqrt((1 - share) / share / 40000) + 0.02
+    )
+    shape, _ = meshing.block("cross", 1e-3 * meshing.fill(surface), 2300.0)
+    assert shape.volume == pytest.approx(1e-9 * surface.volume, rel=1e-6)
+
+
+def test_a_part_inside_another_is_refused() -> None:
+    both = trimesh.util.concatenate([boxes((0, 0, 0)), trimesh.creation.box((5, 5, 5))])
+    with pytest.raises(meshing.BadSurface, match="part 2 of 2 lies inside the others"):
+        meshing.closed(both.vertices, both.faces)
+
+
+def test_solids_of_a_step_file_are_united(tmp_path: Path) -> None:
+    gmsh = pytest.importorskip("gmsh")
+    for place in (10.0, 50.0):
+        gmsh.initialize(interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0, 0, 0, 20, 20, 20)
+        gmsh.model.occ.addBox(place, 5, 3, 20, 20, 20)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / f"{place:g}.step"))
+        gmsh.finalize()
+    surface = meshing.load(tmp_path / "10.step")
+    assert surface.warnings == ["2 parts were united: -15.94% of their volumes together"]
+    assert surface.volume == pytest.approx(2 * 20**3 - 10 * 15 * 17, rel=1e-9)
+    with pytest.raises(meshing.BadSurface, match="holds 2 solids apart"):
+        meshing.load(tmp_path / "50.step")
+
+
+def test_a_fine_surface_is_simplified_on_request(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=30.0)
+    ball.vertices *= (1.0 + 0.1 * np.sin(ball.vertices[:, 0] / 6))[:, None]
+    fine = meshing.load(save(ball, tmp_path / "rock.stl"))
+    coarse = meshing.simplified(fine, 400)
+    assert len(fine.triangles) == 5120 and 390 <= len(coarse.triangles) <= 400
+    change = coarse.volume / fine.volume - 1
+    assert abs(change) < 0.02
+    assert coarse.warnings == [
+        f"5120 triangles were simplified to {len(coarse.triangles)}: {change:+.2%} of the volume"
+    ]
+    assert np.abs(meshing.tet_volumes(meshing.fill(coarse))).sum() == pytest.approx(coarse.volume)
+    assert np.ptp(coarse.points, axis=0) == pytest.approx(np.ptp(fine.points, axis=0), rel=0.05)
+    assert meshing.simplified(coarse, 400) is coarse
+    with pytest.raises(meshing.BadSurface, match="4 triangles at least"):
+        meshing.simplified(coarse, 3)
+
+
+@pytest.mark.parametrize("faces", [5, 30])
+def test_a_surface_that_does_not_stay_closed_is_refused(faces: int) -> None:
+    bars = [trimesh.creation.box(np.roll((60.0, 20.0, 20.0), k)) for k in range(3)]
+    cross = trimesh.util.concatenate(bars)
+    with pytest.raises(meshing.BadSurface, match="with so few the surface does not stay closed"):
+        meshing.simplified(meshing.closed(cross.vertices, cross.faces), faces)
+
+
+def test_plane_faces_are_simplified_without_a_change(tmp_path: Path) -> None:
+    mesh = hexapod_surface()
+    for _ in range(3):
+        mesh = mesh.subdivide()
+    surface = meshing.simplified(meshing.load(save(mesh, tmp_path / "fine.stl")), 60)
+    assert len(surface.triangles) <= 60
+    assert surface.volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
 def test_millimetres_read_as_metres_are_noticed(tmp_path: Path) -> None:
@@ -181,6 +278,27 @@ def test_script_writes_a_file_the_program_reads(tmp_path: Path) -> None:
     )
     assert plan.returncode == 0, plan.stderr
     assert "0.06 x 0.06 x 0.06 m, 30 facets" in plan.stdout
+
+
+def test_the_command_simplifies_and_unites(tmp_path: Path, capsys) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=12.0)
+    both = trimesh.util.concatenate([ball, boxes((12, 0, 0))])
+    path, out = save(both, tmp_path / "two.stl"), tmp_path / "block.txt"
+    words = ["--scale", "0.001", "--out", str(out), "--no-picture", "--simplify"]
+    with pytest.raises(SystemExit) as end:
+        cli.main(["shape", str(path), *words, "300"])
+    said = capsys.readouterr()
+    assert end.value.code == 0 and out.exists()
+    united, simplified = said.err.splitlines()
+    assert re.fullmatch(r"warning: 2 parts were united: -\d+\.\d+% of .*", united)
+    assert re.fullmatch(
+        r"warning: \d+ triangles were simplified to \d+: .* of the volume", simplified
+    )
+    with pytest.raises(SystemExit) as end:
+        cli.main(["shape", str(path), *words, "2"])
+    assert end.value.code == 2
+    (*_, line) = capsys.readouterr().err.splitlines()
+    assert "mics-tools shape: --simplify 2: a closed surface has 4 triangles at least" in line
 
 
 def test_script_refuses_a_bad_file(tmp_path: Path) -> None:

@@ -18,6 +18,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     length.add_argument("--size", type=float, help="largest extent of the block [m]")
     length.add_argument("--scale", type=float, help="metres per unit of the file, 0.001 for mm")
     parser.add_argument("--element", type=float, default=0.0, help="longest edge [file's units]")
+    parser.add_argument(
+        "--simplify",
+        type=int,
+        metavar="FACES",
+        help="most triangles of a fine surface",
+    )
     parser.add_argument("--density", type=float, default=2300.0, help="[kg/m3]")
     parser.add_argument("--out", type=Path, required=True, help="shape file to write")
     parser.add_argument("--no-picture", action="store_true", help="do not draw the block")
@@ -27,6 +33,8 @@ def make(given: argparse.Namespace) -> int:
     """Read, check, fill, write, report, draw."""
     try:
         surface = meshing.load(given.file, given.element)
+        if given.simplify is not None:
+            surface = meshing.simplified(surface, given.simplify)
         scale = meshing.scale_of(surface, given.size, given.scale)
         tets = scale * meshing.fill(surface, given.element)
     except meshing.BadSurface as problem:
@@ -69,10 +77,12 @@ def draw(given: argparse.Namespace) -> int:
 
 SHAPE = Command(
     "shape",
-    "Make a block of kind 'file' from a drawing: check it, fill it, tell its mass.",
+    "Make a block of kind 'file' from a drawing: check it, unite parts that overlap, fill it,\n"
+    "tell its mass.",
     (
         "shape block.stl --size 0.06 --out block.txt",
         "shape block.step --scale 0.001 --out block.txt",
+        "shape scan.stl --scale 0.001 --simplify 500 --out block.txt",
     ),
     arguments,
     make,
