@@ -5,8 +5,8 @@
 !! and free slip where it is thin, as without viscosity. The two cells tell its thickness: with
 !! y_m and y_n their distances from the wall and a the ratio of their velocities along it,
 !! $$ E = e^{-y_m/\delta} = \frac{1 - a}{a} \frac{y_m}{y_n - y_m} $$
-!! (exact for y_n = 2 y_m and at both ends), and the film has \( (1 - E^r)/(1 - E) \) of its master's
-!! velocity, r the ratio of their distances. If films had all of it, the wall layer would carry
+!! (exact for y_n = 2 y_m and at both ends), and the film has \( (1 - E^r)/(1 - E) \) of what its
+!! master has, r the ratio of their distances. If films had all of it, the wall layer would carry
 !! momentum that no fluid has, and friction be too large (docs/decisions/cut_cells.md).
 module wall_layer_m
   use kinds_m, only: wp

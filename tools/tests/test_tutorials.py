@@ -1,0 +1,84 @@
+"""The tutorials work as they stand: cases are saved, commands and programs run in their order."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fences import fences
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+SAID = {
+    "convergence": [
+        r"impact_speed +0\.3\d+, 0\.3\d+, 0\.\d+  \(no order fits\)",
+        r"impact at 0\.28\d m/s, of order 1\.\d; the finest grid is \+5\.\d% off",
+    ],
+    "own_block": [
+        r"3 parts were united: -22\.22%",
+        r"cross is 3 cells long",
+        r"numbers of the \d complete piles of 6",
+        r"covered in half of the piles or more: \d+\.\d cm2",
+    ],
+    "reef_in_current": [
+        r"x +-0\.005 to 0\.605 m",
+        r"blocks  3, fixed: none",
+        r"block 3: let go at x = 0\.\d+ m, lies at x = 0\.\d+ m",
+        r"x = 0\.5 m: 0\.",
+    ],
+}
+MADE = {
+    "convergence": ["mics-fall/3/result/run.h5"],
+    "own_block": ["cross.txt", "mics-crosses/report.html"],
+    "reef_in_current": ["slope.txt", "mics-reef/run.h5", "reef.vtm"],
+}
+
+
+def install(folder: Path) -> None:
+    """What a reader finds in the folder of mics: the program, Python and the tools of here."""
+    (folder / "mics").symlink_to(ROOT / "mics")
+    (folder / ".venv" / "bin").mkdir(parents=True)
+    for name, words in (("python", ""), ("mics-tools", "-m micstools.cli ")):
+        path = folder / ".venv" / "bin" / name
+        path.write_text(f'#!/bin/sh\nexec "{sys.executable}" {words}"$@"\n')
+        path.chmod(0o755)
+
+
+def follow(page: Path, folder: Path) -> str:
+    """Do what a page says, in a folder; all that was said."""
+    said = ""
+    for language, text in fences(page):
+        if language == "fortran":
+            named = re.match(r"! (\w+\.nml)\n", text)
+            assert named, f"a case without its name: {text}"
+            (folder / named[1]).write_text(text)
+            continue
+        words = {"sh": ["sh", "-e", "-c"], "python": [".venv/bin/python", "-c"]}[language]
+        done = subprocess.run(
+            [*words, text],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=200,
+            env={**os.environ, "PYTHONPATH": str(ROOT / "tools"), "OMP_NUM_THREADS": "1"},
+        )
+        assert done.returncode == 0, f"{text}\n{done.stdout}"
+        said += done.stdout
+    return said
+
+
+@pytest.mark.cost(15)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_tutorial_works(page: Path, tmp_path: Path) -> None:
+    if not os.access(ROOT / "mics", os.X_OK):
+        pytest.skip("./mics is not built")
+    install(tmp_path)
+    said = follow(page, tmp_path)
+    for pattern in SAID[page.stem]:
+        assert re.search(pattern, said), f"{pattern}\n{said}"
+    assert [name for name in MADE[page.stem] if not (tmp_path / name).is_file()] == []
+    assert f"](docs/tutorials/{page.name})" in (ROOT / "README.md").read_text()
