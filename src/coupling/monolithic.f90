@@ -256,6 +256,7 @@ contains
       end do
       call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
+      call find_slip(grid, solid, bodies, flow%u, links)
       call share_momentum(grid, links, balance%mass, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
     end associate

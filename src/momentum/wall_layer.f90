@@ -1,13 +1,12 @@
 !> How fast the fluid of a film runs along the wall.
 !!
 !! Between the wall and the cell behind its master the velocity along the wall is taken as that of
-!! a layer, \( U (1 - e^{-y/\delta}) \), which is linear where the layer is thick against the cells
-!! and free slip where it is thin, as without viscosity. The two cells tell its thickness: with
-!! y_m and y_n their distances from the wall and a the ratio of their velocities along it,
-!! $$ E = e^{-y_m/\delta} = \frac{1 - a}{a} \frac{y_m}{y_n - y_m} $$
-!! (exact for y_n = 2 y_m and at both ends), and the film has \( (1 - E^r)/(1 - E) \) of what its
-!! master has, r the ratio of their distances. If films had all of it, the wall layer would carry
-!! momentum that no fluid has, and friction be too large (docs/decisions/cut_cells.md).
+!! a layer, \( U y/(y + \delta) \), which is linear where the layer is thick against the cells and
+!! free slip where it is thin, as without viscosity. The two cells tell its thickness: with y_m and
+!! y_n their distances from the wall and a the ratio of their velocities along it,
+!! $$ \frac{\delta}{y_m} = \frac{1 - a}{a - y_m/y_n} $$
+!! If films had all of the velocity of their masters, the wall layer would carry momentum that no
+!! fluid has, and friction be too large (docs/decisions/cut_cells.md).
 module wall_layer_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
@@ -42,6 +41,7 @@ contains
           if (links%master(n, m) == 0) cycle
           if (.not. is_fluid(2*links%cell(:, links%master(n, m)) - f)) cycle
           weight = links%share(n, m)*links%nearer(n, m)
+          if (weight <= 0.0_wp) cycle
           slip = slip + weight*slip_beside(m, n)
           weights = weights + weight
         end do
@@ -94,14 +94,13 @@ contains
     real(wp), intent(in) :: distances   !! of their distances from the wall, below 1
     real(wp), intent(in) :: r           !! of the distances of film and master
     real(wp) :: slip
-    real(wp), parameter :: linear = 0.999_wp   !! E of a profile that is a line to round-off
-    real(wp) :: a, e
+    real(wp) :: a, thickness   !! of the layer, in distances of the master
 
     slip = 0.0_wp
-    a = min(1.0_wp, max(ratio, distances))
-    e = (1.0_wp - a)/a*distances/(1.0_wp - distances)
-    if (e > linear .or. r >= 1.0_wp) return
-    slip = ((1.0_wp - e**r)/(1.0_wp - e) - r)/(1.0_wp - r)
+    a = min(1.0_wp, ratio)
+    if (a <= distances) return
+    thickness = (1.0_wp - a)/(a - distances)
+    slip = r/(r + thickness)
   end function layer_slip
 
 end module wall_layer_m

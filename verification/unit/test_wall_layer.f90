@@ -1,4 +1,4 @@
-!> The layer at a wall: a line where it is thick, free slip where there is none, else exponential.
+!> The layer at a wall: a line where it is thick, free slip where there is none.
 program test_wall_layer
   use kinds_m, only: wp
   use grid_m, only: n_halo
@@ -33,39 +33,32 @@ program test_wall_layer
 
 contains
 
-  !> Cells at distances 1 and 2 from the wall: the formula is exact.
+  !> Thick and thin layers, cells at distances 1 and 3 from the wall.
   subroutine the_formula()
     integer :: m
-    real(wp) :: delta, film
+    real(wp) :: delta
 
-    do m = -2, 2
+    do m = -3, 3
       delta = 2.0_wp**m
-      film = velocity_in_layer(r, delta)/velocity_in_layer(1.0_wp, delta)
-      call check('exponential layer', r + (1.0_wp - r)*layer_slip( &
-        velocity_in_layer(1.0_wp, delta)/velocity_in_layer(2.0_wp, delta), 0.5_wp, r), film, &
-        1.0e-12_wp)
+      call check('a layer', r + (1.0_wp - r)*layer_slip( &
+        layer(1.0_wp, delta)/layer(3.0_wp, delta), 1.0_wp/3.0_wp, r), &
+        layer(r, delta)/layer(1.0_wp, delta), 1.0e-12_wp)
     end do
     call check('a line has no slip', layer_slip(0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
     call check('nor has what is below it', layer_slip(-0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
-    call check('near a line it is small', layer_slip(0.5002_wp, 0.5_wp, r), 0.0_wp, 1.0e-3_wp)
     call check('without a layer all slips', layer_slip(1.0_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
     call check('faster at the wall: likewise', layer_slip(1.5_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
-    call check('a film as far as its master', layer_slip(0.7_wp, 0.4_wp, 1.0_wp), 0.0_wp, 0.0_wp)
   end subroutine the_formula
 
   !> Flows over the top of a box that moves and turns; the master lies 0.8 cells above it.
   subroutine above_the_box()
     call run_along(1.0e6_wp)
     call check('shear: linear', slip(), 0.0_wp, 1.0e-5_wp)
-    call run_along(1.0e-3_wp)
+    call run_along(0.0_wp)
     call check('no layer: free slip', slip(), 1.0_wp, 1.0e-12_wp)
-    call run_along(8.0_wp)
-    call check('a layer of many cells: within 1 %', r + (1.0_wp - r)*slip(), &
-               velocity_in_layer(0.15_wp, 8.0_wp)/velocity_in_layer(0.8_wp, 8.0_wp), 0.002_wp)
     call run_along(1.0_wp)
-    call check('a layer of one cell: velocity of the film within 5 % of the true one', &
-               r + (1.0_wp - r)*slip(), &
-               velocity_in_layer(0.15_wp, 1.0_wp)/velocity_in_layer(0.8_wp, 1.0_wp), 0.013_wp)
+    call check('a layer of one cell', r + (1.0_wp - r)*slip(), layer(0.15_wp, 1.0_wp) &
+               /layer(0.8_wp, 1.0_wp), 1.0e-12_wp)
   end subroutine above_the_box
 
   !> A layer of thickness delta [cells] along x2, in the frame of the box at the film's centre.
@@ -75,7 +68,7 @@ contains
 
     do k = lbound(u, 3), ubound(u, 3)
       u(:, :, k, 1) = wall(1)
-      u(:, :, k, 2) = wall(2) + delta*velocity_in_layer(max(0.0_wp, k - top - 0.2_wp), delta)
+      u(:, :, k, 2) = wall(2) + (1.0_wp + delta)*layer(max(0.0_wp, k - top - 0.2_wp), delta)
       u(:, :, k, 3) = wall(3) + 7.0_wp*k
     end do
     call find_slip(box%grid, box%solid, box%bodies, u, links)
@@ -94,11 +87,11 @@ contains
     velocity = v(d)
   end function wall
 
-  !> 1 - exp(-y/delta).
-  elemental function velocity_in_layer(y, delta) result(v)
+  !> Velocity at the distance y from the wall.
+  elemental function layer(y, delta) result(v)
     real(wp), intent(in) :: y, delta
     real(wp) :: v
 
-    v = 1.0_wp - exp(-y/delta)
-  end function velocity_in_layer
+    v = y/max(y + delta, tiny(y))
+  end function layer
 end program test_wall_layer
