@@ -236,6 +236,7 @@ contains
     associate (bodies => stage%bodies, links => stage%links, balance => stage%balance, &
                pressure => stage%pressure)
       do solve = 1, 2
+        pressure%rough = solve == 1 .and. any(bodies%free)
         call solve_pressure(grid, solid, stage%rho, dt, flow, bodies, pressure)
         report%pressure = added(report%pressure, pressure%report)
         call correct_cells(grid, solid, dt, flow, stage)

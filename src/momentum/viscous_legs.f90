@@ -35,6 +35,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
     type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
+    logical :: at_wall(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1)
     integer :: d
 
     self%dt = dt
@@ -44,18 +45,21 @@ contains
     call unknown_masses(grid, solid, rho, dt, self)
     if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
     do d = 1, 3
-      call legs_of_direction(grid, solid, bodies, mu, d, self)
+      call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d), at_wall)
+      call legs_to_walls(grid, solid, bodies, mu, d, at_wall, self)
     end do
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
-    call finish_diagonal(grid, self%mass, self%diagonal, self%inverse)
+    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%inverse)
   end subroutine build_viscous
 
-  !> The masses into the diagonal, and its inverse; zero where there is no unknown.
-  subroutine finish_diagonal(grid, mass, diagonal, inverse)
+  !> The ordinary legs and the masses into the diagonal, and its inverse; zero where there is no
+  !! unknown.
+  subroutine finish_diagonal(grid, leg, mass, diagonal, inverse)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: leg, mass
     real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: diagonal, inverse
     integer :: i, j, k, c
@@ -65,7 +69,9 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k, c)
+            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k, c) &
+              + leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
+              + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
             inverse(i, j, k, c) = merge(1.0_wp/max(diagonal(i, j, k, c), tiny(1.0_wp)), 0.0_wp, &
                                         mass(i, j, k, c) > 0.0_wp)
           end do
@@ -129,57 +135,76 @@ contains
     end function film_mass
   end subroutine masses_of_groups
 
-  !> Legs between neighbours in direction d: ordinary, or wall legs of one or both cells.
-  subroutine legs_of_direction(grid, solid, bodies, mu, d, self)
+  !> Ordinary legs in direction d, between neighbours with their centres in the fluid and nothing
+  !! between them. `at_wall` tells the rows with faces of another kind.
+  subroutine ordinary_legs(grid, solid, mu, d, leg, at_wall)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: d
+    real(wp), intent(inout), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(out) :: at_wall(grid%lo(2):, grid%lo(3):)
+    integer :: i, j, k, e(3), upper(3)
+    real(wp) :: conductance   !! A/h [m]
+    logical :: ordinary
+
+    e = unit_step(:, d)
+    upper = grid%hi + e
+    conductance = grid%area(d)/grid%h(d)
+    at_wall = .false.
+    !$omp parallel do private(i, j, ordinary) schedule(static)
+    do k = grid%lo(3), upper(3)
+      do j = grid%lo(2), upper(2)
+        do i = grid%lo(1), upper(1)
+          ordinary = solid%inside(i, j, k) == 0 &
+                     .and. solid%inside(i - e(1), j - e(2), k - e(3)) == 0 &
+                     .and. solid%leg_low(i, j, k, d) > 1.0_wp &
+                     .and. solid%leg_high(i, j, k, d) > 1.0_wp
+          leg(i, j, k) = merge(conductance*harmonic_mean(mu(i - e(1), j - e(2), k - e(3)), &
+                                                         mu(i, j, k)), 0.0_wp, ordinary)
+          at_wall(j, k) = at_wall(j, k) .or. .not. ordinary
+        end do
+      end do
+    end do
+  end subroutine ordinary_legs
+
+  !> Wall legs in direction d, of one or both cells of a face, and the legs to the domain's sides.
+  subroutine legs_to_walls(grid, solid, bodies, mu, d, at_wall, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: d
+    logical, intent(in) :: at_wall(grid%lo(2):, grid%lo(3):)   !! rows with walls
     type(viscous_t), intent(inout) :: self
     integer :: i, j, k, e(3), low(3), high(3), upper(3)
     real(wp) :: conductance   !! A/h [m]
-    logical :: low_wet, high_wet, free_leg
 
     e = unit_step(:, d)
     upper = grid%hi + e
     conductance = grid%area(d)/grid%h(d)
     do k = grid%lo(3), upper(3)
       do j = grid%lo(2), upper(2)
+        if (.not. (at_wall(j, k) .or. d == 1 &
+                   .or. at_domain_side(grid, merge(j, k, d == 2), d))) cycle
         do i = grid%lo(1), upper(1)
           high = [i, j, k]
           low = high - e
-          self%leg(i, j, k, d) = 0.0_wp
           if (at_domain_side(grid, high(d), d)) then
+            self%leg(i, j, k, d) = 0.0_wp
             call side_leg(high(d))
-            cycle
-          end if
-          low_wet = solid%inside(low(1), low(2), low(3)) == 0
-          high_wet = solid%inside(i, j, k) == 0
-          free_leg = solid%leg_low(i, j, k, d) > 1.0_wp .and. solid%leg_high(i, j, k, d) > 1.0_wp
-          if (low_wet .and. high_wet .and. free_leg) then
-            self%leg(i, j, k, d) = conductance &
-              *harmonic_mean(mu(low(1), low(2), low(3)), mu(i, j, k))
-            call add_diagonal(low, self%leg(i, j, k, d))
-            call add_diagonal(high, self%leg(i, j, k, d))
-          else
-            if (low_wet) call wall_leg(low, solid%leg_low(i, j, k, d), 1, &
-                                       solid%leg_body_low(i, j, k, d))
-            if (high_wet) call wall_leg(high, solid%leg_high(i, j, k, d), -1, &
-                                        solid%leg_body_high(i, j, k, d))
+          else if (self%leg(i, j, k, d) <= 0.0_wp) then
+            if (solid%inside(low(1), low(2), low(3)) == 0) then
+              call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
+            end if
+            if (solid%inside(i, j, k) == 0) then
+              call wall_leg(high, solid%leg_high(i, j, k, d), -1, solid%leg_body_high(i, j, k, d))
+            end if
           end if
         end do
       end do
     end do
   contains
-    !> Both cells of an ordinary leg, as far as they are ours.
-    subroutine add_diagonal(c, value)
-      integer, intent(in) :: c(3)
-      real(wp), intent(in) :: value
-
-      self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + value
-    end subroutine add_diagonal
-
     !> Leg from the centre of cell c along +d or -d to the surface of a body.
     subroutine wall_leg(c, theta, sense, body)
       integer, intent(in) :: c(3), sense, body
@@ -215,7 +240,7 @@ contains
         self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
       end if
     end subroutine side_leg
-  end subroutine legs_of_direction
+  end subroutine legs_to_walls
 
   !> A lower face of index i that lies on a side of the domain with a boundary condition.
   pure function at_domain_side(grid, i, d) result(side)
