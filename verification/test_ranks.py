@@ -1,10 +1,12 @@
 """Any number of ranks and threads gives the same bits."""
 
+import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from run_cases import ROOT, Machine, prepare, run
+from run_cases import CASES, ROOT, Machine, prepare, run
 from same_bits import differences
 from shared_runs import SharedRun
 
@@ -40,3 +42,19 @@ def test_same_bits_over_a_bed(tmp_path: Path) -> None:
     run(case, tmp_path / "alone", ALONE)
     run(case, tmp_path / "shared", Machine(PARALLEL, ranks=2, threads=2))
     assert differences(tmp_path / "alone", tmp_path / "shared") == []
+
+
+@several_processes
+def test_waiting_gives_the_core_away(tmp_path: Path, shared_run: SharedRun) -> None:
+    """More processes than cores, and an MPI that was told otherwise and so would wait busily."""
+    case, n = CASES / "ranks" / "coupled.nml", (os.cpu_count() or 1) + 2
+    plain = {name: os.environ[name] for name in os.environ if not name.startswith("OMPI_MCA_")}
+    crowd = ["mpirun", "--timeout", "60", "--bind-to", "none"]  # s; one process alone takes one
+    crowd += ["-host", f"localhost:{4 * n}", "-n", str(n)]
+    subprocess.run(
+        [*crowd, PARALLEL, "--quiet", "--output", tmp_path / "crowd", case],
+        env={**plain, "OMP_NUM_THREADS": "1"},
+        stdin=subprocess.DEVNULL,
+        check=True,
+    )
+    assert differences(shared_run("coupled", ALONE), tmp_path / "crowd") == []

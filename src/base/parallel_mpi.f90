@@ -14,6 +14,7 @@ submodule (parallel_m) parallel_mpi_m
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use decomposition_m, only: best_pieces, last_cell, least_cells
   use exact_bins_m, only: bin_size, merge_bins
+  use patience_m, only: choose_yield
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
   implicit none
@@ -35,6 +36,7 @@ contains
   module procedure parallel_init
     integer :: provided
 
+    call choose_yield()
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)

@@ -1,4 +1,5 @@
-!> How threads wait for one another, and how many of them work while other programs want the cores.
+!> How threads and processes wait for one another, and how many threads work while other programs
+!! want the cores.
 !!
 !! A step is some hundreds of short loops. A thread that sleeps at the end of one must be woken for
 !! the next (measured, two threads on two idle cores: 105 ms a step, 57 with a spin of a
@@ -9,6 +10,11 @@
 !!
 !! The OpenMP library of gfortran reads the length of the spin before the program begins, so the
 !! only way to choose it is to begin again.
+!!
+!! Processes wait in MPI, which asks again and again without giving the core away unless it was told
+!! that there are too few cores; what it is told is often wrong, and it knows nothing of other
+!! programs. So they always give it away. Measured on two cores with other programs there, a short
+!! run in three processes that MPI was told twelve cores for: 5 s, and not done after 60 s without.
 module patience_m
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_long, c_null_char, c_null_ptr, &
     c_ptr
@@ -17,7 +23,7 @@ module patience_m
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
-  public :: choose_spin, share_cores, fair_threads, threads_used
+  public :: choose_spin, choose_yield, share_cores, fair_threads, threads_used
 
   character(*), parameter :: spin_count = '20000'   !! about a millisecond
   real(wp), parameter :: look_interval = 1.0_wp     !! between two looks at the machine [s]
@@ -83,6 +89,15 @@ contains
     arguments(n + 1) = c_null_ptr
     if (c_execv('/proc/self/exe'//c_null_char, arguments) /= 0) return   ! it goes on as it is
   end subroutine choose_spin
+
+  !> Let a process that waits for another one give its core away, unless the user has chosen (the
+  !! name is Open MPI's; other libraries have no such choice). Call it before MPI begins.
+  subroutine choose_yield()
+    character(*), parameter :: name = 'OMPI_MCA_mpi_yield_when_idle'
+
+    if (is_set(name)) return
+    if (c_setenv(name//c_null_char, '1'//c_null_char, 1_c_int) /= 0) return   ! it waits busily
+  end subroutine choose_yield
 
   !> Let fewer threads work while other programs run on their cores, and all of them afterwards.
   !! Call it now and then, outside parallel regions: once a second it looks at the machine.
