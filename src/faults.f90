@@ -5,7 +5,8 @@ module faults_m
   use errors_m, only: exit_ok, exit_numerics, to_text, brief
   use grid_m, only: grid_t
   use boundary_kinds_m, only: is_wall
-  use time_step_m, only: simulation_t, courant_rate
+  use time_step_m, only: simulation_t
+  use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
   use release_m, only: n_waiting
   implicit none
@@ -79,9 +80,11 @@ contains
   subroutine look_at_courant(sim, fault)
     type(simulation_t), intent(in) :: sim
     type(fault_t), intent(inout) :: fault
+    type(courant_rate_t) :: rate
     real(wp) :: courant
 
-    courant = sim%case%run%dt*courant_rate(sim)
+    rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
+    courant = sim%case%run%dt*rate%carried
     if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
       //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
       //' keeps it', fault)

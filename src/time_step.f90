@@ -33,15 +33,13 @@ module time_step_m
   use added_mass_m, only: know_added_mass
   use coupling_m, only: advance_velocity, note_start
   use clock_m, only: clock_init
+  use courant_m, only: courant_rate_t, courant_rate
   use run_state_m, only: run_state_t
   use surface_tension_m, only: capillary_step
-  use parallel_m, only: global_max
   use timers_m, only: timer, tic, toc
   implicit none
   private
-  public :: simulation_t, simulation_init, resume, take_step, courant_rate
-
-  real(wp), parameter :: least_open = 0.5_wp   !! share of a face whose velocity limits the step
+  public :: simulation_t, simulation_init, resume, take_step
 
   !> Everything that lives as long as the run.
   type, extends(run_state_t) :: simulation_t
@@ -160,7 +158,7 @@ contains
         call toc(sim%timer_solid)
         call tic(sim%timer_transport)
         call carry_fluid(case, grid, sim%before, sim%solid, &
-                         span_t(dt, report%cfl, sim%clock%step), flow, sim%transport)
+                         span_t(dt, report%cfl_carried, sim%clock%step), flow, sim%transport)
         if (sim%stage%implicit_momentum) sim%stage%c_ismac%q = sim%transport%liquid%q_step
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
@@ -199,6 +197,7 @@ contains
     report%solver_iterations = stage%pressure%iterations
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
+    report%transport_parts = sim%transport%liquid%parts
     report%small_cells = sim%transport%liquid%small%count
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%stage%tension%surface%fallback
@@ -247,76 +246,24 @@ contains
     call move_alloc(keep, sim%before)
   end subroutine swap_solids
 
-  !> Length of the step: what stability allows, or less to land on a release or on the end.
+  !> Length of the step: `cfl_max` of liquid and blocks, `&run dt` and surface tension, or less to
+  !! land on a release or on the end.
   subroutine choose_step(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
-    real(wp) :: rate, allowed
+    type(courant_rate_t) :: rate
+    real(wp) :: allowed
 
     allowed = sim%case%run%dt
-    rate = courant_rate(sim)
+    if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
     if (sim%case%run%cfl_max > 0.0_wp) then
-      if (rate > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate)
+      if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
       if (sim%wet) allowed = &
         min(allowed, capillary_step(sim%case%fluid, minval(sim%grid%h, sim%grid%n > 1)))
     end if
     call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
-    report%cfl = sim%clock%dt*rate
+    report%cfl = sim%clock%dt*rate%followed
+    report%cfl_carried = sim%clock%dt*rate%carried
   end subroutine choose_step
-
-  !> Largest sum over the directions of |u|/h, over faces that are mostly open, and of the speed of
-  !! the bodies' surfaces over the smallest spacing [1/s].
-  function courant_rate(sim) result(rate)
-    type(simulation_t), intent(in) :: sim
-    real(wp) :: rate
-    integer :: b
-    real(wp) :: largest(1)
-
-    rate = 0.0_wp
-    if (.not. sim%wet) return
-    associate (grid => sim%grid)
-      largest = fluid_rate(grid, sim%flow%uf, sim%solid%open)
-      call global_max(largest)
-      rate = largest(1)
-      do b = 1, sim%blocks%n
-        if (.not. sim%blocks%present(b)) cycle
-        rate = max(rate, (norm2(sim%blocks%v(:, b)) + norm2(sim%blocks%omega(:, b)) &
-                          *sim%blocks%shapes(sim%blocks%shape(b))%radius)/minval(grid%h))
-      end do
-    end associate
-  end function courant_rate
-
-  !> That of the fluid of this process.
-  function fluid_rate(grid, uf, open) result(largest)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):, :) &
-      :: uf, open   !! velocity [m/s] and open share of the lower faces
-    real(wp) :: largest
-    integer :: i, j, k
-
-    largest = 0.0_wp
-    !$omp parallel do private(i, j) reduction(max: largest) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        !$omp simd reduction(max: largest)
-        do i = grid%lo(1), grid%hi(1)
-          largest = max(largest, max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
-                                     speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1) &
-                               + max(speed(uf(i, j, k, 2), open(i, j, k, 2)), &
-                                     speed(uf(i, j + 1, k, 2), open(i, j + 1, k, 2)))/grid%h(2) &
-                               + max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
-                                     speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3))
-        end do
-      end do
-    end do
-  end function fluid_rate
-
-  !> Speed at a face, zero where it is mostly closed.
-  elemental function speed(u, open)
-    real(wp), intent(in) :: u, open
-    real(wp) :: speed
-
-    speed = merge(abs(u), 0.0_wp, open >= least_open)
-  end function speed
 
 end module time_step_m

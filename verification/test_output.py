@@ -57,6 +57,7 @@ SERIES = {
     "substeps": "1",
     "sleeping": "1",
     "curvature_fallback": "1",
+    "transport_parts": "1",
     "wall_time": "s",
 }
 UNITS_OF_FIELDS = {"liquid": "1", "solid": "1", "pressure": "Pa", "velocity": "m/s"}
@@ -66,6 +67,7 @@ OF_THE_FLUID = {
     "pressure_passes",
     "solver_iterations",
     "curvature_fallback",
+    "transport_parts",
     "liquid_volume",
     "liquid_volume_drift",
     "kinetic_energy_fluid",

@@ -14,7 +14,7 @@ module fluid_transport_m
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
 
-  real(wp), parameter :: part_courant = 0.5_wp !! Courant number above which the volumes are parted
+  real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: a cell gives less than it has
   integer, parameter :: max_parts = 100        !! of one step
 
   type :: fluid_transport_t
@@ -25,7 +25,7 @@ module fluid_transport_m
   !> The step at hand.
   type :: span_t
     real(wp) :: dt = 0.0_wp        !! [s]
-    real(wp) :: courant = 0.0_wp   !! largest Courant number [-]
+    real(wp) :: courant = 0.0_wp   !! of all fluid, summed over the directions [-]
     integer :: number = 0          !! of the step, which decides the order of the sweeps
   end type span_t
 
@@ -80,7 +80,7 @@ contains
   end subroutine carry_fluid
 
   !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
-  !! number that the sweeps can follow; one where `cfl_max` keeps the step that short.
+  !! number that the sweeps can follow.
   pure function parts_of_step(courant) result(parts)
     real(wp), intent(in) :: courant   !! of the whole step [-]
     integer :: parts

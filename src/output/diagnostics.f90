@@ -14,7 +14,9 @@ module diagnostics_m
 
   !> What one fluid step, with its body substeps, tells about itself.
   type :: step_report_t
-    real(wp) :: cfl = 0.0_wp                  !! largest Courant number of the fluid [-]
+    real(wp) :: cfl = 0.0_wp                  !! Courant number of liquid and blocks [-]
+    real(wp) :: cfl_carried = 0.0_wp          !! of all fluid, summed over the directions [-]
+    integer :: transport_parts = 0            !! in which the volumes of the step moved
     real(wp) :: divergence_max = 0.0_wp       !! of the face velocity that the next step uses [1/s]
     integer :: pressure_passes = 0
     integer :: solver_iterations = 0          !! of all passes together
@@ -46,19 +48,20 @@ module diagnostics_m
     real(wp) :: substeps = 0.0_wp
     real(wp) :: sleeping = 0.0_wp             !! blocks asleep
     real(wp) :: curvature_fallback = 0.0_wp   !! cells whose curvature does not come from heights
+    real(wp) :: transport_parts = 0.0_wp      !! in which the volumes of the step moved
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 18
+  integer, parameter :: n_columns = 19
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
     'liquid_volume_drift', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
     'max_overlap', 'contact_courant_max', 'substeps', 'sleeping', &
-    'curvature_fallback', 'wall_time']
+    'curvature_fallback', 'transport_parts', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
     '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
-    '1', 's']
+    '1', '1', 's']
 
 contains
 
@@ -100,6 +103,7 @@ contains
       row%liquid_volume_drift = row%cfl
       row%kinetic_energy_fluid = row%cfl
       row%curvature_fallback = row%cfl
+      row%transport_parts = row%cfl
       return
     end if
     row%cfl = report%cfl
@@ -107,6 +111,7 @@ contains
     row%pressure_passes = real(report%pressure_passes, wp)
     row%solver_iterations = real(report%solver_iterations, wp)
     row%curvature_fallback = real(report%curvature_fallback, wp)
+    row%transport_parts = real(report%transport_parts, wp)
     call sum_fluid(grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
     if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
       (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
@@ -185,7 +190,7 @@ contains
          row%kinetic_energy_bodies, &
          row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
          row%contact_courant_max, &
-         row%substeps, row%sleeping, row%curvature_fallback, row%wall_time]
+         row%substeps, row%sleeping, row%curvature_fallback, row%transport_parts, row%wall_time]
   end function row_values
 
 end module diagnostics_m

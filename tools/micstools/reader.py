@@ -131,6 +131,7 @@ class Series:
     substeps: Array
     sleeping: Array
     curvature_fallback: Array
+    transport_parts: Array
     wall_time: Array
 
 

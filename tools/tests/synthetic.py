@@ -169,6 +169,7 @@ def _write_series(group: h5py.Group, time: Array, drops: int) -> None:
         "substeps": np.full(len(time), 20),
         "sleeping": np.zeros(len(time)),
         "curvature_fallback": np.zeros(len(time)),
+        "transport_parts": np.ones(len(time)),
         "wall_time": 0.1 * np.arange(len(time)),
     }.items():
         group[name] = values
