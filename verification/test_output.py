@@ -499,7 +499,7 @@ def test_no_room_for_files(tmp_path: Path) -> None:
     """A limit stands for a full disk: exit code 4, the file is named, older rows can be read."""
 
     def no_large_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (640_000, 640_000))
 
     code, said = run(tmp_path / "run", preexec_fn=no_large_files)
     assert code == 4, said
