@@ -105,12 +105,31 @@ def wall_gaps(body: Placed, low: Array, high: Array, sides: dict[str, str]) -> d
     return gaps
 
 
+def bed_gap(body: Placed, facets: Array, reach: float) -> float:
+    """Least distance between the surfaces of a block and of a bed (n, 3, 3) [m]; infinite where no
+    facet comes within `reach` of the sphere around the block."""
+    margin = body.shape.radius + reach
+    low, high = body.position - margin, body.position + margin
+    beside = (facets.min(axis=1) <= high) & (facets.max(axis=1) >= low)
+    facets = facets[beside.all(axis=1)]
+    if not len(facets):
+        return float("inf")
+    points = body.points
+    edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
+    return min(
+        float(distance_to_triangles(points[np.unique(body.shape.edges)], facets).min()),
+        float(distance_to_triangles(facets.reshape(-1, 3), body.triangles).min()),
+        distance_between_segments(points[body.shape.edges], edges),
+    )
+
+
 @dataclass(frozen=True)
 class Touches:
     """What touches what at one row, by the true shapes."""
 
     blocks: dict[tuple[int, int], float]  # gap of each touching pair, first number the lower [m]
     walls: dict[tuple[int, str], float]  # gap of each touching block and side [m]
+    bed: dict[int, float]  # gap of each block that touches the bed [m]
 
     def of(self, body: int) -> list[int]:
         """Blocks that touch a block."""
@@ -120,9 +139,13 @@ class Touches:
         """Sides that touch a block."""
         return [side for k, side in self.walls if k == body]
 
+    def on_floor(self, body: int) -> bool:
+        """Whether a block touches the floor of the tank or the bed."""
+        return body in self.bed or (body, "z_min") in self.walls
+
 
 def touches(run: Run, row: int, reach: float = 5e-4) -> Touches:
-    """Pairs of released blocks, and of blocks and walls, not farther apart than `reach` [m]."""
+    """What is within `reach` [m]: pairs of released blocks, and they and walls or the bed."""
     bodies = present_bodies(run, row)
     blocks = {}
     for i, j in combinations(bodies, 2):
@@ -134,7 +157,10 @@ def touches(run: Run, row: int, reach: float = 5e-4) -> Touches:
             if distance <= reach:
                 blocks[i, j] = distance
     gaps = _all_wall_gaps(run, bodies)
-    return Touches(blocks, {key: g for key, g in gaps.items() if g <= reach})
+    walls = {key: g for key, g in gaps.items() if g <= reach}
+    corners, facets = run.bed
+    beds = {k: bed_gap(body, corners[facets], reach) for k, body in bodies.items()}
+    return Touches(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
 
 
 @dataclass(frozen=True)

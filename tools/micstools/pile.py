@@ -182,7 +182,7 @@ def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
     b = run.bodies
     row = row % len(b.time)
     seen = touches(run, row, REACH)
-    low = [int(k) for k in b.dropped if "z_min" in seen.walls_of(k)]
+    low = [int(k) for k in b.dropped if seen.on_floor(int(k))]
     if not b.present(row).all() or len(low) > 1:
         return "other", low
     return ("B" if low else "A"), low

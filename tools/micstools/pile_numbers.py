@@ -17,7 +17,7 @@ class PileNumbers:
     """What is counted and measured of a pile."""
 
     blocks: int  # released
-    on_floor: int  # of them, dropped and touching the floor
+    on_floor: int  # of them, dropped and touching the floor or the bed
     plan_area: float  # covered, seen from above [m2]
     top: float  # highest point [m]
     coordination: float  # blocks that touch a block, on average
@@ -52,7 +52,7 @@ def numbers(
     forces = [k.contact_force for k in block_numbers.of_blocks(run)]
     return PileNumbers(
         blocks=len(bodies),
-        on_floor=sum("z_min" in seen.walls_of(int(k)) for k in b.dropped if int(k) in bodies),
+        on_floor=sum(seen.on_floor(int(k)) for k in b.dropped),
         plan_area=float(np.isfinite(top).sum() * step**2),
         top=max(float(body.points[:, 2].max()) for body in blocks),
         coordination=2 * len(seen.blocks) / len(bodies),

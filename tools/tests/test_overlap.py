@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from micstools.geometry import quaternion_from_axis
-from micstools.overlap import Placed, depth, gap, wall_gaps
+from micstools.overlap import Placed, bed_gap, depth, gap, wall_gaps
 from micstools.shapes import cube, hexapod
 
 UPRIGHT = np.array([1.0, 0, 0, 0])
@@ -27,6 +27,20 @@ def test_gap_of_two_faces_two_edges_and_a_corner() -> None:
     on_corner = quaternion_from_axis(np.array([1.0, -1, 0]), turn)
     found = gap(at(c, 0, 0, 0), at(c, 0.001, 0, d / 2 + np.sqrt(3) / 2 * d + 2e-4, on_corner))
     assert found == pytest.approx(2e-4, rel=1e-9)
+
+
+def test_gap_to_a_bed_face_ridge_and_peak() -> None:
+    """Over one large facet, across a ridge along x, above a peak, and far from all of them."""
+    c, reach = cube(0.02), 1e-3
+    flat = np.array([[(-1.0, -1, 0), (2, -1, 0), (-1, 2, 0)]])
+    on_edge = quaternion_from_axis(np.array([0.0, 1, 0]), 45.0)
+    assert bed_gap(at(c, 0, 0, 0.0102), flat, reach) == pytest.approx(2e-4, rel=1e-9)
+    half = 0.02 / np.sqrt(2)
+    ridge = np.array([[(-1.0, 0, 0), (1, 0, 0), (0, y, -1)] for y in (-1.0, 1.0)])
+    assert bed_gap(at(c, 0, 0.003, half + 3e-4, on_edge), ridge, reach) == pytest.approx(3e-4)
+    peak = np.array([[(0.003, 0.002, 0), (1.0, 0, -1), (0, 1, -1)]])
+    assert bed_gap(at(c, 0, 0, 0.0104), peak, reach) == pytest.approx(4e-4, rel=1e-9)
+    assert bed_gap(at(c, 0, 0, 0.05), flat, reach) == float("inf")
 
 
 def test_depth_of_faces_and_of_a_leg() -> None:

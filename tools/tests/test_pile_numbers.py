@@ -1,9 +1,11 @@
 """Numbers of a pile on arrangements that are known exactly."""
 
+import h5py
 import numpy as np
 import pytest
 
 from micstools import pile_numbers, shapes
+from micstools.reader import Run
 from synthetic import UPRIGHT, Motion
 
 EDGE = 0.02
@@ -30,6 +32,18 @@ def test_stacked_cubes(make_run) -> None:
     low, high = np.array(found.box[:3]), np.array(found.box[3:])
     assert low == pytest.approx((0.02, 0.02, 0.0))
     assert found.porosity == pytest.approx(1 - 7 * EDGE**3 / np.prod(high - low))
+
+
+def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
+    """A tower of two cubes on a bed 1 cm high, and a cube that hangs above it."""
+    places = [(np.array([0.03, 0.03, z]), UPRIGHT) for z in (0.02, 0.04)]
+    places.append((np.array([0.27, 0.03, 0.021]), UPRIGHT))
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    assert pile_numbers.numbers(run, step=0.001).on_floor == 0
+    corners = np.array([(x, y, 0.01) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 2, 1), (1, 2, 3)])
+    assert pile_numbers.numbers(Run(run.folder), step=0.001).on_floor == 1
 
 
 def test_height_map_of_a_cube_and_a_tilted_one() -> None:
