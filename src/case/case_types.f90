@@ -64,7 +64,7 @@ module case_types_m
     character(name_length) :: coupling = 'monolithic'
     integer :: coupling_passes = 1
     character(name_length) :: momentum = 'conservative'
-    character(name_length) :: advection = 'tvd5'
+    character(name_length) :: advection = 'mp5'
     character(name_length) :: interface = 'plic'
     character(name_length) :: solid_fraction = 'exact'
     integer :: subcells = 4

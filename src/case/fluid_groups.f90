@@ -74,8 +74,9 @@ contains
     call v%option('momentum', numerics%momentum, 'conservative c_ismac', 'predictor of the ' &
       //'velocity: mass and momentum carried by one flux, or that of the paper', &
       example='''c_ismac''')
-    call v%option('advection', numerics%advection, 'tvd5 upwind', &
-      'values carried through the faces: of fifth order with a limiter, or of the cell upstream', &
+    call v%option('advection', numerics%advection, 'mp5 tvd5 upwind', &
+      'values carried through the faces: of fifth order, clipped where not monotone (mp5) or ' &
+      //'with the limiter of the paper (tvd5), or of the cell upstream', &
       example='''upwind''')
     call v%option('interface', numerics%interface, 'plic', &
       'surface of the liquid: a plane in each cell', example='''plic''')

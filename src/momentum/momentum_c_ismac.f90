@@ -5,7 +5,7 @@
 !!    - \Delta t \nabla\cdot\mu\nabla\delta
 !!    = \Delta t \Big[\rho g - \nabla p^n + \nabla\cdot\mu\nabla u^n
 !!    - \rho (u_f\cdot\nabla) u^n\Big] $$
-!! The right side has the accurate advection (fifth-order TVD, or the donor's value), the left side
+!! The right side has the accurate advection (fifth order, or the donor's value), the left side
 !! that of first order, whose matrix is diagonally dominant at any Courant number. Where the flow is
 !! steady delta is zero, so neither the step nor the first-order operator leaves a trace in it. The
 !! viscous part, the wall legs and the motion of the free bodies are those of `viscous_legs_m`, in
@@ -30,7 +30,7 @@ module momentum_c_ismac_m
   use boundary_kinds_m, only: side_inflow
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
-  use tvd_m, only: face_values, scheme_of, tvd_scheme
+  use tvd_m, only: face_values, scheme_of, mp_scheme
   use viscous_system_m, only: viscous_t, wrench
   use viscous_m, only: apply_viscous, force_of_legs, velocity_scale, inertial_momentum
   use linear_operator_m, only: linear_operator_t, identity_t
@@ -67,7 +67,7 @@ module momentum_c_ismac_m
   end type predictor_operator_t
 
   type :: c_ismac_t
-    integer :: scheme = tvd_scheme                 !! of the advection on the right side
+    integer :: scheme = mp_scheme                  !! of the advection on the right side
     real(wp), allocatable :: q(:, :, :, :)         !! volumes of the step, lower faces [m3]
     real(wp), allocatable :: u_old(:, :, :, :)     !! velocity u^n, halo filled [m/s]
     !> Gravity less pressure gradient over density at u^n, and with the density at u* [m/s2].
@@ -86,7 +86,7 @@ contains
   subroutine c_ismac_init(grid, n, advection, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
-    character(*), intent(in) :: advection   !! 'tvd5' | 'upwind'
+    character(*), intent(in) :: advection   !! 'mp5' | 'tvd5' | 'upwind'
     type(c_ismac_t), intent(out) :: self
     type(grid_t) :: stacked   !! three components as one block
     integer :: a(3), b(3)

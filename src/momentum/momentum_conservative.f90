@@ -6,7 +6,7 @@
 !! with Q and G the volumes of fluid and of liquid that the sweep moved, and momentum moves as
 !! `m_f u~_f`. Dividing by the mass of the cell, which saw the same volumes, keeps a uniform
 !! velocity to round-off through any interface and any opening or closing cell. u~ is the
-!! fifth-order TVD value, carried to the mean over the slab that leaves the donor; that of the donor
+!! fifth-order value, carried to the mean over the slab that leaves the donor; that of the donor
 !! next to the interface, and everywhere with `advection = 'upwind'`.
 !! Source: consistent transport after Rudman (1998); departs from the velocity form of the paper's
 !! eq. (5), which moves water momentum into air at a density ratio of 830.
@@ -17,7 +17,7 @@ module momentum_conservative_m
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
   use mixture_m, only: pure_share
-  use tvd_m, only: face_values, scheme_of, tvd_scheme
+  use tvd_m, only: face_values, scheme_of, mp_scheme
   use carried_volumes_m, only: carried_volumes_t
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
   use small_cells_m, only: late_values, move_late
@@ -26,7 +26,7 @@ module momentum_conservative_m
   public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_late, mass_through
 
   type :: momentum_t
-    integer :: scheme = tvd_scheme                  !! of the carried velocity
+    integer :: scheme = mp_scheme                   !! of the carried velocity
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
     real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
@@ -42,7 +42,7 @@ contains
   subroutine momentum_init(grid, self, advection)
     type(grid_t), intent(in) :: grid
     type(momentum_t), intent(out) :: self
-    character(*), intent(in), optional :: advection   !! name of the scheme, else 'tvd5'
+    character(*), intent(in), optional :: advection   !! name of the scheme, else 'mp5'
     integer :: a(3), b(3)
 
     if (present(advection)) self%scheme = scheme_of(advection)

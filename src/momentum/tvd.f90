@@ -1,34 +1,47 @@
-!> Fifth-order TVD value on a face.
+!> Fifth-order value on a face, kept from overshooting in one of two ways.
 !!
-!! Source: Yamamoto & Daiguji (1993), compact MUSCL structure; weights 1/5 and 3/20 make the
-!! unlimited value (2, -13, 47, 27, -3)/60, fifth order, in place of their 1/6 (fourth order).
+!! Both have the value (2, -13, 47, 27, -3)/60 where no limiter acts. `tvd5` takes the compact MUSCL
+!! structure of Yamamoto & Daiguji (1993), with weights 1/5 and 3/20 in place of their 1/6 (fourth
+!! order); `mp5` clips the value itself to the bounds of Suresh & Huynh (1997), which are wider
+!! where the data are smooth.
 module tvd_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
   implicit none
   private
-  public :: tvd5, face_values, scheme_of, tvd_scheme, upwind_scheme
+  public :: tvd5, mp5, face_values, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell
+  integer, parameter :: mp_scheme = 3       !! fifth-order value that keeps monotony
 
   real(wp), parameter :: limit_outer = 4.0_wp   !! b, = (3 - k)/(1 - k) with k = 1/3
   real(wp), parameter :: limit_inner = 2.0_wp   !! b_1
+  real(wp), parameter :: steepest = 2.0_wp
+    !! alpha: the value is at most this times the step below the cell away from the cell's. With the
+    !! mean of the slab monotone while alpha <= 1/(Courant number), which is 0.5 at most in a sweep
 
 contains
 
   !> Scheme of a name of the case file.
   pure function scheme_of(name) result(scheme)
-    character(*), intent(in) :: name   !! 'tvd5' | 'upwind'
+    character(*), intent(in) :: name   !! 'mp5' | 'tvd5' | 'upwind'
     integer :: scheme
 
-    scheme = merge(upwind_scheme, tvd_scheme, trim(name) == 'upwind')
+    select case (trim(name))
+    case ('upwind')
+      scheme = upwind_scheme
+    case ('tvd5')
+      scheme = tvd_scheme
+    case default
+      scheme = mp_scheme
+    end select
   end function scheme_of
 
   !> Values on the lower faces in one direction, from the side where the fluid comes from.
   subroutine face_values(grid, scheme, e, q, u, face)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: scheme   !! `tvd_scheme` | `upwind_scheme`
+    integer, intent(in) :: scheme   !! `mp_scheme` | `tvd_scheme` | `upwind_scheme`
     integer, intent(in) :: e(3)     !! step along the direction
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: q, u            !! flux through the lower face, any unit; what is carried
@@ -45,11 +58,11 @@ contains
           if (scheme == upwind_scheme) then
             face(i:n, j, k) = merge(u_1, v_1, q(i:n, j, k) > 0.0_wp)
           else
-            call tvd5_row(n - i + 1, q(i:n, j, k), &
-                          u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
-                          u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
-                          u(i + e(1):n + e(1), j + e(2), k + e(3)), &
-                          u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face(i:n, j, k))
+            call fifth_order_row(n - i + 1, scheme, q(i:n, j, k), &
+                                 u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
+                                 u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
+                                 u(i + e(1):n + e(1), j + e(2), k + e(3)), &
+                                 u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face(i:n, j, k))
           end if
         end associate
       end do
@@ -57,21 +70,31 @@ contains
   end subroutine face_values
 
   !> Values on n faces, each between the cells u_3, u_2, u_1 below and v_1, v_2, v_3 above it.
-  pure subroutine tvd5_row(n, q, u_3, u_2, u_1, v_1, v_2, v_3, face)
-    integer, intent(in) :: n
+  pure subroutine fifth_order_row(n, scheme, q, u_3, u_2, u_1, v_1, v_2, v_3, face)
+    integer, intent(in) :: n, scheme
     real(wp), intent(in), dimension(n) :: q, u_3, u_2, u_1, v_1, v_2, v_3
     real(wp), intent(inout) :: face(n)
     integer :: i
     logical :: forward
 
-    !$omp simd private(forward)
-    do i = 1, n
-      forward = q(i) > 0.0_wp
-      face(i) = tvd5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
-                     merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
-                     merge(v_2(i), u_2(i), forward))
-    end do
-  end subroutine tvd5_row
+    if (scheme == tvd_scheme) then
+      !$omp simd private(forward)
+      do i = 1, n
+        forward = q(i) > 0.0_wp
+        face(i) = tvd5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
+                       merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
+                       merge(v_2(i), u_2(i), forward))
+      end do
+    else
+      !$omp simd private(forward)
+      do i = 1, n
+        forward = q(i) > 0.0_wp
+        face(i) = mp5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
+                      merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
+                      merge(v_2(i), u_2(i), forward))
+      end do
+    end if
+  end subroutine fifth_order_row
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
   !!
@@ -91,6 +114,41 @@ contains
     q = minmod(up, limit_outer*down)/6.0_wp + minmod(down, limit_outer*up)/3.0_wp
     q = q_0 + minmod(q, d_p1)
   end function tvd5
+
+  !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow: that of
+  !! fifth order, clipped.
+  !!
+  !! On monotone data between the values of cell 0 and cell 1 and no steeper than `steepest` times
+  !! the step before; beside an extremum of smooth data as far out as its curvature says.
+  !! Source: Suresh & Huynh (1997), eqs. (2.1) and (2.24) to (2.27), without their test whether to
+  !! clip: a value that passes it lies within the bounds.
+  elemental function mp5(q_m2, q_m1, q_0, q_1, q_2) result(q)
+    real(wp), intent(in) :: q_m2, q_m1, q_0, q_1, q_2
+    real(wp) :: q
+    real(wp) :: d_m3, d_m1, d_p1, d_p3   !! differences over the faces -3/2, -1/2, 1/2, 3/2
+    real(wp) :: middle, large, low, high !! of the value less that of cell 0
+
+    d_m3 = q_m1 - q_m2
+    d_m1 = q_0 - q_m1
+    d_p1 = q_1 - q_0
+    d_p3 = q_2 - q_1
+    middle = 0.5_wp*(d_p1 - least_curvature(d_p1 - d_m1, d_p3 - d_p1))
+    large = 0.5_wp*d_m1 + 4.0_wp/3.0_wp*least_curvature(d_m1 - d_m3, d_p1 - d_m1)
+    low = max(min(0.0_wp, d_p1, middle), min(0.0_wp, steepest*d_m1, large))
+    high = min(max(0.0_wp, d_p1, middle), max(0.0_wp, steepest*d_m1, large))
+    q = (24.0_wp*d_p1 + 11.0_wp*d_m1 - 2.0_wp*d_m3 - 3.0_wp*d_p3)/60.0_wp
+    q = q_0 + max(low, min(high, q))
+  end function mp5
+
+  !> Second difference at a face, from those of the cells beside it: the smallest of a, b, 4a - b
+  !! and 4b - a, zero if their signs differ.
+  elemental function least_curvature(a, b) result(c)
+    real(wp), intent(in) :: a, b
+    real(wp) :: c
+
+    c = max(0.0_wp, min(a, b, 4.0_wp*a - b, 4.0_wp*b - a)) &
+        + min(0.0_wp, max(a, b, 4.0_wp*a - b, 4.0_wp*b - a))
+  end function least_curvature
 
   !> Limited third difference about the middle face, from three neighbouring differences.
   elemental function third_difference(a, b, c) result(t)

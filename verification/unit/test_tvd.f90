@@ -1,7 +1,7 @@
-!> Fifth-order TVD value: exact weights on smooth data, order, bounds.
+!> Fifth-order values: exact weights on smooth data, order, bounds, monotony of a step.
 program test_tvd
   use kinds_m, only: wp
-  use tvd_m, only: tvd5
+  use tvd_m, only: tvd5, mp5
   use check_m, only: check, finish_checks
   implicit none
   real(wp) :: q(-2:2), value, error(2), exact
@@ -36,8 +36,61 @@ program test_tvd
   call check('between donor and next cell', inside)
   call check('extremum gives the donor', tvd5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp), 1.0_wp, &
              0.0_wp)
+
+  call clipped()
   call finish_checks()
 contains
+  !> The value that is clipped: the same on gentle data, of fifth order over an extremum too, and
+  !! steps of monotone data stay monotone.
+  subroutine clipped()
+    integer, parameter :: last = 60
+    real(wp), parameter :: courant(3) = [0.1_wp, 0.25_wp, 0.5_wp]
+    real(wp) :: line(-2:last), flux(0:last)
+    integer :: c, step
+    logical :: monotone
+
+    q = [1.0_wp, 2.1_wp, 3.3_wp, 4.6_wp, 6.0_wp]
+    call check('clipped: weights on gentle data', mp5(q(-2), q(-1), q(0), q(1), q(2)), &
+               dot_product([2.0_wp, -13.0_wp, 47.0_wp, 27.0_wp, -3.0_wp], q)/60.0_wp, 1.0e-14_wp)
+    call check('clipped: a single cell', mp5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp) <= 1.0_wp)
+    do level = 1, 2
+      n = 16*2**level
+      error(level) = 0.0_wp
+      do i = 0, 2*n
+        exact = sin(real(i, wp)/real(n, wp))
+        value = mp5(wave(i - 2), wave(i - 1), wave(i), wave(i + 1), wave(i + 2))
+        error(level) = max(error(level), abs(value - exact))
+      end do
+    end do
+    call check('clipped: order over the top of sin(x)', log(error(1)/error(2))/log(2.0_wp), &
+               5.0_wp, 0.15_wp)
+
+    monotone = .true.
+    do c = 1, 3
+      line = 0.0_wp
+      line(:10) = 1.0_wp
+      line(11) = 0.3_wp
+      do step = 1, 20
+        do i = 0, last - 2
+          value = mp5(line(i - 2), line(i - 1), line(i), line(i + 1), line(i + 2))
+          flux(i) = courant(c)*(line(i) + (1.0_wp - courant(c))*(value - line(i)))
+        end do
+        line(1:last - 2) = line(1:last - 2) - (flux(1:last - 2) - flux(0:last - 3))
+        monotone = monotone .and. all(line(-1:) <= line(:last - 1) + 1.0e-14_wp) &
+          .and. all(abs(line - 0.5_wp) <= 0.5_wp + 1.0e-14_wp)
+      end do
+    end do
+    call check('clipped: a step stays monotone', monotone)
+  end subroutine clipped
+
+  !> Mean of sin over the cell that ends at i/n.
+  pure function wave(i) result(m)
+    integer, intent(in) :: i
+    real(wp) :: m
+
+    m = real(n, wp)*(cos(real(i - 1, wp)/real(n, wp)) - cos(real(i, wp)/real(n, wp)))
+  end function wave
+
   !> Mean of exp over the cell that ends at i/n.
   pure function mean(i) result(m)
     integer, intent(in) :: i
