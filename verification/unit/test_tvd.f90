@@ -52,6 +52,8 @@ contains
     q = [1.0_wp, 2.1_wp, 3.3_wp, 4.6_wp, 6.0_wp]
     call check('clipped: weights on gentle data', mp5(q(-2), q(-1), q(0), q(1), q(2)), &
                dot_product([2.0_wp, -13.0_wp, 47.0_wp, 27.0_wp, -3.0_wp], q)/60.0_wp, 1.0e-14_wp)
+    call check('clipped: foot of a front, twice the step before', &
+               mp5(0.0_wp, 0.0_wp, 0.1_wp, 1.0_wp, 1.0_wp), 0.3_wp, 1.0e-14_wp)
     call check('clipped: a single cell', mp5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp) <= 1.0_wp)
     do level = 1, 2
       n = 16*2**level
