@@ -9,7 +9,7 @@ module tvd_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: tvd5, mp5, face_values, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
+  public :: face_value, face_values, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell
@@ -19,8 +19,9 @@ module tvd_m
   real(wp), parameter :: limit_inner = 2.0_wp   !! b_1
   real(wp), parameter :: steepest = 2.0_wp
     !! alpha: the value is at most this times the step below the cell away from the cell's. With the
-    !! mean of the slab monotone while alpha <= 1/(Courant number): 0.5 in liquid; in gas, which
-    !! may reach 0.9 in a sweep, a step of the velocity overshoots by 0.08 of itself at most
+    !! mean of the slab monotone while alpha <= 1/(Courant number): 0.5 in liquid. Gas may
+    !! reach C = 0.9 in a sweep: there a step overshoots by (1 - C)(2 C - 1) of the step before, an
+    !! eighth of it at most
 
 contains
 
@@ -70,7 +71,20 @@ contains
     end do
   end subroutine face_values
 
+  !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
+  pure function face_value(scheme, q) result(value)
+    integer, intent(in) :: scheme   !! `mp_scheme` | `tvd_scheme`
+    real(wp), intent(in) :: q(-2:2)
+    real(wp) :: value, face(1)
+
+    call fifth_order_row(1, scheme, [1.0_wp], q(-2:-2), q(-1:-1), q(0:0), q(1:1), q(2:2), q(2:2), &
+                         face)
+    value = face(1)
+  end function face_value
+
   !> Values on n faces, each between the cells u_3, u_2, u_1 below and v_1, v_2, v_3 above it.
+  !! `mp5` is called here only: so the compiler puts it into the loop, which then is one over
+  !! vectors.
   pure subroutine fifth_order_row(n, scheme, q, u_3, u_2, u_1, v_1, v_2, v_3, face)
     integer, intent(in) :: n, scheme
     real(wp), intent(in), dimension(n) :: q, u_3, u_2, u_1, v_1, v_2, v_3

@@ -1,7 +1,7 @@
 !> Fifth-order values: exact weights on smooth data, order, bounds, monotony of a step.
 program test_tvd
   use kinds_m, only: wp
-  use tvd_m, only: tvd5, mp5
+  use tvd_m, only: face_value, tvd_scheme, mp_scheme
   use check_m, only: check, finish_checks
   implicit none
   real(wp) :: q(-2:2), value, error(2), exact
@@ -10,7 +10,7 @@ program test_tvd
 
   ! Where no limiter acts the weights are (2, -13, 47, 27, -3)/60.
   q = [1.0_wp, 2.1_wp, 3.3_wp, 4.6_wp, 6.0_wp]
-  call check('weights on gentle data', tvd5(q(-2), q(-1), q(0), q(1), q(2)), &
+  call check('weights on gentle data', face_value(tvd_scheme, q), &
              dot_product([2.0_wp, -13.0_wp, 47.0_wp, 27.0_wp, -3.0_wp], q)/60.0_wp, 1.0e-14_wp)
 
   ! Cell means of exp(x): the face value converges with fifth order.
@@ -19,7 +19,7 @@ program test_tvd
     error(level) = 0.0_wp
     do i = 3, n - 3
       exact = exp(real(i, wp)/real(n, wp))
-      value = tvd5(mean(i - 2), mean(i - 1), mean(i), mean(i + 1), mean(i + 2))
+      value = face_value(tvd_scheme, [mean(i - 2), mean(i - 1), mean(i), mean(i + 1), mean(i + 2)])
       error(level) = max(error(level), abs(value - exact))
     end do
   end do
@@ -29,13 +29,13 @@ program test_tvd
   inside = .true.
   do i = 1, 2000
     q = [sin(1.7_wp*i), sin(3.1_wp*i), cos(0.9_wp*i), sin(2.3_wp*i), cos(4.1_wp*i)]
-    value = tvd5(q(-2), q(-1), q(0), q(1), q(2))
+    value = face_value(tvd_scheme, q)
     inside = inside .and. value >= min(q(0), q(1)) - 1.0e-15_wp .and. value <= max(q(0), q(1)) &
       + 1.0e-15_wp
   end do
   call check('between donor and next cell', inside)
-  call check('extremum gives the donor', tvd5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp), 1.0_wp, &
-             0.0_wp)
+  call check('extremum gives the donor', &
+             face_value(tvd_scheme, [0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]), 1.0_wp, 0.0_wp)
 
   call clipped()
   call finish_checks()
@@ -50,17 +50,18 @@ contains
     logical :: monotone
 
     q = [1.0_wp, 2.1_wp, 3.3_wp, 4.6_wp, 6.0_wp]
-    call check('clipped: weights on gentle data', mp5(q(-2), q(-1), q(0), q(1), q(2)), &
+    call check('clipped: weights on gentle data', face_value(mp_scheme, q), &
                dot_product([2.0_wp, -13.0_wp, 47.0_wp, 27.0_wp, -3.0_wp], q)/60.0_wp, 1.0e-14_wp)
     call check('clipped: foot of a front, twice the step before', &
-               mp5(0.0_wp, 0.0_wp, 0.1_wp, 1.0_wp, 1.0_wp), 0.3_wp, 1.0e-14_wp)
-    call check('clipped: a single cell', mp5(0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp) <= 1.0_wp)
+               face_value(mp_scheme, [0.0_wp, 0.0_wp, 0.1_wp, 1.0_wp, 1.0_wp]), 0.3_wp, 1.0e-14_wp)
+    call check('clipped: a single cell', &
+               face_value(mp_scheme, [0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]) <= 1.0_wp)
     do level = 1, 2
       n = 16*2**level
       error(level) = 0.0_wp
       do i = 0, 2*n
         exact = sin(real(i, wp)/real(n, wp))
-        value = mp5(wave(i - 2), wave(i - 1), wave(i), wave(i + 1), wave(i + 2))
+        value = face_value(mp_scheme, [wave(i - 2), wave(i - 1), wave(i), wave(i + 1), wave(i + 2)])
         error(level) = max(error(level), abs(value - exact))
       end do
     end do
@@ -74,7 +75,7 @@ contains
       line(11) = 0.3_wp
       do step = 1, 20
         do i = 0, last - 2
-          value = mp5(line(i - 2), line(i - 1), line(i), line(i + 1), line(i + 2))
+          value = face_value(mp_scheme, line(i - 2:i + 2))
           flux(i) = courant(c)*(line(i) + (1.0_wp - courant(c))*(value - line(i)))
         end do
         line(1:last - 2) = line(1:last - 2) - (flux(1:last - 2) - flux(0:last - 3))
