@@ -13,6 +13,7 @@ program mics
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
+  use messages_m, only: count_from_here
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use case_file_m, only: read_text
   use case_types_m, only: case_t
@@ -59,6 +60,7 @@ program mics
   call write_due_output(sim%run_state_t, report, output)
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   call note_places(sim, fault)
+  call count_from_here()
   do while (.not. sim%clock%finished())
     call share_cores()
     call take_step(sim, report)

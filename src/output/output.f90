@@ -5,7 +5,8 @@
 module output_m
   use kinds_m, only: wp, i8
   use errors_m, only: exit_ok, exit_files
-  use parallel_m, only: broadcast, is_root
+  use parallel_m, only: broadcast, is_root, total_traffic
+  use messages_m, only: traffic_t
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
   use case_types_m, only: case_t
@@ -290,9 +291,11 @@ contains
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     type(row_t) :: row
+    type(traffic_t) :: traffic
     integer :: code
 
     if (output%code == exit_ok) then
+      call total_traffic(state%clock%step - output%progress%first_step, traffic)
       call make_row(output%gravity, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
       if (output%row_step /= state%clock%step) then
@@ -307,12 +310,12 @@ contains
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
-    call close_run_file(output%run_file, code)
+    call close_run_file(output%run_file, code, traffic)
     call close_files(output)
     call output%lock%release()
     call look_for_trouble(output)
     call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
-                       output%folder)
+                       traffic, output%folder)
   end subroutine close_output
 
 end module output_m

@@ -4,7 +4,8 @@ module progress_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use value_text_m, only: fixed_text
-  use parallel_m, only: is_root
+  use parallel_m, only: is_root, nproc
+  use messages_m, only: traffic_t, sent_kinds
   use patience_m, only: threads_used
   use timers_m, only: wall_clock
   use rigid_body_m, only: blocks_t
@@ -142,11 +143,12 @@ contains
   end function time_left
 
   !> Say how the run went.
-  subroutine write_summary(self, clock, cells, exit_code, folder)
+  subroutine write_summary(self, clock, cells, exit_code, traffic, folder)
     type(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
     integer(i8), intent(in) :: cells   !! of the whole domain
     integer, intent(in) :: exit_code
+    type(traffic_t), intent(in) :: traffic
     character(*), intent(in) :: folder
     character(:), allocatable :: how, line
     real(wp) :: seconds, mean
@@ -167,7 +169,27 @@ contains
       //' threads (other programs ran too)'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
+    if (nproc() > 1 .and. traffic%known .and. steps > 0) call say(traffic_text(traffic), self)
     call say('results in '//folder, self)
   end subroutine write_summary
+
+  !> Messages of a step, those of the process that sends most.
+  pure function traffic_text(traffic) result(line)
+    type(traffic_t), intent(in) :: traffic
+    character(:), allocatable :: line
+    real(wp) :: messages, kilobytes
+    integer :: k
+
+    line = ''
+    do k = 1, size(sent_kinds)
+      if (.not. traffic%messages_most(k) > 0.0_wp) cycle
+      messages = traffic%messages_most(k)/real(traffic%steps, wp)
+      kilobytes = 1.0e-3_wp*traffic%bytes_most(k)/real(traffic%steps, wp)
+      if (len(line) > 0) line = line//', '
+      line = line//trim(sent_kinds(k))//' '//fixed_text(messages, 1)//' (' &
+        //fixed_text(kilobytes, 1)//' kB)'
+    end do
+    line = 'messages of one process per step: '//line
+  end function traffic_text
 
 end module progress_m

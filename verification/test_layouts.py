@@ -1,0 +1,98 @@
+"""However the domain is cut: the same bits, and as many messages as one process foretells."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, changed, run
+from same_bits import differences
+
+sys.path.insert(0, str(ROOT / "tools"))
+
+from micstools import messages  # noqa: E402
+
+SERIAL, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
+EXACT = [messages.KINDS.index(kind) for kind in ("halo", "gather", "reduction", "broadcast")]
+pytestmark = pytest.mark.xdist_group("ranks")
+LAYOUTS = [
+    ("coupled", (24, 16, 32), (1, 1, 2)),
+    ("coupled", (30, 14, 8), (3, 1, 1)),
+    ("coupled", (16, 12, 30), (1, 1, 4)),
+    ("paper", (23, 14, 11), (2, 2, 1)),
+    ("coupled", (21, 8, 15), (5, 1, 1)),
+    ("coupled", (23, 13, 10), (2, 3, 1)),
+    ("stream", (8, 29, 11), (1, 7, 1)),
+    ("current", (12, 14, 15), (2, 2, 2)),
+]
+
+
+@pytest.mark.parametrize(("name", "cells", "pieces"), LAYOUTS)
+def test_layout(
+    name: str, cells: tuple[int, int, int], pieces: tuple[int, int, int], tmp_path: Path
+) -> None:
+    """Pieces of different sizes in one, two and three directions."""
+    text = re.sub(r"t_end = [\d.]+", "t_end = 0.03", (CASES / "ranks" / f"{name}.nml").read_text())
+    case = tmp_path / "case.nml"
+    case.write_text(changed(text, {"grid": {"cells": list(cells)}}))
+    run(case, tmp_path / "alone", Machine(SERIAL, threads=1))
+    run(case, tmp_path / "shared", Machine(PARALLEL, ranks=int(np.prod(pieces))))
+    assert differences(tmp_path / "alone", tmp_path / "shared") == []
+    alone, shared = messages.read(tmp_path / "alone"), messages.read(tmp_path / "shared")
+    assert messages.best_pieces(shared.domain, shared.ranks) == pieces
+    assert alone.steps == shared.steps > 0
+    check_counts(messages.predict(alone, shared.ranks), shared, EXACT)
+    check_counts(messages.predict(shared, shared.ranks), shared, list(range(len(messages.KINDS))))
+
+
+def check_counts(sent: messages.Sent, counted: messages.Counted, kinds: list[int]) -> None:
+    """To the last message and byte, of all processes and of the busiest."""
+    for told, found in (
+        (sent.messages.sum(axis=0), counted.messages),
+        (sent.message_bytes.sum(axis=0), counted.message_bytes),
+        (sent.messages.max(axis=0), counted.messages_most),
+        (sent.message_bytes.max(axis=0), counted.message_bytes_most),
+    ):
+        assert told[kinds].tolist() == found[kinds].tolist()
+    assert sent.messages[:, messages.KINDS.index("halo")].all()
+
+
+MEMORY_CASE = """&run t_end = 1.0e-3  dt = 1.0e-3  field_interval = 0 /
+&grid cells = 72, 64, 64  length = 0.18, 0.16, 0.16 /
+&fluid water_level = 0.06 /
+&shape name = 'unit'  kind = 'hexapod'  size = 0.02 /
+&body shape = 'unit'  position = 0.06, 0.08, 0.06 /
+"""
+MEASURE = """import os, resource, subprocess, sys
+code = subprocess.call(sys.argv[2:])
+peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+open(sys.argv[1] + "." + os.environ["OMPI_COMM_WORLD_RANK"], "w").write(str(peak))
+sys.exit(code)
+"""
+
+
+def peaks(case: Path, ranks: int) -> list[int]:
+    """Most memory that each process held at a time [kB]."""
+    own = case.parent / f"memory-{ranks}"
+    start = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(ranks)]
+    program = [str(PARALLEL), "--quiet", "--output", f"{own}-run", str(case)]
+    subprocess.run(
+        [*start, sys.executable, "-c", MEASURE, str(own), *program],
+        env={**os.environ, **MPI_SETTINGS, "OMP_NUM_THREADS": "1"},
+        stdin=subprocess.DEVNULL,
+        check=True,
+    )
+    return [int(Path(f"{own}.{rank}").read_text()) for rank in range(ranks)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other units of the peak")
+def test_memory_of_a_process(tmp_path: Path) -> None:
+    """Each of four processes holds less than 0.4 of what one alone holds."""
+    case = tmp_path / "case.nml"
+    case.write_text(MEMORY_CASE)
+    (alone,), shared = peaks(case, 1), peaks(case, 4)
+    assert max(shared) < 0.4 * alone, (alone, shared)
