@@ -1,0 +1,82 @@
+"""`mics-tools harbour`: a case of many blocks that the program plans."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import f90nml
+import pytest
+
+from micstools import cli, harbour
+from micstools.reader import BadRun
+
+MICS = Path(__file__).parents[2] / "mics"
+
+
+def write(path: Path, *words: str) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main(["harbour", "--out", str(path), *words])
+    assert not end.value.code
+
+
+@pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+@pytest.mark.parametrize(
+    ("words", "cells", "blocks", "memory"),
+    [
+        ([], 25_600_000, 2000, 42.0),
+        (["--spacing", "0.5", "--blocks", "333", "--kind", "dolos"], 3_200_000, 333, 5.8),
+    ],
+)
+def test_the_program_plans_memory_and_time(
+    words: list[str], cells: int, blocks: int, memory: float, tmp_path: Path
+) -> None:
+    case = tmp_path / "harbour.nml"
+    write(case, *words)
+    plan = subprocess.run(
+        [MICS, "--check", case],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=True,
+        cwd=tmp_path,
+    ).stdout
+    assert f"= {cells}\n" in plan
+    assert re.search(rf"dropped +{blocks}, the last one at \d+ s", plan)
+    assert re.search(r"time of the run +about [\d.]+ (hours|days|min)", plan)
+    found = re.search(r"Memory\n +about +([\d.]+) GB", plan)
+    assert found and float(found[1]) == pytest.approx(memory, rel=0.1)
+    assert [path.name for path in tmp_path.iterdir()] == ["harbour.nml"]
+
+
+@pytest.mark.parametrize("blocks", [1, 7, 190, 2000, 5001])
+def test_places(blocks: int) -> None:
+    """As many blocks as asked for, in the basin, no two places too near to each other."""
+    drops = f90nml.reads(harbour.case(harbour.Harbour(blocks=blocks)))["drop"]
+    drops = drops if isinstance(drops, list) else [drops]
+    assert sum(drop["count"] for drop in drops) == blocks
+    places = {(round(drop["position"][0], 3), round(drop["position"][1], 3)) for drop in drops}
+    assert len(places) == len(drops)
+    assert all(1.3 <= x <= 198.7 and 1.3 <= y <= 98.7 for x, y in places)
+    assert len({drop["seed"] for drop in drops}) == len(drops)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        (harbour.Harbour(water=19.0), "--water 19"),
+        (harbour.Harbour(length=(2.0, 100.0, 20.0)), "no room"),
+        (harbour.Harbour(blocks=0), "must be positive"),
+    ],
+)
+def test_refuses(wanted: harbour.Harbour, said: str) -> None:
+    with pytest.raises(BadRun, match=said):
+        harbour.case(wanted)
+
+
+def test_keeps_a_file_that_is_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = tmp_path / "harbour.nml"
+    case.write_text("mine")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["harbour", "--out", str(case)])
+    assert end.value.code == 2 and case.read_text() == "mine"
+    assert "is there already" in capsys.readouterr().err
