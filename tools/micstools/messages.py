@@ -68,6 +68,16 @@ class Sent:
 
 
 @dataclass(frozen=True)
+class Pass:
+    """Something that passes between the processes so many times, all of them at once."""
+
+    kind: str
+    calls: int
+    messages: Ints  # of each process in a call
+    length: Ints  # of such a message [bytes]
+
+
+@dataclass(frozen=True)
 class Blocks:
     """The blocks of a level, one for each process: arrays (ranks, 3), cells counted from 1."""
 
@@ -215,28 +225,32 @@ def _stays_cut(domain: Domain, n: Ints, paired: NDArray[np.bool_], part: Blocks)
 
 def predict(counted: Counted, ranks: int) -> Sent:
     """What each of so many processes sends in the steps of a run."""
-    fine = blocks(counted.domain, ranks)
     messages = np.zeros((ranks, len(KINDS)), np.int64)
     sizes = np.zeros_like(messages)
-    if ranks == 1:
-        return Sent(messages, sizes)
-    cycle, setup = _cycle_and_setup(counted.domain, fine)
-    for asked in counted.asked:
-        if asked.what in ("cycle", "setup"):
-            of_one = cycle if asked.what == "cycle" else setup
-            messages += asked.calls * of_one.messages
-            sizes += asked.calls * of_one.message_bytes
-            continue
-        kind = KINDS.index(asked.what)
-        if asked.detail[2]:
-            count = fine.neighbours[:, asked.detail[2] - 1]
-            length = _layer(fine.size, *asked.detail)
-        else:
-            count = np.array([1] + [int(asked.what != "broadcast")] * (ranks - 1))
-            length = np.full(ranks, asked.detail[0])
-        messages[:, kind] += asked.calls * count
-        sizes[:, kind] += asked.calls * count * length
+    for each in passes(counted.domain, counted.asked, ranks):
+        kind = KINDS.index(each.kind)
+        messages[:, kind] += each.calls * each.messages
+        sizes[:, kind] += each.calls * each.messages * each.length
     return Sent(messages, sizes)
+
+
+def passes(domain: Domain, asked: list[Asked], ranks: int) -> Iterator[Pass]:
+    """All that passes between so many processes for what is asked."""
+    if ranks == 1:
+        return
+    fine = blocks(domain, ranks)
+    for each in asked:
+        if each.what == "cycle":
+            yield from _cycles(domain, fine, each.calls)
+        elif each.what == "setup":
+            yield from _setups(domain, fine, each.calls)
+        elif each.detail[2]:
+            count = fine.neighbours[:, each.detail[2] - 1]
+            yield Pass(each.what, each.calls, count, _layer(fine.size, *each.detail))
+        else:
+            count = np.full(ranks, int(each.what != "broadcast"))
+            count[0] = 1
+            yield Pass(each.what, each.calls, count, np.full(ranks, each.detail[0]))
 
 
 def _layer(size: Ints, cell_bytes: int, width: int, direction: int) -> Ints:
@@ -245,35 +259,40 @@ def _layer(size: Ints, cell_bytes: int, width: int, direction: int) -> Ints:
     return np.asarray(cell_bytes * width * across.prod(axis=1))
 
 
-def _cycle_and_setup(domain: Domain, fine: Blocks) -> tuple[Sent, Sent]:
-    """What one cycle of the multigrid and one set-up of its coefficients send."""
-    shape = (len(fine.first), len(KINDS))
-    cycle, setup = (Sent(np.zeros(shape, np.int64), np.zeros(shape, np.int64)) for _ in range(2))
-    halo, gather = KINDS.index("halo"), KINDS.index("gather")
+def _cycles(domain: Domain, fine: Blocks, calls: int) -> Iterator[Pass]:
+    """What cycles of the multigrid send."""
     for number, level in enumerate(levels(domain, fine)):
-        block = level.blocks
         if level.cut:
-            count, length = block.neighbours, _level_layers(block)
             # load, three half sweeps, on coarser levels four more, prolong, four or eight
-            for sent, fills in ((cycle, 9 if number == 0 else 17), (setup, 1)):
-                sent.messages[:, halo] += fills * count.sum(axis=1)
-                sent.message_bytes[:, halo] += fills * (count * length).sum(axis=1)
+            yield from _fills(level.blocks, calls * (9 if number == 0 else 17))
+        else:
+            yield from _gathers(level.blocks.size, 4, calls)
+
+
+def _setups(domain: Domain, fine: Blocks, calls: int) -> Iterator[Pass]:
+    """What new coefficients of its levels send."""
+    for level in levels(domain, fine):
+        if level.cut:
+            yield from _fills(level.blocks, calls)
             continue
-        cycle.messages[:, gather] += 2
-        cycle.message_bytes[:, gather] += BOX + 4 * block.size.prod(axis=1)
         for d in range(3):
-            faces = block.size.copy()
-            faces[:, d] += block.last[:, d] == level.cells[d]
-            setup.messages[:, gather] += 2
-            setup.message_bytes[:, gather] += BOX + 8 * faces.prod(axis=1)
-    return cycle, setup
+            faces = level.blocks.size.copy()
+            faces[:, d] += level.blocks.last[:, d] == level.cells[d]
+            yield from _gathers(faces, 8, calls)
 
 
-def _level_layers(block: Blocks) -> Ints:
-    """Bytes of a layer of a level in each direction: pairs of single precision, filled up."""
+def _gathers(size: Ints, cell_bytes: int, calls: int) -> Iterator[Pass]:
+    """Blocks of all processes put together: where they lie, then what they hold."""
+    one = np.ones(len(size), np.int64)
+    yield Pass("gather", calls, one, BOX * one)
+    yield Pass("gather", calls, one, cell_bytes * size.prod(axis=1))
+
+
+def _fills(block: Blocks, calls: int) -> Iterator[Pass]:
+    """Layers of a level, direction by direction: pairs of single precision, filled up."""
     size = block.size + 2
     pairs = (block.last[:, 0] + 1) // 2 - (block.first[:, 0] + 1) // 2 + 1
     line = 2 * (VECTOR * ((pairs + VECTOR - 1) // VECTOR) + 2)
-    return np.stack(
-        [8 * size[:, 1] * size[:, 2], 4 * line * size[:, 2], 4 * line * size[:, 1]], axis=1
-    )
+    lengths = (8 * size[:, 1] * size[:, 2], 4 * line * size[:, 2], 4 * line * size[:, 1])
+    for d, length in enumerate(lengths):
+        yield Pass("halo", calls, block.neighbours[:, d], length)
