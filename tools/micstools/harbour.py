@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from micstools.reader import BadRun
 
-PITCH = 1.3  # distance of the places where blocks are dropped, in heights of a block
+PITCH = 1.5  # distance of the places where blocks are dropped, in heights of a block
 CLEAR = 0.8  # of the drop above the water and below the top, likewise
 LAYERS = 5  # blocks dropped at one place, as a rule
 FALL = 4.0  # s, from one drop at a place to the next
