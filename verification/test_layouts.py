@@ -61,6 +61,27 @@ def check_counts(sent: messages.Sent, counted: messages.Counted, kinds: list[int
     assert sent.messages[:, messages.KINDS.index("halo")].all()
 
 
+@pytest.mark.parametrize("coupling", ["monolithic", "mics"])
+def test_reductions_of_many_blocks(coupling: str, tmp_path: Path) -> None:
+    """What is summed for each of many blocks passes in one message: 30 take no more than 2."""
+    most = []
+    for n in (2, 30):
+        text = (CASES / "ranks" / "coupled.nml").read_text().split("&body")[0]
+        text = re.sub(r"t_end = [\d.]+", "t_end = 0.01", text)
+        text += f"&numerics coupling = '{coupling}'  max_pressure_passes = 50 /\n"
+        for b in range(n):
+            x, y, z = 0.02 + 0.0221 * (b % 6), 0.02 + 0.06 * (b // 6 % 2), 0.03 + 0.05 * (b // 12)
+            text += f"&body shape = 'ball'  position = {x}, {y}, {z}  fixed = {b > 1} /\n"
+        case = tmp_path / f"{n}.nml"
+        case.write_text(text)
+        run(case, tmp_path / str(n), Machine(SERIAL, threads=1))
+        found = messages.read(tmp_path / str(n))
+        passed = [each for each in found.asked if each.what == "reduction"]
+        cycles = sum(each.calls for each in found.asked if each.what == "cycle")
+        most.append(sum(each.calls for each in passed) / (found.steps + cycles))
+    assert most[1] < 1.5 * most[0], most
+
+
 MEMORY_CASE = """&run t_end = 1.0e-3  dt = 1.0e-3  field_interval = 0 /
 &grid cells = 72, 64, 64  length = 0.18, 0.16, 0.16 /
 &fluid water_level = 0.06 /

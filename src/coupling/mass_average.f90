@@ -8,7 +8,7 @@
 !! Source: Yoshikawa et al. (2008), section 3 (2); order of the steps as in Sharma & Patankar
 !! (2005).
 module mass_average_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use vectors_m, only: cross
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo, unit_step
@@ -29,7 +29,7 @@ module mass_average_m
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
   public :: mass_average_stage, overlay_bodies, density_of_mixture
@@ -210,9 +210,11 @@ contains
     real(wp), intent(in) :: dt
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(stage_t), intent(inout) :: stage
+    integer(i8) :: bins(bin_size, 6*stage%bodies%n)
+    real(wp) :: total(6*stage%bodies%n), f(3)
     integer :: b, m, n
-    real(wp) :: f(3)
 
+    bins = spread(no_terms, 2, 6*stage%bodies%n)
     do b = 1, stage%bodies%n
       n = 0
       call make_room(stage, solid%body_cell(b + 1) - solid%body_cell(b))
@@ -227,8 +229,10 @@ contains
                                                   stage%bodies%x(:, b)), f)
         end associate
       end do
-      stage%from_pressure(:, b) = exact_sums(stage%terms(1:n, :))
+      call exact_add_columns(stage%terms(1:n, :), bins(:, 6*b - 5:6*b))
     end do
+    call exact_totals(bins, total)
+    stage%from_pressure(:, :stage%bodies%n) = reshape(total, [6, stage%bodies%n])
   end subroutine momentum_gained
 
   !> Terms for n cells.

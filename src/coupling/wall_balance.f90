@@ -10,7 +10,7 @@
 !! the old pressure that acts before the transport (`mid_step_m`) does so on the surface of the
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use growing_m, only: ensure_room
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
@@ -22,7 +22,7 @@ module wall_balance_m
   use mid_step_m, only: mid_step_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
   public :: wall_balance_t, wall_balance_init, begin_balance, note_change, note_velocity
@@ -117,9 +117,11 @@ contains
       !! [kg/m3]
     type(wall_balance_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n), arm(3), wall(3), moved(3)
     integer :: b, m, n
-    real(wp) :: arm(3), wall(3), moved(3)
 
+    bins = spread(no_terms, 2, 6*bodies%n)
     do b = 1, bodies%n
       n = 0
       do m = 1, links%n
@@ -134,8 +136,10 @@ contains
                                      - self%mass(m)*(self%gained(:, m) - wall))/dt, arm)
         end associate
       end do
-      force(:, b) = exact_sums(self%terms(:n, :))
+      call exact_add_columns(self%terms(:n, :), bins(:, 6*b - 5:6*b))
     end do
+    call exact_totals(bins, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
   end subroutine force_of_walls
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
@@ -154,8 +158,11 @@ contains
     type(mid_step_t), intent(in) :: mid_step
     type(wall_balance_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n)
     integer :: b, m, n
 
+    bins = spread(no_terms, 2, 6*bodies%n)
     if (size(self%terms, 1) < links%n + before%n) then
       deallocate (self%terms)
       allocate (self%terms(2*(links%n + before%n), 6))
@@ -171,8 +178,10 @@ contains
           if (links%number(c(1), c(2), c(3)) == 0) call add(c)
         end associate
       end do
-      force(:, b) = exact_sums(self%terms(:n, :))
+      call exact_add_columns(self%terms(:n, :), bins(:, 6*b - 5:6*b))
     end do
+    call exact_totals(bins, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
     subroutine add(c)
       integer, intent(in) :: c(3)

@@ -10,7 +10,7 @@
 !! C is the share extended through bodies (`extended_fraction_m`) and repeated at the sides of the
 !! domain: the surface meets walls and upright sides of bodies at 90 degrees.
 module surface_tension_m
-  use kinds_m, only: wp, pi
+  use kinds_m, only: wp, i8, pi
   use case_types_m, only: fluid_t
   use boundary_kinds_m, only: no_side
   use grid_m, only: grid_t, unit_step
@@ -21,7 +21,7 @@ module surface_tension_m
   use face_weight_m, only: weight_at_faces
   use surface_curvature_m, only: surface_curvature_t, surface_curvature_init, find_curvature, &
                                  no_surface
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
   public :: surface_tension_t, find_tension, add_tension, force_from_tension, capillary_step
@@ -149,9 +149,12 @@ contains
     type(surface_tension_t), intent(in) :: self
     real(wp), allocatable, intent(inout) :: work(:, :)   !! (*, 6) grows when needed
     real(wp), intent(inout) :: force(:, :)   !! (6, bodies) about the centre of mass [N, N m]
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n)
     integer :: b, m, t, n
 
     if (.not. self%acts) return
+    bins = spread(no_terms, 2, 6*bodies%n)
     do b = 1, bodies%n
       n = solid%body_face(b + 1) - solid%body_face(b)
       if (size(work, 1) < n) then
@@ -166,8 +169,10 @@ contains
           work(t, :) = flux%s(:, m)*grid%h(f(4))*self%force(f(1), f(2), f(3), f(4))
         end associate
       end do
-      force(:, b) = force(:, b) + exact_sums(work(1:t, :))
+      call exact_add_columns(work(1:t, :), bins(:, 6*b - 5:6*b))
     end do
+    call exact_totals(bins, total)
+    force(:, :bodies%n) = force(:, :bodies%n) + reshape(total, [6, bodies%n])
   end subroutine force_from_tension
 
 end module surface_tension_m

@@ -4,12 +4,12 @@
 !! The force on a body is the sum over its wall legs (`viscous_legs_m`), so the stage conserves
 !! momentum. Departure from the paper: its overlay gives a drag that depends on the time step.
 module viscous_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use viscous_system_m, only: viscous_t, unknown, wrench
-  use exact_sum_m, only: exact_dot, exact_sums
+  use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
@@ -230,8 +230,11 @@ contains
     type(viscous_t), intent(inout) :: self
     real(wp), intent(in) :: x_body(:, :)
     real(wp), intent(out) :: y_body(:, :)
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n)
     integer :: i, j, k, c, b, m
 
+    bins = spread(no_terms, 2, 6*bodies%n)
     call halo_exchange(self%s, n_halo)
     !$omp parallel do collapse(2) private(i, j) schedule(static)
     do c = 1, 3
@@ -260,11 +263,15 @@ contains
               - walls%k(m)*wall_velocity(x_body(:, b), walls%arm(:, m))
           end associate
         end do
+        call exact_add_columns(walls%work(1:walls%first(b + 1) - walls%first(b), :), &
+          bins(:, 6*b - 5:6*b))
+      end do
+      call exact_totals(bins, total)
+      do b = 1, bodies%n
         y_body(:, b) = 0.0_wp
         if (.not. bodies%free(b)) cycle
         y_body(:, b) = inertial_momentum(bodies, b, self%dt, x_body(:, b)) &
-                     + matmul(self%body_matrix(:, :, b), x_body(:, b)) &
-                     - exact_sums(walls%work(1:walls%first(b + 1) - walls%first(b), :))
+                     + matmul(self%body_matrix(:, :, b), x_body(:, b)) - total(6*b - 5:6*b)
       end do
     end associate
   end subroutine apply_viscous
@@ -274,9 +281,11 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     type(flow_t), intent(in) :: flow
     type(viscous_t), intent(inout) :: self
+    integer(i8) :: bins(bin_size, 6*bodies%n)
+    real(wp) :: slip(3), total(6*bodies%n)
     integer :: b, m
-    real(wp) :: slip(3)
 
+    bins = spread(no_terms, 2, 6*bodies%n)
     associate (walls => self%walls, force => self%force)
       do b = 1, bodies%n
         do m = walls%first(b), walls%first(b + 1) - 1
@@ -286,7 +295,12 @@ contains
               wrench(walls%k(m)*unknown(self%mass(n(1), n(2), n(3), :), slip), walls%arm(:, m))
           end associate
         end do
-        force(:, b) = exact_sums(walls%work(1:walls%first(b + 1) - walls%first(b), :))
+        call exact_add_columns(walls%work(1:walls%first(b + 1) - walls%first(b), :), &
+          bins(:, 6*b - 5:6*b))
+      end do
+      call exact_totals(bins, total)
+      do b = 1, bodies%n
+        force(:, b) = total(6*b - 5:6*b)
         force(4:6, b) = force(4:6, b) - self%spin_drag(b)*bodies%motion(4:6, b)
       end do
     end associate

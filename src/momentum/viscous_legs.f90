@@ -5,7 +5,7 @@
 !! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
 !! that of its group (`linked_cells_m`). A film without a master hangs on the walls alone.
 module viscous_legs_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: drags, is_wall
   use solid_geometry_m, only: solid_geometry_t
@@ -15,7 +15,7 @@ module viscous_legs_m
   use viscous_system_m, only: viscous_t, add_wall, add_side, grow_work, unknown, wrench
   use film_legs_m, only: film_legs
   use linked_cells_m, only: linked_cells_t, is_alone
-  use exact_sum_m, only: exact_sums
+  use exact_sum_m, only: exact_add, exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
   public :: build_viscous
@@ -290,11 +290,15 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
+    integer, parameter :: sums = 37            ! the 6 x 6 block, viscosity times volume
+    integer(i8), allocatable :: bins(:, :, :)
+    real(wp), allocatable :: total(:, :)
     integer :: b, c, m, n
     real(wp) :: unit(6)        !! one of the six unit motions
-    real(wp) :: mu_volume(6)
 
+    allocate (bins(bin_size, sums, bodies%n), total(sums, bodies%n))
     do b = 1, bodies%n
+      bins(:, :, b) = spread(no_terms, 2, sums)
       n = self%walls%first(b + 1) - self%walls%first(b)
       do c = 1, 6
         unit = 0.0_wp
@@ -306,19 +310,23 @@ contains
                                              wall_velocity(unit, arm)), arm)
           end associate
         end do
-        self%body_matrix(:, c, b) = exact_sums(self%walls%work(1:n, :))
+        call exact_add_columns(self%walls%work(1:n, :), bins(:, 6*c - 5:6*c, b))
       end do
-      mu_volume = viscosity_times_volume(b)
-      self%spin_drag(b) = 2.0_wp*mu_volume(1)
+      call add_viscosity_times_volume(b, bins(:, sums, b))
+    end do
+    call sum_up(size(total), bins, total)
+    do b = 1, bodies%n
+      self%body_matrix(:, :, b) = reshape(total(:36, b), [6, 6])
+      self%spin_drag(b) = 2.0_wp*total(sums, b)
       do c = 4, 6
         self%body_matrix(c, c, b) = self%body_matrix(c, c, b) + self%spin_drag(b)
       end do
     end do
   contains
-    !> Integral of the fluid's viscosity over the body, in all six places [Pa s m3].
-    function viscosity_times_volume(body) result(total)
+    !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3].
+    subroutine add_viscosity_times_volume(body, bins)
       integer, intent(in) :: body
-      real(wp) :: total(6)
+      integer(i8), intent(inout) :: bins(:)
       integer :: m, n, i(3)
 
       n = 0
@@ -327,10 +335,19 @@ contains
         if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
         n = n + 1
         if (n > size(self%walls%work, 1)) call grow_work(self)
-        self%walls%work(n, :) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+        self%walls%work(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
       end do
-      total = exact_sums(self%walls%work(1:n, :))
-    end function viscosity_times_volume
+      call exact_add(self%walls%work(1:n, 1), bins)
+    end subroutine add_viscosity_times_volume
+
+    !> All sums with one message.
+    subroutine sum_up(n, bins, total)
+      integer, intent(in) :: n
+      integer(i8), intent(inout) :: bins(bin_size, n)
+      real(wp), intent(inout) :: total(n)
+
+      call exact_totals(bins, total)
+    end subroutine sum_up
   end subroutine bodies_seen_by_legs
 
 end module viscous_legs_m
