@@ -26,7 +26,7 @@ program test_courant
   flow%uf(:, :, :, 3) = 0.4_wp
   flow%c(3, 3, 3) = 0.5_wp
   rate = courant_rate(grid, flow, solid, blocks)
-  call check('the sum over the directions is followed in liquid', rate%followed, 80.0_wp, 1.0e-12_wp)
+  call check('the sum of the directions is followed in liquid', rate%followed, 80.0_wp, 1.0e-12_wp)
   call check('and carried', rate%carried, 80.0_wp, 1.0e-12_wp)
 
   flow%uf(3, 5, 3, 2) = 20.0_wp
