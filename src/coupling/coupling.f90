@@ -7,7 +7,7 @@ module coupling_m
   use solid_geometry_m, only: solid_geometry_t
   use surface_tension_m, only: find_tension
   use face_memory_m, only: note_deviation
-  use linked_cells_m, only: link_cells
+  use linked_cells_m, only: linked_cells_t, link_cells
   use mid_step_m, only: to_mid_step
   use rigid_flux_m, only: solid_face_flux
   use monolithic_m, only: monolithic_stage
@@ -33,7 +33,7 @@ contains
 
     if (case%numerics%coupling == 'monolithic') then
       call find_trend(dt, dt_before, blocks, stage)
-      call link_cells(grid, solid, stage%links_before)
+      call find_links_before(grid, solid, stage)
     end if
     if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
@@ -50,6 +50,20 @@ contains
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
     end if
   end subroutine note_start
+
+  !> The links of the start of the step: those of the end of the last one, unless blocks have come.
+  subroutine find_links_before(grid, solid, stage)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid   !! at the start
+    type(stage_t), intent(inout) :: stage
+    type(linked_cells_t), allocatable :: keep
+
+    call move_alloc(stage%links_before, keep)
+    call move_alloc(stage%links, stage%links_before)
+    call move_alloc(keep, stage%links)
+    if (.not. stage%linked) call link_cells(grid, solid, stage%links_before)
+    stage%linked = .false.
+  end subroutine find_links_before
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
   !! the fluid that gets the old pressure.

@@ -49,7 +49,9 @@ module velocity_stage_m
     type(rigid_motion_t) :: foreseen               !! the motion at the end, by `trend`
     real(wp), allocatable :: trend(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
-    type(linked_cells_t) :: links_before, links    !! of the surface at the start and at the end
+    type(linked_cells_t), allocatable :: links_before, links
+      !! of the surface at the start and at the end of the step
+    logical :: linked = .false.                    !! `links` fit the surface as it is
     type(mid_step_t) :: mid_step
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
@@ -92,6 +94,7 @@ contains
       allocate (stage%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
       allocate (stage%u_before, source=stage%a_stress)
     else
+      allocate (stage%links_before, stage%links)
       call linked_cells_init(grid, stage%links_before)
       call linked_cells_init(grid, stage%links)
       call mid_step_init(grid, stage%mid_step)
