@@ -35,6 +35,7 @@ module linked_cells_m
     integer, allocatable :: body(:)              !! (*) body whose wall it is
     integer, allocatable :: number(:, :, :)      !! number of a wall cell, else 0
     real(wp), allocatable :: normal(:, :)        !! (3, films) of the wall, into the fluid
+    integer, allocatable :: step(:, :)           !! (3*masters_at_most, films) to their masters
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
     real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
@@ -56,7 +57,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%cell(3, 0), self%body(0), self%normal(3, 0), self%leader(0), self%part(2, 0))
-    allocate (self%master(masters_at_most, 0))
+    allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
     allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
@@ -172,29 +173,48 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(linked_cells_t), intent(inout) :: self
-    integer :: m, n, c(3), steps(3, masters_at_most), body
-    real(wp) :: share(masters_at_most)
+    integer :: m, n, o(3), body
 
     call ensure_room(self%n_films, self%normal)
+    call ensure_room(self%n_films, self%step)
     call ensure_room(self%n_films, self%master)
     call ensure_room(self%n_films, self%share)
     call ensure_room(self%n_films, self%nearer)
+    !$omp parallel do schedule(static)
     do m = 1, self%n_films
-      c = self%cell(:, m)
+      call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
+                     self%share(:, m), self%nearer(:, m))
+    end do
+    do m = 1, self%n_films
       body = self%body(m)
-      self%normal(:, m) = wall_normal(grid, solid, c)
       self%master(:, m) = 0
-      self%nearer(:, m) = 0.0_wp
-      call to_masters(grid, solid, c, self%normal(:, m), steps, share)
-      self%share(:, m) = share
       do n = 1, masters_at_most
-        if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
-        self%nearer(n, m) = nearer_than(grid, solid, c, steps(:, n), self%normal(:, m))
-        call add_cell(c + steps(:, n), body, self)
-        self%master(n, m) = self%number(c(1) + steps(1, n), c(2) + steps(2, n), c(3) + steps(3, n))
+        o = self%cell(:, m) + self%step(3*n - 2:3*n, m)
+        if (self%share(n, m) <= 0.0_wp .or. .not. is_near(grid, o, n_halo)) cycle
+        call add_cell(o, body, self)
+        self%master(n, m) = self%number(o(1), o(2), o(3))
       end do
     end do
   end subroutine find_masters
+
+  !> Normal of the wall of film c, the steps to its masters, their shares of it, and 1 - r.
+  subroutine find_wall(grid, solid, c, normal, steps, share, nearer)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp), intent(out) :: normal(3)
+    integer, intent(out) :: steps(3, masters_at_most)
+    real(wp), intent(out) :: share(masters_at_most), nearer(masters_at_most)
+    integer :: n
+
+    normal = wall_normal(grid, solid, c)
+    nearer = 0.0_wp
+    call to_masters(grid, solid, c, normal, steps, share)
+    do n = 1, masters_at_most
+      if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
+      nearer(n) = nearer_than(grid, solid, c, steps(:, n), normal)
+    end do
+  end subroutine find_wall
 
   !> Steps from film c to its masters, and their shares of it, zero where there is none: cells
   !! across its open faces whose centre lies in the fluid, by open area along the normal; without

@@ -32,6 +32,7 @@ contains
     real(wp) :: slip, weight, weights
     integer :: m, n
 
+    !$omp parallel do private(n, slip, weight, weights) schedule(static)
     do m = 1, links%n_films
       associate (f => links%cell(:, m))
         if (.not. grid%owns(f)) cycle
