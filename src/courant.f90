@@ -3,7 +3,8 @@
 !!
 !! The step follows liquid and blocks. Gas that a closing hole presses out, or that a jet drags
 !! along, is ten times as fast and has a thousandth of the mass: it does not shorten the step, its
-!! transport takes more parts (`fluid_transport_m`). Measured choice: docs/decisions/time_step.md.
+!! transport takes more parts (`fluid_transport_m`), unless it is faster still. Measured choice:
+!! docs/decisions/time_step.md.
 module courant_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
@@ -17,12 +18,15 @@ module courant_m
 
   real(wp), parameter :: least_open = 0.5_wp     !! share of a face whose velocity counts
   real(wp), parameter :: least_liquid = 0.5_wp   !! of a cell that the step follows
+  real(wp), parameter :: gas_lead = 8.0_wp
+    !! gas faster than so many times what is followed shortens the step all the same
 
   !> Courant numbers per second, |u|/h summed over the directions [1/s]; a step times one of them is
   !! a Courant number.
   type :: courant_rate_t
     real(wp) :: followed = 0.0_wp
-      !! largest of the cells that are at least half liquid, and of the blocks' surfaces
+      !! largest of the cells that are at least half liquid, and of the blocks' surfaces; at least
+      !! an eighth of `carried`
     real(wp) :: carried = 0.0_wp    !! largest of all cells
   end type courant_rate_t
 
@@ -48,6 +52,7 @@ contains
                                           *blocks%shapes(blocks%shape(b))%radius)/minval(grid%h))
     end do
     rate%carried = max(rate%carried, rate%followed)
+    rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate
 
   !> Followed and carried, of the fluid of this process.
