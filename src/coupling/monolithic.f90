@@ -215,8 +215,8 @@ contains
     call shorten_at_walls(grid, dt, stage%bodies, stage%links%cell(:, :stage%links%n), &
                           stage%links%body, stage%links%number, stage%mid_step%takes_part, &
                           stage%rho, stage%acceleration, flow)
-    call face_velocity_at_walls(grid, solid, stage%foreseen, dt, stage%mid_step%takes_part, &
-                                stage%rho, stage%acceleration, flow)
+    call face_velocity_at_walls(grid, solid, stage%foreseen, stage%links%slip, dt, &
+                                stage%mid_step%takes_part, stage%rho, stage%acceleration, flow)
     call renew_acceleration(dt, flow, stage)
   end subroutine predict_faces
 

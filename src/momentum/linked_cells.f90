@@ -4,7 +4,7 @@
 !! it belongs to its masters, the cells with their centre in the fluid across its open faces, by
 !! shares that close with the face. A master and its parts of films are a group with one momentum.
 !! Normal to the wall the velocity of a film is linear from its master to the wall; along the wall
-!! it has more of the master's, by the slip s of `wall_layer_m`,
+!! it has more of the master's, by the slip s at r (`wall_profile_m`),
 !! $$ u_{film} = T u + (1 - T) U_w, \qquad T = 1 - (1 - r) (1 - s + s\, n\, n^T) $$
 !! with r the distance of the middle of the film from the wall over that of the master, from the
 !! plane of the cut cell. A film without such a neighbour (a gap narrower than a cell) is a group
@@ -18,6 +18,7 @@ module linked_cells_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use plic_m, only: unit_constant
+  use wall_profile_m, only: slip_at
   implicit none
   private
   public :: linked_cells_t, linked_cells_init, link_cells
@@ -39,7 +40,7 @@ module linked_cells_m
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
     real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
-    real(wp), allocatable :: slip(:, :, :)       !! of the film in a cell, along the wall, 0 to 1
+    real(wp), allocatable :: slip(:, :, :)       !! of the layer at the film in a cell, 0 to 1
     integer :: n_groups = 0                      !! with a master beside an own cell
     integer, allocatable :: leader(:)            !! (groups) number of the master
     integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
@@ -475,7 +476,7 @@ contains
     integer :: d
 
     associate (m => part(1), n => self%normal(:, part(1)), c => self%cell(:, part(1)))
-      slip = self%slip(c(1), c(2), c(3))
+      slip = slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - self%nearer(part(2), m))
       v = velocity_at_wall(grid, self, m, bodies)
       do d = 1, 3
         less(:, d) = slip*n*n(d)

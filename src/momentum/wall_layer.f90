@@ -4,7 +4,10 @@
 !! a layer, \( U y/(y + \delta) \), which is linear where the layer is thick against the cells and
 !! free slip where it is thin, as without viscosity. The two cells tell its thickness: with y_m and
 !! y_n their distances from the wall and a the ratio of their velocities along it,
-!! $$ \frac{\delta}{y_m} = \frac{1 - a}{a - y_m/y_n} $$
+!! $$ \frac{\delta}{y_m} = \frac{1 - a}{a - y_m/y_n}, \qquad
+!! s = \frac{1}{1 + \delta/y_m} = \frac{a - y_m/y_n}{1 - y_m/y_n} $$
+!! s is the slip of the layer; films and the faces beside them take their velocity along the wall by
+!! it (`wall_profile_m`).
 !! If films had all of the velocity of their masters, the wall layer would carry momentum that no
 !! fluid has, and friction be too large (docs/decisions/cut_cells.md).
 module wall_layer_m
@@ -20,8 +23,9 @@ module wall_layer_m
 
 contains
 
-  !> The slip of each film: the mean over its masters with fluid behind them, by what each takes
-  !! off its velocity (share times 1 - r); none in gaps where there is no such master.
+  !> The slip of the layer at each film: the mean over its masters with fluid behind them, by
+  !! share times 1 - r (what lies as far out as its master tells little of the layer); none in gaps
+  !! where there is no such master.
   subroutine find_slip(grid, solid, bodies, u, links)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -59,7 +63,7 @@ contains
       if (is_fluid) is_fluid = solid%inside(c(1), c(2), c(3)) == 0
     end function is_fluid
 
-    !> Slip of film m by its master number n and the cell behind that one.
+    !> Slip of the layer at film m by its master number n and the cell behind that one.
     pure real(wp) function slip_beside(m, n)
       integer, intent(in) :: m, n
       real(wp) :: wall(3), along(3), along_next(3), ratio, distance
@@ -74,8 +78,7 @@ contains
         ratio = dot_product(along, along_next) &
                 /max(dot_product(along_next, along_next), tiny(1.0_wp))
         distance = master_distance(grid, solid, f, c - f, normal)
-        slip_beside = layer_slip(ratio, distance/(distance + dot_product(normal, (c - f)*grid%h)), &
-                                 1.0_wp - links%nearer(n, m))
+        slip_beside = layer_slip(ratio, distance/(distance + dot_product(normal, (c - f)*grid%h)))
       end associate
     end function slip_beside
   end subroutine find_slip
@@ -88,20 +91,13 @@ contains
     along = v - n*dot_product(n, v)
   end function along_wall
 
-  !> Slip of a film in the layer: 0 if its velocity is linear to the wall, 1 if it has all of its
-  !! master's.
-  elemental function layer_slip(ratio, distances, r) result(slip)
+  !> Slip of a layer: 0 if its velocity is linear to the wall, 1 if it is the same everywhere.
+  elemental function layer_slip(ratio, distances) result(slip)
     real(wp), intent(in) :: ratio       !! of the velocities of the master and the next cell
     real(wp), intent(in) :: distances   !! of their distances from the wall, below 1
-    real(wp), intent(in) :: r           !! of the distances of film and master
     real(wp) :: slip
-    real(wp) :: a, thickness   !! of the layer, in distances of the master
 
-    slip = 0.0_wp
-    a = min(1.0_wp, ratio)
-    if (a <= distances) return
-    thickness = (1.0_wp - a)/(a - distances)
-    slip = r/(r + thickness)
+    slip = max(0.0_wp, min(1.0_wp, ratio) - distances)/(1.0_wp - distances)
   end function layer_slip
 
 end module wall_layer_m

@@ -10,6 +10,7 @@ module face_velocity_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: face_mean
+  use wall_profile_m, only: slip_at
   implicit none
   private
   public :: acceleration_t, acceleration_init, face_acceleration, cell_mean_of_faces
@@ -341,18 +342,22 @@ contains
   end subroutine shorten_at_walls
 
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
-  !! that of the cell to that of the wall, where the leg through the face ends; the rest is the
-  !! cell's.
+  !! that of the cell to that of the wall, where the leg through the face ends; the rest by the
+  !! layer along the wall, as with the film on the other side of the face.
   !!
   !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
   !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
   !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
-  !! smaller (measured: docs/decisions/coupling.md). Along the wall the fluid slips past it: taking
-  !! the wall's whole velocity there makes the added mass wrong by some per cent.
-  subroutine face_velocity_at_walls(grid, solid, bodies, dt, in_liquid, rho, a, flow)
+  !! smaller (measured: docs/decisions/coupling.md). Without viscosity the fluid slips past the
+  !! wall: taking the wall's whole velocity there makes the added mass wrong by some per cent. With
+  !! it the cell's whole velocity carries up to twice what flows along the wall, and friction is too
+  !! large (docs/decisions/cut_cells.md).
+  subroutine face_velocity_at_walls(grid, solid, bodies, slip, dt, in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! motion as far as the old pressure makes it
+    real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of the layer along the wall, in cells with their centre in a body, 0 to 1
     real(wp), intent(in) :: dt                   !! [s]
     logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -386,7 +391,7 @@ contains
     subroutine add_side(c, sense, theta, body)
       integer, intent(in) :: c(3), sense, body
       real(wp), intent(in) :: theta   !! [cells]
-      real(wp) :: x_wall(3), wall(3), n(3), nu, time
+      real(wp) :: x_wall(3), wall(3), n(3), nu, time, near, along
 
       if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
@@ -399,12 +404,25 @@ contains
       associate (u => flow%u(c(1), c(2), c(3), :))
         time = dt
         if (in_liquid(c(1), c(2), c(3))) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
-        total = total + u(d) + near_wall(theta, n(d), solid%open(f(1), f(2), f(3), d))*n(d) &
-                               *dot_product(n, wall - u) &
+        near = near_wall(theta, n(d), solid%open(f(1), f(2), f(3), d))
+        along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
+        total = total + u(d) + near*(along*(wall(d) - u(d)) &
+                                     + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
           + face_step(time, nu, sum(1.0_wp/grid%h**2))*(a%face(f(1), f(2), f(3), d) &
                                                              - a%cell(c(1), c(2), c(3), d))
       end associate
     end subroutine add_side
+
+    !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond the
+    !! face; free slip where there is fluid again.
+    pure function slip_beyond(o, r) result(s)
+      integer, intent(in) :: o(3)
+      real(wp), intent(in) :: r
+      real(wp) :: s
+
+      s = 1.0_wp
+      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(slip(o(1), o(2), o(3)), r)
+    end function slip_beyond
 
     !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
     !! centre of the cell is.

@@ -50,6 +50,7 @@ program test_face_velocity
   in_liquid = .true.
   call short_times()
   call normal_to_the_wall()
+  call along_the_wall()
   call finish_checks()
 
 contains
@@ -110,8 +111,7 @@ contains
   subroutine normal_to_the_wall()
     real(wp) :: x(3)
 
-    call face_velocity_at_walls(box%grid, box%solid, box%bodies, dt, in_liquid, box%flow%rho, a, &
-                                box%flow)
+    call at_walls()
     x = [0.57_wp, 0.35_wp, 0.45_wp]
     call check('face above a wall', box%flow%uf(7, 4, 5, 1), between(x, 0.3_wp/0.8_wp) &
                + time(x)*(a%face(7, 4, 5, 1) - a%cell(7, 4, 5, 1)), tolerance)
@@ -119,6 +119,30 @@ contains
     call check('face below a wall', box%flow%uf(3, 4, 5, 1), between(x, 0.1_wp/0.6_wp) &
                + time(x)*(a%face(3, 4, 5, 1) - a%cell(2, 4, 5, 1)), tolerance)
   end subroutine normal_to_the_wall
+
+  !> At an edge of the box at rest: with a line to the wall the velocity of a face comes from the
+  !! same component of the cell, with free slip the wall turns the rest of it.
+  subroutine along_the_wall()
+    real(wp), parameter :: share = 0.3_wp/0.8_wp   !! of the cell's distance from the wall
+
+    a%face = 0.0_wp
+    a%cell = 0.0_wp
+    box%bodies%motion = 0.0_wp
+    links%slip = 0.0_wp
+    call at_walls()
+    call check('a line to the wall', box%flow%uf(7, 6, 5, 1), share*stream(1), tolerance)
+    links%slip = 0.25_wp
+    call at_walls()
+    associate (n => [0.8_wp, 0.7_wp, 0.0_wp]/norm2([0.8_wp, 0.7_wp]), s => share/(share + 3.0_wp))
+      call check('a layer along the wall', box%flow%uf(7, 6, 5, 1), share*stream(1) &
+                 + s*(1.0_wp - share)*(stream(1) - n(1)*dot_product(n, stream)), tolerance)
+    end associate
+  end subroutine along_the_wall
+
+  subroutine at_walls()
+    call face_velocity_at_walls(box%grid, box%solid, box%bodies, links%slip, dt, in_liquid, &
+                                box%flow%rho, a, box%flow)
+  end subroutine at_walls
 
   !> Velocity in x at a share of the way from the wall at x to the cell [m/s].
   real(wp) function between(x, share)

@@ -80,7 +80,7 @@ contains
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
     call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
                u(4, 5, top + 1, 1:2), 1.0e-12_wp)
-    links%slip = 0.25_wp
+    links%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the film
     call fill(u)
     total = momentum(u)
     call share_momentum(box%grid, links, mass, box%bodies, u)

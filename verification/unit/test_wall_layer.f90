@@ -4,6 +4,7 @@ program test_wall_layer
   use grid_m, only: n_halo
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
   use wall_layer_m, only: find_slip, layer_slip
+  use wall_profile_m, only: slip_at
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -40,14 +41,14 @@ contains
 
     do m = -3, 3
       delta = 2.0_wp**m
-      call check('a layer', r + (1.0_wp - r)*layer_slip( &
-        layer(1.0_wp, delta)/layer(3.0_wp, delta), 1.0_wp/3.0_wp, r), &
+      call check('a layer', r + (1.0_wp - r)*slip_at(layer_slip( &
+        layer(1.0_wp, delta)/layer(3.0_wp, delta), 1.0_wp/3.0_wp), r), &
         layer(r, delta)/layer(1.0_wp, delta), 1.0e-12_wp)
     end do
-    call check('a line has no slip', layer_slip(0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
-    call check('nor has what is below it', layer_slip(-0.4_wp, 0.4_wp, r), 0.0_wp, 0.0_wp)
-    call check('without a layer all slips', layer_slip(1.0_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
-    call check('faster at the wall: likewise', layer_slip(1.5_wp, 0.4_wp, r), 1.0_wp, 0.0_wp)
+    call check('a line has no slip', layer_slip(0.4_wp, 0.4_wp), 0.0_wp, 0.0_wp)
+    call check('nor has what is below it', layer_slip(-0.4_wp, 0.4_wp), 0.0_wp, 0.0_wp)
+    call check('without a layer all slips', layer_slip(1.0_wp, 0.4_wp), 1.0_wp, 0.0_wp)
+    call check('faster at the wall: likewise', layer_slip(1.5_wp, 0.4_wp), 1.0_wp, 0.0_wp)
   end subroutine the_formula
 
   !> Flows over the top of a box that moves and turns; the master lies 0.8 cells above it.
@@ -75,7 +76,7 @@ contains
   end subroutine run_along
 
   real(wp) function slip()
-    slip = links%slip(4, 5, top)
+    slip = slip_at(links%slip(4, 5, top), r)
   end function slip
 
   !> Component d of the velocity of the box at the centre of the film [m/s].
