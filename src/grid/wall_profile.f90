@@ -7,8 +7,8 @@ module wall_profile_m
 
 contains
 
-  !> Share of the velocity of a cell along the wall that the fluid at r times its distance has beyond
-  !! the line to the wall.
+  !> Share of the velocity of a cell along the wall that the fluid at r times its distance has
+  !! beyond the line to the wall.
   !!
   !! In a layer U y/(y + delta), s = 1/(1 + delta/y_c), y_c the distance of the cell: 0 in a thick
   !! layer, 1 without one (`momentum/wall_layer.f90`).

@@ -413,8 +413,8 @@ contains
       end associate
     end subroutine add_side
 
-    !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond the
-    !! face; free slip where there is fluid again.
+    !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond
+    !! the face; free slip where there is fluid again.
     pure function slip_beyond(o, r) result(s)
       integer, intent(in) :: o(3)
       real(wp), intent(in) :: r
