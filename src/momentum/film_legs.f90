@@ -65,7 +65,7 @@ contains
       n = 0
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       if (solid%inside(c(1), c(2), c(3)) == 0) return
-      if (any(self%mass(c(1), c(2), c(3), :) > 0.0_wp)) n = solid%cut(c(1), c(2), c(3))
+      if (self%mass(c(1), c(2), c(3)) > 0.0_wp) n = solid%cut(c(1), c(2), c(3))
     end function film_number
 
     !> Area of body b in each film cell as a vector, what its shares of the faces lack to close, and

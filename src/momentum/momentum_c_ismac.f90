@@ -180,7 +180,9 @@ contains
 
     call velocity_scale(grid, flow%u, bodies, scale)
     call set_operator(grid, rho, bodies, viscous%dt, viscous, self)
-    viscous%s = merge(self%u_old, 0.0_wp, viscous%mass > 0.0_wp)
+    do m = 1, 3
+      viscous%s(:, :, :, m) = merge(self%u_old(:, :, :, m), 0.0_wp, viscous%mass > 0.0_wp)
+    end do
     none = 0.0_wp
     call apply_viscous(grid, bodies, viscous, none, pull)
     do b = 1, bodies%n   ! motion if the fluid kept its velocity
@@ -198,7 +200,7 @@ contains
     call unpack_components(self%delta, self%operator)
     associate (a => grid%lo, z => grid%hi)
       do m = 1, 3
-        where (viscous%mass(a(1):z(1), a(2):z(2), a(3):z(3), m) > 0.0_wp)
+        where (viscous%mass(a(1):z(1), a(2):z(2), a(3):z(3)) > 0.0_wp)
           flow%u(a(1):z(1), a(2):z(2), a(3):z(3), m) = &
             self%u_old(a(1):z(1), a(2):z(2), a(3):z(3), m) &
             + self%operator%x(a(1):z(1), a(2):z(2), a(3):z(3), m)
@@ -245,7 +247,7 @@ contains
             end do
             do m = 1, 3
               op%inverse(i, j, k, m) = 0.0_wp
-              if (viscous%mass(i, j, k, m) > 0.0_wp) op%inverse(i, j, k, m) = &
+              if (viscous%mass(i, j, k) > 0.0_wp) op%inverse(i, j, k, m) = &
                 1.0_wp/(viscous%diagonal(i, j, k, m) + inflow)
             end do
           end do
@@ -315,7 +317,7 @@ contains
         do k = grid%lo(3), grid%hi(3)
           do j = grid%lo(2), grid%hi(2)
             do i = grid%lo(1), grid%hi(1)
-              op%y(i, j, k, m) = viscous%mass(i, j, k, m)*u(i, j, k, m) - viscous%y(i, j, k, m) &
+              op%y(i, j, k, m) = viscous%mass(i, j, k)*u(i, j, k, m) - viscous%y(i, j, k, m) &
                                  + rho(i, j, k)*self%gain(i, j, k, m)/dt
             end do
           end do
@@ -464,7 +466,7 @@ contains
                      *(x(i + e(1), j + e(2), k + e(3), :) - x(i, j, k, :))
             end do
             do m = 1, 3
-              associate (mass => viscous%mass(i, j, k, m))
+              associate (mass => viscous%mass(i, j, k))
                 if (mass > 0.0_wp) u(i, j, k, m) = u(i, j, k, m) + rate(m)/mass
               end associate
             end do

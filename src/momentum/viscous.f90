@@ -8,8 +8,9 @@ module viscous_m
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use viscous_system_m, only: viscous_t, unknown, wrench
-  use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms
+  use viscous_system_m, only: viscous_t, wrench
+  use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms, &
+    terms_at_once
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
@@ -18,6 +19,7 @@ module viscous_m
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
   integer, parameter :: max_iterations = 500
+  integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
 
 contains
 
@@ -111,7 +113,7 @@ contains
   !! the wall's (`impose_rigid_velocity` sets it).
   subroutine first_guess(grid, mass, u, s, r)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: u, s, r
     integer :: i, j, k, c
@@ -121,9 +123,9 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            u(i, j, k, c) = merge(u(i, j, k, c), 0.0_wp, mass(i, j, k, c) > 0.0_wp)
+            u(i, j, k, c) = merge(u(i, j, k, c), 0.0_wp, mass(i, j, k) > 0.0_wp)
             s(i, j, k, c) = u(i, j, k, c)
-            r(i, j, k, c) = mass(i, j, k, c)*u(i, j, k, c)
+            r(i, j, k, c) = mass(i, j, k)*u(i, j, k, c)
           end do
         end do
       end do
@@ -230,11 +232,9 @@ contains
     type(viscous_t), intent(inout) :: self
     real(wp), intent(in) :: x_body(:, :)
     real(wp), intent(out) :: y_body(:, :)
-    integer(i8) :: bins(bin_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n)
+    real(wp) :: pull(6, bodies%n)
     integer :: i, j, k, c, b, m
 
-    bins = spread(no_terms, 2, 6*bodies%n)
     call halo_exchange(self%s, n_halo)
     !$omp parallel do collapse(2) private(i, j) schedule(static)
     do c = 1, 3
@@ -252,28 +252,21 @@ contains
         end do
       end do
     end do
-    associate (walls => self%walls)
-      do b = 1, bodies%n
-        do m = walls%first(b), walls%first(b + 1) - 1
-          associate (n => walls%cell(:, m), s => self%s, y => self%y)
-            walls%work(m - walls%first(b) + 1, :) = &
-              wrench(walls%k(m)*unknown(self%mass(n(1), n(2), n(3), :), s(n(1), n(2), n(3), :)), &
-                     walls%arm(:, m))
-            y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) &
-              - walls%k(m)*wall_velocity(x_body(:, b), walls%arm(:, m))
-          end associate
-        end do
-        call exact_add_columns(walls%work(1:walls%first(b + 1) - walls%first(b), :), &
-          bins(:, 6*b - 5:6*b))
+    do b = 1, bodies%n
+      if (all(abs(x_body(:, b)) <= 0.0_wp)) cycle
+      do m = self%walls%first(b), self%walls%first(b + 1) - 1
+        associate (n => self%walls%cell(:, m))
+          self%y(n(1), n(2), n(3), :) = self%y(n(1), n(2), n(3), :) &
+            - self%walls%k(m)*wall_velocity(x_body(:, b), self%walls%arm(:, m))
+        end associate
       end do
-      call exact_totals(bins, total)
-      do b = 1, bodies%n
-        y_body(:, b) = 0.0_wp
-        if (.not. bodies%free(b)) cycle
-        y_body(:, b) = inertial_momentum(bodies, b, self%dt, x_body(:, b)) &
-                     + matmul(self%body_matrix(:, :, b), x_body(:, b)) - total(6*b - 5:6*b)
-      end do
-    end associate
+    end do
+    call pull_of_legs(self, self%s, x_body, pull)
+    do b = 1, bodies%n
+      y_body(:, b) = 0.0_wp
+      if (.not. bodies%free(b)) cycle
+      y_body(:, b) = inertial_momentum(bodies, b, self%dt, x_body(:, b)) - pull(:, b)
+    end do
   end subroutine apply_viscous
 
   !> Viscous force and torque on each body, from its wall legs [N, N m].
@@ -281,29 +274,47 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     type(flow_t), intent(in) :: flow
     type(viscous_t), intent(inout) :: self
-    integer(i8) :: bins(bin_size, 6*bodies%n)
-    real(wp) :: slip(3), total(6*bodies%n)
-    integer :: b, m
 
-    bins = spread(no_terms, 2, 6*bodies%n)
-    associate (walls => self%walls, force => self%force)
-      do b = 1, bodies%n
-        do m = walls%first(b), walls%first(b + 1) - 1
-          associate (n => walls%cell(:, m))
-            slip = flow%u(n(1), n(2), n(3), :) - wall_velocity(bodies%motion(:, b), walls%arm(:, m))
-            walls%work(m - walls%first(b) + 1, :) = &
-              wrench(walls%k(m)*unknown(self%mass(n(1), n(2), n(3), :), slip), walls%arm(:, m))
-          end associate
-        end do
-        call exact_add_columns(walls%work(1:walls%first(b + 1) - walls%first(b), :), &
-          bins(:, 6*b - 5:6*b))
-      end do
-      call exact_totals(bins, total)
-      do b = 1, bodies%n
-        force(:, b) = total(6*b - 5:6*b)
-        force(4:6, b) = force(4:6, b) - self%spin_drag(b)*bodies%motion(4:6, b)
-      end do
-    end associate
+    call pull_of_legs(self, flow%u, bodies%motion, self%force)
   end subroutine force_of_legs
+
+  !> Force and torque on each body of its wall legs, and of the stress that they leave out, for
+  !! velocities of the cells and motions of the bodies [N, N m].
+  subroutine pull_of_legs(self, u, motion, pull)
+    type(viscous_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: &
+      u(lbound(self%mass, 1):, lbound(self%mass, 2):, lbound(self%mass, 3):, :)   !! [m/s]
+    real(wp), intent(in) :: motion(:, :)   !! (6, bodies)
+    real(wp), intent(out) :: pull(:, :)    !! (6, bodies)
+    integer(i8) :: bins(bin_size, size(pull))
+    real(wp) :: total(size(pull)), term(terms_at_once, 6), slip(3)
+    integer :: b, m, n, from
+
+    bins = spread(no_terms, 2, size(pull))
+    associate (walls => self%walls)
+      !$omp parallel private(b, m, n, term, slip) if (walls%n > worth_threads)
+      do b = 1, size(pull, 2)
+        !$omp do schedule(static)
+        do from = walls%first(b), walls%first(b + 1) - 1, terms_at_once
+          n = 0
+          do m = from, min(from + terms_at_once, walls%first(b + 1)) - 1
+            n = n + 1
+            associate (c => walls%cell(:, m))
+              slip = u(c(1), c(2), c(3), :) - wall_velocity(motion(:, b), walls%arm(:, m))
+              term(n, :) = wrench(walls%k(m)*slip, walls%arm(:, m))
+            end associate
+          end do
+          call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        end do
+        !$omp end do nowait
+      end do
+      !$omp end parallel
+    end associate
+    call exact_totals(bins, total)
+    pull = reshape(total, shape(pull))
+    do b = 1, size(pull, 2)
+      pull(4:6, b) = pull(4:6, b) - self%spin_drag(b)*motion(4:6, b)
+    end do
+  end subroutine pull_of_legs
 
 end module viscous_m

@@ -9,13 +9,13 @@ module viscous_legs_m
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: drags, is_wall
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, add_wall, add_side, grow_work, unknown, wrench
+  use viscous_system_m, only: viscous_t, wall_legs_t, add_wall, add_side
   use film_legs_m, only: film_legs
   use linked_cells_m, only: linked_cells_t, is_alone
-  use exact_sum_m, only: exact_add, exact_add_columns, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
   public :: build_viscous
@@ -58,8 +58,8 @@ contains
   !! unknown.
   subroutine finish_diagonal(grid, leg, mass, diagonal, inverse)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: leg, mass
+    real(wp), intent(in), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: diagonal, inverse
     integer :: i, j, k, c
@@ -69,11 +69,11 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k, c) &
+            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k) &
               + leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
               + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
             inverse(i, j, k, c) = merge(1.0_wp/max(diagonal(i, j, k, c), tiny(1.0_wp)), 0.0_wp, &
-                                        mass(i, j, k, c) > 0.0_wp)
+                                        mass(i, j, k) > 0.0_wp)
           end do
         end do
       end do
@@ -93,7 +93,7 @@ contains
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          self%mass(i, j, k, :) = &
+          self%mass(i, j, k) = &
             merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), least_mass)*grid%volume/dt, &
                   0.0_wp, solid%inside(i, j, k) == 0)
         end do
@@ -116,7 +116,7 @@ contains
         if (.not. grid%owns(c)) cycle
         do m = links%first(g), links%first(g + 1) - 1
           associate (film => links%part(1, m), master => links%part(2, m))
-            self%mass(c(1), c(2), c(3), :) = self%mass(c(1), c(2), c(3), :) &
+            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) &
               + links%share(master, film)*film_mass(links%cell(:, film))
           end associate
         end do
@@ -124,7 +124,7 @@ contains
     end do
     do m = 1, links%n_films
       associate (c => links%cell(:, m))
-        if (is_alone(links, m) .and. grid%owns(c)) self%mass(c(1), c(2), c(3), :) = film_mass(c)
+        if (is_alone(links, m) .and. grid%owns(c)) self%mass(c(1), c(2), c(3)) = film_mass(c)
       end associate
     end do
   contains
@@ -282,42 +282,29 @@ contains
   end subroutine group_by_body
 
   !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
-  !! over dt added by the solver, and 2 mu V Omega, the part of the wall stress that the legs leave
-  !! out.
+  !! over dt added by the solver. With the sums K = sum k, S = sum k r, M = sum k r r^T over the legs
+  !! of arm r, a motion (v, w) is held by the force K v + w x S and the torque
+  !! S x v + (tr(M) 1 - M) w; and by 2 mu V w, the part of the wall stress that the legs leave out.
   subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
-    integer, parameter :: sums = 37            ! the 6 x 6 block, viscosity times volume
-    integer(i8), allocatable :: bins(:, :, :)
-    real(wp), allocatable :: total(:, :)
-    integer :: b, c, m, n
-    real(wp) :: unit(6)        !! one of the six unit motions
+    integer, parameter :: sums = 11   ! K, S, M and viscosity times volume
+    integer(i8) :: bins(bin_size, sums*bodies%n)
+    real(wp) :: total(sums*bodies%n)
+    integer :: b, c
 
-    allocate (bins(bin_size, sums, bodies%n), total(sums, bodies%n))
+    bins = spread(no_terms, 2, sums*bodies%n)
     do b = 1, bodies%n
-      bins(:, :, b) = spread(no_terms, 2, sums)
-      n = self%walls%first(b + 1) - self%walls%first(b)
-      do c = 1, 6
-        unit = 0.0_wp
-        unit(c) = 1.0_wp
-        do m = self%walls%first(b), self%walls%first(b + 1) - 1
-          associate (i => self%walls%cell(:, m), arm => self%walls%arm(:, m))
-            self%walls%work(m - self%walls%first(b) + 1, :) = &
-              wrench(self%walls%k(m)*unknown(self%mass(i(1), i(2), i(3), :), &
-                                             wall_velocity(unit, arm)), arm)
-          end associate
-        end do
-        call exact_add_columns(self%walls%work(1:n, :), bins(:, 6*c - 5:6*c, b))
-      end do
-      call add_viscosity_times_volume(b, bins(:, sums, b))
+      call add_moments(self%walls, b, bins(:, sums*b - 10:sums*b - 1))
+      call add_viscosity_times_volume(b, bins(:, sums*b:sums*b))
     end do
-    call sum_up(size(total), bins, total)
+    call exact_totals(bins, total)
     do b = 1, bodies%n
-      self%body_matrix(:, :, b) = reshape(total(:36, b), [6, 6])
-      self%spin_drag(b) = 2.0_wp*total(sums, b)
+      self%body_matrix(:, :, b) = held_by(total(sums*b - 10:sums*b - 1))
+      self%spin_drag(b) = 2.0_wp*total(sums*b)
       do c = 4, 6
         self%body_matrix(c, c, b) = self%body_matrix(c, c, b) + self%spin_drag(b)
       end do
@@ -326,28 +313,64 @@ contains
     !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3].
     subroutine add_viscosity_times_volume(body, bins)
       integer, intent(in) :: body
-      integer(i8), intent(inout) :: bins(:)
-      integer :: m, n, i(3)
+      integer(i8), intent(inout) :: bins(:, :)
+      real(wp) :: term(terms_at_once, 1)
+      integer :: m, n, from, i(3)
 
-      n = 0
-      do m = solid%body_cell(body), solid%body_cell(body + 1) - 1
-        i = solid%cell(:, m)
-        if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
-        n = n + 1
-        if (n > size(self%walls%work, 1)) call grow_work(self)
-        self%walls%work(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+      do from = solid%body_cell(body), solid%body_cell(body + 1) - 1, terms_at_once
+        n = 0
+        do m = from, min(from + terms_at_once, solid%body_cell(body + 1)) - 1
+          i = solid%cell(:, m)
+          if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
+          n = n + 1
+          term(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
+        end do
+        call exact_add_columns(term(:n, :), bins)
       end do
-      call exact_add(self%walls%work(1:n, 1), bins)
     end subroutine add_viscosity_times_volume
-
-    !> All sums with one message.
-    subroutine sum_up(n, bins, total)
-      integer, intent(in) :: n
-      integer(i8), intent(inout) :: bins(bin_size, n)
-      real(wp), intent(inout) :: total(n)
-
-      call exact_totals(bins, total)
-    end subroutine sum_up
   end subroutine bodies_seen_by_legs
+
+  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the legs of a body to their sums.
+  subroutine add_moments(walls, body, bins)
+    type(wall_legs_t), intent(in) :: walls
+    integer, intent(in) :: body
+    integer(i8), intent(inout) :: bins(:, :)   !! (bin_size, 10)
+    real(wp) :: term(terms_at_once, 10)
+    integer :: from, m, n
+
+    do from = walls%first(body), walls%first(body + 1) - 1, terms_at_once
+      n = min(terms_at_once, walls%first(body + 1) - from)
+      do m = 1, n
+        associate (k => walls%k(from + m - 1), r => walls%arm(:, from + m - 1))
+          term(m, 1) = k
+          term(m, 2:4) = k*r
+          term(m, 5:7) = k*r**2
+          term(m, 8:10) = k*[r(1)*r(2), r(2)*r(3), r(3)*r(1)]
+        end associate
+      end do
+      call exact_add_columns(term(:n, :), bins)
+    end do
+  end subroutine add_moments
+
+  !> The 6 x 6 block from K, S and M.
+  pure function held_by(moment) result(matrix)
+    real(wp), intent(in) :: moment(10)   !! K, S, M (xx, yy, zz, xy, yz, zx)
+    real(wp) :: matrix(6, 6)
+    real(wp) :: s_cross(3, 3)
+    integer :: c
+
+    associate (k => moment(1), s => moment(2:4), m => moment(5:7), xy => moment(8), &
+               yz => moment(9), zx => moment(10))
+      s_cross = reshape([0.0_wp, s(3), -s(2), -s(3), 0.0_wp, s(1), s(2), -s(1), 0.0_wp], [3, 3])
+      matrix = 0.0_wp
+      matrix(4:6, 1:3) = s_cross
+      matrix(1:3, 4:6) = -s_cross
+      matrix(4:6, 4:6) = -reshape([m(1), xy, zx, xy, m(2), yz, zx, yz, m(3)], [3, 3])
+      do c = 1, 3
+        matrix(c, c) = k
+        matrix(c + 3, c + 3) = sum(m) - m(c)
+      end do
+    end associate
+  end function held_by
 
 end module viscous_legs_m

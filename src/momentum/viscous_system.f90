@@ -7,7 +7,7 @@ module viscous_system_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: viscous_t, viscous_init, add_wall, add_side, grow_work, unknown, wrench
+  public :: viscous_t, wall_legs_t, viscous_init, add_wall, add_side, wrench
 
   !> Legs between cells and bodies, grouped by body.
   type :: wall_legs_t
@@ -16,7 +16,6 @@ module viscous_system_m
     integer, allocatable :: cell(:, :)        !! (3, *)
     real(wp), allocatable :: k(:)             !! conductance [kg/s]
     real(wp), allocatable :: arm(:, :)        !! (3, *) from the centre of mass to the wall [m]
-    real(wp), allocatable :: work(:, :)       !! (*, 6) terms of sums over the legs of a body
     integer, allocatable :: found_body(:)     !! body of each leg as found, before grouping
     integer, allocatable :: found_cell(:, :)
     real(wp), allocatable :: found_k(:), found_arm(:, :)
@@ -40,8 +39,8 @@ module viscous_system_m
   !> The system, what solves it, and what came out.
   type :: viscous_t
     real(wp) :: dt = 0.0_wp   !! [s]
-    real(wp), allocatable :: mass(:, :, :, :)
-      !! rho m V/dt of each component, 0: not an unknown [kg/s]
+    real(wp), allocatable :: mass(:, :, :)
+      !! rho m V/dt, 0: the velocity is not an unknown [kg/s]
     real(wp), allocatable :: leg(:, :, :, :)
       !! conductance of the leg across the lower face [kg/s]
     real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
@@ -76,16 +75,16 @@ contains
     n = 2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))
     if (.not. any(abs(grid%side_velocity) > 0.0_wp)) n = 0
     allocate (self%sides%cell(3, n), self%sides%pull(3, n))
-    allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%leg, self%diagonal, self%inverse, self%r, self%z, self%s, self%y, &
-              source=self%mass)
+    allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%leg(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%diagonal, self%inverse, self%r, self%z, self%s, self%y, source=self%leg)
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%force(6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
     allocate (self%films%sum(7, 0), self%films%area(3, 0))
     associate (walls => self%walls)
       allocate (walls%first(n_bodies + 1), source=1)
-      allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0), walls%work(0, 6))
+      allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0))
       allocate (walls%found_body(0), walls%found_cell(3, 0), walls%found_k(0), &
                 walls%found_arm(3, 0))
     end associate
@@ -127,8 +126,8 @@ contains
     call move_alloc(body, self%walls%found_body)
     call move_alloc(k, self%walls%found_k)
     call move_alloc(arm, self%walls%found_arm)
-    deallocate (self%walls%cell, self%walls%k, self%walls%arm, self%walls%work)
-    allocate (self%walls%cell(3, m), self%walls%k(m), self%walls%arm(3, m), self%walls%work(m, 6))
+    deallocate (self%walls%cell, self%walls%k, self%walls%arm)
+    allocate (self%walls%cell(3, m), self%walls%k(m), self%walls%arm(3, m))
   end subroutine grow
 
   !> Note what a side that may move does to cell c: conductance k and velocity of the side.
@@ -144,24 +143,6 @@ contains
     self%sides%cell(:, self%sides%n) = c
     self%sides%pull(:, self%sides%n) = k*velocity
   end subroutine add_side
-
-  !> Double the length of the work array of the sums.
-  subroutine grow_work(self)
-    type(viscous_t), intent(inout) :: self
-    real(wp), allocatable :: longer(:, :)
-
-    allocate (longer(2*size(self%walls%work, 1) + 64, 6), source=0.0_wp)
-    longer(1:size(self%walls%work, 1), :) = self%walls%work
-    call move_alloc(longer, self%walls%work)
-  end subroutine grow_work
-
-  !> Velocity components that are unknowns; the others move with the wall and pull on nothing.
-  pure function unknown(mass, x) result(v)
-    real(wp), intent(in) :: mass(3), x(3)
-    real(wp) :: v(3)
-
-    v = merge(x, 0.0_wp, mass > 0.0_wp)
-  end function unknown
 
   !> Force at a point and its torque about the centre of mass, as one vector of six.
   pure function wrench(f, arm) result(w)
