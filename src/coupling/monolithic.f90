@@ -116,7 +116,7 @@ contains
       if (stage%implicit_momentum) return
       call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
       call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
-                             flow, a%cell, stage%mid_step, balance, stage%from_mid_step)
+                             flow, a%cell, stage%mid_step, stage%from_mid_step)
     end associate
   end subroutine accelerate_fluid
 

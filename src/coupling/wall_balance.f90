@@ -22,11 +22,13 @@ module wall_balance_m
   use mid_step_m, only: mid_step_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
   public :: wall_balance_t, wall_balance_init, begin_balance, note_change, note_velocity
   public :: force_of_walls, force_of_mid_step
+
+  integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
 
   !> Of each wall cell of `linked_cells_t`.
   type :: wall_balance_t
@@ -34,7 +36,6 @@ module wall_balance_m
     real(wp), allocatable :: pushed(:, :)   !! (3, *) change of velocity by the faces [m/s]
     real(wp), allocatable :: gained(:, :)   !! (3, *) that which the group took [m/s]
     real(wp), allocatable :: before(:, :)   !! (3, *) velocity before the viscous stage [m/s]
-    real(wp), allocatable :: terms(:, :)    !! (*, 6) of the sums
   end type wall_balance_t
 
 contains
@@ -43,8 +44,7 @@ contains
   subroutine wall_balance_init(self)
     type(wall_balance_t), intent(out) :: self
 
-    allocate (self%mass(0), self%pushed(3, 0), self%gained(3, 0), self%before(3, 0), &
-              self%terms(0, 6))
+    allocate (self%mass(0), self%pushed(3, 0), self%gained(3, 0), self%before(3, 0))
   end subroutine wall_balance_init
 
   !> The masses of the wall cells; nothing has changed yet.
@@ -59,10 +59,7 @@ contains
     call ensure_room(links%n, self%pushed)
     call ensure_room(links%n, self%gained)
     call ensure_room(links%n, self%before)
-    if (size(self%terms, 1) < links%n) then
-      deallocate (self%terms)
-      allocate (self%terms(2*links%n, 6))
-    end if
+    !$omp parallel do schedule(static)
     do m = 1, links%n
       associate (c => links%cell(:, m))
         self%mass(m) = mass_through(fluid, flow%room(c(1), c(2), c(3)), &
@@ -83,6 +80,7 @@ contains
     real(wp), intent(inout) :: change(:, :)   !! (3, wall cells) [m/s]
     integer :: m
 
+    !$omp parallel do schedule(static)
     do m = 1, links%n
       associate (c => links%cell(:, m))
         change(:, m) = change(:, m) + dt*a(c(1), c(2), c(3), :)
@@ -99,6 +97,7 @@ contains
     real(wp), intent(inout) :: velocity(:, :)   !! (3, wall cells) [m/s]
     integer :: m
 
+    !$omp parallel do schedule(static)
     do m = 1, links%n
       associate (c => links%cell(:, m))
         velocity(:, m) = u(c(1), c(2), c(3), :)
@@ -115,38 +114,51 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [kg/m3]
-    type(wall_balance_t), intent(inout) :: self
+    type(wall_balance_t), intent(in) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
     integer(i8) :: bins(bin_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n), arm(3), wall(3), moved(3)
-    integer :: b, m, n
+    real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
+    integer :: b, e, n, from
 
     bins = spread(no_terms, 2, 6*bodies%n)
+    !$omp parallel private(b, e, n, term) if (links%n > worth_threads)
     do b = 1, bodies%n
-      n = 0
-      do m = 1, links%n
-        if (links%body(m) /= b) cycle
-        associate (c => links%cell(:, m))
-          if (.not. grid%owns(c)) cycle
-          arm = arm_of(grid, c, bodies%x(:, b))
-          wall = wall_velocity(bodies%motion(:, b) - at_start%motion(:, b), arm)
-          moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
+      !$omp do schedule(static)
+      do from = links%first_of_body(b), links%first_of_body(b + 1) - 1, terms_at_once
+        n = 0
+        do e = from, min(from + terms_at_once, links%first_of_body(b + 1)) - 1
+          if (.not. grid%owns(links%cell(:, links%by_body(e)))) cycle
           n = n + 1
-          self%terms(n, :) = wrench((moved*(self%pushed(:, m) - wall) &
-                                     - self%mass(m)*(self%gained(:, m) - wall))/dt, arm)
-        end associate
+          term(n, :) = of_cell(links%by_body(e), b)
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
-      call exact_add_columns(self%terms(:n, :), bins(:, 6*b - 5:6*b))
+      !$omp end do nowait
     end do
+    !$omp end parallel
     call exact_totals(bins, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
+  contains
+    !> Force and torque that wall cell m owes body b.
+    pure function of_cell(m, b) result(owed)
+      integer, intent(in) :: m, b
+      real(wp) :: owed(6)
+      real(wp) :: arm(3), wall(3), moved(3)
+
+      associate (c => links%cell(:, m))
+        arm = arm_of(grid, c, bodies%x(:, b))
+        wall = wall_velocity(bodies%motion(:, b) - at_start%motion(:, b), arm)
+        moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
+        owed = wrench((moved*(self%pushed(:, m) - wall) &
+                       - self%mass(m)*(self%gained(:, m) - wall))/dt, arm)
+      end associate
+    end function of_cell
   end subroutine force_of_walls
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
   !! start (`mid_step%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
   !! surface of the end, of groups.
-  subroutine force_of_mid_step(grid, fluid, before, links, bodies, dt, flow, a, mid_step, self, &
-                               force)
+  subroutine force_of_mid_step(grid, fluid, before, links, bodies, dt, flow, a, mid_step, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(linked_cells_t), intent(in) :: before, links   !! of the start and of the end
@@ -156,46 +168,57 @@ contains
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
     type(mid_step_t), intent(in) :: mid_step
-    type(wall_balance_t), intent(inout) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
     integer(i8) :: bins(bin_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n)
-    integer :: b, m, n
+    integer :: b
 
     bins = spread(no_terms, 2, 6*bodies%n)
-    if (size(self%terms, 1) < links%n + before%n) then
-      deallocate (self%terms)
-      allocate (self%terms(2*(links%n + before%n), 6))
-    end if
+    !$omp parallel private(b) if (links%n > worth_threads)
     do b = 1, bodies%n
-      n = 0
-      do m = 1, links%n
-        if (links%body(m) == b) call add(links%cell(:, m))
-      end do
-      do m = 1, before%n
-        if (before%body(m) /= b) cycle
-        associate (c => before%cell(:, m))
-          if (links%number(c(1), c(2), c(3)) == 0) call add(c)
-        end associate
-      end do
-      call exact_add_columns(self%terms(:n, :), bins(:, 6*b - 5:6*b))
+      call add_cells(links, .false., b)
+      call add_cells(before, .true., b)
     end do
+    !$omp end parallel
     call exact_totals(bins, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
-    subroutine add(c)
-      integer, intent(in) :: c(3)
+    !> Add the wall cells of body b in a list; of those of the start only what is none at the end.
+    subroutine add_cells(list, at_start, b)
+      type(linked_cells_t), intent(in) :: list
+      logical, intent(in) :: at_start
+      integer, intent(in) :: b
+      real(wp) :: term(terms_at_once, 6)
+      integer :: e, n, from, c(3)
+
+      !$omp do schedule(static)
+      do from = list%first_of_body(b), list%first_of_body(b + 1) - 1, terms_at_once
+        n = 0
+        do e = from, min(from + terms_at_once, list%first_of_body(b + 1)) - 1
+          c = list%cell(:, list%by_body(e))
+          if (.not. grid%owns(c)) cycle
+          if (at_start .and. links%number(c(1), c(2), c(3)) > 0) cycle
+          n = n + 1
+          term(n, :) = of_cell(c, b)
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+      end do
+      !$omp end do nowait
+    end subroutine add_cells
+
+    !> Force and torque that cell c owes body b.
+    pure function of_cell(c, b) result(owed)
+      integer, intent(in) :: c(3), b
+      real(wp) :: owed(6)
       real(wp) :: f(3), mass
 
-      if (.not. grid%owns(c)) return
       f = -mid_step%given(c(1), c(2), c(3), :)
       if (mid_step%takes_part(c(1), c(2), c(3))) then
         mass = mass_through(fluid, flow%room(c(1), c(2), c(3)), flow%liquid(c(1), c(2), c(3)))
         f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
       end if
-      n = n + 1
-      self%terms(n, :) = wrench(f/dt, arm_of(grid, c, bodies%x(:, b)))
-    end subroutine add
+      owed = wrench(f/dt, arm_of(grid, c, bodies%x(:, b)))
+    end function of_cell
   end subroutine force_of_mid_step
 
   !> From the centre of mass of a body to the centre of a cell [m].

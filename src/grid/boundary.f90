@@ -55,32 +55,43 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-    integer :: d, s, m, c
-    real(wp) :: factor, shift
+    integer :: d, s, c
 
     do d = 1, 3
       call halo_exchange(u, n_halo, d)
-      do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
-        do c = 1, 3
-          factor = 1.0_wp
-          shift = 0.0_wp
-          if (grid%side(s, d) == side_no_slip .or. (is_wall(grid%side(s, d)) .and. c == d)) then
-            factor = -1.0_wp
-            shift = 2.0_wp*grid%side_velocity(c, s, d)
-          else if (grid%side(s, d) == side_inflow) then
-            factor = 0.0_wp
-            shift = grid%side_velocity(c, s, d)
-          end if
-          do m = 1, n_halo
-            call mirror_plane(u(:, :, :, c), d, ghost_layer(grid, s, d, m), &
-                              mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), &
-                                factor, shift)
-          end do
+      if (grid%periodic(d)) cycle
+      !$omp parallel do collapse(2) schedule(static)
+      do c = 1, 3
+        do s = 1, 2
+          if (grid%at_side(s, d)) call fill_component(grid, s, d, c, u(:, :, :, c))
         end do
       end do
     end do
   end subroutine fill_velocity_halo
+
+  !> Halo of component c of the velocity outside side s of direction d.
+  pure subroutine fill_component(grid, s, d, c, u)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, c
+    real(wp), intent(inout), contiguous :: u(:, :, :)
+    real(wp) :: factor, shift
+    integer :: m
+
+    factor = 1.0_wp
+    shift = 0.0_wp
+    if (grid%side(s, d) == side_no_slip .or. (is_wall(grid%side(s, d)) .and. c == d)) then
+      factor = -1.0_wp
+      shift = 2.0_wp*grid%side_velocity(c, s, d)
+    else if (grid%side(s, d) == side_inflow) then
+      factor = 0.0_wp
+      shift = grid%side_velocity(c, s, d)
+    end if
+    do m = 1, n_halo
+      call mirror_plane(u, d, ghost_layer(grid, s, d, m), &
+                        mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), &
+                        factor, shift)
+    end do
+  end subroutine fill_component
 
   !> Position of halo layer m outside side s, counted in the local array with its halo (first = 1).
   pure function ghost_layer(grid, s, d, m) result(layer)

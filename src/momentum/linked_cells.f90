@@ -21,7 +21,7 @@ module linked_cells_m
   use wall_profile_m, only: slip_at
   implicit none
   private
-  public :: linked_cells_t, linked_cells_init, link_cells
+  public :: linked_cells_t, linked_cells_init, link_cells, order_by_body
   public :: match_densities, share_momentum, share_acceleration, follow_masters, is_alone
   public :: open_shares, velocity_at_wall, master_distance
 
@@ -35,6 +35,8 @@ module linked_cells_m
     integer, allocatable :: cell(:, :)           !! (3, *)
     integer, allocatable :: body(:)              !! (*) body whose wall it is
     integer, allocatable :: number(:, :, :)      !! number of a wall cell, else 0
+    !> Wall cells of body b: `by_body(first_of_body(b):first_of_body(b+1)-1)`.
+    integer, allocatable :: by_body(:), first_of_body(:)
     real(wp), allocatable :: normal(:, :)        !! (3, films) of the wall, into the fluid
     integer, allocatable :: step(:, :)           !! (3*masters_at_most, films) to their masters
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
@@ -45,6 +47,7 @@ module linked_cells_m
     integer, allocatable :: leader(:)            !! (groups) number of the master
     integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
     integer, allocatable :: part(:, :)           !! (2, *) film, which of its masters
+    integer, allocatable :: group(:)             !! of each master while the groups are found
   end type linked_cells_t
 
 contains
@@ -57,7 +60,8 @@ contains
 
     a = grid%first
     b = grid%last
-    allocate (self%cell(3, 0), self%body(0), self%normal(3, 0), self%leader(0), self%part(2, 0))
+    allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
+    allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
     allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
     allocate (self%first(1), source=1)
@@ -84,6 +88,7 @@ contains
     self%n_films = self%n
     call add_cut_cells(grid, solid, self)
     call find_masters(grid, solid, self)
+    call order_by_body(size(solid%body_cell) - 1, self)
     call group_films(grid, self)
   end subroutine link_cells
 
@@ -168,6 +173,30 @@ contains
       if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell(c, b, self)
     end subroutine add_beside
   end subroutine add_cut_cells
+
+  !> The wall cells in the order of their bodies.
+  subroutine order_by_body(n_bodies, self)
+    integer, intent(in) :: n_bodies
+    type(linked_cells_t), intent(inout) :: self
+    integer :: b, m
+
+    call ensure_room(n_bodies + 1, self%first_of_body)
+    call ensure_room(self%n, self%by_body)
+    associate (first => self%first_of_body)
+      first(:n_bodies + 1) = 0
+      do m = 1, self%n
+        first(self%body(m)) = first(self%body(m)) + 1
+      end do
+      first(1) = first(1) + 1
+      do b = 2, n_bodies + 1   ! behind the end of each
+        first(b) = first(b) + first(b - 1)
+      end do
+      do m = self%n, 1, -1     ! from the back, which brings them down to the begins
+        first(self%body(m)) = first(self%body(m)) - 1
+        self%by_body(first(self%body(m))) = m
+      end do
+    end associate
+  end subroutine order_by_body
 
   !> Masters, normal and profile of each film.
   subroutine find_masters(grid, solid, self)
@@ -328,35 +357,71 @@ contains
   subroutine group_films(grid, self)
     type(grid_t), intent(in) :: grid
     type(linked_cells_t), intent(inout) :: self
-    integer :: m, n, n_parts, i, j, k, f, c(3)
+    integer :: m, n, f, g, n_parts
 
+    call ensure_room(self%n, self%group)
+    self%group(:self%n) = 0
+    do f = 1, self%n_films   ! count the parts of each master
+      do n = 1, masters_at_most
+        m = self%master(n, f)
+        if (m > 0) self%group(m) = self%group(m) + 1
+      end do
+    end do
     self%n_groups = 0
     n_parts = 0
     do m = self%n_films + 1, self%n
-      c = self%cell(:, m)
-      if (any(c < grid%lo - 1) .or. any(c > grid%hi + 1)) cycle
-      call ensure_room(self%n_groups + 1, self%leader)
-      call ensure_room(self%n_groups + 2, self%first)
-      self%first(self%n_groups + 1) = n_parts + 1
-      do k = c(3) - 1, c(3) + 1
-        do j = c(2) - 1, c(2) + 1
-          do i = c(1) - 1, c(1) + 1
-            f = self%number(i, j, k)
-            if (f < 1 .or. f > self%n_films) cycle
-            n = findloc(self%master(:, f), m, 1)
-            if (n == 0) cycle
-            n_parts = n_parts + 1
-            call ensure_room(n_parts, self%part)
-            self%part(:, n_parts) = [f, n]
-          end do
-        end do
-      end do
-      if (n_parts < self%first(self%n_groups + 1)) cycle
+      if (self%group(m) == 0) cycle
+      n = self%group(m)
+      self%group(m) = 0
+      if (any(self%cell(:, m) < grid%lo - 1) .or. any(self%cell(:, m) > grid%hi + 1)) cycle
       self%n_groups = self%n_groups + 1
+      self%group(m) = self%n_groups
+      call ensure_room(self%n_groups, self%leader)
+      call ensure_room(self%n_groups + 1, self%first)
       self%leader(self%n_groups) = m
+      n_parts = n_parts + n
+      self%first(self%n_groups) = n_parts + 1   ! behind the end, until the parts are there
     end do
     self%first(self%n_groups + 1) = n_parts + 1
+    call ensure_room(n_parts, self%part, rows=2)
+    do f = 1, self%n_films
+      do n = 1, masters_at_most
+        m = self%master(n, f)
+        if (m == 0) cycle
+        g = self%group(m)
+        if (g == 0) cycle
+        self%first(g) = self%first(g) - 1
+        self%part(:, self%first(g)) = [f, n]
+      end do
+    end do
+    !$omp parallel do schedule(static)
+    do g = 1, self%n_groups
+      call sort_parts(self%cell(:, self%leader(g)), self%cell, &
+                      self%part(:, self%first(g):self%first(g + 1) - 1))
+    end do
   end subroutine group_films
+
+  !> Parts of films in the order of the films' places around the leader.
+  pure subroutine sort_parts(leader, cell, part)
+    integer, intent(in) :: leader(3), cell(:, :)
+    integer, intent(inout) :: part(:, :)   !! (2, *)
+    integer :: m, n, moved(2)
+
+    do m = 2, size(part, 2)
+      moved = part(:, m)
+      do n = m, 2, -1
+        if (place(part(1, n - 1)) < place(moved(1))) exit
+        part(:, n) = part(:, n - 1)
+      end do
+      part(:, n) = moved
+    end do
+  contains
+    pure integer function place(film)
+      integer, intent(in) :: film
+
+      place = dot_product(cell(:, film) - leader, [1, 3, 9])
+    end function place
+  end subroutine sort_parts
 
   !> Is this film a group of its own?
   elemental function is_alone(self, film) result(yes)
@@ -379,6 +444,7 @@ contains
     type(linked_cells_t), intent(inout) :: self
     integer :: m, n
 
+    !$omp parallel do private(n) schedule(static)
     do m = 1, self%n_films
       do n = 1, masters_at_most
         if (self%master(n, m) == 0) cycle
@@ -518,6 +584,7 @@ contains
     real(wp) :: excess(3, self%n_films)   !! of a film over the mean of its masters
     integer :: g, m
 
+    !$omp parallel do private(total) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m)) cycle
       call mean_of_masters(grid, self, m, a, total)
@@ -543,6 +610,7 @@ contains
         a(c(1), c(2), c(3), :) = a(c(1), c(2), c(3), :) + total/max(weight, tiny(1.0_wp))
       end associate
     end do
+    !$omp parallel do private(total) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       call mean_of_masters(grid, self, m, a, total)
@@ -594,6 +662,7 @@ contains
     real(wp) :: changed(3)
     integer :: m, n
 
+    !$omp parallel do private(n, changed) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       changed = before(:, m)

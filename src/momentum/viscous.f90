@@ -151,9 +151,16 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(out) :: scale
     real(wp) :: m(1)
+    integer :: k, c
 
+    m = 0.0_wp
     associate (a => grid%lo, z => grid%hi)
-      m = maxval(abs(u(a(1):z(1), a(2):z(2), a(3):z(3), :)))
+      !$omp parallel do collapse(2) reduction(max: m) schedule(static)
+      do c = 1, 3
+        do k = grid%lo(3), grid%hi(3)
+          m = max(m, maxval(abs(u(a(1):z(1), a(2):z(2), k, c))))
+        end do
+      end do
     end associate
     call global_max(m)
     scale = max(m(1), 1.0e-12_wp, maxval([0.0_wp, abs(bodies%motion(1:3, :))]), &

@@ -309,6 +309,7 @@ contains
     type(flow_t), intent(inout) :: flow
     integer :: m, d, c(3)
 
+    !$omp parallel do private(d, c) schedule(static)
     do m = 1, size(wall_cell, 2)
       do d = 1, 3
         call shorten(wall_cell(:, m), d, body(m))
@@ -364,54 +365,64 @@ contains
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
-    integer :: m, d, f(3), low(3), sides
-    real(wp) :: total
+    integer :: m
 
+    !$omp parallel do schedule(static)
     do m = 1, solid%n_leg
-      f = solid%leg(1:3, m)
-      d = solid%leg(4, m)
+      call set_face(solid%leg(1:3, m), solid%leg(4, m))
+    end do
+  contains
+    !> The lower face of cell f in direction d: mean of what the cells with a leg through it see.
+    subroutine set_face(f, d)
+      integer, intent(in) :: f(3), d
+      integer :: low(3), sides
+      real(wp) :: total
+
       low = f - unit_step(:, d)
-      if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) cycle
-      if (any((low < 1 .or. f > grid%n) .and. .not. grid%periodic)) cycle
+      if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
+      if (any((low < 1 .or. f > grid%n) .and. .not. grid%periodic)) return
+      sides = 0
+      total = 0.0_wp
       associate (i => f(1), j => f(2), k => f(3))
-        if (solid%open(i, j, k, d) <= 0.0_wp) cycle
-        sides = 0
-        total = 0.0_wp
-        if (solid%inside(low(1), low(2), low(3)) == 0) then
-          call add_side(low, 1, solid%leg_low(i, j, k, d), solid%leg_body_low(i, j, k, d))
+        if (solid%open(i, j, k, d) <= 0.0_wp) return
+        if (solid%inside(low(1), low(2), low(3)) == 0 .and. solid%leg_body_low(i, j, k, d) > 0) then
+          sides = sides + 1
+          total = total + seen_from(low, 1, solid%leg_low(i, j, k, d), &
+                                    solid%leg_body_low(i, j, k, d), f, d)
         end if
-        if (solid%inside(i, j, k) == 0) then
-          call add_side(f, -1, solid%leg_high(i, j, k, d), solid%leg_body_high(i, j, k, d))
+        if (solid%inside(i, j, k) == 0 .and. solid%leg_body_high(i, j, k, d) > 0) then
+          sides = sides + 1
+          total = total + seen_from(f, -1, solid%leg_high(i, j, k, d), &
+                                    solid%leg_body_high(i, j, k, d), f, d)
         end if
         if (sides > 0) flow%uf(i, j, k, d) = total/real(sides, wp)
       end associate
-    end do
-  contains
-    !> Velocity of the face as seen from cell c, whose leg along +d or -d ends at theta cells.
-    subroutine add_side(c, sense, theta, body)
-      integer, intent(in) :: c(3), sense, body
+    end subroutine set_face
+
+    !> Velocity of face f as seen from cell c, whose leg along +d or -d ends at theta cells.
+    pure function seen_from(c, sense, theta, body, f, d) result(velocity)
+      integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
+      real(wp) :: velocity
       real(wp) :: x_wall(3), wall(3), n(3), nu, time, near, along
 
-      if (body == 0) return
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))
-      n = wall_normal(low) + wall_normal(f)
+      n = wall_normal(f - unit_step(:, d)) + wall_normal(f)
       n = n/max(norm2(n), tiny(1.0_wp))
-      sides = sides + 1
       associate (u => flow%u(c(1), c(2), c(3), :))
         time = dt
         if (in_liquid(c(1), c(2), c(3))) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
         near = near_wall(theta, n(d), solid%open(f(1), f(2), f(3), d))
         along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
-        total = total + u(d) + near*(along*(wall(d) - u(d)) &
+        velocity = u(d) + near*(along*(wall(d) - u(d)) &
                                      + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
           + face_step(time, nu, sum(1.0_wp/grid%h**2))*(a%face(f(1), f(2), f(3), d) &
                                                              - a%cell(c(1), c(2), c(3), d))
       end associate
-    end subroutine add_side
+    end function seen_from
 
     !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond
     !! the face; free slip where there is fluid again.

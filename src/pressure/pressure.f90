@@ -81,12 +81,12 @@ contains
     type(flow_t), intent(inout) :: flow
     type(rigid_motion_t), intent(inout) :: bodies
     type(pressure_t), intent(inout) :: self
-    integer :: iterations
+    integer :: iterations, k
     real(wp) :: allowed     !! divergence [1/s]
     real(wp) :: tolerance   !! of the residual of the linear system [m3/s2]
 
     self%report = pressure_report_t()
-    self%phi_total = 0.0_wp
+    call start_from_none(self%phi_total)
     call set_bodies(grid, bodies, self%system)
     allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
     tolerance = 0.5_wp*allowed*grid%volume/dt
@@ -97,8 +97,11 @@ contains
         if (system%work%singular) report%divergence = uneven(grid, self%rhs, system%work)
         report%converged = report%divergence < allowed
         if (report%converged .or. report%passes == self%max_passes) exit
-        self%rhs = -self%rhs/dt
-        self%phi = 0.0_wp
+        call start_from_none(self%phi)
+        !$omp parallel do schedule(static)
+        do k = lbound(self%rhs, 3), ubound(self%rhs, 3)
+          self%rhs(:, :, k) = -self%rhs(:, :, k)/dt
+        end do
         call solve_linear(tolerance, system, self%rhs, self%phi, iterations)
         report%passes = report%passes + 1
         report%iterations = report%iterations + iterations
@@ -106,8 +109,22 @@ contains
       end do
     end associate
     call fill_scalar_halo(grid, self%phi_total)
-    flow%p = flow%p + self%phi_total
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      flow%p(:, :, k) = flow%p(:, :, k) + self%phi_total(:, :, k)
+    end do
   end subroutine solve_pressure
+
+  !> Zero everywhere.
+  subroutine start_from_none(phi)
+    real(wp), intent(inout), contiguous :: phi(:, :, :)
+    integer :: k
+
+    !$omp parallel do schedule(static)
+    do k = 1, size(phi, 3)
+      phi(:, :, k) = 0.0_wp
+    end do
+  end subroutine start_from_none
 
   !> Largest divergence in a closed box less its mean over the open cells [1/s], which is what the
   !! walls swallow (`pressure_system_m`). The transport shares it out, too (`open_flux_m`).
@@ -143,15 +160,20 @@ contains
     type(flow_t), intent(inout) :: flow
     type(pressure_t), intent(inout) :: self
     real(wp), parameter :: weightless(3) = 0.0_wp
-    integer :: b
+    integer :: b, k
 
-    associate (a => grid%lo, z => grid%hi)
-      self%phi_pass(a(1):z(1), a(2):z(2), a(3):z(3)) = self%phi(a(1):z(1), a(2):z(2), a(3):z(3))
+    associate (a => grid%lo, z => grid%hi, phi => self%phi, pass => self%phi_pass, &
+               total => self%phi_total)
+      !$omp parallel do schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        pass(a(1):z(1), a(2):z(2), k) = phi(a(1):z(1), a(2):z(2), k)
+        total(a(1):z(1), a(2):z(2), k) = total(a(1):z(1), a(2):z(2), k) &
+                                         + phi(a(1):z(1), a(2):z(2), k)
+      end do
     end associate
     call fill_scalar_halo(grid, self%phi_pass)
     call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_pass, flow%sides)
     call add_product(grid, dt, self%a_pass, flow%uf)
-    self%phi_total = self%phi_total + self%phi_pass
     associate (op => self%system%operator)
       call force_from_cells(bodies, op%flux, self%phi, grid%lo - 1, op%push)
       call motion_of_force(bodies, op%push)

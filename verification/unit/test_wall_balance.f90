@@ -10,8 +10,8 @@ program test_wall_balance
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: uncounted_fluid
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, share_acceleration, &
-    open_shares
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, order_by_body, &
+    share_acceleration, open_shares
   use mid_step_m, only: mid_step_t, mid_step_init
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
     force_of_walls, force_of_mid_step
@@ -179,6 +179,7 @@ contains
         if (modulo(sum(c), 3) == 0) links%body(m) = 2
       end associate
     end do
+    call order_by_body(2, links)
     call share_acceleration(box%grid, box%solid%open, box%flow%rho, links, a%cell)
     call note_change(box%grid, links, dt, a%cell, balance%gained)
     of_fluid = matmul(balance%gained(:, :links%n), balance%mass(:links%n))
@@ -189,6 +190,7 @@ contains
                of_fluid + dt*sum(forces(1:3, :), 2), from_faces, 1.0e-12_wp*sum(balance%mass))
     call check('momentum: both bodies get some', all(norm2(forces(1:3, :), 1) > 1.0_wp))
     links%body(:links%n) = 1
+    call order_by_body(1, links)
   end subroutine momentum_of_all
 
   !> The two halves of the old pressure: where they are the same, no force; else what was given on
@@ -240,7 +242,7 @@ contains
     type(mid_step_t), intent(in) :: mid_step
 
     call force_of_mid_step(box%grid, box%case%fluid, before, links, box%bodies, dt, box%flow, &
-                           a%cell, mid_step, balance, force)
+                           a%cell, mid_step, force)
   end subroutine find_halves
 
   !> The links of the box lifted by `way`.
