@@ -16,7 +16,7 @@ module flux_band_m
   use messages_m, only: begin_search, end_search
   implicit none
   private
-  public :: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, drop_part, &
+  public :: flux_band_t, flux_band_init, make_room, find_parts, sum_by_part, drop_part, &
             find_open_lines
 
   !> Work of finding and sorting the parts.
@@ -74,8 +74,8 @@ contains
     allocate (self%k(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%line(2, size(self%k, 2), size(self%k, 3)), source=0)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
-    allocate (self%cell(3, 0))
-    call grow_lists(self)
+    call ensure_room(1, self%cell)
+    call make_room(self)
     call allocate_parts(first_parts, self)
   end subroutine flux_band_init
 
@@ -87,12 +87,11 @@ contains
     allocate (self%finder%home(n), self%finder%bins(bin_size, 2*n))
   end subroutine allocate_parts
 
-  !> More room in the lists, the entries kept.
-  subroutine grow_lists(self)
+  !> Room in the lists for all cells.
+  subroutine make_room(self)
     type(flux_band_t), intent(inout) :: self
     integer :: n
 
-    call ensure_room(self%n + 1, self%cell)
     n = size(self%cell, 2)
     call ensure_room(n, self%r)
     call ensure_room(n, self%open)
@@ -104,21 +103,7 @@ contains
       call ensure_room(n, f%moved)
       call ensure_room(n, f%moved_cell)
     end associate
-  end subroutine grow_lists
-
-  !> Append a cell to the list; call in the order of the grid.
-  subroutine add_cell(cell, r, open, self)
-    integer, intent(in) :: cell(3)
-    real(wp), intent(in) :: r, open
-    type(flux_band_t), intent(inout) :: self
-
-    if (self%n == size(self%cell, 2)) call grow_lists(self)
-    self%n = self%n + 1
-    self%number(cell(1), cell(2), cell(3)) = self%n
-    self%cell(:, self%n) = cell
-    self%r(self%n) = r
-    self%open(self%n) = open
-  end subroutine add_cell
+  end subroutine make_room
 
   !> Number of a cell in the whole domain, from 1.
   pure function global_number(grid, c) result(g)

@@ -15,8 +15,9 @@ module open_flux_m
   use boundary_kinds_m, only: is_wall, gives_pressure
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, add_cell, find_parts, sum_by_part, &
+  use flux_band_m, only: flux_band_t, flux_band_init, make_room, find_parts, sum_by_part, &
                          drop_part, find_open_lines
+  use cell_list_m, only: list_marked
   use krylov_m, only: krylov_work_t, krylov_init, conjugate_gradient
   use multigrid_m, only: multigrid_t
   use solve_control_m, only: solve_control_t, solve_report_t
@@ -182,25 +183,34 @@ contains
     real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flux_band_t), intent(inout) :: band
-    integer :: i, j, k
-    real(wp) :: diagonal, outflow, room_left
+    integer :: i, j, k, l
+    real(wp) :: outflow, room_left
 
-    band%number = 0
-    band%n = 0
-    do k = grid%lo(3), grid%hi(3)
+    !$omp parallel do private(i, j) schedule(static)
+    do k = lbound(band%number, 3), ubound(band%number, 3)
+      band%number(:, :, k) = 0
+      if (k < grid%lo(3) .or. k > grid%hi(3)) cycle
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (band%marked(i, j, k) == 0) cycle
-          diagonal = band%k(i, j, k, 1) + band%k(i + 1, j, k, 1) + band%k(i, j, k, 2) &
-                     + band%k(i, j + 1, k, 2) + band%k(i, j, k, 3) + band%k(i, j, k + 1, 3)
-          if (.not. diagonal > 0.0_wp) cycle
-          outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
-                    + (q(i, j, k + 1, 3) - q(i, j, k, 3))
-          room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
-          call add_cell([i, j, k], (room_left - outflow)/grid%volume, &
-                        1.0_wp - new%alpha(i, j, k), band)
+          band%number(i, j, k) = merge(1, 0, band%k(i, j, k, 1) + band%k(i + 1, j, k, 1) &
+            + band%k(i, j, k, 2) + band%k(i, j + 1, k, 2) &
+            + band%k(i, j, k, 3) + band%k(i, j, k + 1, 3) > 0.0_wp)
         end do
       end do
+    end do
+    call list_marked(grid, lbound(band%number), band%number, band%cell, band%n)
+    call make_room(band)
+    !$omp parallel do private(i, j, k, outflow, room_left) schedule(static)
+    do l = 1, band%n
+      i = band%cell(1, l)
+      j = band%cell(2, l)
+      k = band%cell(3, l)
+      outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
+                + (q(i, j, k + 1, 3) - q(i, j, k, 3))
+      room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
+      band%r(l) = (room_left - outflow)/grid%volume
+      band%open(l) = 1.0_wp - new%alpha(i, j, k)
     end do
   end subroutine list_band
 
@@ -239,9 +249,7 @@ contains
     type(open_flux_t), intent(inout) :: self
     type(solve_report_t) :: report   ! the next step makes good what is left
 
-    self%rest = 0.0_wp
-    self%phi = 0.0_wp
-    call put_balances(self%band, lbound(self%rest), self%rest)
+    call put_balances(self%band, lbound(self%rest), self%rest, self%phi)
     call find_open_lines(self%band%k, self%band%line)
     self%work%line = self%band%line
     call self%multigrid%setup(self%band%k)
@@ -252,13 +260,18 @@ contains
     self%residual = report%residual
   end subroutine solve_potential
 
-  !> Put the balances of the cells of the band on the grid.
-  pure subroutine put_balances(band, first, r)
+  !> Put the balances of the cells of the band on the grid, zero elsewhere; no potential yet.
+  subroutine put_balances(band, first, r, phi)
     type(flux_band_t), intent(in) :: band
     integer, intent(in) :: first(3)
-    real(wp), intent(inout), contiguous :: r(first(1):, first(2):, first(3):)
-    integer :: l
+    real(wp), intent(inout), dimension(first(1):, first(2):, first(3):), contiguous :: r, phi
+    integer :: k, l
 
+    !$omp parallel do schedule(static)
+    do k = first(3), ubound(r, 3)
+      r(:, :, k) = 0.0_wp
+      phi(:, :, k) = 0.0_wp
+    end do
     do l = 1, band%n
       associate (c => band%cell(:, l))
         r(c(1), c(2), c(3)) = band%r(l)

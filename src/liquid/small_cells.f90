@@ -7,6 +7,7 @@
 module small_cells_m
   use kinds_m, only: wp, i8
   use growing_m, only: ensure_room
+  use cell_list_m, only: list_marked
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
@@ -65,26 +66,12 @@ contains
     type(solid_geometry_t), intent(in) :: old
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
-    integer :: i, j, k, n
 
     call mark_small_cells(grid, old, volumes, self%number)
-    n = 0
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        if (maxval(self%number(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
-        do i = grid%lo(1), grid%hi(1)
-          if (self%number(i, j, k) == 0) cycle
-          n = n + 1
-          call ensure_room(n, self%cell)
-          self%number(i, j, k) = n
-          self%cell(:, n) = [i, j, k]
-        end do
-      end do
-    end do
-    self%n = n
-    call ensure_room(n, self%amount)
-    call ensure_room(n, self%mass)
-    call ensure_room(n, self%ratio)
+    call list_marked(grid, lbound(self%number), self%number, self%cell, self%n)
+    call ensure_room(self%n, self%amount)
+    call ensure_room(self%n, self%mass)
+    call ensure_room(self%n, self%ratio)
     call halo_exchange(self%number, n_halo)
     call find_late_faces(grid, volumes, self)
   end subroutine find_small_cells
