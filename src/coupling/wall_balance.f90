@@ -191,6 +191,7 @@ contains
       real(wp) :: term(terms_at_once, 6)
       integer :: e, n, from, c(3)
 
+      if (list%n == 0) return
       !$omp do schedule(static)
       do from = list%first_of_body(b), list%first_of_body(b + 1) - 1, terms_at_once
         n = 0

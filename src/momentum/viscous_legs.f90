@@ -7,7 +7,7 @@
 module viscous_legs_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
-  use boundary_kinds_m, only: drags, is_wall
+  use boundary_kinds_m, only: drags, is_wall, no_side
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
@@ -35,7 +35,6 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
     type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
-    logical :: at_wall(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1)
     integer :: d
 
     self%dt = dt
@@ -45,9 +44,10 @@ contains
     call unknown_masses(grid, solid, rho, dt, self)
     if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
     do d = 1, 3
-      call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d), at_wall)
-      call legs_to_walls(grid, solid, bodies, mu, d, at_wall, self)
+      call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d))
+      call legs_to_sides(grid, solid, mu, d, self)
     end do
+    call legs_to_bodies(grid, solid, bodies, mu, self)
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
@@ -136,14 +136,13 @@ contains
   end subroutine masses_of_groups
 
   !> Ordinary legs in direction d, between neighbours with their centres in the fluid and nothing
-  !! between them. `at_wall` tells the rows with faces of another kind.
-  subroutine ordinary_legs(grid, solid, mu, d, leg, at_wall)
+  !! between them.
+  subroutine ordinary_legs(grid, solid, mu, d, leg)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: d
     real(wp), intent(inout), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):)
-    logical, intent(out) :: at_wall(grid%lo(2):, grid%lo(3):)
     integer :: i, j, k, e(3), upper(3)
     real(wp) :: conductance   !! A/h [m]
     logical :: ordinary
@@ -151,7 +150,6 @@ contains
     e = unit_step(:, d)
     upper = grid%hi + e
     conductance = grid%area(d)/grid%h(d)
-    at_wall = .false.
     !$omp parallel do private(i, j, ordinary) schedule(static)
     do k = grid%lo(3), upper(3)
       do j = grid%lo(2), upper(2)
@@ -162,50 +160,31 @@ contains
                      .and. solid%leg_high(i, j, k, d) > 1.0_wp
           leg(i, j, k) = merge(conductance*harmonic_mean(mu(i - e(1), j - e(2), k - e(3)), &
                                                          mu(i, j, k)), 0.0_wp, ordinary)
-          at_wall(j, k) = at_wall(j, k) .or. .not. ordinary
         end do
       end do
     end do
   end subroutine ordinary_legs
 
-  !> Wall legs in direction d, of one or both cells of a face, and the legs to the domain's sides.
-  subroutine legs_to_walls(grid, solid, bodies, mu, d, at_wall, self)
+  !> Wall legs, of one or both cells of each face through which a leg meets a surface.
+  subroutine legs_to_bodies(grid, solid, bodies, mu, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(in) :: d
-    logical, intent(in) :: at_wall(grid%lo(2):, grid%lo(3):)   !! rows with walls
     type(viscous_t), intent(inout) :: self
-    integer :: i, j, k, e(3), low(3), high(3), upper(3)
-    real(wp) :: conductance   !! A/h [m]
+    integer :: m, d, low(3)
 
-    e = unit_step(:, d)
-    upper = grid%hi + e
-    conductance = grid%area(d)/grid%h(d)
-    do k = grid%lo(3), upper(3)
-      do j = grid%lo(2), upper(2)
-        if (.not. (at_wall(j, k) .or. d == 1 &
-                   .or. at_domain_side(grid, merge(j, k, d == 2), d))) cycle
-        do i = grid%lo(1), upper(1)
-          high = [i, j, k]
-          low = high - e
-          if (at_domain_side(grid, high(d), d)) then
-            self%leg(i, j, k, d) = 0.0_wp
-            call side_leg(high(d))
-          else if (self%leg(i, j, k, d) <= 0.0_wp) then
-            if (solid%inside(low(1), low(2), low(3)) == 0) then
-              call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
-            end if
-            if (solid%inside(i, j, k) == 0) then
-              call wall_leg(high, solid%leg_high(i, j, k, d), -1, solid%leg_body_high(i, j, k, d))
-            end if
-          end if
-        end do
-      end do
+    do m = 1, solid%n_leg
+      associate (i => solid%leg(1, m), j => solid%leg(2, m), k => solid%leg(3, m))
+        d = solid%leg(4, m)
+        low = [i, j, k] - unit_step(:, d)
+        if (grid%side_of_face(low(d) + 1, d) /= no_side) cycle
+        call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
+        call wall_leg([i, j, k], solid%leg_high(i, j, k, d), -1, solid%leg_body_high(i, j, k, d))
+      end associate
     end do
   contains
-    !> Leg from the centre of cell c along +d or -d to the surface of a body.
+    !> Leg from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
     subroutine wall_leg(c, theta, sense, body)
       integer, intent(in) :: c(3), sense, body
       real(wp), intent(in) :: theta   !! [cells]
@@ -213,43 +192,47 @@ contains
       integer :: a
 
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
+      if (solid%inside(c(1), c(2), c(3)) /= 0) return
       t = min(max(theta, least_theta), 1.0_wp)
       do a = 1, 3
         x_wall(a) = grid%centre(c(a), a)
       end do
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
-      call add_wall(self, c, body, mu(c(1), c(2), c(3))*conductance/t, &
+      call add_wall(self, c, body, mu(c(1), c(2), c(3))*grid%area(d)/(grid%h(d)*t), &
                     nearest_arm(grid, x_wall, bodies%x(:, body)))
     end subroutine wall_leg
+  end subroutine legs_to_bodies
 
-    !> Half a leg to a wall of the domain or to an inflow, which pulls the cell towards the velocity
-    !! of the side; slip walls hold the normal component only.
-    subroutine side_leg(face)
-      integer, intent(in) :: face
-      integer :: s, c(3)
-      real(wp) :: value
-
-      s = merge(1, 2, face == 1)
-      c = merge(high, low, s == 1)
-      if (any(c < grid%lo) .or. any(c > grid%hi)) return
-      if (solid%inside(c(1), c(2), c(3)) /= 0) return
-      value = 2.0_wp*mu(c(1), c(2), c(3))*conductance
-      if (drags(grid%side(s, d))) then
-        call add_side(self, c, value, grid%side_velocity(:, s, d))
-      else if (is_wall(grid%side(s, d))) then
-        self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
-      end if
-    end subroutine side_leg
-  end subroutine legs_to_walls
-
-  !> A lower face of index i that lies on a side of the domain with a boundary condition.
-  pure function at_domain_side(grid, i, d) result(side)
+  !> Half a leg in direction d to a wall of the domain or to an inflow, which pulls the cell towards
+  !! the velocity of the side; slip walls hold the normal component only.
+  subroutine legs_to_sides(grid, solid, mu, d, self)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: i, d
-    logical :: side
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in) :: d
+    type(viscous_t), intent(inout) :: self
+    integer :: s, i, j, k, a(3), b(3), c(3)
+    real(wp) :: value
 
-    side = (i == 1 .or. i == grid%n(d) + 1) .and. .not. grid%periodic(d)
-  end function at_domain_side
+    do s = 1, 2
+      call grid%side_faces(s, d, a, b)
+      self%leg(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            c = [i, j, k] - merge(0, 1, s == 1)*unit_step(:, d)
+            if (solid%inside(c(1), c(2), c(3)) /= 0) cycle
+            value = 2.0_wp*mu(c(1), c(2), c(3))*grid%area(d)/grid%h(d)
+            if (drags(grid%side(s, d))) then
+              call add_side(self, c, value, grid%side_velocity(:, s, d))
+            else if (is_wall(grid%side(s, d))) then
+              self%diagonal(c(1), c(2), c(3), d) = self%diagonal(c(1), c(2), c(3), d) + value
+            end if
+          end do
+        end do
+      end do
+    end do
+  end subroutine legs_to_sides
 
   !> Bring the wall legs into the order of the bodies, keeping the order of the cells.
   subroutine group_by_body(n_bodies, self)

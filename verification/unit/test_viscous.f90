@@ -1,6 +1,7 @@
 !> Implicit viscosity: exact shear past a wall inside the cells, film cells, momentum of the stage.
 program test_viscous
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use case_types_m, only: grid_input_t, boundary_input_t
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
@@ -157,10 +158,25 @@ contains
       if (grid%centre(k - 1, 3) < z0 .and. grid%centre(k, 3) > z0) then
         solid%leg_high(:, :, k, 3) = (grid%centre(k, 3) - z0)/grid%h(3)
         solid%leg_body_high(:, :, k, 3) = 1
+        call list_legs(k)
       end if
     end do
     call list_slab(1, 0.0_wp, z0)
   end subroutine make_wall
+
+  !> The legs through the lower faces of the cells of plane k.
+  subroutine list_legs(k)
+    integer, intent(in) :: k
+    integer :: i, j
+
+    call ensure_room(product(grid%n), solid%leg)
+    do j = 1, grid%n(2)
+      do i = 1, grid%n(1)
+        solid%n_leg = solid%n_leg + 1
+        solid%leg(:, solid%n_leg) = [i, j, k, 3]
+      end do
+    end do
+  end subroutine list_legs
 
   !> Two held bodies with a gap between them, or the floor and a body above it that moves along x;
   !! the gap is narrower than a cell, whose centre lies in a body.
