@@ -20,14 +20,16 @@ module courant_m
   real(wp), parameter :: least_liquid = 0.5_wp   !! of a cell that the step follows
   real(wp), parameter :: gas_lead = 8.0_wp
     !! gas faster than so many times what is followed shortens the step all the same
+  real(wp), parameter :: past_wall = 1.5_wp
+    !! flow past a body over the body's speed: of a sphere in an ideal fluid, at its equator
 
-  !> Courant numbers per second, |u|/h summed over the directions [1/s]; a step times one of them is
-  !! a Courant number.
+  !> Courant numbers per second [1/s]; a step times one of them is a Courant number.
   type :: courant_rate_t
     real(wp) :: followed = 0.0_wp
-      !! largest of the cells that are at least half liquid, and of the blocks' surfaces; at least
-      !! an eighth of `carried`
-    real(wp) :: carried = 0.0_wp    !! largest of all cells
+      !! largest |u_d|/h_d of the cells that are at least half liquid, and of the flow past the
+      !! blocks; at least an eighth of `carried`
+    real(wp) :: carried = 0.0_wp
+      !! largest of all cells, summed over the directions: what a cell may lose in a step
   end type courant_rate_t
 
 contains
@@ -48,8 +50,9 @@ contains
     rate%carried = fluid(2)
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      rate%followed = max(rate%followed, (norm2(blocks%v(:, b)) + norm2(blocks%omega(:, b)) &
-                                          *blocks%shapes(blocks%shape(b))%radius)/minval(grid%h))
+      rate%followed = max(rate%followed, past_wall/minval(grid%h)*( &
+                      norm2(blocks%v(:, b)) &
+                      + norm2(blocks%omega(:, b))*blocks%shapes(blocks%shape(b))%radius))
     end do
     rate%carried = max(rate%carried, rate%followed)
     rate%followed = max(rate%followed, rate%carried/gas_lead)
@@ -63,24 +66,24 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share
     real(wp) :: rates(2)
-    real(wp) :: rate, followed, carried
+    real(wp) :: x, y, z, followed, carried
     integer :: i, j, k
 
     followed = 0.0_wp
     carried = 0.0_wp
-    !$omp parallel do private(i, j, rate) reduction(max: followed, carried) schedule(static)
+    !$omp parallel do private(i, j, x, y, z) reduction(max: followed, carried) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        !$omp simd private(rate) reduction(max: followed, carried)
+        !$omp simd private(x, y, z) reduction(max: followed, carried)
         do i = grid%lo(1), grid%hi(1)
-          rate = max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
-                     speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1) &
-               + max(speed(uf(i, j, k, 2), open(i, j, k, 2)), &
-                     speed(uf(i, j + 1, k, 2), open(i, j + 1, k, 2)))/grid%h(2) &
-               + max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
-                     speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3)
-          carried = max(carried, rate)
-          followed = max(followed, merge(rate, 0.0_wp, c(i, j, k) >= least_liquid))
+          x = max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
+                  speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1)
+          y = max(speed(uf(i, j, k, 2), open(i, j, k, 2)), &
+                  speed(uf(i, j + 1, k, 2), open(i, j + 1, k, 2)))/grid%h(2)
+          z = max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
+                  speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3)
+          carried = max(carried, x + y + z)
+          followed = max(followed, merge(max(x, y, z), 0.0_wp, c(i, j, k) >= least_liquid))
         end do
       end do
     end do

@@ -20,8 +20,8 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity, &
                              face_velocity_at_walls, shorten_at_walls
   use buoyancy_m, only: uncounted_fluid
-  use linked_cells_m, only: linked_cells_t, link_cells, match_densities, share_momentum, &
-                            share_acceleration, follow_masters
+  use linked_cells_m, only: linked_cells_t, link_cells, match_densities
+  use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
   use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
     force_of_mid_step

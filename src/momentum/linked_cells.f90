@@ -2,28 +2,22 @@
 !!
 !! A film is a cut cell whose centre lies in a body. What fluid it holds has no velocity of its own:
 !! it belongs to its masters, the cells with their centre in the fluid across its open faces, by
-!! shares that close with the face. A master and its parts of films are a group with one momentum.
-!! Normal to the wall the velocity of a film is linear from its master to the wall; along the wall
-!! it has more of the master's, by the slip s at r (`wall_profile_m`),
-!! $$ u_{film} = T u + (1 - T) U_w, \qquad T = 1 - (1 - r) (1 - s + s\, n\, n^T) $$
-!! with r the distance of the middle of the film from the wall over that of the master, from the
-!! plane of the cut cell. A film without such a neighbour (a gap narrower than a cell) is a group
-!! of its own. Derivation and trials: docs/decisions/cut_cells.md.
+!! shares that close with the face. A master and its parts of films are a group with one momentum
+!! (`group_momentum_m`). A film without such a neighbour (a gap narrower than a cell) is a group of
+!! its own. Derivation and trials: docs/decisions/cut_cells.md.
 module linked_cells_m
   use kinds_m, only: wp
-  use vectors_m, only: inverse3
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use plic_m, only: unit_constant
-  use wall_profile_m, only: slip_at
   implicit none
   private
   public :: linked_cells_t, linked_cells_init, link_cells, order_by_body
-  public :: match_densities, share_momentum, share_acceleration, follow_masters, is_alone
-  public :: open_shares, velocity_at_wall, master_distance
+  public :: masters_at_most, is_alone, match_densities, open_shares
+  public :: velocity_at_wall, master_distance
 
   integer, parameter :: reach = 2            !! layers of the halo with films that are needed
   integer, parameter :: masters_at_most = 3  !! of a film
@@ -456,107 +450,6 @@ contains
     end do
   end subroutine match_densities
 
-  !> Find the velocity of each group that keeps its momentum.
-  !!
-  !! `u` holds any velocities of the members, halo filled; on return those of the groups with a
-  !! master beside an own cell are shared, which makes all own cells right.
-  subroutine share_momentum(grid, self, mass, bodies, u)
-    type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
-    real(wp), intent(in) :: mass(:)              !! (wall cells) of the fluid [kg]
-    type(rigid_motion_t), intent(in) :: bodies   !! the walls
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
-    real(wp) :: matrix(3, 3), total(3), t(3, 3), wall(3), part
-    real(wp) :: excess(3, self%n_films)   !! of a film over the mean that its masters make it
-    integer :: g, m, d
-
-    !$omp parallel do private(total) schedule(static)
-    do m = 1, self%n_films
-      if (is_alone(self, m)) cycle
-      call film_velocity(grid, self, m, bodies, u, total)
-      associate (f => self%cell(:, m))
-        excess(:, m) = u(f(1), f(2), f(3), :) - total
-      end associate
-    end do
-    !$omp parallel do private(matrix, total, t, wall, part, m, d) schedule(static)
-    do g = 1, self%n_groups
-      associate (leader => self%leader(g), c => self%cell(:, self%leader(g)))
-        matrix = 0.0_wp
-        do d = 1, 3
-          matrix(d, d) = mass(leader)
-        end do
-        total = mass(leader)*u(c(1), c(2), c(3), :)
-        do m = self%first(g), self%first(g + 1) - 1
-          call profile(grid, self, self%part(:, m), bodies, t, wall)
-          associate (film => self%part(1, m))
-            part = self%share(self%part(2, m), film)*mass(film)
-            total = total + part*(matmul(t, u(c(1), c(2), c(3), :)) + excess(:, film))
-            matrix = matrix + part*t
-          end associate
-        end do
-        if (matrix(1, 1) + matrix(2, 2) + matrix(3, 3) > 0.0_wp) then
-          u(c(1), c(2), c(3), :) = matmul(inverse3(matrix), total)
-        end if
-      end associate
-    end do
-    !$omp parallel do private(total) schedule(static)
-    do m = 1, self%n_films
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      call film_velocity(grid, self, m, bodies, u, total)
-      associate (f => self%cell(:, m))
-        u(f(1), f(2), f(3), :) = total
-      end associate
-    end do
-  end subroutine share_momentum
-
-  !> Velocity of a film by those of its masters [m/s].
-  pure subroutine film_velocity(grid, self, film, bodies, u, velocity)
-    type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
-    integer, intent(in) :: film
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(out) :: velocity(3)
-    real(wp) :: t(3, 3), wall(3)
-    integer :: n
-
-    velocity = 0.0_wp
-    do n = 1, masters_at_most
-      if (self%master(n, film) == 0) cycle
-      call profile(grid, self, [film, n], bodies, t, wall)
-      associate (c => self%cell(:, self%master(n, film)))
-        velocity = velocity + self%share(n, film)*(matmul(t, u(c(1), c(2), c(3), :)) + wall)
-      end associate
-    end do
-  end subroutine film_velocity
-
-  !> T and (1 - T) U_w of a part of a film.
-  pure subroutine profile(grid, self, part, bodies, t, wall)
-    type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
-    integer, intent(in) :: part(2)   !! film, which of its masters
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(out) :: t(3, 3), wall(3)
-    real(wp) :: v(3), less(3, 3), slip
-    integer :: d
-
-    associate (m => part(1), n => self%normal(:, part(1)), c => self%cell(:, part(1)))
-      slip = slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - self%nearer(part(2), m))
-      v = velocity_at_wall(grid, self, m, bodies)
-      do d = 1, 3
-        less(:, d) = slip*n*n(d)
-        less(d, d) = less(d, d) + 1.0_wp - slip
-      end do
-      less = self%nearer(part(2), m)*less
-    end associate
-    wall = matmul(less, v)
-    t = -less
-    do d = 1, 3
-      t(d, d) = t(d, d) + 1.0_wp
-    end do
-  end subroutine profile
-
   !> Velocity of the wall of a film [m/s].
   pure function velocity_at_wall(grid, self, film, bodies) result(v)
     type(grid_t), intent(in) :: grid
@@ -571,73 +464,6 @@ contains
     end associate
   end function velocity_at_wall
 
-  !> Acceleration of each group: the mean over its cells by the mass that the faces move, component
-  !! by component. Halo filled on entry.
-  subroutine share_acceleration(grid, open, rho, self, a)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! [kg/m3]
-    type(linked_cells_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp) :: weight(3), total(3), w(3)
-    real(wp) :: excess(3, self%n_films)   !! of a film over the mean of its masters
-    integer :: g, m
-
-    !$omp parallel do private(total) schedule(static)
-    do m = 1, self%n_films
-      if (is_alone(self, m)) cycle
-      call mean_of_masters(grid, self, m, a, total)
-      associate (f => self%cell(:, m))
-        excess(:, m) = a(f(1), f(2), f(3), :) - total
-      end associate
-    end do
-    !$omp parallel do private(weight, total, w, m) schedule(static)
-    do g = 1, self%n_groups
-      associate (c => self%cell(:, self%leader(g)))
-        weight = rho(c(1), c(2), c(3))*open_shares(grid, open, c)
-      end associate
-      total = 0.0_wp
-      do m = self%first(g), self%first(g + 1) - 1
-        associate (f => self%cell(:, self%part(1, m)))
-          w = self%share(self%part(2, m), self%part(1, m))*rho(f(1), f(2), f(3)) &
-              *open_shares(grid, open, f)
-          weight = weight + w
-          total = total + w*excess(:, self%part(1, m))
-        end associate
-      end do
-      associate (c => self%cell(:, self%leader(g)))
-        a(c(1), c(2), c(3), :) = a(c(1), c(2), c(3), :) + total/max(weight, tiny(1.0_wp))
-      end associate
-    end do
-    !$omp parallel do private(total) schedule(static)
-    do m = 1, self%n_films
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      call mean_of_masters(grid, self, m, a, total)
-      associate (f => self%cell(:, m))
-        a(f(1), f(2), f(3), :) = total
-      end associate
-    end do
-  end subroutine share_acceleration
-
-  !> Mean of the masters of a film by shares.
-  pure subroutine mean_of_masters(grid, self, film, a, mean)
-    type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
-    integer, intent(in) :: film
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(out) :: mean(3)
-    integer :: n
-
-    mean = 0.0_wp
-    do n = 1, masters_at_most
-      if (self%master(n, film) == 0) cycle
-      associate (c => self%cell(:, self%master(n, film)))
-        mean = mean + self%share(n, film)*a(c(1), c(2), c(3), :)
-      end associate
-    end do
-  end subroutine mean_of_masters
-
   !> Share of the cell's mass that moves with each velocity component: mean of its two open faces.
   pure function open_shares(grid, open, c) result(w)
     type(grid_t), intent(in) :: grid
@@ -651,32 +477,5 @@ contains
       w(d) = 0.5_wp*(open(c(1), c(2), c(3), d) + open(e(1), e(2), e(3), d))
     end do
   end function open_shares
-
-  !> The own films change by what their masters have changed since the velocities `before`.
-  subroutine follow_masters(grid, self, before, u)
-    type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
-    real(wp), intent(in) :: before(:, :)   !! (3, wall cells) [m/s]
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! halo filled on entry [m/s]
-    real(wp) :: changed(3)
-    integer :: m, n
-
-    !$omp parallel do private(n, changed) schedule(static)
-    do m = 1, self%n_films
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      changed = before(:, m)
-      do n = 1, masters_at_most
-        if (self%master(n, m) == 0) cycle
-        associate (c => self%cell(:, self%master(n, m)))
-          changed = changed + self%share(n, m)*(u(c(1), c(2), c(3), :) &
-                                                - before(:, self%master(n, m)))
-        end associate
-      end do
-      associate (f => self%cell(:, m))
-        u(f(1), f(2), f(3), :) = changed
-      end associate
-    end do
-  end subroutine follow_masters
 
 end module linked_cells_m

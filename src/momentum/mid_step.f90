@@ -18,7 +18,8 @@ module mid_step_m
   use fields_m, only: flow_t
   use boundary_m, only: fill_velocity_halo
   use momentum_conservative_m, only: mass_through
-  use linked_cells_m, only: linked_cells_t, share_acceleration
+  use linked_cells_m, only: linked_cells_t
+  use group_momentum_m, only: share_acceleration
   use solid_geometry_m, only: solid_geometry_t
   use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces
   use parallel_m, only: halo_exchange

@@ -265,8 +265,8 @@ contains
   end subroutine group_by_body
 
   !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
-  !! over dt added by the solver. With the sums K = sum k, S = sum k r, M = sum k r r^T over the legs
-  !! of arm r, a motion (v, w) is held by the force K v + w x S and the torque
+  !! over dt added by the solver. With the sums K = sum k, S = sum k r, M = sum k r r^T over the
+  !! legs of arm r, a motion (v, w) is held by the force K v + w x S and the torque
   !! S x v + (tr(M) 1 - M) w; and by 2 mu V w, the part of the wall stress that the legs leave out.
   subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
     type(solid_geometry_t), intent(in) :: solid

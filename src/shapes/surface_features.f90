@@ -65,7 +65,7 @@ contains
     logical, intent(in), optional :: with_net   !! default: yes
     integer, allocatable :: edge(:, :)
     real(wp), allocatable :: point_normal(:, :)
-    logical, allocatable :: juts(:)
+    logical, allocatable :: is_corner(:)
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -80,9 +80,9 @@ contains
     call make_facets(shape, surface)
     call pair_edges(shape, edge)
     call outward_at_points(shape, surface%normal, point_normal)
-    call find_corners(shape, edge, point_normal, juts)
+    call find_corners(shape, surface%normal, edge, point_normal, is_corner)
     call make_edges(shape, edge, point_normal, surface)
-    call make_probes(shape, juts, surface)
+    call make_probes(shape, is_corner, surface)
     call sort_into_bins(shape, surface)
     if (present(with_net)) then
       if (.not. with_net) return
@@ -216,27 +216,33 @@ contains
     end do
   end subroutine outward_at_points
 
-  !> Corners that stick out: all edges fall away from them.
-  pure subroutine find_corners(shape, edge, point_normal, juts)
+  !> Corners that may touch: where a sharp convex edge ends, since past its end the crossing with
+  !! another edge does not count (on a saddle of a bed an edge rests on such a corner though others
+  !! rise from it); and those that stick out, from which all edges fall away.
+  pure subroutine find_corners(shape, normal, edge, point_normal, is_corner)
     type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: normal(:, :)          !! (3, facets)
     integer, intent(in) :: edge(:, :)             !! (4, edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
-    logical, allocatable, intent(out) :: juts(:)  !! (points)
+    logical, allocatable, intent(out) :: is_corner(:)  !! (points)
     real(wp), parameter :: jut = 0.01_wp          !! sine by which edges fall away from a corner
     real(wp) :: along(3)
     integer :: e, c
 
-    allocate (juts(size(shape%point, 2)))
-    juts = norm2(point_normal, 1) > 0.0_wp
+    allocate (is_corner(size(shape%point, 2)))
+    is_corner = norm2(point_normal, 1) > 0.0_wp
     do e = 1, size(edge, 2)
       along = shape%point(:, edge(2, e)) - shape%point(:, edge(1, e))
       along = along/norm(along)
       do c = 1, 2
         associate (outward => point_normal(:, edge(c, e)))
-          if (dot_product(along, outward) > -jut*norm(outward)) juts(edge(c, e)) = .false.
+          if (dot_product(along, outward) > -jut*norm(outward)) is_corner(edge(c, e)) = .false.
         end associate
         along = -along
       end do
+    end do
+    do e = 1, size(edge, 2)
+      if (bend_of(shape, edge(:, e), normal) > 0) is_corner(edge(1:2, e)) = .true.
     end do
   end subroutine find_corners
 
@@ -296,11 +302,11 @@ contains
   !! The corners of one flat face weigh `flat_sum` together, or one each where they are fewer: a
   !! many-cornered face is no stiffer than a square one. The points inside carry equal faces that
   !! lie exactly on one another, where no corner is inside the other body.
-  pure subroutine make_probes(shape, juts, surface)
+  pure subroutine make_probes(shape, is_corner, surface)
     type(shape_t), intent(in) :: shape
-    logical, intent(in) :: juts(:)                !! (points) corners that stick out
+    logical, intent(in) :: is_corner(:)                !! (points)
     type(surface_t), intent(inout) :: surface
-    real(wp) :: weight(size(juts)), middle(3), whole
+    real(wp) :: weight(size(is_corner)), middle(3), whole
     integer :: f, c, n, m
 
     weight = 1.0_wp
@@ -309,15 +315,15 @@ contains
       weight(corners(shape, f)) = min(weight(corners(shape, f)), flat_sum/real(n, wp))
     end do
     whole = sum([(norm(area_vector(shape, f)), f=1, size(shape%facet) - 1)])
-    n = count(juts)
+    n = count(is_corner)
     surface%n_corners = n
     do f = 1, size(shape%facet) - 1
       if (norm(area_vector(shape, f)) > large*whole) n = n + size(corners(shape, f))
     end do
     allocate (surface%probe(3, n), surface%weight(n))
     n = 0
-    do c = 1, size(juts)
-      if (.not. juts(c)) cycle
+    do c = 1, size(is_corner)
+      if (.not. is_corner(c)) cycle
       n = n + 1
       surface%probe(:, n) = shape%point(:, c)
       surface%weight(n) = weight(c)

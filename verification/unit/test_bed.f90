@@ -17,6 +17,8 @@ program test_bed
   use surface_features_m, only: found_t, nowhere
   use walls_m, only: walls_t, walls_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, room_for, max_overlap
+  use touches_m, only: touches_t
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use bed_file_m, only: bed_form_t, read_bed_file
   use bed_m, only: bed_t, make_bed, set_bed, bed_covers, bed_distance, bed_place
   implicit none
@@ -32,6 +34,7 @@ program test_bed
   call distance_from_slope()
   call distance_from_trench()
   call depth_in_bed()
+  call edge_on_saddle()
   call refusals()
   call finish_checks()
 
@@ -512,6 +515,49 @@ contains
     call max_overlap(walls, blocks, overlap, depth)
     call check('a foot in the trench', depth, 0.0_wp, 1.0e-12_wp)
   end subroutine depth_in_bed
+
+  !> An edge across a saddle of the bed: it rests on the corner in the middle, where both ridges end.
+  subroutine edge_on_saddle()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(shape_t) :: shapes(1)
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contact_surface_t) :: contact
+    type(touches_t) :: touches
+    character(:), allocatable :: message
+    real(wp), parameter :: deep = 1.0e-4_wp, edge = 0.02_wp, top = 0.04_wp
+    integer, parameter :: round(9) = [2, 3, 6, 9, 8, 7, 4, 1, 2]   ! the points about the fifth
+    integer :: i, j
+
+    call hexapod_case(case, shapes(1))
+    case%shape(1)%kind = 'box'
+    case%shape(1)%size = [3*edge, edge, edge]
+    call make_shape(case%shape(1), shapes(1), message)
+    case%body(1)%fixed = .false.
+    case%body(1)%position = [0.05_wp, 0.05_wp, top + edge*sqrt(0.5_wp) - deep]
+    case%body(1)%quaternion = [cos(atan(1.0_wp)/2), sin(atan(1.0_wp)/2), 0.0_wp, 0.0_wp]
+    allocate (form%point(3, 9), form%triangle(3, 8))
+    form%checksum = ''
+    do j = -1, 1
+      do i = -1, 1   ! falls along x, rises along y
+        form%point(:, 5 + i + 3*j) = [0.05_wp*(1 + i), 0.05_wp*(1 + j), top + 0.01_wp*(j**2 - i**2)]
+      end do
+    end do
+    do i = 1, 8
+      form%triangle(:, i) = [5, round(i + 1), round(i)]
+    end do
+    call walls_init(case%grid, case%boundary, walls)
+    walls%n = 0
+    call set_bed(case, form, walls%bed, message)
+    call check('a saddle: '//message, len(message) == 0)
+    call blocks_init(case, shapes, blocks)
+    call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
+    call find_surface_touches(walls, blocks, 0.0_wp, contact, touches)
+    call check('an edge on a saddle touches it', touches%n > 0)
+    call check('as deep as it lies', maxval(touches%item(:touches%n)%depth), deep*sqrt(0.5_wp), &
+      1.0e-12_wp)
+  end subroutine edge_on_saddle
 
   !> What `--check` refuses.
   subroutine refusals()

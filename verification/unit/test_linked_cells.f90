@@ -4,7 +4,8 @@ program test_linked_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities, &
-    share_momentum, share_acceleration, follow_masters, is_alone
+    is_alone
+  use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks

@@ -11,7 +11,8 @@ program test_wall_balance
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: uncounted_fluid
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, order_by_body, &
-    share_acceleration, open_shares
+    open_shares
+  use group_momentum_m, only: share_acceleration
   use mid_step_m, only: mid_step_t, mid_step_init
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
     force_of_walls, force_of_mid_step
