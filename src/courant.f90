@@ -30,6 +30,7 @@ module courant_m
       !! blocks; at least an eighth of `carried`
     real(wp) :: carried = 0.0_wp
       !! largest of all cells, summed over the directions: what a cell may lose in a step
+    logical :: has_surface = .false.   !! are there cells of liquid and cells of gas?
   end type courant_rate_t
 
 contains
@@ -41,13 +42,14 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(blocks_t), intent(in) :: blocks
     type(courant_rate_t) :: rate
-    real(wp) :: fluid(2)
+    real(wp) :: fluid(4)
     integer :: b
 
     fluid = fluid_rates(grid, flow%uf, solid%open, flow%c)
     call global_max(fluid)
     rate%followed = fluid(1)
     rate%carried = fluid(2)
+    rate%has_surface = all(fluid(3:) >= least_liquid)
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
       rate%followed = max(rate%followed, past_wall/minval(grid%h)*( &
@@ -58,23 +60,26 @@ contains
     rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate
 
-  !> Followed and carried, of the fluid of this process.
+  !> Followed and carried, the most liquid and the most gas in a cell, of this process.
   function fluid_rates(grid, uf, open, c) result(rates)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):, :) &
       :: uf, open   !! velocity [m/s] and open share of the lower faces
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share
-    real(wp) :: rates(2)
-    real(wp) :: x, y, z, followed, carried
+    real(wp) :: rates(4)
+    real(wp) :: x, y, z, followed, carried, liquid, gas
     integer :: i, j, k
 
     followed = 0.0_wp
     carried = 0.0_wp
-    !$omp parallel do private(i, j, x, y, z) reduction(max: followed, carried) schedule(static)
+    liquid = 0.0_wp
+    gas = 0.0_wp
+    !$omp parallel do private(i, j, x, y, z) schedule(static) &
+    !$omp reduction(max: followed, carried, liquid, gas)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        !$omp simd private(x, y, z) reduction(max: followed, carried)
+        !$omp simd private(x, y, z) reduction(max: followed, carried, liquid, gas)
         do i = grid%lo(1), grid%hi(1)
           x = max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
                   speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1)
@@ -83,11 +88,13 @@ contains
           z = max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
                   speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3)
           carried = max(carried, x + y + z)
+          liquid = max(liquid, c(i, j, k))
+          gas = max(gas, 1.0_wp - c(i, j, k))
           followed = max(followed, merge(max(x, y, z), 0.0_wp, c(i, j, k) >= least_liquid))
         end do
       end do
     end do
-    rates = [followed, carried]
+    rates = [followed, carried, liquid, gas]
   end function fluid_rates
 
   !> Speed at a face, zero where it is mostly closed.

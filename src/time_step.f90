@@ -35,7 +35,7 @@ module time_step_m
   use clock_m, only: clock_init
   use courant_m, only: courant_rate_t, courant_rate
   use run_state_m, only: run_state_t
-  use surface_tension_m, only: capillary_step
+  use wave_step_m, only: gravity_step, capillary_step
   use timers_m, only: timer, tic, toc
   implicit none
   private
@@ -253,14 +253,16 @@ contains
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
     type(courant_rate_t) :: rate
-    real(wp) :: allowed
+    real(wp) :: allowed, h
 
     allowed = sim%case%run%dt
     if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
-      if (sim%wet) allowed = &
-        min(allowed, capillary_step(sim%case%fluid, minval(sim%grid%h, sim%grid%n > 1)))
+      if (rate%has_surface) then
+        h = minval(sim%grid%h, sim%grid%n > 1)
+        allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
+      end if
     end if
     call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
     report%cfl = sim%clock%dt*rate%followed

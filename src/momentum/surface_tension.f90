@@ -10,7 +10,7 @@
 !! C is the share extended through bodies (`extended_fraction_m`) and repeated at the sides of the
 !! domain: the surface meets walls and upright sides of bodies at 90 degrees.
 module surface_tension_m
-  use kinds_m, only: wp, i8, pi
+  use kinds_m, only: wp, i8
   use case_types_m, only: fluid_t
   use boundary_kinds_m, only: no_side
   use grid_m, only: grid_t, unit_step
@@ -24,7 +24,7 @@ module surface_tension_m
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
-  public :: surface_tension_t, find_tension, add_tension, force_from_tension, capillary_step
+  public :: surface_tension_t, find_tension, add_tension, force_from_tension
 
   type :: surface_tension_t
     logical :: acts = .false.
@@ -33,21 +33,6 @@ module surface_tension_m
   end type surface_tension_t
 
 contains
-
-  !> Longest stable step with explicit surface tension [s]; huge without.
-  !!
-  !! $$ \Delta t = \sqrt{(\rho_l + \rho_g) h^3/(4\pi\sigma)} $$
-  !! The shortest wave of the grid must not pass a cell in a step (Brackbill, Kothe, Zemach,
-  !! J. Comput. Phys. 100, 1992).
-  pure function capillary_step(fluid, h) result(dt)
-    type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in) :: h   !! smallest spacing of the cells [m]
-    real(wp) :: dt
-
-    dt = huge(1.0_wp)
-    if (fluid%single_phase .or. fluid%surface_tension <= 0.0_wp) return
-    dt = sqrt((fluid%liquid_density + fluid%gas_density)*h**3/(4.0_wp*pi*fluid%surface_tension))
-  end function capillary_step
 
   !> Curvature of the surface and its force at all faces of own cells.
   subroutine find_tension(grid, fluid, solid, c, self)

@@ -15,7 +15,7 @@ module case_check_m
   use shapes_builtin_m, only: make_shape, given_size
   use rigid_body_m, only: blocks_t, blocks_init
   use drops_m, only: draw_drop
-  use surface_tension_m, only: capillary_step
+  use wave_step_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift

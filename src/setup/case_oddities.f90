@@ -4,6 +4,7 @@ module case_oddities_m
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t, shape_input_t, is_given
   use tet_mesh_m, only: shape_t
+  use wave_step_m, only: gravity_step
   implicit none
   private
   public :: find_oddities
@@ -36,9 +37,14 @@ contains
   subroutine look_at_water(case, oddities)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: oddities
-    real(wp) :: low, high
+    real(wp) :: low, high, longest
     logical :: below
 
+    longest = gravity_step(case%fluid, minval(case%grid%length/real(case%grid%cells, wp), &
+                                              case%grid%cells > 1))
+    if (case%run%dt > longest .and. case%run%cfl_max <= 0.0_wp) call oddities%add('&run dt', &
+      case%run%dt, 'lets the shortest waves of the grid grow, should be at most ' &
+      //brief(longest, 3)//' s; or cfl_max > 0 lets the step shrink', case%run%line)
     if (case%fluid%single_phase .or. len(case%fluid%initial_state) > 0) return
     low = case%grid%origin(3)
     high = low + case%grid%length(3)

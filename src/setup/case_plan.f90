@@ -7,7 +7,7 @@ module case_plan_m
   use contact_laws_m, only: choose_law
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
-  use surface_tension_m, only: capillary_step
+  use wave_step_m, only: gravity_step, capillary_step
   use contact_sphere_placement_m, only: height_errors
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
@@ -234,6 +234,9 @@ contains
       if (.not. case%fluid%single_phase) then
         call entry(unit, 'liquid transport', brief(0.5_wp*h/speed)//' s at '//brief(speed) &
                    //' m/s, half a cell a step')
+      end if
+      if (gravity_step(case%fluid, h) < huge(h)) then
+        call entry(unit, 'shortest waves', brief(gravity_step(case%fluid, h))//' s')
       end if
       if (capillary_step(case%fluid, h) < huge(h)) then
         call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')

@@ -516,7 +516,7 @@ contains
     call check('a foot in the trench', depth, 0.0_wp, 1.0e-12_wp)
   end subroutine depth_in_bed
 
-  !> An edge across a saddle of the bed: it rests on the corner in the middle, where both ridges end.
+  !> An edge across a saddle of the bed: it rests on the corner where both ridges end.
   subroutine edge_on_saddle()
     type(case_t) :: case
     type(bed_form_t) :: form

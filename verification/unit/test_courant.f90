@@ -20,6 +20,7 @@ program test_courant
   rate = courant_rate(grid, flow, solid, blocks)
   call check('at rest nothing is followed', rate%followed, 0.0_wp, 0.0_wp)
   call check('at rest nothing is carried', rate%carried, 0.0_wp, 0.0_wp)
+  call check('gas alone has no surface', .not. rate%has_surface)
 
   flow%uf(:, :, :, 1) = 0.3_wp
   flow%uf(:, :, :, 2) = -0.8_wp
@@ -28,6 +29,7 @@ program test_courant
   rate = courant_rate(grid, flow, solid, blocks)
   call check('the largest direction is followed in liquid', rate%followed, 40.0_wp, 1.0e-12_wp)
   call check('the sum of the directions is carried', rate%carried, 80.0_wp, 1.0e-12_wp)
+  call check('liquid and gas have a surface', rate%has_surface)
 
   flow%uf(3, 5, 3, 2) = 5.0_wp
   rate = courant_rate(grid, flow, solid, blocks)

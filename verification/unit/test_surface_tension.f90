@@ -8,8 +8,8 @@ program test_surface_tension
   use boundary_m, only: fill_scalar_halo
   use parallel_m, only: parallel_init, parallel_final, global_max
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
-  use surface_tension_m, only: surface_tension_t, find_tension, add_tension, force_from_tension, &
-    capillary_step
+  use surface_tension_m, only: surface_tension_t, find_tension, add_tension, force_from_tension
+  use wave_step_m, only: gravity_step, capillary_step
   use box_solid_m, only: simple_grid, set_boxes
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -305,10 +305,20 @@ contains
     end do
   end subroutine weight_of_level_liquid
 
-  !> Brackbill's limit for water and air on 1 mm: sqrt(999.404e-9/(4 pi 0.07)) s.
+  !> Brackbill's limit for water and air on 1 mm: sqrt(999.404e-9/(4 pi 0.07)) s. For waves under
+  !! gravity, sqrt(h/g) without gas.
   subroutine longest_step()
+    type(fluid_t) :: light
+
     call check('capillary step [s]', capillary_step(fluid, 1.0e-3_wp), 1.0659e-3_wp, 1.0e-8_wp)
     call check('none without tension', capillary_step(fluid_t(), 1.0e-3_wp) > 1.0e300_wp)
+    light%gas_density = 0.0_wp
+    light%gravity = [0.0_wp, 3.0_wp, -4.0_wp]
+    call check('gravity step [s]', gravity_step(light, 0.05_wp), 0.1_wp, 1.0e-15_wp)
+    light%gas_density = 0.6_wp*light%liquid_density
+    call check('of two liquids [s]', gravity_step(light, 0.05_wp), 0.2_wp, 1.0e-15_wp)
+    light%gravity = 0.0_wp
+    call check('none without gravity', gravity_step(light, 0.05_wp) > 1.0e300_wp)
   end subroutine longest_step
 
   !> On a body through a surface of one curvature, tension and the pressure that balances it cancel.

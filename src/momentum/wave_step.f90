@@ -1,0 +1,43 @@
+!> The longest step for the shortest waves of a grid: the surface moves explicitly.
+module wave_step_m
+  use kinds_m, only: wp, pi
+  use case_types_m, only: fluid_t
+  implicit none
+  private
+  public :: gravity_step, capillary_step
+
+contains
+
+  !> Longest step with waves under gravity [s]; huge where nothing drives them.
+  !!
+  !! $$ \Delta t = \sqrt{\frac{h}{g} \frac{\rho_l + \rho_g}{|\rho_l - \rho_g|}} $$
+  !! Differences over two cells make of the shortest wave one of k = 2/h, along a diagonal of the
+  !! surface 2 sqrt(2)/h. It grows where omega dt > 2: from 1.19 times this step on.
+  pure function gravity_step(fluid, h) result(dt)
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: h   !! smallest spacing of the cells [m]
+    real(wp) :: dt
+    real(wp) :: drive
+
+    dt = huge(1.0_wp)
+    if (fluid%single_phase) return
+    drive = norm2(fluid%gravity)*abs(fluid%liquid_density - fluid%gas_density)
+    if (drive > 0.0_wp) dt = sqrt(h*(fluid%liquid_density + fluid%gas_density)/drive)
+  end function gravity_step
+
+  !> Longest step with surface tension [s]; huge without.
+  !!
+  !! $$ \Delta t = \sqrt{(\rho_l + \rho_g) h^3/(4\pi\sigma)} $$
+  !! The shortest wave of the grid must not pass a cell in a step (Brackbill, Kothe, Zemach,
+  !! J. Comput. Phys. 100, 1992).
+  pure function capillary_step(fluid, h) result(dt)
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: h   !! smallest spacing of the cells [m]
+    real(wp) :: dt
+
+    dt = huge(1.0_wp)
+    if (fluid%single_phase .or. fluid%surface_tension <= 0.0_wp) return
+    dt = sqrt((fluid%liquid_density + fluid%gas_density)*h**3/(4.0_wp*pi*fluid%surface_tension))
+  end function capillary_step
+
+end module wave_step_m
