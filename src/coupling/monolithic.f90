@@ -23,6 +23,7 @@ module monolithic_m
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
+  use centre_velocity_m, only: find_centres, to_centres, to_means
   use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
     force_of_mid_step
   use surface_stress_m, only: surface_stress
@@ -54,7 +55,9 @@ contains
     call find_inertia(grid, stage%links, stage%balance%mass, flow, stage%rho)
     call match_densities(grid, stage%rho, stage%links)
     call find_slip(grid, solid, stage%at_start, flow%u, stage%links)
-    call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, flow%u)
+    call note_velocity(grid, stage%links, flow%u, stage%balance%before)
+    call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, &
+                        stage%balance%before, flow%u, stage%balance%to_wall)
     associate (system => stage%pressure%system)
       call set_pressure_system(grid, solid%open, stage%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
@@ -185,17 +188,24 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
 
-    associate (bodies => stage%bodies, viscous => stage%viscous)
+    associate (bodies => stage%bodies, viscous => stage%viscous, links => stage%links, &
+               balance => stage%balance)
       call fill_velocity_halo(grid, flow%u)
-      call note_velocity(grid, stage%links, flow%u, stage%balance%before)
-      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, stage%links)
+      call note_velocity(grid, links, flow%u, balance%before)
+      if (.not. stage%implicit_momentum) then   ! that carries the mean in the same solve
+        call find_centres(grid, solid, stage%at_start, flow%u, links)
+        call to_centres(grid, links, stage%at_start, flow%u)
+        call fill_velocity_halo(grid, flow%u)
+      end if
+      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links)
       call predict_velocity(grid, stage%rho, flow, stage)
+      call to_means(grid, links, stage%at_start, flow%u)
       call fill_velocity_halo(grid, flow%u)
-      call follow_masters(grid, stage%links, stage%balance%before, flow%u)
+      call follow_masters(grid, links, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = stage%dry_motion
       call push_bodies(dt, stage%from_pressure + stage%from_level + viscous%force, bodies)
-      call impose_rigid_velocity(grid, solid, stage%links, bodies, flow%u)
+      call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
     end associate
   end subroutine add_viscosity
 
@@ -257,9 +267,6 @@ contains
         stage%late(:, b) = merge(from_walls(:, b) - stage%late(:, b), 0.0_wp, bodies%free(b))
       end do
       call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
-      call fill_velocity_halo(grid, flow%u)
-      call find_slip(grid, solid, bodies, flow%u, links)
-      call share_momentum(grid, links, balance%mass, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
     end associate
   end subroutine find_pressure

@@ -3,10 +3,11 @@
 !! The faces of a cell move the share m_d of its mass, the mean of two open faces; the mass that is
 !! there is m. What the faces gave and the fluid did not get, the bodies have felt too little:
 !! $$ F = \frac{1}{\Delta t} \sum \left[ m_d (\delta u_f - \delta U) - m (\delta u - \delta U)
-!! \right] $$
+!! + I \right] $$
 !! with delta u_f the change of velocity by the accelerations at the faces, delta u that which the
 !! group took and delta U that of the wall, whose part `uncounted_fluid` counts. It is the part of
-!! the pressure on the wall that the trapezoid rule of the faces misses. In the same way the half of
+!! the pressure on the wall that the trapezoid rule of the faces misses. I is the momentum of films
+!! that the wall bears as one end of a lever (`group_momentum_m`). In the same way the half of
 !! the old pressure that acts before the transport (`mid_step_m`) does so on the surface of the
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
@@ -35,7 +36,8 @@ module wall_balance_m
     real(wp), allocatable :: mass(:)        !! of its fluid [kg]
     real(wp), allocatable :: pushed(:, :)   !! (3, *) change of velocity by the faces [m/s]
     real(wp), allocatable :: gained(:, :)   !! (3, *) that which the group took [m/s]
-    real(wp), allocatable :: before(:, :)   !! (3, *) velocity before the viscous stage [m/s]
+    real(wp), allocatable :: before(:, :)   !! (3, *) velocity noted before sharing [m/s]
+    real(wp), allocatable :: to_wall(:, :)  !! (3, *) momentum of films that the wall bears [kg m/s]
   end type wall_balance_t
 
 contains
@@ -45,6 +47,7 @@ contains
     type(wall_balance_t), intent(out) :: self
 
     allocate (self%mass(0), self%pushed(3, 0), self%gained(3, 0), self%before(3, 0))
+    allocate (self%to_wall(3, 0))
   end subroutine wall_balance_init
 
   !> The masses of the wall cells; nothing has changed yet.
@@ -59,6 +62,7 @@ contains
     call ensure_room(links%n, self%pushed)
     call ensure_room(links%n, self%gained)
     call ensure_room(links%n, self%before)
+    call ensure_room(links%n, self%to_wall)
     !$omp parallel do schedule(static)
     do m = 1, links%n
       associate (c => links%cell(:, m))
@@ -68,6 +72,7 @@ contains
     end do
     self%pushed(:, :links%n) = 0.0_wp
     self%gained(:, :links%n) = 0.0_wp
+    self%to_wall(:, :links%n) = 0.0_wp
   end subroutine begin_balance
 
   !> Add dt a of each wall cell to a change of velocity.
@@ -150,7 +155,7 @@ contains
         wall = wall_velocity(bodies%motion(:, b) - at_start%motion(:, b), arm)
         moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
         owed = wrench((moved*(self%pushed(:, m) - wall) &
-                       - self%mass(m)*(self%gained(:, m) - wall))/dt, arm)
+                       - self%mass(m)*(self%gained(:, m) - wall) + self%to_wall(:, m))/dt, arm)
       end associate
     end function of_cell
   end subroutine force_of_walls

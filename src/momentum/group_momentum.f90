@@ -5,13 +5,18 @@
 !! it has more of the master's, by the slip s at r (`wall_profile_m`),
 !! $$ u_{film} = T u + (1 - T) U_w, \qquad T = 1 - (1 - r) (1 - s + s\, n\, n^T) $$
 !! with r the distance of the middle of the film from the wall over that of the master, from the
-!! plane of the cut cell. Derivation and trials: docs/decisions/cut_cells.md.
+!! plane of the cut cell. A force on a film along the wall bends the layer: master and wall bear it
+!! like the ends of a lever, T_t of it the master, with T_t = r + (1 - r) s the share of its
+!! velocity that the film has there, and the rest the wall. What the group cannot give to a film so
+!! that it keeps this profile is the same kind of force. Derivation and trials:
+!! docs/decisions/cut_cells.md.
 module group_momentum_m
   use kinds_m, only: wp
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, masters_at_most, is_alone, open_shares, velocity_at_wall
+  use linked_cells_m, only: linked_cells_t, masters_at_most, is_alone, along_share, open_shares, &
+                            velocity_at_wall
   use wall_profile_m, only: slip_at
   implicit none
   private
@@ -19,59 +24,88 @@ module group_momentum_m
 
 contains
 
-  !> Find the velocity of each group that keeps its momentum.
+  !> Find the velocity of each group that keeps its momentum, but for what the wall bears.
   !!
-  !! `u` holds any velocities of the members, halo filled; on return those of the groups with a
-  !! master beside an own cell are shared, which makes all own cells right.
-  subroutine share_momentum(grid, self, mass, bodies, u)
+  !! With e what a film has more than its masters make it, the velocity u of a master changes by
+  !! $$ \left( m + \sum p L T \right) \delta u = \sum p L e, \qquad
+  !! L = n n^T + T_t (1 - n n^T) $$
+  !! with p the masses of its parts of films; the wall gets (1 - L) p (e - T delta u). `u` holds any
+  !! velocities of the members, halo filled; on return those of the groups with a master beside an
+  !! own cell are shared, which makes all own cells right.
+  subroutine share_momentum(grid, self, mass, bodies, before, u, to_wall)
     type(grid_t), intent(in) :: grid
     type(linked_cells_t), intent(in) :: self
     real(wp), intent(in) :: mass(:)              !! (wall cells) of the fluid [kg]
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
+    real(wp), intent(in) :: before(:, :)         !! (3, wall cells) the velocities in `u` [m/s]
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-    real(wp) :: matrix(3, 3), total(3), t(3, 3), wall(3), part
+    real(wp), intent(inout) :: to_wall(:, :)
+      !! (3, wall cells) momentum that the wall bears at own films, added to [kg m/s]
+    real(wp) :: matrix(3, 3), given(3), t(3, 3), wall(3), part
     real(wp) :: excess(3, self%n_films)   !! of a film over the mean that its masters make it
-    integer :: g, m, d
+    integer :: g, m, d, n
 
-    !$omp parallel do private(total) schedule(static)
+    !$omp parallel do private(given) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m)) cycle
-      call film_velocity(grid, self, m, bodies, u, total)
-      associate (f => self%cell(:, m))
-        excess(:, m) = u(f(1), f(2), f(3), :) - total
-      end associate
+      call film_velocity(grid, self, m, bodies, u, given)
+      excess(:, m) = before(:, m) - given
     end do
-    !$omp parallel do private(matrix, total, t, wall, part, m, d) schedule(static)
+    !$omp parallel do private(matrix, given, t, wall, part, m, d) schedule(static)
     do g = 1, self%n_groups
       associate (leader => self%leader(g), c => self%cell(:, self%leader(g)))
         matrix = 0.0_wp
         do d = 1, 3
           matrix(d, d) = mass(leader)
         end do
-        total = mass(leader)*u(c(1), c(2), c(3), :)
+        given = 0.0_wp
         do m = self%first(g), self%first(g + 1) - 1
           call profile(grid, self, self%part(:, m), bodies, t, wall)
           associate (film => self%part(1, m))
             part = self%share(self%part(2, m), film)*mass(film)
-            total = total + part*(matmul(t, u(c(1), c(2), c(3), :)) + excess(:, film))
-            matrix = matrix + part*t
+            given = given + part*to_master(self, self%part(:, m), excess(:, film))
+            do d = 1, 3
+              matrix(:, d) = matrix(:, d) + part*to_master(self, self%part(:, m), t(:, d))
+            end do
           end associate
         end do
         if (matrix(1, 1) + matrix(2, 2) + matrix(3, 3) > 0.0_wp) then
-          u(c(1), c(2), c(3), :) = matmul(inverse3(matrix), total)
+          u(c(1), c(2), c(3), :) = before(:, leader) + matmul(inverse3(matrix), given)
         end if
       end associate
     end do
-    !$omp parallel do private(total) schedule(static)
+    !$omp parallel do private(given, t, wall, n) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      call film_velocity(grid, self, m, bodies, u, total)
+      call film_velocity(grid, self, m, bodies, u, given)
       associate (f => self%cell(:, m))
-        u(f(1), f(2), f(3), :) = total
+        u(f(1), f(2), f(3), :) = given
       end associate
+      do n = 1, masters_at_most
+        if (self%master(n, m) == 0) cycle
+        call profile(grid, self, [m, n], bodies, t, wall)
+        associate (c => self%cell(:, self%master(n, m)))
+          given = excess(:, m) &
+                  - matmul(t, u(c(1), c(2), c(3), :) - before(:, self%master(n, m)))
+        end associate
+        to_wall(:, m) = to_wall(:, m) &
+                        + self%share(n, m)*mass(m)*(given - to_master(self, [m, n], given))
+      end do
     end do
   end subroutine share_momentum
+
+  !> L e: what the master bears of a force on a part of a film.
+  pure function to_master(self, part, e) result(borne)
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: part(2)   !! film, which of its masters
+    real(wp), intent(in) :: e(3)
+    real(wp) :: borne(3)
+
+    associate (n => self%normal(:, part(1)))
+      borne = e - (1.0_wp - along_share(self, part(1), part(2)))*(e - n*dot_product(n, e))
+    end associate
+  end function to_master
 
   !> Velocity of a film by those of its masters [m/s].
   pure subroutine film_velocity(grid, self, film, bodies, u, velocity)
@@ -187,26 +221,32 @@ contains
     end do
   end subroutine mean_of_masters
 
-  !> The own films change by what their masters have changed since the velocities `before`.
-  subroutine follow_masters(grid, self, before, u)
+  !> The own films change along with their masters since the velocities `before`, by forces that act
+  !! on masters alone: by T_t of what those change. The wall bears what the group lacks of that.
+  subroutine follow_masters(grid, self, mass, before, u, to_wall)
     type(grid_t), intent(in) :: grid
     type(linked_cells_t), intent(in) :: self
+    real(wp), intent(in) :: mass(:)        !! (wall cells) of the fluid [kg]
     real(wp), intent(in) :: before(:, :)   !! (3, wall cells) [m/s]
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled on entry [m/s]
-    real(wp) :: changed(3)
+    real(wp), intent(inout) :: to_wall(:, :)
+      !! (3, wall cells) momentum that the wall bears at own films, added to [kg m/s]
+    real(wp) :: change(3), changed(3), t
     integer :: m, n
 
-    !$omp parallel do private(n, changed) schedule(static)
+    !$omp parallel do private(n, t, change, changed) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       changed = before(:, m)
       do n = 1, masters_at_most
         if (self%master(n, m) == 0) cycle
+        t = along_share(self, m, n)
         associate (c => self%cell(:, self%master(n, m)))
-          changed = changed + self%share(n, m)*(u(c(1), c(2), c(3), :) &
-                                                - before(:, self%master(n, m)))
+          change = self%share(n, m)*t*(u(c(1), c(2), c(3), :) - before(:, self%master(n, m)))
         end associate
+        changed = changed + change
+        to_wall(:, m) = to_wall(:, m) - (1.0_wp - t)*mass(m)*change
       end do
       associate (f => self%cell(:, m))
         u(f(1), f(2), f(3), :) = changed

@@ -13,11 +13,12 @@ module linked_cells_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use plic_m, only: unit_constant
+  use wall_profile_m, only: slip_at
   implicit none
   private
   public :: linked_cells_t, linked_cells_init, link_cells, order_by_body
-  public :: masters_at_most, is_alone, match_densities, open_shares
-  public :: velocity_at_wall, master_distance
+  public :: masters_at_most, is_alone, along_share, match_densities, open_shares
+  public :: velocity_at_wall, wall_normal, distance_to_fluid, distance_to_centre
 
   integer, parameter :: reach = 2            !! layers of the halo with films that are needed
   integer, parameter :: masters_at_most = 3  !! of a film
@@ -37,6 +38,8 @@ module linked_cells_m
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
     real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the film in a cell, 0 to 1
+    !> Of a wall cell: share of its velocity, seen from the wall, that its centre has.
+    real(wp), allocatable :: centre(:)
     integer :: n_groups = 0                      !! with a master beside an own cell
     integer, allocatable :: leader(:)            !! (groups) number of the master
     integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
@@ -55,7 +58,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
-    allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
+    allocate (self%normal(3, 0), self%leader(0), self%part(2, 0), self%centre(0))
     allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
     allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
     allocate (self%first(1), source=1)
@@ -84,6 +87,8 @@ contains
     call find_masters(grid, solid, self)
     call order_by_body(size(solid%body_cell) - 1, self)
     call group_films(grid, self)
+    call ensure_room(self%n, self%centre)
+    self%centre(:self%n) = 1.0_wp
   end subroutine link_cells
 
   !> Is a cut cell a film of this process or of the halo that matters?
@@ -314,28 +319,42 @@ contains
     integer, intent(in) :: c(3), step(3)   !! from the film to the master
     real(wp), intent(in) :: n(3)           !! of the wall
     real(wp) :: nearer
-    real(wp) :: middle, far
+    integer, parameter :: here(3) = 0
+    real(wp) :: far
 
     nearer = 0.0_wp
     if (all(abs(n) <= 0.0_wp)) return
-    associate (alpha => solid%alpha(c(1), c(2), c(3)))
-      middle = level_of(grid, n, 0.5_wp*(1.0_wp + alpha)) - level_of(grid, n, alpha)
-    end associate
-    far = master_distance(grid, solid, c, step, n)
-    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, middle/max(far, tiny(far))))
+    far = distance_to_fluid(grid, solid, c, step, n)
+    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, distance_to_fluid(grid, solid, c, here, n) &
+                                              /max(far, tiny(far))))
   end function nearer_than
 
-  !> Distance of the master of film c from the plane of the film [m].
-  pure function master_distance(grid, solid, c, step, n) result(distance)
+  !> Distance of the middle of the fluid of a cell from the wall in a cut cell c, taken as a plane
+  !! [m].
+  pure function distance_to_fluid(grid, solid, c, step, n) result(distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3), step(3)   !! from the film to the master
+    integer, intent(in) :: c(3), step(3)   !! from the cut cell to the cell of the fluid
+    real(wp), intent(in) :: n(3)           !! of the wall
+    real(wp) :: distance
+    integer :: o(3)
+
+    o = c + step
+    distance = distance_to_centre(grid, solid, c, n) + dot_product(n, real(step, wp)*grid%h) &
+               + level_of(grid, n, 0.5_wp*(1.0_wp + solid%alpha(o(1), o(2), o(3))))
+  end function distance_to_fluid
+
+  !> Distance of the centre of a cut cell c from its wall, taken as a plane; below zero in a film
+  !! [m].
+  pure function distance_to_centre(grid, solid, c, n) result(distance)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
     real(wp), intent(in) :: n(3)           !! of the wall
     real(wp) :: distance
 
-    distance = dot_product(n, real(step, wp)*grid%h) &
-               - level_of(grid, n, solid%alpha(c(1), c(2), c(3)))
-  end function master_distance
+    distance = -level_of(grid, n, solid%alpha(c(1), c(2), c(3)))
+  end function distance_to_centre
 
   !> Place along the normal of the plane below which a share of a cell lies, from its centre [m].
   pure function level_of(grid, n, share) result(level)
@@ -425,6 +444,18 @@ contains
 
     yes = all(self%master(:, film) == 0)
   end function is_alone
+
+  !> Share of the velocity of its master number n along the wall, seen from the wall, that a film
+  !! has.
+  pure function along_share(self, film, n) result(share)
+    type(linked_cells_t), intent(in) :: self
+    integer, intent(in) :: film, n
+    real(wp) :: share
+
+    associate (c => self%cell(:, film), nearer => self%nearer(n, film))
+      share = 1.0_wp - nearer*(1.0_wp - slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - nearer))
+    end associate
+  end function along_share
 
   !> Flatten the profile of films that are heavier than their master.
   !!

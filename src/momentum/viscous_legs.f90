@@ -14,7 +14,7 @@ module viscous_legs_m
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_legs_t, add_wall, add_side
   use film_legs_m, only: film_legs
-  use linked_cells_m, only: linked_cells_t, is_alone
+  use linked_cells_m, only: linked_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
@@ -101,7 +101,9 @@ contains
     end do
   end subroutine unknown_masses
 
-  !> The films' mass goes to their masters; those without one are unknowns themselves.
+  !> The films' mass goes to their masters, as the lever has it (`group_momentum_m`); those without
+  !! one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
+  !! (`centre_velocity_m`).
   subroutine masses_of_groups(grid, solid, rho, dt, links, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -116,15 +118,20 @@ contains
         if (.not. grid%owns(c)) cycle
         do m = links%first(g), links%first(g + 1) - 1
           associate (film => links%part(1, m), master => links%part(2, m))
-            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) &
-              + links%share(master, film)*film_mass(links%cell(:, film))
+            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) + links%share(master, film) &
+              *along_share(links, film, master)**2*film_mass(links%cell(:, film))
           end associate
         end do
       end associate
     end do
-    do m = 1, links%n_films
+    do m = 1, links%n
       associate (c => links%cell(:, m))
-        if (is_alone(links, m) .and. grid%owns(c)) self%mass(c(1), c(2), c(3)) = film_mass(c)
+        if (.not. grid%owns(c)) cycle
+        if (m > links%n_films) then
+          self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/links%centre(m)
+        else if (is_alone(links, m)) then
+          self%mass(c(1), c(2), c(3)) = film_mass(c)
+        end if
       end associate
     end do
   contains

@@ -15,11 +15,11 @@ module wall_layer_m
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, velocity_at_wall, master_distance
+  use linked_cells_m, only: linked_cells_t, velocity_at_wall, distance_to_fluid
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: find_slip, layer_slip
+  public :: find_slip, slip_by_two, layer_slip
 
 contains
 
@@ -66,22 +66,36 @@ contains
     !> Slip of the layer at film m by its master number n and the cell behind that one.
     pure real(wp) function slip_beside(m, n)
       integer, intent(in) :: m, n
-      real(wp) :: wall(3), along(3), along_next(3), ratio, distance
+      real(wp) :: wall(3)
       integer :: next(3)
 
       associate (f => links%cell(:, m), c => links%cell(:, links%master(n, m)), &
                  normal => links%normal(:, m))
         next = 2*c - f
         wall = velocity_at_wall(grid, links, m, bodies)
-        along = along_wall(u(c(1), c(2), c(3), :) - wall, normal)
-        along_next = along_wall(u(next(1), next(2), next(3), :) - wall, normal)
-        ratio = dot_product(along, along_next) &
-                /max(dot_product(along_next, along_next), tiny(1.0_wp))
-        distance = master_distance(grid, solid, f, c - f, normal)
-        slip_beside = layer_slip(ratio, distance/(distance + dot_product(normal, (c - f)*grid%h)))
+        slip_beside = slip_by_two(u(c(1), c(2), c(3), :) - wall, &
+                                  u(next(1), next(2), next(3), :) - wall, normal, &
+                                  distance_to_fluid(grid, solid, f, c - f, normal), &
+                                  dot_product(normal, (c - f)*grid%h))
       end associate
     end function slip_beside
   end subroutine find_slip
+
+  !> Slip of the layer as a cell and the next one behind it tell it.
+  pure function slip_by_two(u, u_next, normal, distance, behind) result(slip)
+    real(wp), intent(in) :: u(3), u_next(3)   !! their velocities, seen from the wall [m/s]
+    real(wp), intent(in) :: normal(3)         !! of the wall
+    real(wp), intent(in) :: distance          !! of the fluid of the cell from the wall [m]
+    real(wp), intent(in) :: behind            !! > 0, of the next one from there [m]
+    real(wp) :: slip
+    real(wp) :: along(3), along_next(3)
+
+    along = along_wall(u, normal)
+    along_next = along_wall(u_next, normal)
+    slip = layer_slip(dot_product(along, along_next) &
+                      /max(dot_product(along_next, along_next), tiny(1.0_wp)), &
+                      distance/(distance + behind))
+  end function slip_by_two
 
   !> Part of a velocity along a wall of normal n.
   pure function along_wall(v, n) result(along)

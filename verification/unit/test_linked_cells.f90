@@ -1,5 +1,5 @@
-!> Films and their masters at a box, and what groups share: momentum is kept, a film moves between
-!! its master and the wall, what moves as one keeps moving as one.
+!> Films and their masters at a box, and what groups share: momentum is kept with what the wall
+!! bears, a film moves between its master and the wall, what moves as one keeps moving as one.
 program test_linked_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
@@ -23,8 +23,8 @@ program test_linked_cells
   type(linked_cells_t) :: links
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u, before
-  real(wp), allocatable :: mass(:)
-  real(wp) :: sums(3), total(3)
+  real(wp), allocatable :: mass(:), noted(:, :), to_wall(:, :)
+  real(wp) :: total(3)
   integer :: seed = 77, m
 
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
@@ -35,7 +35,7 @@ program test_linked_cells
     call link_cells(box%grid, box%solid, links)
   end do
   call the_links()
-  allocate (mass(links%n))
+  allocate (mass(links%n), noted(3, links%n), to_wall(3, links%n))
   call random_numbers(seed, mass)
   mass = 2.0_wp + mass
   call the_shares()
@@ -72,11 +72,11 @@ contains
   subroutine the_shares()
     links%slip = 1.0_wp
     call fill(u)
-    before = u
     total = momentum(u)
-    call share_momentum(box%grid, links, mass, box%bodies, u)
-    sums = momentum(u)
-    call check('the momentum is kept', sums, total, 1.0e-11_wp*sum(mass))
+    call share()
+    call check('the momentum is kept', momentum(u), total, 1.0e-11_wp*sum(mass))
+    call check('with free slip the wall bears nothing', maxval(abs(to_wall)), 0.0_wp, &
+               1.0e-14_wp*sum(mass))
     call check('across the wall a film lies between wall and master', u(4, 5, top, 3), &
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
     call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
@@ -84,25 +84,66 @@ contains
     links%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the film
     call fill(u)
     total = momentum(u)
-    call share_momentum(box%grid, links, mass, box%bodies, u)
-    call check('with a layer the momentum is kept too', momentum(u), total, 1.0e-11_wp*sum(mass))
+    before = u
+    call share()
+    call check('with a layer the momentum is kept too', momentum(u) + sum(to_wall, 2), total, &
+               1.0e-11_wp*sum(mass))
+    call the_lever(before(4, 5, top, :), before(4, 5, top + 1, :))
     call check('along the wall a film has more of the velocity of its master', u(4, 5, top, 1:2), &
                [(wall(4, 5, m) + (r + (1.0_wp - r)*0.25_wp)*(u(4, 5, top + 1, m) - wall(4, 5, m)), &
                  m=1, 2)], 1.0e-12_wp)
     before = u
-    call share_momentum(box%grid, links, mass, box%bodies, u)
+    call share()
     call check('sharing twice is sharing once', maxval(abs(u - before)), 0.0_wp, 1.0e-11_wp)
     box%bodies%motion(4:6, 1) = 0.0_wp
     do m = 1, 3
       u(:, :, :, m) = motion(m)
     end do
-    call share_momentum(box%grid, links, mass, box%bodies, u)
+    call share()
     do m = 1, 3
       u(:, :, :, m) = u(:, :, :, m) - motion(m)
     end do
     call check('what moves with the box goes on so', maxval(abs(u)), 0.0_wp, 1.0e-13_wp)
     box%bodies%motion(:, 1) = motion
   end subroutine the_shares
+
+  !> A film of the top and its only master: along the wall it has a share t of the master's velocity
+  !! and gives it the share t of what it has too much.
+  subroutine the_lever(film, master)
+    real(wp), intent(in) :: film(3), master(3)   !! velocities before [m/s]
+    real(wp), parameter :: t = r + (1.0_wp - r)*0.25_wp
+    real(wp) :: excess, change
+    integer :: f, d
+
+    f = links%number(4, 5, top)
+    associate (m_film => mass(f), m => mass(links%master(3, f)))
+      do d = 1, 2
+        excess = film(d) - wall(4, 5, d) - t*(master(d) - wall(4, 5, d))
+        change = t*m_film*excess/(m + t**2*m_film)
+        call check('the master gets its end of the lever', u(4, 5, top + 1, d), &
+                   master(d) + change, 1.0e-12_wp)
+        call check('the wall the other one', to_wall(d, f), &
+                   (1.0_wp - t)*m_film*(excess - t*change), 1.0e-12_wp)
+      end do
+      excess = film(3) - wall(4, 5, 3) - r*(master(3) - wall(4, 5, 3))
+      call check('across the wall the master gets all', u(4, 5, top + 1, 3), &
+                 master(3) + m_film*excess/(m + r*m_film), 1.0e-12_wp)
+    end associate
+  end subroutine the_lever
+
+  subroutine note()
+    do m = 1, links%n
+      associate (c => links%cell(:, m))
+        noted(:, m) = u(c(1), c(2), c(3), :)
+      end associate
+    end do
+    to_wall = 0.0_wp
+  end subroutine note
+
+  subroutine share()
+    call note()
+    call share_momentum(box%grid, links, mass, box%bodies, noted, u, to_wall)
+  end subroutine share
 
   !> The mean by the mass that the faces move.
   subroutine the_accelerations()
@@ -125,24 +166,28 @@ contains
     box%flow%rho = box%case%fluid%liquid_density
   end subroutine the_accelerations
 
-  !> Films follow what their masters do.
+  !> Films follow what their masters do, along the wall and across it by their share there.
   subroutine the_rest()
-    real(wp) :: noted(3, links%n)
+    real(wp) :: t
+    integer :: film, n
+    real(wp), parameter :: change(3) = [1.0_wp, 2.0_wp, 3.0_wp]
 
+    film = links%number(4, 5, top)
+    t = r + (1.0_wp - r)*0.25_wp
     call fill(u)
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
-        noted(:, m) = u(c(1), c(2), c(3), :)
-      end associate
-    end do
+    call note()
     before = u
-    u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + [1.0_wp, 2.0_wp, 3.0_wp]
+    u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
     u(4, 5, top, :) = 99.0_wp
-    call follow_masters(box%grid, links, noted, u)
-    call check('films change as their master', u(4, 5, top, :) - before(4, 5, top, :), &
-               [1.0_wp, 2.0_wp, 3.0_wp], 1.0e-14_wp)
+    call follow_masters(box%grid, links, mass, noted, u, to_wall)
+    call check('films change with their master', u(4, 5, top, :) - before(4, 5, top, :), t*change, &
+               1.0e-14_wp)
     call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
                1.0e-14_wp)
+    n = links%master(3, film)
+    call check('masters, film and wall have what the group of the legs has', &
+               mass(film)*t*change + to_wall(:, film), mass(film)*t**2*change, 1.0e-13_wp)
+    call check('a master of one film', count(links%master(:, :links%n_films) == n), 1)
   end subroutine the_rest
 
   !> A film of water under gas is not extrapolated to the gas.

@@ -70,14 +70,20 @@ program test_viscous
              -matmul(viscous%body_matrix(:, :, 1), wall%motion(:, 1)), 1.0e-13_wp)
   call check('they do', norm2(viscous%force(4:6, 1)) > 1.0e-3_wp)
 
-  ! The film above the wall, centre inside, gives its mass to the cell above it and has no legs.
+  ! The film above the wall, centre inside, hangs on the cell above it as on a lever, its middle at
+  ! r of the distance of that cell from the wall, and has no legs. A cell that is known at its
+  ! centre is heavier by the part that this has of its velocity.
   call make_wall(heights(2))
   call linked_cells_init(grid, links)
   call link_cells(grid, solid, links)
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, links)
   film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
   call check('mass of a group', viscous%mass(2, 2, 3), &
-             rho*(1.0_wp + film)*grid%volume/5.0_wp, 1.0e-12_wp)
+             rho*(1.0_wp + (0.5_wp*film/(film + 0.5_wp))**2*film)*grid%volume/5.0_wp, 1.0e-12_wp)
+  links%centre(links%number(2, 2, 3)) = 0.5_wp
+  film = viscous%mass(2, 2, 3)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, links)
+  call check('mass at a centre', viscous%mass(2, 2, 3), 2*film, 1.0e-12_wp)
   call check('the film is no unknown', viscous%mass(2, 2, 2), 0.0_wp, 0.0_wp)
 
   ! The upper side moves too: shear flow between two moving walls.
