@@ -25,12 +25,12 @@ WATER = "#7fb8e6"
 BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
 DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
-VIEWS = ("front", "side")
+VIEWS = ("front", "side", "top")
 # Direction to the viewer, and tangent of half the angle of view across.
 _SIGHT = {
     "front": (np.array([0.0, -1.0, 0.22]), 0.16),
     "side": (np.array([1.0, 0.0, 0.12]), 0.06),
-    "top": (np.array([0.0, -0.02, 1.0]), 0.16),
+    "top": (np.array([0.0, -0.02, 1.0]), 0.05),
 }
 ARROW = 0.12  # length of an arrow of the speed of a style, over the height of the tank
 STILL = 1e-4  # [m/s] below this no arrows are drawn
@@ -92,7 +92,8 @@ def _loads(library: str) -> bool:
 
 
 def picture(run: Run, t: float, view: str, path: Path, style: Style | None = None) -> Path:
-    """Draw the run at time `t` [s] seen from the `front` (along +y) or the `side` (along -x).
+    """Draw the run at time `t` [s] seen from the `front` (along +y), the `side` (along -x) or the
+    `top`, from where the water would only veil the blocks: without it and its arrows.
 
     With fluid the picture is that of the written field nearest to `t`.
     """
@@ -100,13 +101,17 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     fields = run.fields(t) if run.field_times.size else None
     t = t if fields is None else fields.time
     camera = camera_for(run.grid.low, run.grid.high, view)
-    width = style.width if view == "front" else int(0.55 * style.width)
+    width = style.width if view != "side" else int(0.55 * style.width)
     row = run.bodies.row(t)
-    plotter = _stage(run, row, fields if style.water else None, width, camera)
     arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
+    if view == "top":
+        fields = None
     if fields is not None and style.arrows:
         arrows = arrows_of(run, fields, view)
-    speed = style.speed or usual_speed(arrows.velocity)
+    plotter = _stage(run, row, fields if style.water else None, width, camera)
+    speed = usual_speed(arrows.velocity)
+    if arrows.velocity.size and style.speed:
+        speed = style.speed
     height = float(run.grid.high[2] - run.grid.low[2])
     _add_arrows(plotter, arrows, speed, ARROW * height)
     _look(plotter, camera)
@@ -145,8 +150,9 @@ def arrow_speed(run: Run, times: list[float], views: list[str]) -> float:
     `Style.speed`."""
     if not run.field_times.size:
         return 0.0
-    found = [arrows_of(run, run.fields(t), view).velocity for t in times for view in views]
-    return usual_speed(np.concatenate(found))
+    sides = [view for view in views if view != "top"]
+    found = [arrows_of(run, run.fields(t), view).velocity for t in times for view in sides]
+    return usual_speed(np.concatenate(found)) if found else 0.0
 
 
 def usual_speed(velocity: Array) -> float:
@@ -157,9 +163,14 @@ def usual_speed(velocity: Array) -> float:
 
 
 def telling_views(run: Run) -> list[str]:
-    """The views of a run; a slice one cell thick is seen from its flat side only."""
+    """The views of a run; a slice one cell thick is seen from its flat side only, and a tank
+    without blocks not from the top."""
     cells = [len(faces) - 1 for faces in run.grid.faces]
-    hidden = {"side": cells[1] == 1, "front": cells[0] == 1 and cells[1] > 1}
+    hidden = {
+        "side": cells[1] == 1,
+        "front": cells[0] == 1 and cells[1] > 1,
+        "top": 1 in cells[:2] or not run.bodies.n,
+    }
     return [view for view in VIEWS if not hidden[view]]
 
 
@@ -171,7 +182,7 @@ def _keys(run: Run, speed: float, pixels: float, view: str) -> list[labels.Key]:
         told = labels.round_below(speed)
         length = told / speed * ARROW * float(size[2])
         keys.append(labels.Key("arrow", round(pixels * length), f"{told:g} m/s"))
-    length = labels.round_below(0.25 * float(size[0 if view == "front" else 1]))
+    length = labels.round_below(0.25 * float(size[1 if view == "side" else 0]))
     text = f"{length:g} m" if length >= 1 else f"{1e3 * length:g} mm"
     return [*keys, labels.Key("bar", round(pixels * length), text)]
 
