@@ -4,7 +4,9 @@ usage: python tools/bench.py [--out build/bench.json] [--repeat 3] [--threads 1]
 
 Each job is run `--repeat` times; the table shows the fastest and how much longer the slowest
 took, and the load of the machine beforehand, for other programs at work spoil figures. Reading
-and writing are included. `ns` is the CPU time of a cell and step, or of a block and substep.
+and writing are included. `ns` is the CPU time of a cell and step, or of a block and substep. With
+more than one thread it tells first how much work that many programs of one thread get done at
+once: the two virtual cores of a rented machine are often halves of one, and then no program gains.
 """
 
 import argparse
@@ -75,6 +77,19 @@ def pile(program: Path, threads: int) -> Timing:
     return Timing(row["wall_s"], row["cpu_s"], row["time"], row["steps"], PILE)
 
 
+def work_at_once(n: int) -> float:
+    """How many times the work of one program n programs do at once that only count; n where each
+    has a core of its own."""
+    words = [sys.executable, "-c", "n = 0\nfor i in range(20_000_000): n += i"]
+    walls = []
+    for programs in (1, n):
+        began = time.perf_counter()
+        for running in [subprocess.Popen(words) for _ in range(programs)]:
+            running.wait()
+        walls.append(time.perf_counter() - began)
+    return n * walls[0] / walls[1]
+
+
 def row(name: str, timings: list[Timing]) -> dict[str, object]:
     """What the table says of a job."""
     best = min(timings, key=lambda timing: timing.wall)
@@ -106,6 +121,9 @@ def main() -> None:
     parser.add_argument("--program", type=Path, default=ROOT / "mics")
     given = parser.parse_args()
     program, load, rows = given.program.resolve(), os.getloadavg()[0], []
+    at_once = work_at_once(given.threads) if given.threads > 1 else 1.0
+    if given.threads > 1:
+        print(f"{given.threads} programs at once do {at_once:.2f} times the work of one")
     print(
         f"{'job':12} {'size':>7} {'steps':>6} {'wall s':>8} {'CPU s':>8} {'ns':>8} {'slowest':>8}"
     )
@@ -127,6 +145,7 @@ def main() -> None:
         )
     about = {"version": version(program), "processor": processor(), "threads": given.threads}
     about |= {"cores": os.cpu_count(), "load_before": load, "repeat": given.repeat}
+    about["work_at_once"] = round(at_once, 2)
     given.out.parent.mkdir(parents=True, exist_ok=True)
     given.out.write_text(json.dumps({**about, "jobs": rows}, indent=2) + "\n")
     print(f"load before: {load:.1f}; written to {given.out}")
