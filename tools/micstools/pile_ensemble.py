@@ -156,9 +156,10 @@ def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, floa
         yield total, count / total, *wilson(count, total)
 
 
-def maps(ensemble: Ensemble) -> Maps:
-    """The mean pile of the complete ones, its spread, and where blocks are likely."""
-    whole = ensemble.whole
+def maps(ensemble: Ensemble, choice: dict[str, Any] | None = None) -> Maps:
+    """The mean pile of the complete ones, its spread, and where blocks are likely; of one choice
+    of the varied variables, or of all runs."""
+    whole = [p for p in ensemble.of(choice or {}) if p.complete]
     if not whole:
         raise BadRun(f"{ensemble.folder} holds no pile with all its blocks")
     tops = np.array([p.top for p in whole])

@@ -64,6 +64,25 @@ def test_an_ensemble_without_a_complete_pile_has_no_page(tmp_path: Path) -> None
         ensemble_page.page(found)
 
 
+def test_each_choice_has_its_own_maps(tmp_path: Path) -> None:
+    folder, name = write_ensemble(tmp_path), "contact.friction"
+    about = json.loads((folder / "ensemble.json").read_text())
+    about["choices"] = [{name: 0.4}, {name: 0.6}, {name: 0.8}]
+    for row in about["table"]:  # left | right, right, high | in the air, nowhere
+        row[name] = 0.4 if row["run"] == 1 else 0.6 if row["run"] < 5 else 0.8
+    (folder / "ensemble.json").write_text(json.dumps(about))
+    found = pile_ensemble.open_ensemble(folder, 0.002)
+    left, right = (pile_ensemble.maps(found, {name: value}) for value in (0.4, 0.6))
+    more = left.cover - right.cover  # fixed blocks lie in all piles
+    assert more[:, left.x < 0.15].max() == 1.0 and more[:, left.x > 0.15].min() == -1.0
+    assert more[:, left.x < 0.15].min() == 0.0 and more[:, left.x > 0.15].max() == 0.0
+    text = ensemble_page.page(found)
+    said = re.findall(r"<h3>(contact\.friction[^<]*)</h3>", text)
+    piles = {0.4: "one pile", 0.6: "three piles", 0.8: "one pile"}
+    assert said == [f"{name} = {value}: {n}" for value, n in piles.items()]
+    assert text.count('class="maps"') == 3
+
+
 def test_a_histogram_counts_every_value() -> None:
     drawn = charts.histogram(np.array([1.0, 1.1, 2.0, 5.0]), "a", [(1.5, "median")])
     heights = [float(h) for h in re.findall(r'class="bar"[^>]* height="([\d.]+)"', drawn)]

@@ -81,7 +81,7 @@ def page(ensemble: Ensemble) -> str:
         tag("p", sentence(ensemble), class_="lead"),
         tag("p", assumptions(ensemble)),
         _patterns(ensemble),
-        _plan(ensemble, pile_ensemble.maps(ensemble)),
+        _plan(ensemble),
         _histograms(ensemble),
         _wall(ensemble),
         _running(ensemble),
@@ -150,7 +150,7 @@ def _patterns(ensemble: Ensemble) -> Markup:
     for choice in ensemble.choices:
         piles = ensemble.of(choice)
         shares = pile_ensemble.pattern_shares(piles)
-        name = ", ".join(f"{k} = {v}" for k, v in choice.items()) or "all runs"
+        name = _name(choice)
         for k, (pattern, share) in enumerate(shares.items()):
             low, high = (100 * v for v in share["interval_95"])
             seen = f"{share['count']} of {len(piles)}".replace(" ", "\u00a0")
@@ -167,6 +167,10 @@ def _patterns(ensemble: Ensemble) -> Markup:
     )
 
 
+def _name(choice: dict[str, Any]) -> str:
+    return ", ".join(f"{k} = {v}" for k, v in choice.items()) or "all runs"
+
+
 def _bar(share: float, low: float, high: float) -> Markup:
     """A share in percent as a bar, its interval as a line over it."""
     drawn = [
@@ -178,20 +182,32 @@ def _bar(share: float, low: float, high: float) -> Markup:
                role="img", aria_label=f"{share:.0f} %")  # fmt: skip
 
 
-def _plan(ensemble: Ensemble, found: Maps) -> Markup:
-    top = 1e3 * float(found.high.max())
-    drawn = [
+def _plan(ensemble: Ensemble) -> Markup:
+    """The mean pile from above, for each choice of the varied variables to one scale of height."""
+    choices = [c for c in ensemble.choices if any(p.complete for p in ensemble.of(c))]
+    found = [pile_ensemble.maps(ensemble, choice) for choice in choices]
+    top = 1e3 * max(float(maps.high.max()) for maps in found)
+    size = ensemble.whole[0].run.grid
+    extent = " x ".join(millimetres(v) for v in (size.high - size.low)[:2])
+    note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
+    note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
+    parts: list[Markup] = []
+    for choice, maps in zip(choices, found, strict=True):
+        if len(ensemble.choices) > 1:
+            piles = sum(p.complete for p in ensemble.of(choice))
+            parts.append(tag("h3", f"{_name(choice)}: {count(piles, 'pile')}"))
+        parts.append(tag("div", *_maps(maps, top), class_="maps"))
+    return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
+
+
+def _maps(found: Maps, top: float) -> list[Markup]:
+    """Cover and height of a mean pile, on a scale that ends at `top` [mm]."""
+    return [
         views.plan_map(100 * found.cover, 100.0, "probability that a block lies over a point", "%"),
         views.plan_map(1e3 * found.mean, top, "mean height", "mm"),
         views.plan_map(1e3 * found.low, top, "height that 90 % of the piles exceed", "mm"),
         views.plan_map(1e3 * found.high, top, "height that 10 % of the piles exceed", "mm"),
     ]
-    size = ensemble.whole[0].run.grid
-    extent = " x ".join(millimetres(v) for v in (size.high - size.low)[:2])
-    note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
-    note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
-    return section("plan", "Where blocks will lie", tag("div", *drawn, class_="maps"),
-                   tag("p", note, class_="note"))  # fmt: skip
 
 
 def _histograms(ensemble: Ensemble) -> Markup:
