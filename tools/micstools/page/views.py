@@ -216,12 +216,17 @@ def _numbers(seen: Seen) -> list[Markup]:
     return found
 
 
+_MAP_WIDTH = 300.0
+"""Units of a drawing along the longer side of a map, whatever its points: words keep their size."""
+
+
 def plan_map(values: Array, top: float, name: str, unit: str) -> Markup:
     """A map of the plan (ny, nx) in colours from 0 to `top`, which can be told apart in grey, with
     their key."""
     share = np.clip(values / (top or 1.0), 0, 1)
     picture = Image.fromarray(_ramp(share[::-1]), "RGB")
-    rows, columns = values.shape
+    step = _MAP_WIDTH / max(values.shape)
+    rows, columns = (round(step * n, 1) for n in values.shape)
     strip = Image.fromarray(_ramp(np.linspace(0, 1, 64)[None]), "RGB")
     bar = rows + 6
     drawn = [
@@ -234,7 +239,7 @@ def plan_map(values: Array, top: float, name: str, unit: str) -> Markup:
     for at, value in ((0.0, 0.0), (0.25, top / 2), (0.5, top)):
         anchor = "start" if at == 0 else "middle"
         words = f"{value:.3g} {unit}" if at == 0.5 else f"{value:.3g}"
-        drawn.append(tag("text", words, x=at * columns, y=bar + 18,
+        drawn.append(tag("text", words, x=round(at * columns, 1), y=bar + 18,
                          text_anchor=anchor, class_="little"))  # fmt: skip
     size = f"width:{100 * columns / max(rows, columns):.0f}%"
     svg = tag("svg", *drawn, viewBox=f"-1 -1 {columns + 2} {rows + 30}", role="img",
