@@ -48,8 +48,8 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
-.PHONY: all units everything deps run test verify mutate soak bench bench-contact docs reference \
-  lint clean help FORCE
+.PHONY: all units everything deps run test verify mutate soak bench bench-contact paper-ensemble \
+  docs reference lint clean help FORCE
 
 all: $(binary)
 
@@ -65,6 +65,8 @@ help:
 	@echo 'make soak     faults many times: full disks, programs at once, broken files; an hour'
 	@echo 'make bench    time the main job, a dam break and a dry pile; writes build/bench.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
+	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; an hour.'
+	@echo '               RUNS=50; MOVES=20: besides, what moves the shares, 20 coarse runs of each'
 	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
 	@echo 'make docs     pages to browse, build/docs/site/index.html; every link is followed'
 	@echo 'make lint     style of the Fortran and Python sources'
@@ -127,8 +129,8 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
 	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@
 
-no_build := deps lint clean help run test verify mutate soak bench bench-contact docs reference \
-  everything $(variants)
+no_build := deps lint clean help run test verify mutate soak bench bench-contact paper-ensemble \
+  docs reference everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
 # What a source left in the other folder when it began or ceased to use HDF5 is not to be found.
@@ -171,6 +173,12 @@ THREADS := 1
 bench-contact: deps
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) tools/bench_contact.py --n $(N) --threads $(THREADS)
+
+RUNS := 50
+MOVES := 0
+paper-ensemble: deps
+	@$(MAKE) --no-print-directory
+	@$(PYTHON) tools/paper_ensemble.py --runs $(RUNS) --moves $(MOVES)
 
 # What the program says about its own input.
 reference:

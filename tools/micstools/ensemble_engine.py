@@ -62,7 +62,7 @@ def run_all(
         n_workers=1,
         threads_per_worker=jobs,
         processes=False,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # any free port: ensembles may run side by side
         memory_limit=0,
         silence_logs=logging.CRITICAL,
     )

@@ -99,19 +99,16 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     """
     style = style or Style()
     fields = run.fields(t) if run.field_times.size else None
-    t = t if fields is None else fields.time
-    camera = camera_for(run.grid.low, run.grid.high, view)
-    width = style.width if view != "side" else int(0.55 * style.width)
-    row = run.bodies.row(t)
-    arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
+    row = run.bodies.row(t if fields is None else fields.time)
     if view == "top":
         fields = None
+    camera = camera_for(run.grid.low, run.grid.high, view)
+    width = style.width if view != "side" else int(0.55 * style.width)
+    plotter = _stage(run, row, fields if style.water else None, width, camera)
+    arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
     if fields is not None and style.arrows:
         arrows = arrows_of(run, fields, view)
-    plotter = _stage(run, row, fields if style.water else None, width, camera)
-    speed = usual_speed(arrows.velocity)
-    if arrows.velocity.size and style.speed:
-        speed = style.speed
+    speed = style.speed if arrows.velocity.size and style.speed else usual_speed(arrows.velocity)
     height = float(run.grid.high[2] - run.grid.low[2])
     _add_arrows(plotter, arrows, speed, ARROW * height)
     _look(plotter, camera)

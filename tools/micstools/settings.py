@@ -115,9 +115,10 @@ def _patched(group: str, name: str, variables: dict[str, Any]) -> str:
         return after.read_text().rstrip("\n")
 
 
-def value(text: str, group: str, variable: str) -> Any:
-    """A variable of the first group of a name; none where the case does not give it."""
-    for name, start, end in groups(text):
-        if name == group:
-            return f90nml.Parser().reads(text[start:end] + "\n")[group].get(variable)
-    return None
+def value(text: str, group: str, variable: str, occurrence: int = 0) -> Any:
+    """A variable of one of the groups of a name; none where the case does not give it."""
+    places = [(start, end) for name, start, end in groups(text) if name == group]
+    if occurrence >= len(places):
+        return None
+    start, end = places[occurrence]
+    return f90nml.Parser().reads(text[start:end] + "\n")[group].get(variable)

@@ -1,0 +1,10 @@
+"""The fifty drops of the paper anew: shares of the patterns, their page, and what moves them.
+
+usage: python tools/paper_ensemble.py [--runs 50] [--moves 20] [--jobs 2] [--out DIR]
+"""
+
+from micstools.cli import script
+from micstools.commands import paper
+
+if __name__ == "__main__":
+    script(__doc__, paper.arguments, paper.work)
