@@ -8,7 +8,7 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: absent, is_given, size_count
+  public :: absent, is_given, size_count, smallest_spacing
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
 
@@ -173,5 +173,13 @@ contains
     case default; n = 1
     end select
   end function size_count
+
+  !> Shortest edge of a cell, of the directions that have more than one [m].
+  pure function smallest_spacing(grid) result(h)
+    type(grid_input_t), intent(in) :: grid
+    real(wp) :: h
+
+    h = minval(grid%length/real(grid%cells, wp), grid%cells > 1)
+  end function smallest_spacing
 
 end module case_types_m

@@ -7,7 +7,7 @@ module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm
-  use case_types_m, only: case_t, drop_input_t
+  use case_types_m, only: case_t, drop_input_t, smallest_spacing
   use boundary_kinds_m, only: side_code, side_periodic, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
@@ -115,8 +115,7 @@ contains
     real(wp) :: limit
 
     if (case%run%physics == 'dry' .or. case%run%cfl_max > 0.0_wp) return
-    limit = capillary_step(case%fluid, minval(case%grid%length/real(case%grid%cells, wp), &
-                                              case%grid%cells > 1))
+    limit = capillary_step(case%fluid, smallest_spacing(case%grid))
     if (case%run%dt <= limit) return
     call problems%add('&run dt', case%run%dt, 'unstable with surface tension, must be at most ' &
       //brief(limit, 3)//' s here; or cfl_max > 0 lets the step shrink', case%run%line)

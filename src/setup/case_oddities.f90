@@ -2,7 +2,7 @@
 module case_oddities_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, is_given
+  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
   use tet_mesh_m, only: shape_t
   use wave_step_m, only: gravity_step
   implicit none
@@ -40,8 +40,7 @@ contains
     real(wp) :: low, high, longest
     logical :: below
 
-    longest = gravity_step(case%fluid, minval(case%grid%length/real(case%grid%cells, wp), &
-                                              case%grid%cells > 1))
+    longest = gravity_step(case%fluid, smallest_spacing(case%grid))
     if (case%run%dt > longest .and. case%run%cfl_max <= 0.0_wp) call oddities%add('&run dt', &
       case%run%dt, 'lets the shortest waves of the grid grow, should be at most ' &
       //brief(longest, 3)//' s; or cfl_max > 0 lets the step shrink', case%run%line)

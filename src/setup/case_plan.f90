@@ -2,7 +2,7 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, is_given
+  use case_types_m, only: case_t, is_given, smallest_spacing
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
   use tet_mesh_m, only: shape_t
@@ -223,7 +223,7 @@ contains
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
                //count_text(case%run%t_end/case%run%dt)//' steps')
     call entry(unit, 'time of the run', 'about '//time_text(wet, case)//' or more on one core')
-    h = minval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
+    h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
       if (case%run%cfl_max > 0.0_wp) then
         call entry(unit, 'Courant limit', brief(case%run%cfl_max*h/speed)//' s at '//brief(speed) &

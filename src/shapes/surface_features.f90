@@ -63,9 +63,10 @@ contains
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(out) :: surface
     logical, intent(in), optional :: with_net   !! default: yes
-    integer, allocatable :: edge(:, :)
+    integer, allocatable :: edge(:, :), bend(:)
     real(wp), allocatable :: point_normal(:, :)
     logical, allocatable :: is_corner(:)
+    integer :: e
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
@@ -80,8 +81,9 @@ contains
     call make_facets(shape, surface)
     call pair_edges(shape, edge)
     call outward_at_points(shape, surface%normal, point_normal)
-    call find_corners(shape, surface%normal, edge, point_normal, is_corner)
-    call make_edges(shape, edge, point_normal, surface)
+    bend = [(bend_of(shape, edge(:, e), surface%normal), e=1, size(edge, 2))]
+    call find_corners(shape, edge, bend, point_normal, is_corner)
+    call make_edges(shape, edge, bend, point_normal, surface)
     call make_probes(shape, is_corner, surface)
     call sort_into_bins(shape, surface)
     if (present(with_net)) then
@@ -219,10 +221,9 @@ contains
   !> Corners that may touch: where a sharp convex edge ends, since past its end the crossing with
   !! another edge does not count (on a saddle of a bed an edge rests on such a corner though others
   !! rise from it); and those that stick out, from which all edges fall away.
-  pure subroutine find_corners(shape, normal, edge, point_normal, is_corner)
+  pure subroutine find_corners(shape, edge, bend, point_normal, is_corner)
     type(shape_t), intent(in) :: shape
-    real(wp), intent(in) :: normal(:, :)          !! (3, facets)
-    integer, intent(in) :: edge(:, :)             !! (4, edges)
+    integer, intent(in) :: edge(:, :), bend(:)    !! (4, edges), (edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
     logical, allocatable, intent(out) :: is_corner(:)  !! (points)
     real(wp), parameter :: jut = 0.01_wp          !! sine by which edges fall away from a corner
@@ -242,21 +243,18 @@ contains
       end do
     end do
     do e = 1, size(edge, 2)
-      if (bend_of(shape, edge(:, e), normal) > 0) is_corner(edge(1:2, e)) = .true.
+      if (bend(e) > 0) is_corner(edge(1:2, e)) = .true.
     end do
   end subroutine find_corners
 
   !> The edges that are not flat.
-  pure subroutine make_edges(shape, edge, point_normal, surface)
+  pure subroutine make_edges(shape, edge, bend, point_normal, surface)
     type(shape_t), intent(in) :: shape
-    integer, intent(in) :: edge(:, :)             !! (4, edges)
+    integer, intent(in) :: edge(:, :), bend(:)    !! (4, edges), (edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
     type(surface_t), intent(inout) :: surface
-    integer :: bend(size(edge, 2)), e, m, wanted
+    integer :: e, m, wanted
 
-    do e = 1, size(edge, 2)
-      bend(e) = bend_of(shape, edge(:, e), surface%normal)
-    end do
     m = count(bend /= 0)
     allocate (surface%edge(m), surface%end_outward(3, 2, m))
     surface%n_convex = count(bend > 0)

@@ -5,7 +5,7 @@ module one_body_m
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
@@ -13,7 +13,7 @@ module one_body_m
   use velocity_stage_m, only: copy_motion
   implicit none
   private
-  public :: one_body_t, describe, place, random_numbers
+  public :: one_body_t, describe, place, wall_at, layer, random_numbers
 
   type :: one_body_t
     type(case_t) :: case
@@ -67,6 +67,24 @@ contains
     call rigid_motion_init(self%blocks%n, self%bodies)
     call copy_motion(self%blocks, self%bodies)
   end subroutine place
+
+  !> Velocity of the block, once placed, at the centre of a cell [m/s].
+  function wall_at(self, cell) result(velocity)
+    type(one_body_t), intent(in) :: self
+    integer, intent(in) :: cell(3)
+    real(wp) :: velocity(3)
+
+    velocity = wall_velocity(self%bodies%motion(:, 1), (cell - 0.5_wp) &
+      *self%case%grid%length/self%case%grid%cells - self%case%body(1)%position)
+  end function wall_at
+
+  !> Velocity at the distance y from a wall in a layer of thickness delta, over that far from it.
+  elemental function layer(y, delta) result(v)
+    real(wp), intent(in) :: y, delta
+    real(wp) :: v
+
+    v = y/max(y + delta, tiny(y))
+  end function layer
 
   !> The same random numbers on every machine, between -1 and 1.
   subroutine random_numbers(seed, a)

@@ -4,8 +4,7 @@ program test_centre_velocity
   use grid_m, only: n_halo
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
   use centre_velocity_m, only: find_centres, to_centres, to_means
-  use rigid_motion_m, only: wall_velocity
-  use one_body_m, only: one_body_t, describe, place
+  use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
   implicit none
   character(8), parameter :: sides(2, 3) = 'slip'
@@ -18,6 +17,7 @@ program test_centre_velocity
     !! of the box [m/s, rad/s]
   real(wp), parameter :: at_centre = 0.05_wp, of_fluid = 0.275_wp   !! from the wall [cells]
   type(one_body_t) :: box
+  real(wp) :: wall(3)   !! velocity of the box at the centre of the cut cell [m/s]
   type(linked_cells_t) :: links
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u, means
@@ -26,6 +26,7 @@ program test_centre_velocity
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
   call place(box)
   box%bodies%motion(:, 1) = motion
+  wall = wall_at(box, [4, 5, top])
   call linked_cells_init(box%grid, links)
   call link_cells(box%grid, box%solid, links)
   call check('at first all centres have all', all(abs(links%centre(:links%n) - 1.0_wp) <= 0.0_wp))
@@ -70,21 +71,4 @@ contains
     end do
     call find_centres(box%grid, box%solid, box%bodies, u, links)
   end subroutine run_along
-
-  !> Component d of the velocity of the box at the centre of the cell [m/s].
-  function wall(d) result(velocity)
-    integer, intent(in) :: d
-    real(wp) :: velocity, v(3)
-
-    v = wall_velocity(motion, 0.1_wp*([4, 5, top] - 0.5_wp) - middle)
-    velocity = v(d)
-  end function wall
-
-  !> Velocity at the distance y from the wall.
-  elemental function layer(y, delta) result(v)
-    real(wp), intent(in) :: y, delta
-    real(wp) :: v
-
-    v = y/max(y + delta, tiny(y))
-  end function layer
 end program test_centre_velocity

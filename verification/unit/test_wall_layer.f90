@@ -5,8 +5,7 @@ program test_wall_layer
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
   use wall_layer_m, only: find_slip, layer_slip
   use wall_profile_m, only: slip_at
-  use rigid_motion_m, only: wall_velocity
-  use one_body_m, only: one_body_t, describe, place
+  use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
   implicit none
   character(8), parameter :: sides(2, 3) = 'slip'
@@ -19,6 +18,7 @@ program test_wall_layer
   real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
     !! of the box [m/s, rad/s]
   type(one_body_t) :: box
+  real(wp) :: wall(3)   !! velocity of the box at the centre of the cut cell [m/s]
   type(linked_cells_t) :: links
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u
@@ -27,6 +27,7 @@ program test_wall_layer
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
   call place(box)
   box%bodies%motion(:, 1) = motion
+  wall = wall_at(box, [4, 5, top])
   call linked_cells_init(box%grid, links)
   call link_cells(box%grid, box%solid, links)
   call above_the_box()
@@ -78,21 +79,4 @@ contains
   real(wp) function slip()
     slip = slip_at(links%slip(4, 5, top), r)
   end function slip
-
-  !> Component d of the velocity of the box at the centre of the film [m/s].
-  function wall(d) result(velocity)
-    integer, intent(in) :: d
-    real(wp) :: velocity, v(3)
-
-    v = wall_velocity(motion, 0.1_wp*([4, 5, top] - 0.5_wp) - middle)
-    velocity = v(d)
-  end function wall
-
-  !> Velocity at the distance y from the wall.
-  elemental function layer(y, delta) result(v)
-    real(wp), intent(in) :: y, delta
-    real(wp) :: v
-
-    v = y/max(y + delta, tiny(y))
-  end function layer
 end program test_wall_layer
