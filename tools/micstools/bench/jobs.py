@@ -1,0 +1,107 @@
+"""The jobs of the bench, run by the program."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from micstools import settings
+from micstools.bench import dry_pile
+from micstools.bench.timing import Timing, timed
+from micstools.geometry import Array
+from micstools.reader import Run
+
+INPUT = Path(__file__).parents[3] / "input"
+_NOT_STEPPING = ("output", "restart files")
+
+
+@dataclass(frozen=True)
+class DamBreak:
+    """A column of water that collapses in a box with an open top, between walls that let slip."""
+
+    cells: tuple[int, int, int] = (80, 20, 40)
+    length: tuple[float, float, float] = (0.6, 0.15, 0.3)  # [m]
+    column: tuple[float, float, float] = (0.15, 0.15, 0.2)  # [m]
+    water: tuple[float, float] = (998.2, 1.0e-3)  # [kg/m3, Pa s]
+    air: tuple[float, float] = (1.2, 1.8e-5)
+    seconds: float = 0.3
+
+
+DAM = DamBreak()
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case and how it is run."""
+
+    name: str
+    text: str
+    threads: int = 1
+    ranks: int = 1
+
+
+def blocks(seconds: float, factor: int = 1) -> str:
+    """The first seconds of the main job, on `factor` times its cells in each direction."""
+    text = (INPUT / "blocks.nml").read_text()
+    cells = [factor * n for n in settings.value(text, "grid", "cells")]
+    text = settings.set_group(text, "grid", {"cells": cells})
+    return settings.set_group(text, "run", {"t_end": seconds})
+
+
+def whole(name: str) -> str:
+    """A case of input/ as it is."""
+    return (INPUT / f"{name}.nml").read_text()
+
+
+def dam_break(dam: DamBreak = DAM) -> str:
+    """The case of a dam break."""
+    cells, length, column = (", ".join(map(repr, v)) for v in (dam.cells, dam.length, dam.column))
+    return f"""\
+&run title = 'Dam break of the bench'  physics = 'fluid'  t_end = {dam.seconds}  dt = 5.0e-3
+  field_interval = 0  restart_interval = 0 /
+&grid cells = {cells}  length = {length} /
+&boundary x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip'
+  z_min = 'slip'  z_max = 'open' /
+&fluid liquid_density = {dam.water[0]}  liquid_viscosity = {dam.water[1]}
+  gas_density = {dam.air[0]}  gas_viscosity = {dam.air[1]} /
+&water min = 0.0, 0.0, 0.0  max = {column} /
+"""
+
+
+def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:
+    """Run a job with the serial or, on several ranks, the parallel program of `programs`."""
+    path, output = folder / "case.nml", folder / "result"
+    path.write_text(job.text)
+    words: list[str | Path] = [programs[job.ranks > 1], "--quiet", "--threads", str(job.threads)]
+    if job.ranks > 1:
+        words[:0] = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(job.ranks)]
+    wall, cpu, memory, _ = timed([*words, "--output", output, path], folder)
+    found = Run(output)
+    seconds = {k: v for k, (v, _) in found.timers.items() if k not in _NOT_STEPPING}
+    stepping = sum(seconds.values())
+    return Timing(
+        wall=wall,
+        cpu=cpu,
+        memory=memory,
+        simulated=float(found.series.time[-1]),
+        steps=len(found.series.time) - 1,
+        size=int(np.prod(settings.value(job.text, "grid", "cells"))),
+        stepping=stepping,
+        phases={k: v / stepping for k, v in seconds.items()},
+    )
+
+
+def pile(n: int, seconds: float, program: Path, threads: int, folder: Path) -> Timing:
+    """Run the dry pile of n blocks; a step is one of contact, the size that of the pile."""
+    path, output = folder / "pile.nml", folder / "result"
+    path.write_text(dry_pile.case(n, output, seconds))
+    words = [str(program), "--quiet", "--threads", str(threads), str(path)]
+    wall, cpu, memory, _ = timed(words, folder)
+    return Timing(wall, cpu, memory, seconds, int(Run(output).series.substeps.sum()), n)
+
+
+def last_places(folder: Path) -> tuple[Array, Array]:
+    """Where the blocks of the pile in a folder ended: positions (n, 3) [m], quaternions (n, 4)."""
+    bodies = Run(folder / "result").bodies
+    return bodies.position[-1], bodies.quaternion[-1]

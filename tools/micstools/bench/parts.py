@@ -1,0 +1,169 @@
+"""The parts of the bench: each gives rows, dictionaries of what was run and what it took."""
+
+import importlib.util
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from micstools.bench import dry_pile, jobs, peer_hypre, peer_interfoam, pressure_dump
+from micstools.bench.jobs import Job
+from micstools.bench.timing import Timing, timed
+
+Row = dict[str, Any]
+KEYS = ("part", "job", "by", "threads", "ranks", "size")
+"""What tells rows apart."""
+TOLERANCE = 1e-6  # of the pressure systems
+SYSTEMS = ((60, 20, 40), (120, 40, 80))
+PILE = 64  # blocks
+PILE_SECONDS = 2.0
+PEERS = "interFoam (openfoam), hypre (libhypre-dev), pybullet (pip)"
+
+
+@dataclass(frozen=True)
+class Means:
+    """What the bench works with."""
+
+    programs: tuple[Path, Path]  # serial and parallel; the latter may not be there
+    solver: Path  # solve_dump
+    repeat: int
+    threads: int
+
+    @property
+    def crews(self) -> list[tuple[int, int]]:
+        """Threads and ranks: one, all threads, as many ranks."""
+        found = [(1, 1)]
+        if self.threads > 1:
+            found.append((self.threads, 1))
+            if self.programs[1].exists():
+                found.append((1, self.threads))
+        return found
+
+
+def whole_jobs(means: Means) -> Iterator[Row]:
+    """The two tanks of the paper from start to end, once, on all threads."""
+    for name in ("blocks", "blocks_coarse"):
+        job = Job(name, jobs.whole(name), means.threads)
+        yield row("whole", job.name, [_fresh(partial(jobs.run, job, means.programs))],
+                  threads=job.threads)  # fmt: skip
+
+
+def short_jobs(means: Means) -> Iterator[Row]:
+    """The start of the main job, a dam break, a dry pile."""
+    texts = {"blocks": jobs.blocks(0.3), "dam_break": jobs.dam_break()}
+    for name, text in texts.items():
+        for threads, ranks in means.crews:
+            job = Job(name, text, threads, ranks)
+            runs = [_fresh(partial(jobs.run, job, means.programs)) for _ in range(means.repeat)]
+            yield row("jobs", name, runs, threads=threads, ranks=ranks)
+    for threads, ranks in means.crews:
+        if ranks == 1:
+            yield _pile("jobs", PILE, PILE_SECONDS, threads, means.repeat, means)
+
+
+def growth(means: Means) -> Iterator[Row]:
+    """A few steps of the main job on ever more cells, a dry pile of ever more blocks."""
+    for factor in (1, 2, 4):
+        job = Job(f"cells x {factor**3}", jobs.blocks(0.04, factor))
+        yield row("growth", job.name, [_fresh(partial(jobs.run, job, means.programs))])
+    for n in (9, 64, 512, 1000):
+        yield _pile("growth", n, 0.5, 1, 1, means)
+
+
+def pressure(means: Means) -> Iterator[Row]:
+    """The pressure system alone, set-up included."""
+    with tempfile.TemporaryDirectory() as folder:
+        for cells in SYSTEMS:
+            path = pressure_dump.write(Path(folder) / "system.bin", cells)
+            for threads in sorted({1, means.threads}):
+                words = [means.solver, path, TOLERANCE, 5 * means.repeat, threads]
+                yield _solved("mics", words, threads)
+
+
+def peers(means: Means) -> Iterator[Row]:
+    """Other programs at the same work, of those that are installed."""
+    if peer_interfoam.installed():
+        runs = [_fresh(peer_interfoam.dam_break)]
+        yield row("jobs", "dam_break", runs, by="interFoam")
+    if peer_hypre.library():
+        yield from _hypre(means)
+    if importlib.util.find_spec("pybullet"):
+        yield _bullet(means)
+
+
+def _hypre(means: Means) -> Iterator[Row]:
+    module = [sys.executable, "-m", "micstools.bench.peer_hypre"]
+    with tempfile.TemporaryDirectory() as folder:
+        for cells in SYSTEMS:
+            path = pressure_dump.write(Path(folder) / "system.bin", cells)
+            for ranks in sorted({1, means.threads}):
+                mpirun = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", ranks]
+                start = [*mpirun, *module] if ranks > 1 else module
+                for smoother in ("jacobi", "red_black"):
+                    words = [*start, path, TOLERANCE, 5 * means.repeat, smoother]
+                    yield _solved(f"hypre {smoother}", words, 1, ranks)
+
+
+def _bullet(means: Means) -> Row:
+    words = [sys.executable, "-m", "micstools.bench.peer_bullet", PILE, PILE_SECONDS]
+    wall, cpu, steps, depth = timed(list(map(str, words)), Path.cwd())[3].split()[-1].split(",")
+    runs = [Timing(float(wall), float(cpu), float("nan"), PILE_SECONDS, int(steps), PILE)]
+    return row("jobs", "pile", runs, by="pybullet") | {"depth_mm": float(depth)}
+
+
+def _pile(part: str, n: int, seconds: float, threads: int, repeat: int, means: Means) -> Row:
+    def work(folder: Path) -> tuple[Timing, float]:
+        timing = jobs.pile(n, seconds, means.programs[0], threads, folder)
+        last = jobs.last_places(folder) if part == "jobs" else None
+        return timing, 1e3 * dry_pile.true_depth(*last) if last else float("nan")
+
+    runs = [_fresh(work) for _ in range(repeat)]
+    found = row(part, "pile", [timing for timing, _ in runs], threads=threads)
+    return found | ({"depth_mm": round(runs[0][1], 3)} if part == "jobs" else {})
+
+
+def _solved(by: str, words: list[Any], threads: int, ranks: int = 1) -> Row:
+    """A row of what a solver printed."""
+    said = timed(list(map(str, words)), Path.cwd())[3].strip().splitlines()[-1].split(",")
+    nx, ny, nz, _, iterations = map(int, said[:5])
+    setup, solve, cpu, residual = map(float, said[5:])
+    return {"part": "pressure", "job": "1e-6", "by": by, "threads": threads, "ranks": ranks,
+            "size": nx * ny * nz, "wall": setup + solve, "cpu": cpu, "setup": setup,
+            "iterations": iterations, "residual": residual}  # fmt: skip
+
+
+def _fresh(work: Callable[[Path], Any]) -> Any:
+    """Work in an empty folder that is gone afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        return work(Path(folder))
+
+
+def row(
+    part: str, job: str, runs: list[Timing], by: str = "mics", threads: int = 1, ranks: int = 1
+) -> Row:
+    """The fastest of some runs, and by how much the slowest took longer."""
+    best = min(runs, key=lambda run: run.wall)
+    numbers = {
+        "simulated": best.simulated,
+        "wall": best.wall,
+        "cpu": best.cpu,
+        "spread": max(run.wall for run in runs) / best.wall - 1,
+        "ns": 1e9 * best.cpu / (best.steps * best.size),
+        "step_ms": 1e3 * best.stepping / best.steps,
+        "memory": best.memory,
+        "memory_each": best.memory / best.size,
+    }
+    known = {k: float(f"{v:.4g}") for k, v in numbers.items() if v == v}
+    about = {"part": part, "job": job, "by": by, "threads": threads, "ranks": ranks}
+    shares = {"phases": {k: round(v, 4) for k, v in best.phases.items()}} if best.phases else {}
+    return about | {"size": best.size, "steps": best.steps} | known | shares
+
+
+def version(program: Path) -> str:
+    """The first line that a program says of itself."""
+    done = subprocess.run([program, "--version"], check=True, capture_output=True, text=True)
+    return done.stdout.splitlines()[0]

@@ -1,0 +1,89 @@
+"""How long a program takes, on which machine."""
+
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Timing:
+    """One run of a job."""
+
+    wall: float  # [s]
+    cpu: float  # [s]
+    memory: float  # largest resident [bytes]
+    simulated: float  # [s]
+    steps: int  # of the water, or substeps of contact
+    size: int  # cells, or blocks
+    stepping: float = float("nan")  # [s] of the wall time, without start and output
+    phases: dict[str, float] = field(default_factory=dict)  # shares of `stepping`
+
+
+AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+"""Else Open MPI refuses to start in a container."""
+
+
+def timed(
+    words: Sequence[str | Path], folder: Path, settings: dict[str, str] | None = None
+) -> tuple[float, float, float, str]:
+    """Run a program, with `settings` in its environment: wall and CPU seconds, its own and its
+    children's, largest memory of one of them [bytes], and what it said."""
+    with tempfile.TemporaryFile("w+") as said:
+        began = time.perf_counter()
+        running = subprocess.Popen(
+            [str(word) for word in words],
+            cwd=folder,
+            env={**os.environ, **AS_ROOT, **(settings or {})},
+            stdout=said,
+            stderr=said,
+        )
+        _, status, used = os.wait4(running.pid, 0)
+        wall = time.perf_counter() - began
+        running.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        text = said.read()
+    if running.returncode:
+        last = text.strip().splitlines()[-1:] or ["nothing said"]
+        raise subprocess.SubprocessError(f"{words[0]} ended with {running.returncode}: {last[0]}")
+    unit = 1 if sys.platform == "darwin" else 1024
+    return wall, used.ru_utime + used.ru_stime, float(unit * used.ru_maxrss), text
+
+
+def processor() -> str:
+    """The name of the processor, where the system tells."""
+    path = Path("/proc/cpuinfo")
+    lines = path.read_text().splitlines() if path.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def work_at_once(n: int) -> float:
+    """How many times the work of one program n programs do at once that only count; n where each
+    has a core of its own."""
+    words = [sys.executable, "-c", "n = 0\nfor i in range(20_000_000): n += i"]
+    walls = []
+    for programs in (1, n):
+        began = time.perf_counter()
+        for running in [subprocess.Popen(words) for _ in range(programs)]:
+            running.wait()
+        walls.append(time.perf_counter() - began)
+    return n * walls[0] / walls[1]
+
+
+def bandwidth() -> float:
+    """Bytes a second that one core adds up from and to memory, best of five [1/s]."""
+    a, b = np.ones(20_000_000), np.ones(20_000_000)
+    c, best = np.zeros_like(a), float("inf")
+    for _ in range(5):
+        began = time.perf_counter()
+        np.add(a, b, out=c)
+        best = min(best, time.perf_counter() - began)
+    return 3 * a.nbytes / best
