@@ -54,7 +54,8 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 all: $(binary)
 
 help:
-	@echo 'make deps     install what is missing: compiler, HDF5, MPI, Python packages in .venv'
+	@echo 'make deps     install what is missing: compiler, HDF5, MPI, Python packages in .venv;'
+	@echo '               what only tests, drawings or ensembles need comes with their commands'
 	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
 	@echo 'make SAN=1    ./mics_san, under the address and undefined behaviour sanitizers'
@@ -140,8 +141,9 @@ $(shell rm -f $(ELSEWHERE) $(ELSEWHERE:.o=_m.mod))
 endif
 endif
 
+deps = FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
 deps:
-	@FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
+	@$(deps)
 
 run: deps
 	@$(MAKE) --no-print-directory
@@ -149,18 +151,21 @@ run: deps
 	$(PYTHON) tools/plot_pile.py $(CASE)
 	$(PYTHON) tools/plot_history.py $(CASE)
 
-test: deps
+test:
+	@$(deps) test shape ensemble
 	+@verification/run_tests
 
 verify: deps
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) verification/verify.py
 
-mutate: deps
+mutate:
+	@$(deps) test shape ensemble
 	@$(PYTHON) verification/mutate.py
 
 # Every script of the folder, though one finds a fault.
-soak: deps
+soak:
+	@$(deps) test
 	@$(MAKE) --no-print-directory
 	@status=0; for script in verification/soak/*.py; do \
 	  echo "$$script"; $(PYTHON) $$script || status=1; done; exit $$status
@@ -179,7 +184,8 @@ bench-contact: deps
 
 RUNS := 50
 MOVES := 0
-paper-ensemble: deps
+paper-ensemble:
+	@$(deps) ensemble
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) tools/paper_ensemble.py --runs $(RUNS) --moves $(MOVES)
 
@@ -190,10 +196,11 @@ reference:
 	./mics --help=json > docs/mics-case.schema.json
 
 docs:
-	@tools/deps.sh docs
+	@$(deps) docs
 	@$(PYTHON) tools/build_docs.py
 
-lint: deps
+lint:
+	@$(deps) lint
 	@tools/lint.sh
 
 clean:

@@ -1,8 +1,10 @@
 #!/bin/sh
 # Install what is missing: compiler, HDF5, MPI, drawing libraries; Python packages in .venv.
-# Does nothing, quickly, when everything is there. `deps.sh docs` also installs what `make docs` needs.
+# Does nothing, quickly, when everything is there. `deps.sh shape test` also installs what
+# requirements-shape.txt and requirements-test.txt name, and the libraries that Gmsh asks for.
 set -u
 cd "$(dirname "$0")/.." || exit 1
+extras=$*
 
 say() { echo "deps: $*"; }
 stop() { echo "deps: $*" >&2; exit 1; }
@@ -27,10 +29,13 @@ missing() {
       library libEGL.so.1 || echo libegl1
       library libGL.so.1 || echo libgl1
       library libXcursor.so.1 || echo libxcursor1
-      library libGLU.so.1 || echo libglu1-mesa   # this and the next three for Gmsh
-      library libXrender.so.1 || echo libxrender1
-      library libXft.so.2 || echo libxft2
-      library libXinerama.so.1 || echo libxinerama1 ;;
+      case $extras in
+        *shape*)   # Gmsh
+          library libGLU.so.1 || echo libglu1-mesa
+          library libXrender.so.1 || echo libxrender1
+          library libXft.so.2 || echo libxft2
+          library libXinerama.so.1 || echo libxinerama1 ;;
+      esac ;;
   esac
 }
 
@@ -69,7 +74,11 @@ system() {
   [ -z "$left" ] || stop "still missing after installing: $left"
 }
 
-requirements="requirements.txt requirements-lint.txt${1:+ requirements-$1.txt}"
+requirements=requirements.txt
+for extra in $extras; do
+  [ -f "requirements-$extra.txt" ] || stop "there is no requirements-$extra.txt"
+  requirements="$requirements requirements-$extra.txt"
+done
 
 # Exit code 0 when .venv holds exactly the pinned versions, and `mics-tools`.
 python_packages_ready() {

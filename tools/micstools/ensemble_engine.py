@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from micstools import extras
 from micstools.ensemble import Member, State, state
 
 _living: set[subprocess.Popen[bytes]] = set()
@@ -55,6 +56,7 @@ def run_all(
 ) -> None:
     """Run all members, `jobs` at once, and tell of each end. On KeyboardInterrupt every run writes
     its restart file before the exception goes on."""
+    extras.need("ensemble")
     from dask.distributed import Client, LocalCluster, as_completed
 
     _stopping.clear()

@@ -3,8 +3,6 @@
 A part is points (n, 3) and triangles (m, 3), closed, in the units of its file.
 """
 
-from typing import Any
-
 import numpy as np
 
 from micstools.geometry import Array, IntArray
@@ -31,22 +29,23 @@ def united(parts: list[Part]) -> Part:
         f"the surface is in {len(parts)} pieces, a block is one without hollows; unite what "
         "belongs together where it was drawn, and make a file of each block"
     )
-    manifold = _manifold3d()
+    import manifold3d
+
     outward = _outward(parts)
     if any(volume(part) <= 0 for part in outward):
         raise NotOne(apart)
     found = [
-        manifold.Manifold(manifold.Mesh64(points, triangles.astype(np.uint64)))
+        manifold3d.Manifold(manifold3d.Mesh64(points, triangles.astype(np.uint64)))
         for points, triangles in outward
     ]
-    if any(solid.status() != manifold.Error.NoError for solid in found):
+    if any(solid.status() != manifold3d.Error.NoError for solid in found):
         raise NotOne(apart)
-    add = manifold.OpType.Add
-    whole = manifold.Manifold.batch_boolean(found, add)
+    add = manifold3d.OpType.Add
+    whole = manifold3d.Manifold.batch_boolean(found, add)
     if len(whole.decompose()) != 1:
         raise NotOne(apart)
     for k, solid in enumerate(found):
-        others = manifold.Manifold.batch_boolean(found[:k] + found[k + 1 :], add)
+        others = manifold3d.Manifold.batch_boolean(found[:k] + found[k + 1 :], add)
         if whole.volume() - others.volume() <= SWALLOWED * solid.volume():
             raise NotOne(
                 f"part {k + 1} of {len(parts)} lies inside the others: a hollow, or left over? "
@@ -102,14 +101,3 @@ def _outward(parts: list[Part]) -> list[Part]:
     if all(volume(part) < 0 for part in found):
         return [(points, triangles[:, ::-1]) for points, triangles in found]
     return found
-
-
-def _manifold3d() -> Any:
-    try:
-        import manifold3d
-    except ImportError as error:
-        raise NotOne(
-            "the surface is in several pieces; to unite those that overlap: "
-            ".venv/bin/python -m pip install manifold3d"
-        ) from error
-    return manifold3d

@@ -1,10 +1,10 @@
-!> The pressure system of a file, solved by the conjugate gradients and the multigrid of the program.
+!> The pressure system of a file, solved by conjugate gradients and multigrid of the program.
 !!
 !! usage: solve_dump FILE TOLERANCE REPEATS THREADS
 !!
-!! Prints one row: cells in x, y, z, threads, iterations to |b - A x| <= TOLERANCE |b| (sums over all
-!! cells), seconds of the set-up and of the solve, each the least of REPEATS, CPU seconds of the pair
-!! likewise, and the residual reached. `tools/micstools/bench/pressure_dump.py` tells the format.
+!! Prints one row: cells in x, y, z, threads, iterations to |b - A x| <= TOLERANCE |b| (sums over
+!! all cells), seconds of the set-up and of the solve, each the least of REPEATS, CPU seconds of
+!! the pair likewise, and the residual. `tools/micstools/bench/pressure_dump.py` tells the format.
 program solve_dump
   use, intrinsic :: iso_fortran_env, only: int64, real64
   use kinds_m, only: wp
@@ -50,8 +50,7 @@ program solve_dump
     call cpu_time(cpu(2))
     least(3) = min(least(3), cpu(2) - cpu(1))
   end do
-  print '(5(i0, a), 4(es12.5, :, a))', grid%n(1), ',', grid%n(2), ',', grid%n(3), ',', threads, ',', &
-    iterations, ',', least(1), ',', least(2), ',', least(3), ',', residual
+  print '(5(i0, ","), 3(es12.5, ","), es12.5)', grid%n, threads, iterations, least, residual
   call parallel_final()
 
 contains

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from micstools import command, meshing, scene, shapes
+from micstools import command, extras, meshing, scene, shapes
 from micstools.commands.base import Command
 from micstools.reader import BadRun
 
@@ -31,6 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def make(given: argparse.Namespace) -> int:
     """Read, check, fill, write, report, draw."""
+    extras.need("shape")
     try:
         surface = meshing.load(given.file, given.element)
         if given.simplify is not None:
