@@ -31,7 +31,8 @@ def draw_pictures(given: argparse.Namespace) -> int:
             scene.picture(run, t, view, out / f"{view}-{t:06.3f}.png", style) for t in times
         ]
         plots.contact_sheet(pictures, out / f"{view}.png", columns=min(4, len(pictures)))
-        print(f"{len(pictures)} pictures and a sheet: {out / f'{view}.png'}")
+        many = "1 picture" if len(pictures) == 1 else f"{len(pictures)} pictures"
+        print(f"{many} and a sheet: {out / f'{view}.png'}")
     return 0
 
 
