@@ -25,7 +25,9 @@ def check(runs: list[Run]) -> Checks:
             spheres[round(0.06 / float(run.grid.spacing[0]), 1)] = found
         cells = f"{0.06 / float(run.grid.spacing[0]):g} cells per 60 mm"
         band = 0.02 if sphere else 0.25
-        checks.close(f"{shape}, {cells}: added mass / displaced mass", found, TOUCHING, band, sphere)
+        checks.close(
+            f"{shape}, {cells}: added mass / displaced mass", found, TOUCHING, band, sphere
+        )
         sound(run, checks)
     checks.study("added mass of a sphere at a wall", spheres, TOUCHING, "cells per diameter")
     return checks
