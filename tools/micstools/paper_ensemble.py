@@ -18,7 +18,7 @@ from micstools.geometry import quaternion_from_axis, quaternion_product
 from micstools.overlap import touches
 from micstools.pile import REACH
 from micstools.pile_ensemble import Pile
-from micstools.reader import Run
+from micstools.reader import BadRun, Run
 from micstools.shares import in_words
 
 UPWARDS = np.array([0.0, 0.0, 1.0])
@@ -39,12 +39,20 @@ class Choice:
         return settings.set_variables(self.bodies(case), map(settings.parse, self.set_to))
 
 
+def _of_body(text: str, name: str, k: int) -> list[float]:
+    """A variable of a &body, counted from 0."""
+    found: list[float] | None = settings.value(text, "body", name, k)
+    if found is None:
+        raise BadRun(f"the case has no &body {k + 1} with a {name}: it is not the paper's")
+    return found
+
+
 def fixed_at(distance: float) -> Callable[[str], str]:
     """The outer of three fixed blocks at +- `distance` [m] from the middle one."""
 
     def moved(text: str) -> str:
         for k, sign in ((0, -1), (2, 1)):
-            x, *others = settings.value(text, "body", "position", 1)
+            x, *others = _of_body(text, "position", 1)
             place = [round(x + sign * distance, 9), *others]
             text = settings.set_group(text, "body", {"position": place}, k)
         return text
@@ -57,7 +65,7 @@ def fixed_turned(*degrees: float) -> Callable[[str], str]:
 
     def turned(text: str) -> str:
         for k, angle in enumerate(degrees):
-            old = np.array(settings.value(text, "body", "quaternion", k))
+            old = np.array(_of_body(text, "quaternion", k))
             new = quaternion_product(quaternion_from_axis(UPWARDS, angle), old)
             text = settings.set_group(text, "body", {"quaternion": [float(q) for q in new]}, k)
         return text

@@ -11,6 +11,7 @@ from micstools.cli import script
 from micstools.commands import paper
 from micstools.geometry import rotation_matrix
 from micstools.paper_ensemble import CHOICES
+from micstools.reader import BadRun
 from test_pile_ensemble import write_ensemble
 
 CASE = paper.CASE.read_text()
@@ -42,6 +43,12 @@ def test_fixed_blocks_move_along_the_tank_and_turn_about_the_upright() -> None:
         assert turn == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
 
 
+def test_another_case_than_the_papers_is_refused() -> None:
+    for change in (paper_ensemble.fixed_at(0.065), paper_ensemble.fixed_turned(60)):
+        with pytest.raises(BadRun, match="it is not the paper's"):
+            change("&run t_end = 1.0 /\n")
+
+
 def test_the_row_of_an_ensemble(tmp_path: Path) -> None:
     piles = pile_ensemble.open_ensemble(write_ensemble(tmp_path / "e"), 0.002).piles
     found = paper_ensemble.row("cubes", piles)
@@ -57,7 +64,7 @@ def test_runs_what_is_missing_and_writes_the_table(
     """With the program itself, in air: three blocks, let go in a moment."""
     try:
         program.find()
-    except Exception:
+    except BadRun:
         pytest.skip("mics is not built")
     case, out = tmp_path / "blocks.nml", tmp_path / "out"
     dry = ("run.physics='dry'", "run.t_end=0.6", "drop.count=2", "drop.interval=0.3")
