@@ -57,9 +57,12 @@ def run_all(
     """Run all members, `jobs` at once, and tell of each end. On KeyboardInterrupt every run writes
     its restart file before the exception goes on."""
     extras.need("ensemble")
+    import dask
     from dask.distributed import Client, LocalCluster, as_completed
 
     _stopping.clear()
+    # A worker that was not heard of for minutes is given up: so would be that of a laptop asleep.
+    dask.config.set({"distributed.scheduler.worker-ttl": None})
     cluster = LocalCluster(
         n_workers=1,
         threads_per_worker=jobs,

@@ -2,8 +2,11 @@
 
 import csv
 import fcntl
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -238,3 +241,24 @@ def test_the_slurm_script_is_a_script(tmp_path: Path) -> None:
     )
     folder = tmp_path / "a b" / "0004"
     assert done.stdout == f"--quiet --output {folder}/result {folder}/case.nml\n"
+
+
+@pytest.mark.cost(20)
+def test_an_ensemble_that_slept_goes_on(tmp_path: Path, program: Path) -> None:
+    """As a laptop does over lunch: stopped for longer than the engine waits for a sign of life."""
+    words = [sys.executable, "-m", "micstools.cli", "ensemble", str(program.parent / "case.nml"),
+             "--program", str(program), "--runs", "6", "--jobs", "1", "--seed", "3",
+             "--out", str(tmp_path / "out")]  # fmt: skip
+    settings = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "1s"}
+    running = subprocess.Popen(words, env=settings, stdout=subprocess.PIPE, text=True)
+    assert running.stdout is not None
+    while "1 of 6 done" not in running.stdout.readline():
+        assert running.poll() is None
+    running.send_signal(signal.SIGSTOP)
+    time.sleep(12)
+    running.send_signal(signal.SIGCONT)
+    try:
+        said, _ = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert "6 of 6 done" in said
