@@ -69,12 +69,12 @@ def main() -> None:
         f"load before: {found['load_before']:.1f}\n{table.HEAD}"
     )
     rows: list[parts.Row] = []
+    given.out.parent.mkdir(parents=True, exist_ok=True)
     for name in dict.fromkeys([*given.only, *(name for name in EXTRA if vars(given)[name])]):
         for row in PARTS[name](means):
             print(table.line(row), flush=True)
             rows.append(row)
-    given.out.parent.mkdir(parents=True, exist_ok=True)
-    given.out.write_text(json.dumps({**found, "rows": rows}, indent=2) + "\n")
+            given.out.write_text(json.dumps({**found, "rows": rows}, indent=2) + "\n")
     print(f"written to {given.out}")
     if old:
         print(table.beside({**found, "rows": rows}, old))
