@@ -76,7 +76,7 @@ def fixed_turned(*degrees: float) -> Callable[[str], str]:
 CHOICES = (
     Choice("as_it_is", "as it is"),
     Choice("spheres", "contact spheres of the paper", ("contact.model='spheres'",)),
-    Choice("mics", "coupling of the paper", ("run.coupling='mics'",)),
+    Choice("mics", "coupling of the paper", ("numerics.coupling='mics'",)),
     Choice("friction_04", "friction 0.4", ("contact.friction=0.4",)),
     Choice("friction_08", "friction 0.8", ("contact.friction=0.8",)),
     Choice("floor_02", "friction of floor and walls 0.2", ("contact.wall_friction=0.2",)),

@@ -31,6 +31,15 @@ def test_choices_differ_in_what_they_say() -> None:
     assert len(set(others)) == len(others)
 
 
+def test_the_program_takes_every_choice() -> None:
+    try:
+        path = program.find()
+    except BadRun:
+        pytest.skip("mics is not built")
+    for choice in CHOICES:
+        program.check(path, choice.text(CASE))
+
+
 def test_fixed_blocks_move_along_the_tank_and_turn_about_the_upright() -> None:
     near = paper_ensemble.fixed_at(0.065)(CASE)
     assert fixed(near, "position")[:, 0] == pytest.approx([0.085, 0.15, 0.215])
