@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from micstools import program
-from micstools.bench import jobs, parts, peer_hypre, peer_interfoam, pressure_dump, table
+from micstools.bench import jobs, parts, peer_interfoam, pressure_dump, table
 from micstools.bench.jobs import DAM, Job
 from micstools.bench.timing import Timing, timed
 from micstools.reader import BadRun
@@ -23,7 +23,7 @@ def test_the_pressure_system_is_the_published_one() -> None:
 
 def test_a_system_that_was_written_is_symmetric_and_open_at_the_top(tmp_path: Path) -> None:
     path = pressure_dump.write(tmp_path / "system.bin", (6, 4, 5))
-    cells, (cx, cy, cz), right = peer_hypre.read(path)
+    cells, (cx, cy, cz), right = pressure_dump.read(path)
     assert cells == [6, 4, 5] and right.shape == (5, 4, 6)
     assert not cx[:, :, [0, -1]].any() and not cy[:, [0, -1]].any() and not cz[0].any()
     rho, h = pressure_dump.density((6, 4, 5)), pressure_dump.LENGTH / cells
@@ -31,7 +31,7 @@ def test_a_system_that_was_written_is_symmetric_and_open_at_the_top(tmp_path: Pa
     assert cx[2, 1, 3] == pytest.approx(2 / ((rho[2, 1, 2] + rho[2, 1, 3]) * h[0] ** 2))
     (tmp_path / "other.bin").write_bytes(b"something else")
     with pytest.raises(ValueError, match="holds no pressure system"):
-        peer_hypre.read(tmp_path / "other.bin")
+        pressure_dump.read(tmp_path / "other.bin")
 
 
 def test_a_job_of_the_program(tmp_path: Path) -> None:

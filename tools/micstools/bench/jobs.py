@@ -8,7 +8,7 @@ import numpy as np
 
 from micstools import settings
 from micstools.bench import dry_pile
-from micstools.bench.timing import Timing, timed
+from micstools.bench.timing import Timing, mpirun, timed
 from micstools.geometry import Array
 from micstools.reader import Run
 
@@ -73,10 +73,9 @@ def run(job: Job, programs: Sequence[Path], folder: Path) -> Timing:
     """Run a job with the serial or, on several ranks, the parallel program of `programs`."""
     path, output = folder / "case.nml", folder / "result"
     path.write_text(job.text)
-    words: list[str | Path] = [programs[job.ranks > 1], "--quiet", "--threads", str(job.threads)]
-    if job.ranks > 1:
-        words[:0] = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(job.ranks)]
-    wall, cpu, memory, _ = timed([*words, "--output", output, path], folder)
+    program = [*mpirun(job.ranks), programs[job.ranks > 1]]
+    words = [*program, "--quiet", "--threads", job.threads, "--output", output, path]
+    wall, cpu, memory, _ = timed(words, folder)
     found = Run(output)
     seconds = {k: v for k, (v, _) in found.timers.items() if k not in _NOT_STEPPING}
     stepping = sum(seconds.values())
@@ -96,7 +95,7 @@ def pile(n: int, seconds: float, program: Path, threads: int, folder: Path) -> T
     """Run the dry pile of n blocks; a step is one of contact, the size that of the pile."""
     path, output = folder / "pile.nml", folder / "result"
     path.write_text(dry_pile.case(n, output, seconds))
-    words = [str(program), "--quiet", "--threads", str(threads), str(path)]
+    words = [program, "--quiet", "--threads", threads, path]
     wall, cpu, memory, _ = timed(words, folder)
     return Timing(wall, cpu, memory, seconds, int(Run(output).series.substeps.sum()), n)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from micstools.bench import dry_pile, jobs, peer_hypre, peer_interfoam, pressure_dump
 from micstools.bench.jobs import Job
-from micstools.bench.timing import Timing, timed
+from micstools.bench.timing import Timing, mpirun, timed
 
 Row = dict[str, Any]
 KEYS = ("part", "job", "by", "threads", "ranks", "size")
@@ -89,7 +89,7 @@ def peers(means: Means) -> Iterator[Row]:
     if peer_interfoam.installed():
         runs = [_fresh(peer_interfoam.dam_break)]
         yield row("jobs", "dam_break", runs, by="interFoam")
-    if peer_hypre.library():
+    if peer_hypre.installed():
         yield from _hypre(means)
     if importlib.util.find_spec("pybullet"):
         yield _bullet(means)
@@ -101,16 +101,14 @@ def _hypre(means: Means) -> Iterator[Row]:
         for cells in SYSTEMS:
             path = pressure_dump.write(Path(folder) / "system.bin", cells)
             for ranks in sorted({1, means.threads}):
-                mpirun = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", ranks]
-                start = [*mpirun, *module] if ranks > 1 else module
                 for smoother in ("jacobi", "red_black"):
-                    words = [*start, path, TOLERANCE, 5 * means.repeat, smoother]
+                    words = [*mpirun(ranks), *module, path, TOLERANCE, 5 * means.repeat, smoother]
                     yield _solved(f"hypre {smoother}", words, 1, ranks)
 
 
 def _bullet(means: Means) -> Row:
     words = [sys.executable, "-m", "micstools.bench.peer_bullet", PILE, PILE_SECONDS]
-    wall, cpu, steps, depth = timed(list(map(str, words)), Path.cwd())[3].split()[-1].split(",")
+    wall, cpu, steps, depth = timed(words, Path.cwd())[3].split()[-1].split(",")
     runs = [Timing(float(wall), float(cpu), float("nan"), PILE_SECONDS, int(steps), PILE)]
     return row("jobs", "pile", runs, by="pybullet") | {"depth_mm": float(depth)}
 
@@ -128,7 +126,7 @@ def _pile(part: str, n: int, seconds: float, threads: int, repeat: int, means: M
 
 def _solved(by: str, words: list[Any], threads: int, ranks: int = 1) -> Row:
     """A row of what a solver printed."""
-    said = timed(list(map(str, words)), Path.cwd())[3].strip().splitlines()[-1].split(",")
+    said = timed(words, Path.cwd())[3].strip().splitlines()[-1].split(",")
     nx, ny, nz, _, iterations = map(int, said[:5])
     setup, solve, cpu, residual = map(float, said[5:])
     return {"part": "pressure", "job": "1e-6", "by": by, "threads": threads, "ranks": ranks,

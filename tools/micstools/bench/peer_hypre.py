@@ -15,31 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from micstools.bench.pressure_dump import read
 from micstools.geometry import Array
 
 _RELAXATION = {"jacobi": 1, "red_black": 2}  # weighted; symmetric
 _OFFSETS = ((0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1))
 
 
-def library() -> str | None:
-    """The shared library of hypre, where there is one."""
-    return ctypes.util.find_library("HYPRE")
-
-
-def read(path: Path) -> tuple[list[int], list[Array], Array]:
-    """Cells, coefficients of the lower faces across x, y, z and the right side of a file."""
-    data = path.read_bytes()
-    if data[:8] != b"POIS7P01":
-        raise ValueError(f"{path} holds no pressure system")
-    n = [int(v) for v in np.frombuffer(data, "<i8", 3, 8)]
-    nx, ny, nz = n
-    shapes = [(nz, ny, nx + 1), (nz, ny + 1, nx), (nz + 1, ny, nx), (nz, ny, nx)]
-    start, found = 8 + 24 + 24, []
-    for shape in shapes:
-        count = int(np.prod(shape))
-        found.append(np.frombuffer(data, "<f8", count, start).reshape(shape))
-        start += 8 * count
-    return n, found[:3], found[3]
+def installed() -> bool:
+    """Is there a hypre to call?"""
+    return ctypes.util.find_library("HYPRE") is not None
 
 
 class _Mpi:
@@ -47,23 +32,23 @@ class _Mpi:
 
     def __init__(self) -> None:
         name = ctypes.util.find_library("mpi")
-        self.library = ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
-        self.library.MPI_Init(None, None)
-        world = ctypes.c_char.in_dll(self.library, "ompi_mpi_comm_world")
+        self.calls = ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
+        self.calls.MPI_Init(None, None)
+        world = ctypes.c_char.in_dll(self.calls, "ompi_mpi_comm_world")
         self.world = ctypes.c_void_p(ctypes.addressof(world))
 
     def ask(self, name: str) -> int:
         """`MPI_Comm_rank` or `MPI_Comm_size`."""
         number = ctypes.c_int()
-        getattr(self.library, name)(self.world, ctypes.byref(number))
+        getattr(self.calls, name)(self.world, ctypes.byref(number))
         return number.value
 
-    def slowest(self, values: list[float], name: str = "ompi_mpi_op_max") -> list[float]:
-        """The largest of each number of all processes, or the sum."""
+    def over_all(self, values: list[float], name: str) -> list[float]:
+        """Each number over all processes: `max` or `sum`."""
         mine, found = (ctypes.c_double * len(values))(*values), (ctypes.c_double * len(values))()
-        kind = ctypes.c_char.in_dll(self.library, "ompi_mpi_double")
-        op = ctypes.c_char.in_dll(self.library, name)
-        self.library.MPI_Allreduce(
+        kind = ctypes.c_char.in_dll(self.calls, "ompi_mpi_double")
+        op = ctypes.c_char.in_dll(self.calls, f"ompi_mpi_op_{name}")
+        self.calls.MPI_Allreduce(
             mine, found, len(values), ctypes.c_void_p(ctypes.addressof(kind)),
             ctypes.c_void_p(ctypes.addressof(op)), self.world)  # fmt: skip
         return list(found)
@@ -73,7 +58,7 @@ class _System:
     """Matrix and vectors of hypre for a slab of the tank."""
 
     def __init__(self, mpi: _Mpi, path: Path) -> None:
-        self.hypre = ctypes.CDLL(library())
+        self.hypre = ctypes.CDLL(ctypes.util.find_library("HYPRE"))
         self.call("Init")
         self.mpi = mpi
         self.cells, (cx, cy, cz), right = read(path)
@@ -160,13 +145,13 @@ def main(words: list[str]) -> None:
     mpi = _Mpi()
     system = _System(mpi, Path(path))
     runs = [system.solve(float(tolerance), relaxation) for _ in range(int(repeats))]
-    setup, solve = (mpi.slowest([run[k] for run in runs]) for k in (0, 1))
-    cpu = mpi.slowest([run[2] for run in runs], "ompi_mpi_op_sum")
+    setup, solve = (mpi.over_all([run[k] for run in runs], "max") for k in (0, 1))
+    cpu = mpi.over_all([run[2] for run in runs], "sum")
     if mpi.ask("MPI_Comm_rank") == 0:
         row = [*system.cells, mpi.ask("MPI_Comm_size"), runs[0][3]]
         print(*row, *(f"{v:.5e}" for v in (min(setup), min(solve), min(cpu), runs[0][4])), sep=",")
     sys.stdout.flush()
-    mpi.library.MPI_Finalize()
+    mpi.calls.MPI_Finalize()
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ outside which phi is 0.
 """
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,22 @@ def write(path: Path, cells: tuple[int, int, int]) -> Path:
     return path
 
 
+def read(path: Path) -> tuple[list[int], list[Array], Array]:
+    """Cells, coefficients of the lower faces across x, y, z and the right side of a file."""
+    data = path.read_bytes()
+    if data[:8] != b"POIS7P01":
+        raise ValueError(f"{path} holds no pressure system")
+    n = [int(v) for v in np.frombuffer(data, "<i8", 3, 8)]
+    nx, ny, nz = n
+    shapes = [(nz, ny, nx + 1), (nz, ny + 1, nx), (nz + 1, ny, nx), (nz, ny, nx)]
+    start, found = 8 + 24 + 24, []
+    for shape in shapes:
+        count = int(np.prod(shape))
+        found.append(np.frombuffer(data, "<f8", count, start).reshape(shape))
+        start += 8 * count
+    return n, found[:3], found[3]
+
+
 def _coefficients(rho: Array, axis: int, h: float) -> Array:
     """1/(rho h^2) of the faces across an axis (0 is x), an array that runs z, y, x."""
     rho = np.moveaxis(rho, 2 - axis, 0)
@@ -57,6 +74,7 @@ def _coefficients(rho: Array, axis: int, h: float) -> Array:
     return np.moveaxis(found, 0, 2 - axis)
 
 
+@cache
 def density(cells: tuple[int, int, int]) -> Array:
     """Density (nz, ny, nx) [kg/m3] of water under waves, air and blocks, from 4 points per edge."""
     solid = _samples(cells, _in_a_block).mean(axis=-1)

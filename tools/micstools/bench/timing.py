@@ -31,8 +31,14 @@ AS_ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 """Else Open MPI refuses to start in a container."""
 
 
+def mpirun(ranks: int) -> list[str]:
+    """The words before a program that is to run on some ranks; none for one."""
+    words = ["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(ranks)]
+    return words if ranks > 1 else []
+
+
 def timed(
-    words: Sequence[str | Path], folder: Path, settings: dict[str, str] | None = None
+    words: Sequence[object], folder: Path, settings: dict[str, str] | None = None
 ) -> tuple[float, float, float, str]:
     """Run a program, with `settings` in its environment: wall and CPU seconds, its own and its
     children's, largest memory of one of them [bytes], and what it said."""

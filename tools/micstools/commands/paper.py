@@ -32,14 +32,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def work(given: argparse.Namespace) -> int:
     """Run what is missing, tell the shares and write `shares.csv` and `shares.md`."""
     folder: Path = given.out
-    code = _ensemble(
-        given, CHOICES[0], program.case_text(given.case, []), folder / "drops", given.runs
-    )
+    case = program.case_text(given.case, [])
+    code = _ensemble(given, CHOICES[0], case, folder / "drops", given.runs)
     if code:
         return code
     _call(PILE, str(folder / "drops"))
     _call(REPORT, str(folder / "drops"))
     rows = [paper_ensemble.row_of(f"{given.case.name}, as it is", folder / "drops")]
+    _write(folder, rows)
     quick = program.case_text(given.case, [COARSE])
     for choice in CHOICES if given.moves else ():
         code = _ensemble(given, choice, quick, folder / choice.name, given.moves)
@@ -47,7 +47,6 @@ def work(given: argparse.Namespace) -> int:
             return code
         rows.append(paper_ensemble.row_of(f"coarse: {choice.words}", folder / choice.name))
         _write(folder, rows)
-    _write(folder, rows)
     print(paper_ensemble.as_markdown(rows), end="")
     return 0
 
