@@ -135,11 +135,14 @@ contains
   subroutine find_final_fault(sim, fault)
     type(simulation_t), intent(in) :: sim
     type(fault_t), intent(inout) :: fault
+    character(:), allocatable :: why
     integer :: n
 
     n = n_waiting(sim%clock%t, sim%blocks)
     if (n == 0) return
-    call set(sim, to_text(n)//' due block(s) never found room', fault)
+    why = ''
+    if (sim%clock%settled) why = ', and all others are at rest'
+    call set(sim, to_text(n)//' due block(s) never found room'//why, fault)
   end subroutine find_final_fault
 
   subroutine set(sim, what, fault)

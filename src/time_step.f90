@@ -25,7 +25,7 @@ module time_step_m
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
-  use release_m, only: release_due_blocks, next_release
+  use release_m, only: release_due_blocks, next_release, none_to_come
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow
@@ -190,7 +190,7 @@ contains
       if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
       speed = max(speed, norm2(sim%blocks%v(:, b)))
     end do
-    call sim%clock%note_speed(speed, all(sim%blocks%present))
+    call sim%clock%note_speed(speed, none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes

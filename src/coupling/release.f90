@@ -13,7 +13,7 @@ module release_m
   use overlap_m, only: overlap_t, room_for
   implicit none
   private
-  public :: release_due_blocks, next_release, n_waiting
+  public :: release_due_blocks, next_release, n_waiting, none_to_come
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
 
@@ -76,5 +76,15 @@ contains
     n = 0
     if (blocks%n > 0) n = count(.not. blocks%present .and. blocks%release_time < time - same_time)
   end function n_waiting
+
+  !> Is every block in the tank, or tried before this moment and without room? Once all blocks rest
+  !! nobody makes room any more.
+  pure function none_to_come(time, blocks) result(yes)
+    real(wp), intent(in) :: time   !! [s]
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+
+    yes = count(.not. blocks%present) == n_waiting(time, blocks)
+  end function none_to_come
 
 end module release_m

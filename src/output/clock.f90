@@ -22,7 +22,7 @@ module clock_m
     real(wp) :: t_end = 0.0_wp      !! [s]
     real(wp) :: next_row = 0.0_wp, next_frame = 0.0_wp, next_restart = 0.0_wp   !! due times [s]
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
-    logical :: settled = .false.    !! at rest for `rest_time`
+    logical :: settled = .false.    !! at rest for `rest_time`, and no block to come
     type(run_t) :: run              !! intervals and the rule for settling
   contains
     procedure :: choose_step, advance, finished, note_speed
@@ -104,12 +104,12 @@ contains
   end function finished
 
   !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
-  pure subroutine note_speed(self, speed, all_released)
+  pure subroutine note_speed(self, speed, none_to_come)
     class(clock_t), intent(inout) :: self
     real(wp), intent(in) :: speed          !! largest of all free blocks [m/s]
-    logical, intent(in) :: all_released
+    logical, intent(in) :: none_to_come    !! no block is still to be released, but for lack of room
 
-    if (.not. all_released .or. speed >= self%run%rest_speed) then
+    if (.not. none_to_come .or. speed >= self%run%rest_speed) then
       self%rest_began = -1.0_wp
     else if (self%rest_began < 0.0_wp) then
       self%rest_began = self%t

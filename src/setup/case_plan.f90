@@ -59,7 +59,7 @@ contains
     if (case%run%stop_when_settled) then
       call entry(unit, 'ends early', 'when every block is slower than ' &
         //brief(case%run%rest_speed) &
-                 //' m/s for '//brief(case%run%rest_time)//' s')
+        //' m/s for '//brief(case%run%rest_time)//' s')
     end if
   end subroutine print_run
 

@@ -1,0 +1,67 @@
+"""`stop_when_settled`: a run ends when nothing moves and no block is to come any more."""
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from run_cases import ROOT
+
+MICS = ROOT / "mics"
+RELEASED = 0.2
+"""When the second cube is due [s]."""
+CASE = """&run t_end = 5  dt = 0.01  physics = 'dry'  stop_when_settled = {stop}  rest_time = 0.3 /
+&grid cells = 4, 4, 4  length = 0.4, 0.4, 0.4 /
+&shape name = 'c'  kind = 'cube'  size = 0.1  density = 2300 /
+&drop shape = 'c'  position = 0.1, 0.2, 0.06  count = {count}  interval = 0.2 /
+"""
+LATER = "&drop shape = 'c'  position = 0.3, 0.2, 0.06  count = 1  first_time = 2 /\n"
+ALL_AT_REST = "1 due block(s) never found room, and all others are at rest"
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+def run(work: Path, case: str) -> tuple[int, str, float]:
+    """Exit code, messages and last time [s] of a run."""
+    (work / "case.nml").write_text(case)
+    done = subprocess.run(
+        [str(MICS), "--threads", "1", "--quiet", "case.nml"],
+        cwd=work,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    with h5py.File(work / "mics-out" / "run.h5") as h5:
+        told = int(np.ravel(h5["provenance"].attrs["exit_status"])[0])
+        assert told == done.returncode
+        return done.returncode, done.stderr, float(h5["series/time"][-1])
+
+
+def test_ends_when_all_rest(tmp_path: Path) -> None:
+    """A cube falls 1 cm: at rest well within a second."""
+    code, said, end = run(tmp_path, CASE.format(stop="T", count=1))
+    assert (code, said) == (0, "")
+    assert 0.3 < end < 1.0
+
+
+def test_ends_when_the_last_one_finds_no_room(tmp_path: Path) -> None:
+    """The second cube's place is the first one's; nobody will ever make room."""
+    code, said, end = run(tmp_path, CASE.format(stop="T", count=2))
+    assert code == 3 and ALL_AT_REST in said, said
+    assert RELEASED + 0.3 < end < 1.0
+
+
+def test_waits_for_those_to_come(tmp_path: Path) -> None:
+    """Beside a cube that waits in vain another is due at 2 s: the run sees it to the floor."""
+    code, said, end = run(tmp_path, CASE.format(stop="T", count=2) + LATER)
+    assert code == 3 and ALL_AT_REST in said, said
+    assert 2.3 < end < 3.0
+
+
+def test_goes_on_when_not_asked(tmp_path: Path) -> None:
+    """Without `stop_when_settled` the run goes to its end and does not speak of rest."""
+    code, said, end = run(tmp_path, CASE.format(stop="F", count=2))
+    assert code == 3 and end == pytest.approx(5.0)
+    assert "1 due block(s) never found room" in said and "at rest" not in said
