@@ -30,6 +30,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_sentence_has_shares_and_heights(report: Path) -> None:
     found = pile_ensemble.open_ensemble(report.parent, 0.002)
     said = ensemble_page.sentence(found)
+    assert "17\u00a0%" in said  # numbers and units stay on one line
+    said = said.replace("\u00a0", " ")
     assert said.startswith("In 2 of 12 (17 %, 5 to 45) runs every dropped block ends off the floor")
     assert "in 6 of 12 (50 %, 25 to 75) at least one more" in said
     assert "Half of the 10 complete piles are higher than" in said

@@ -99,11 +99,12 @@ def sentence(ensemble: Ensemble) -> str:
     said = [f"in {in_words(shares[name]['count'], total)} {words}" for name, words in _SAID.items()]
     tops = [1e3 * p.numbers.top for p in ensemble.whole]
     low, median, high = np.percentile(tops, [5, 50, 95])
-    return (
+    words = (
         f"{run_words.capital(', '.join(said))} (in brackets: share and 95 % interval). "
         f"Half of the {len(tops)} complete piles are higher than {median:.3g} mm, and 90 % have "
         f"their top between {low:.3g} and {high:.3g} mm."
     )
+    return words.replace(" %", "\u00a0%").replace(" mm", "\u00a0mm")
 
 
 def assumptions(ensemble: Ensemble) -> str:
