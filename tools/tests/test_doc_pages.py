@@ -5,7 +5,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from check_links import broken_links
-from doc_pages import IN_SITE, Links, Page, pages, with_links
+from doc_pages import IN_SITE, ROOT, Links, Page, pages, with_links
 
 PAGE = Page(PurePosixPath("docs/theory.md"), "page/theory")
 
@@ -53,6 +53,13 @@ def test_names_of_no_file_are_found(text: str) -> None:
 )
 def test_what_is_left_alone(text: str) -> None:
     assert linked(text) == (text, [])
+
+
+def test_all_texts_name_files_that_are_there() -> None:
+    links = Links(pages())
+    for page in pages():
+        with_links(page, (ROOT / page.source).read_text(), links)
+    assert links.problems == []
 
 
 @pytest.mark.parametrize(
