@@ -1,4 +1,5 @@
-"""Runs the members of an ensemble, several at once, on dask.distributed."""
+"""Runs the members of an ensemble, several at once, on dask.distributed: on this machine, or on
+workers that the queue of a cluster starts."""
 
 import contextlib
 import logging
@@ -7,26 +8,40 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from micstools import extras
+from micstools import ensemble_queue, extras
 from micstools.ensemble import Member, State, state
+from micstools.ensemble_queue import Queue
 
 _living: set[subprocess.Popen[bytes]] = set()
 _stopping = threading.Event()
 
 
-def execute(member: Member, program: Path) -> int | None:
-    """Run a member from where it stands to its end, on one thread; None when told to stop."""
+@dataclass(frozen=True)
+class Engine:
+    """What runs the members."""
+
+    program: Path
+    jobs: int  # at once
+    queue: Queue | None = None  # of a cluster; else this machine
+
+
+def execute(member: Member, program: Path, here: Path) -> int | None:
+    """Run a member from where it stands to its end, on one thread; None when told to stop. What
+    the case names is found from `here`, wherever a worker was started."""
+    member = replace(member, folder=here / member.folder)
     restarts = [p for p in member.result.glob("restart-[ab].h5") if p.is_file()]
     for path in sorted(restarts, key=lambda p: p.stat().st_mtime_ns, reverse=True):
-        code = _call(member, [str(program), "--restart", str(path), str(member.case)])
+        code = _call(member, [str(program), "--restart", str(path), str(member.case)], here)
         if code not in (2, 4):  # a damaged restart file: try the other, then the beginning
             return code
-    return _call(member, [str(program), "--output", str(member.result), str(member.case)])
+    return _call(member, [str(program), "--output", str(member.result), str(member.case)], here)
 
 
-def _call(member: Member, words: list[str]) -> int | None:
+def _call(member: Member, words: list[str], here: Path) -> int | None:
     if _stopping.is_set():
         return None
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
@@ -38,6 +53,7 @@ def _call(member: Member, words: list[str]) -> int | None:
             stdout=nothing,
             stderr=log,
             env=environment,
+            cwd=here,
             process_group=0,
         )
         _living.add(process)
@@ -49,31 +65,23 @@ def _call(member: Member, words: list[str]) -> int | None:
 
 
 def run_all(
-    waiting: Sequence[Member],
-    program: Path,
-    jobs: int,
-    ended: Callable[[Member, State], None],
+    waiting: Sequence[Member], engine: Engine, ended: Callable[[Member, State], None]
 ) -> None:
-    """Run all members, `jobs` at once, and tell of each end. On KeyboardInterrupt every run writes
-    its restart file before the exception goes on."""
+    """Run all members and tell of each end. On KeyboardInterrupt every run writes its restart file
+    before the exception goes on."""
     extras.need("ensemble")
-    import dask
-    from dask.distributed import Client, LocalCluster, as_completed
+    from dask.distributed import Client, as_completed
 
     _stopping.clear()
-    # A worker that was not heard of for minutes is given up: so would be that of a laptop asleep.
-    dask.config.set({"distributed.scheduler.worker-ttl": None})
-    cluster = LocalCluster(
-        n_workers=1,
-        threads_per_worker=jobs,
-        processes=False,
-        dashboard_address="127.0.0.1:0",  # any free port: ensembles may run side by side
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-    )
-    with cluster, Client(cluster) as client:
+    jobs = min(engine.jobs, len(waiting))
+    if engine.queue is None:
+        workers = _this_machine(jobs)
+    else:
+        workers = ensemble_queue.cluster(engine.queue, jobs, waiting[0].folder.parent / "jobs")
+    with workers, Client(workers) as client:
         try:
-            futures = {client.submit(execute, m, program, pure=False): m for m in waiting}
+            words = (engine.program, Path.cwd())
+            futures = {client.submit(execute, m, *words, pure=False): m for m in waiting}
             for future in as_completed(futures):
                 problem = future.exception()
                 if problem is not None:
@@ -81,8 +89,28 @@ def run_all(
                 else:
                     ended(futures[future], state(futures[future]))
         except KeyboardInterrupt:
-            stop()
+            if engine.queue is None:
+                stop()
+            else:
+                client.run(stop)
             raise
+
+
+def _this_machine(jobs: int) -> Any:
+    """One worker with a thread for each job. A worker that was not heard of for minutes is given
+    up: so would be that of a laptop asleep."""
+    import dask
+    from dask.distributed import LocalCluster
+
+    dask.config.set({"distributed.scheduler.worker-ttl": None})
+    return LocalCluster(
+        n_workers=1,
+        threads_per_worker=jobs,
+        processes=False,
+        dashboard_address="127.0.0.1:0",  # any free port: ensembles may run side by side
+        memory_limit=0,
+        silence_logs=logging.CRITICAL,
+    )
 
 
 def stop(patience: float = 60.0) -> None:

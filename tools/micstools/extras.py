@@ -11,7 +11,7 @@ from micstools.reader import BadRun
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
-    "ensemble": ("dask", "distributed"),
+    "ensemble": ("dask", "dask_jobqueue", "distributed"),
 }
 
 

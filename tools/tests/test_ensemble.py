@@ -7,12 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from micstools import cli, ensemble, ensemble_fields, settings, shares, slurm
 from micstools.ensemble import Plan
+from micstools.program import find as find_program
 from micstools.reader import BadRun, Run
 from synthetic import Motion, write_run
 
@@ -241,6 +243,160 @@ def test_the_slurm_script_is_a_script(tmp_path: Path) -> None:
     )
     folder = tmp_path / "a b" / "0004"
     assert done.stdout == f"--quiet --output {folder}/result {folder}/case.nml\n"
+
+
+BLOCKS = """\
+&run t_end = 30.0  physics = 'dry'  restart_interval = 0.5 /
+&grid cells = 30, 10, 20  length = 0.3, 0.1, 0.2 /
+&shape name = 'cube' kind = 'cube' size = 0.02 /
+&drop shape = 'cube' position = 0.15, 0.05, 0.1 count = 8 spread = 0.02, 0.02, 0.0 /
+"""
+
+
+def ensemble_words(folder: Path, jobs: int) -> list[str]:
+    return [sys.executable, "-m", "micstools.cli", "ensemble", str(folder.parent / "blocks.nml"),
+            "--runs", "3", "--jobs", str(jobs), "--out", str(folder)]  # fmt: skip
+
+
+def wait_until(happened: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not happened():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def interrupted(folder: Path, restarts: int) -> str:
+    """Start an ensemble, press Ctrl-C once some restart files are there; what it said."""
+    running = subprocess.Popen(ensemble_words(folder, 2), stderr=subprocess.PIPE, text=True,
+                               preexec_fn=ctrl_c_counts)  # fmt: skip
+    try:
+        wait_until(lambda: len(list(folder.glob("*/result/restart-*.h5"))) >= restarts)
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    return said
+
+
+def ctrl_c_counts() -> None:
+    """Also where whoever runs the tests had switched it off, as `sh` does for what ends in &."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.cost(30)
+def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) -> None:
+    """With the program itself: runs stopped on their way, then gone on with, against runs that
+    were left alone, one after the other."""
+    try:
+        built = find_program()
+    except BadRun:
+        pytest.skip("mics is not built")
+    (tmp_path / "blocks.nml").write_text(BLOCKS)
+    stopped, whole = tmp_path / "stopped", tmp_path / "whole"
+    assert "stopped; the same command goes on" in interrupted(stopped, 2)
+    assert set(outcomes(stopped)) <= {"interrupted", "missing", "settled"}
+    assert "interrupted" in outcomes(stopped)
+    assert subprocess.run(ensemble_words(stopped, 2)).returncode == 0
+    assert subprocess.run([*ensemble_words(whole, 1), "--program", built]).returncode == 0
+    assert outcomes(whole) == ["settled"] * 3
+    for name in ("ensemble.csv", "ensemble.json"):
+        assert (stopped / name).read_bytes() == (whole / name).read_bytes()
+    for number in ("0001", "0002", "0003"):
+        one, two = (Run(folder / number / "result").bodies for folder in (stopped, whole))
+        assert (one.time == two.time).all() and (one.position == two.position).all()
+
+
+# Stand-ins for sbatch and scancel, qsub and qdel: the job begins at once, on this machine.
+SUBMIT = """\
+#!/bin/sh
+if [ -e {folder}/full ]; then echo "the queue is full" >&2; exit 1; fi
+setsid sh "$(cp "$1" {folder}/job.$$ && echo {folder}/job.$$)" > {folder}/said.$$ 2>&1 &
+echo "Submitted batch job $!"
+"""
+CANCEL = """\
+#!/bin/sh
+kill -- -"$1"
+"""
+
+
+@pytest.fixture
+def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "queue"
+    folder.mkdir()
+    for names, text in ((("sbatch", "qsub"), SUBMIT), (("scancel", "qdel"), CANCEL)):
+        for name in names:
+            (folder / name).write_text(text.replace("{folder}", str(folder)))
+            (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+    return folder
+
+
+@pytest.mark.cost(10)
+@pytest.mark.parametrize("system", ["slurm", "pbs"])
+def test_a_queue_gives_the_same_table(
+    tmp_path: Path, program: Path, queue: Path, system: str, capfd
+) -> None:
+    words = ("--runs", "3", "--jobs", "2", "--seed", "3", "--out")
+    asked = ("--cluster", system, "walltime=1:00:00", "queue=short")
+    assert call(program, *words, str(tmp_path / "queued"), *asked) == 0
+    assert call(program, *words, str(tmp_path / "here")) == 0
+    for name in ("ensemble.csv", "ensemble.json"):
+        assert (tmp_path / "queued" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+    job = next(queue.glob("job.*")).read_text()
+    assert {"slurm": "#SBATCH -t 1:00:00\n", "pbs": "#PBS -l walltime=1:00:00\n"}[system] in job
+    assert {"slurm": "#SBATCH -p short\n", "pbs": "#PBS -q short\n"}[system] in job
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.cost(10)
+def test_ctrl_c_reaches_the_runs_of_a_queue(tmp_path: Path, program: Path, queue: Path) -> None:
+    slow = program.read_text().replace("import h5py", "import time; time.sleep(50)\nimport h5py")
+    program.write_text(slow)
+    out = tmp_path / "out"
+    words = [sys.executable, "-m", "micstools.cli", "ensemble", str(tmp_path / "case.nml"),
+             "--program", str(program), "--runs", "2", "--jobs", "1", "--out", str(out),
+             "--cluster", "slurm"]  # fmt: skip
+    running = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
+    try:
+        wait_until((out / "0001" / "log.txt").exists)
+        time.sleep(0.5)
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=40)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    assert said == "stopped; the same command goes on where each run stood\n"
+    assert "KeyboardInterrupt" in (out / "0001" / "log.txt").read_text()
+
+
+def test_a_queue_that_takes_no_job_is_one_line(
+    tmp_path: Path, program: Path, queue: Path, capsys
+) -> None:
+    words = ("--runs", "2", "--jobs", "2", "--out", str(tmp_path / "out"), "--cluster")
+    (queue / "full").touch()
+    assert call(program, *words, "slurm") == 2
+    assert capsys.readouterr().err == (
+        "mics-tools ensemble: --cluster slurm: sbatch takes no job: the queue is full\n"
+    )
+    for wish, said in (
+        (["lsf"], "--cluster lsf: must be slurm or pbs"),
+        (["pbs", "nodes=3"], "must be NAME=VALUE, of walltime, queue, account, memory, interface"),
+        (["pbs", "memory=much"], "--cluster pbs: Could not interpret 'much' as a byte unit"),
+        (["pbs", "--slurm"], "give one"),
+    ):
+        assert call(program, *words, *wish) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert said in line
+
+
+def test_a_queue_that_is_not_here_is_one_line(
+    tmp_path: Path, program: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    words = ("--runs", "2", "--out", str(tmp_path / "out"), "--cluster", "slurm")
+    assert call(program, *words) == 2
+    assert "there is no sbatch on this machine" in capsys.readouterr().err
 
 
 @pytest.mark.cost(20)

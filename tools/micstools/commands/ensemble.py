@@ -16,6 +16,7 @@ from micstools import (
     ensemble,
     ensemble_engine,
     ensemble_fields,
+    ensemble_queue,
     ensemble_table,
     program,
     settings,
@@ -23,6 +24,7 @@ from micstools import (
 )
 from micstools.commands.base import Command
 from micstools.ensemble import Member, Plan, State
+from micstools.ensemble_engine import Engine
 from micstools.reader import BadRun
 
 STOPPED = 130
@@ -44,6 +46,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, help="folder, default mics-ensemble-CASE")
     add("--slurm", nargs="*", metavar="OPTION", help="write a Slurm array script instead of "
         "running, with options of sbatch such as time=2:00:00")  # fmt: skip
+    add("--cluster", nargs="+", metavar="WORD", help="slurm or pbs: let its queue start --jobs "
+        "workers, with NAME=VALUE for each job: " + ", ".join(ensemble_queue.OPTIONS)
+        + "; this call waits for them")  # fmt: skip
 
 
 def _plan(given: argparse.Namespace) -> Plan:
@@ -99,8 +104,8 @@ def _alone(folder: Path) -> Iterator[IO[str]]:
 class _Live:
     """Tells of the runs that end: a line that changes on a terminal, else a line each."""
 
-    def __init__(self, plan: Plan, table: dict[Member, State], jobs: int) -> None:
-        self.plan, self.table, self.jobs = plan, table, jobs
+    def __init__(self, plan: Plan, table: dict[Member, State]) -> None:
+        self.plan, self.table = plan, table
         self.left = sum(not end.counts for end in table.values())
         self.todo, self.start = self.left, time.monotonic()
         self.terminal = sys.stdout.isatty()
@@ -133,11 +138,11 @@ def _terminated(signum: int, _frame: object) -> NoReturn:
 
 
 def _ensemble(given: argparse.Namespace) -> int:
-    path, plan = program.find(given.program), _plan(given)
+    plan, engine = _plan(given), _engine(given)
     members = list(ensemble.members(plan))
     _differ(plan, members)
     wanted, again = _kept(given, plan, len(members))
-    cost = _cost(path, plan, members)
+    cost = _cost(engine.program, plan, members)
     with _alone(plan.folder):
         for member in members:
             ensemble.write_case(member)
@@ -148,12 +153,19 @@ def _ensemble(given: argparse.Namespace) -> int:
         sys.stdout.flush()
         ensemble_table.write(plan, table)
         if given.slurm is not None:
-            return _write_slurm(plan, waiting, path, given.slurm)
-        code = _compute(plan, table, waiting, path, given.jobs)
+            return _write_slurm(plan, waiting, engine.program, given.slurm)
+        code = _compute(plan, table, waiting, engine)
         if again is None or code == STOPPED:
             return code
         numbers = wanted or ensemble_fields.medians(table)
-        return max(code, _run_again([again[number - 1] for number in numbers], path, given.jobs))
+        return max(code, _run_again([again[number - 1] for number in numbers], engine))
+
+
+def _engine(given: argparse.Namespace) -> Engine:
+    queue = ensemble_queue.parse(given.cluster) if given.cluster else None
+    if queue and given.slurm is not None:
+        raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
+    return Engine(program.find(given.program), given.jobs, queue)
 
 
 def _kept(
@@ -167,7 +179,7 @@ def _kept(
     return ensemble_fields.parse(given.keep_fields, runs), ensemble_fields.with_fields(plan)
 
 
-def _run_again(chosen: list[Member], path: Path, jobs: int) -> int:
+def _run_again(chosen: list[Member], engine: Engine) -> int:
     """Run members with their fields, as far as that is not done yet."""
     for member in chosen:
         ensemble.write_case(member)
@@ -176,7 +188,7 @@ def _run_again(chosen: list[Member], path: Path, jobs: int) -> int:
           f"{len(waiting)} of them to do", flush=True)  # fmt: skip
     try:
         if waiting:
-            ensemble_engine.run_all(waiting, path, min(jobs, len(waiting)), lambda *_: None)
+            ensemble_engine.run_all(waiting, engine, lambda *_: None)
     except KeyboardInterrupt:
         print("stopped; the same command goes on where each run stood", file=sys.stderr)
         return STOPPED
@@ -197,15 +209,13 @@ def _write_slurm(plan: Plan, waiting: list[Member], path: Path, options: list[st
     return 0
 
 
-def _compute(
-    plan: Plan, table: dict[Member, State], waiting: list[Member], path: Path, jobs: int
-) -> int:
-    live = _Live(plan, table, jobs)
+def _compute(plan: Plan, table: dict[Member, State], waiting: list[Member], engine: Engine) -> int:
+    live = _Live(plan, table)
     signal.signal(signal.SIGTERM, _terminated)
     stopped = False
     try:
         if waiting:
-            ensemble_engine.run_all(waiting, path, min(jobs, len(waiting)), live.ended)
+            ensemble_engine.run_all(waiting, engine, live.ended)
     except KeyboardInterrupt:
         stopped = True
     live.close()
@@ -233,6 +243,7 @@ ENSEMBLE = Command(
         "ensemble input/blocks_coarse.nml --runs 50 --keep-fields median",
         "ensemble input/blocks_coarse.nml --runs 20 --vary contact.friction=0.4,0.6 --out mics-mu",
         "ensemble input/blocks.nml --runs 50 --slurm time=2:00:00 partition=short",
+        "ensemble input/blocks.nml --runs 50 --cluster slurm walltime=2:00:00 queue=short --jobs 50",
     ),
     _arguments,
     _ensemble,
