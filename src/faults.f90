@@ -141,7 +141,7 @@ contains
     n = n_waiting(sim%clock%t, sim%blocks)
     if (n == 0) return
     why = ''
-    if (sim%clock%settled) why = ', and all others are at rest'
+    if (sim%clock%settled()) why = ', and all others are at rest'
     call set(sim, to_text(n)//' due block(s) never found room'//why, fault)
   end subroutine find_final_fault
 

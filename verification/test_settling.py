@@ -60,6 +60,16 @@ def test_waits_for_those_to_come(tmp_path: Path) -> None:
     assert 2.3 < end < 3.0
 
 
+def test_a_settled_run_has_no_more_to_do(tmp_path: Path) -> None:
+    """Gone on with, it makes no step: an ensemble that is called again keeps its table."""
+    _, _, end = run(tmp_path, CASE.format(stop="T", count=1))
+    files = sorted((tmp_path / "mics-out").glob("restart-*.h5"), key=lambda p: p.stat().st_mtime_ns)
+    words = [str(MICS), "--threads", "1", "--quiet", "--restart", str(files[-1]), "case.nml"]
+    subprocess.run(words, cwd=tmp_path, timeout=120, check=True)
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as h5:
+        assert float(h5["series/time"][-1]) == end
+
+
 def test_goes_on_when_not_asked(tmp_path: Path) -> None:
     """Without `stop_when_settled` the run goes to its end and does not speak of rest."""
     code, said, end = run(tmp_path, CASE.format(stop="F", count=2))

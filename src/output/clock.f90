@@ -22,10 +22,9 @@ module clock_m
     real(wp) :: t_end = 0.0_wp      !! [s]
     real(wp) :: next_row = 0.0_wp, next_frame = 0.0_wp, next_restart = 0.0_wp   !! due times [s]
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
-    logical :: settled = .false.    !! at rest for `rest_time`, and no block to come
     type(run_t) :: run              !! intervals and the rule for settling
   contains
-    procedure :: choose_step, advance, finished, note_speed
+    procedure :: choose_step, advance, finished, settled, note_speed
     procedure :: row_due, frame_due, restart_due, row_done, frame_done, restart_done
   end type clock_t
 
@@ -100,8 +99,17 @@ contains
     class(clock_t), intent(in) :: self
     logical :: yes
 
-    yes = self%t >= self%t_end - same_time .or. self%settled
+    yes = self%t >= self%t_end - same_time .or. self%settled()
   end function finished
+
+  !> Have all blocks been at rest for `rest_time`, with none to come, in a run that ends then?
+  pure function settled(self) result(yes)
+    class(clock_t), intent(in) :: self
+    logical :: yes
+
+    yes = self%run%stop_when_settled .and. self%rest_began >= 0.0_wp &
+      .and. self%t - self%rest_began >= self%run%rest_time - same_time
+  end function settled
 
   !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
   pure subroutine note_speed(self, speed, none_to_come)
@@ -114,8 +122,6 @@ contains
     else if (self%rest_began < 0.0_wp) then
       self%rest_began = self%t
     end if
-    self%settled = self%run%stop_when_settled .and. self%rest_began >= 0.0_wp &
-      .and. self%t - self%rest_began >= self%run%rest_time - same_time
   end subroutine note_speed
 
   !> Is a row due now?

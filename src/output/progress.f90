@@ -159,7 +159,7 @@ contains
     steps = clock%step - self%first_step
     how = 'stopped with code '//to_text(exit_code)
     if (exit_code == 0) how = 'finished'
-    if (exit_code == 0 .and. clock%settled) how = 'settled'
+    if (exit_code == 0 .and. clock%settled()) how = 'settled'
     line = how//' at t = '//fixed_text(clock%t, 5)//' s: '//to_text(steps)//' steps in ' &
       //fixed_text(seconds, 1)//' s'
     if (self%fluid .and. steps > 0) line = line//', ' &

@@ -243,7 +243,7 @@ ENSEMBLE = Command(
         "ensemble input/blocks_coarse.nml --runs 50 --keep-fields median",
         "ensemble input/blocks_coarse.nml --runs 20 --vary contact.friction=0.4,0.6 --out mics-mu",
         "ensemble input/blocks.nml --runs 50 --slurm time=2:00:00 partition=short",
-        "ensemble input/blocks.nml --runs 50 --cluster slurm walltime=2:00:00 queue=short --jobs 50",
+        "ensemble input/blocks.nml --runs 50 --jobs 50 --cluster slurm walltime=2:00:00 queue=day",
     ),
     _arguments,
     _ensemble,
