@@ -139,7 +139,7 @@ def state(member: Member) -> State:
             code = int(np.ravel(h5["provenance"].attrs["exit_status"])[0])
             time = float(h5["series/time"][-1])
     except (OSError, RuntimeError, KeyError, IndexError, ValueError) as error:
-        return State("failed", None, reason=f"run.h5 cannot be read ({error})")
+        return State("failed", None, reason=last or f"run.h5 cannot be read ({error})")
     if code == 0:
         end = settings_end(member.text)
         return State("time over" if time >= end - 1e-9 else "settled", code, time)

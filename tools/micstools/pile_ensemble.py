@@ -70,6 +70,12 @@ class Ensemble:
         return [p for p in self.piles if p.complete]
 
     @property
+    def example(self) -> Pile:
+        """The one that stands for what all have in common: the first with all its blocks, if any
+        has."""
+        return next(iter(self.whole), self.piles[0])
+
+    @property
     def choices(self) -> list[dict[str, Any]]:
         """The varied variables, a dictionary for each choice."""
         found: list[dict[str, Any]] = self.about["choices"]

@@ -12,7 +12,6 @@ import pytest
 from browser import MISSING, Browser
 from micstools import cli, pile_ensemble
 from micstools.page import charts, ensemble_page
-from micstools.reader import BadRun
 from test_pile_ensemble import ENDS, WAITING, write_ensemble
 
 in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
@@ -60,10 +59,19 @@ def test_what_is_taken_along_is_whole(report: Path) -> None:
     assert json.loads(base64.b64decode(content))["complete"] == 10
 
 
-def test_an_ensemble_without_a_complete_pile_has_no_page(tmp_path: Path) -> None:
-    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, [WAITING]), 0.002)
-    with pytest.raises(BadRun, match="no pile with all its blocks"):
-        ensemble_page.page(found)
+def test_an_ensemble_without_a_complete_pile_tells_so(tmp_path: Path) -> None:
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, [WAITING] * 2), 0.002)
+    text = ensemble_page.page(found).replace("\u00a0", " ")
+    assert "in 2 of 2 (100 %, 34 to 100) a block finds no room" in text
+    assert "No pile has all its blocks, so there is no mean pile." in text
+    assert text.count("data-pile=") == 2 and 'id="plan"' not in text
+
+
+def test_one_pile_is_an_ensemble(tmp_path: Path) -> None:
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, ENDS[:1]), 0.002)
+    text = ensemble_page.page(found).replace("\u00a0", " ")
+    assert "In 0 of 1 (0 %, 0 to 79) runs" in text
+    assert re.search(r"The one complete pile is [0-9.]+ mm high", text)
 
 
 def test_each_choice_has_its_own_maps(tmp_path: Path) -> None:
@@ -91,6 +99,14 @@ def test_a_histogram_counts_every_value() -> None:
     unit = min(heights)
     assert sum(round(h / unit) for h in heights) == 4
     assert "0.5" not in re.findall(r">([\d.]+)</text>", drawn)
+
+
+def test_values_that_differ_by_rounding_are_one_bar() -> None:
+    values = 40.0 + 1e-14 * np.arange(3)
+    drawn = charts.histogram(values, "a", [(40.0, "median")])
+    assert drawn.count('class="bar"') == 1
+    low, high = charts.spanning(values)
+    assert low < 39 and high > 41
 
 
 @pytest.fixture(scope="module")

@@ -67,7 +67,8 @@ def spanning(values: Array, zero: bool = False) -> tuple[float, float]:
     found = found[np.isfinite(found)]
     low, high = (float(found.min()), float(found.max())) if found.size else (0.0, 1.0)
     low, high = (min(low, 0.0), max(high, 0.0)) if zero else (low, high)
-    room = 0.04 * (high - low) or max(abs(high), 1.0) * 0.5
+    alike = high - low <= 1e-6 * max(abs(low), abs(high))  # but for rounding
+    room = max(abs(high), 1.0) * 0.5 if alike else 0.04 * (high - low)
     return (low if zero and low == 0 else low - room), high + room
 
 

@@ -26,8 +26,7 @@ from micstools.page.html import (
 from micstools.page.parts import number, player
 from micstools.page.run_words import count, millimetres
 from micstools.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
-from micstools.pile_numbers import PileNumbers
-from micstools.reader import BadRun, Run
+from micstools.reader import Run
 from micstools.shares import in_words
 
 _START = """
@@ -56,24 +55,22 @@ class Quantity:
     """A number that is shown as a histogram."""
 
     name: str
-    value: Callable[[PileNumbers], float]
+    value: Callable[[Pile], float]
 
 
 _QUANTITIES = (
-    Quantity("top of the pile [mm]", lambda n: 1e3 * n.top),
-    Quantity("plan area covered [cm²]", lambda n: 1e4 * n.plan_area),
-    Quantity("contacts per block", lambda n: n.coordination),
-    Quantity("porosity of the box around the pile", lambda n: n.porosity),
-    Quantity("time to rest [s]", lambda n: n.time_to_rest),
-    Quantity("hardest contact [N]", lambda n: n.contact_force),
+    Quantity("top of the pile [mm]", lambda p: _top(p)),
+    Quantity("plan area covered [cm²]", lambda p: 1e4 * p.numbers.plan_area),
+    Quantity("contacts per block", lambda p: p.numbers.coordination),
+    Quantity("porosity of the box around the pile", lambda p: p.numbers.porosity),
+    Quantity("time to rest [s]", lambda p: p.numbers.time_to_rest),
+    Quantity("hardest contact [N]", lambda p: p.numbers.contact_force),
 )
 
 
 def page(ensemble: Ensemble) -> str:
     """The page of an ensemble as text."""
-    if not ensemble.whole:
-        raise BadRun(f"{ensemble.folder} holds no pile with all its blocks: nothing can be drawn")
-    run = ensemble.whole[0].run
+    run = ensemble.example.run
     title = f"{run_words.title(run)}: {count(len(ensemble.piles), 'run')}"
     return document(
         title,
@@ -81,8 +78,7 @@ def page(ensemble: Ensemble) -> str:
         tag("p", sentence(ensemble), class_="lead"),
         tag("p", assumptions(ensemble)),
         _patterns(ensemble),
-        _plan(ensemble),
-        _histograms(ensemble),
+        *([_plan(ensemble), _histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
         _running(ensemble),
         _health(ensemble),
@@ -97,19 +93,32 @@ def sentence(ensemble: Ensemble) -> str:
     """Shares of the patterns and the height of the piles, each with its interval."""
     total, shares = len(ensemble.piles), pile_ensemble.pattern_shares(ensemble.piles)
     said = [f"in {in_words(shares[name]['count'], total)} {words}" for name, words in _SAID.items()]
-    tops = [1e3 * p.numbers.top for p in ensemble.whole]
+    words = f"{run_words.capital(', '.join(said))} (in brackets: share and 95 % interval). "
+    words += _heights([_top(p) for p in ensemble.whole])
+    return words.replace(" %", "\u00a0%").replace(" mm", "\u00a0mm")
+
+
+def _top(p: Pile) -> float:
+    """Height of a pile above the floor of the tank [mm]."""
+    return 1e3 * (p.numbers.top - float(p.run.grid.low[2]))
+
+
+def _heights(tops: list[float]) -> str:
+    """The tops [mm] of the complete piles in words."""
+    if not tops:
+        return "No pile has all its blocks, so there is no mean pile."
+    if len(tops) == 1:
+        return f"The one complete pile is {tops[0]:.3g} mm high."
     low, median, high = np.percentile(tops, [5, 50, 95])
-    words = (
-        f"{run_words.capital(', '.join(said))} (in brackets: share and 95 % interval). "
+    return (
         f"Half of the {len(tops)} complete piles are higher than {median:.3g} mm, and 90 % have "
         f"their top between {low:.3g} and {high:.3g} mm."
     )
-    return words.replace(" %", "\u00a0%").replace(" mm", "\u00a0mm")
 
 
 def assumptions(ensemble: Ensemble) -> str:
     """What the shares rest on."""
-    run = ensemble.whole[0].run
+    run = ensemble.example.run
     varied = sorted({name for choice in ensemble.choices for name in choice})
     said = ["This rests on what was assumed: " + _friction(run, varied)]
     by_chance = [w for drop in run.parameters.get("drop", []) for w in run_words.chance(drop)]
@@ -188,7 +197,7 @@ def _plan(ensemble: Ensemble) -> Markup:
     choices = [c for c in ensemble.choices if any(p.complete for p in ensemble.of(c))]
     found = [pile_ensemble.maps(ensemble, choice) for choice in choices]
     top = 1e3 * max(float(maps.high.max()) for maps in found)
-    size = ensemble.whole[0].run.grid
+    size = ensemble.example.run.grid
     extent = " x ".join(millimetres(v) for v in (size.high - size.low)[:2])
     note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
     note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
@@ -215,7 +224,7 @@ def _histograms(ensemble: Ensemble) -> Markup:
     drawn: list[Markup] = []
     rows: list[list[object]] = []
     for quantity in _QUANTITIES:
-        values = [quantity.value(p.numbers) for p in ensemble.whole]
+        values = [quantity.value(p) for p in ensemble.whole]
         spread = pile_ensemble.spread_of(values)
         if spread is None:
             continue
@@ -262,7 +271,7 @@ def _thumbnail(p: Pile, marks: list[str]) -> Markup:
     colours = views.block_colours(b.dropped, b.n)
     sheet = views.Sheet(grid.low, grid.high, views.bed_of(p.run), _SMALL)
     address = views.uri(sheet.picture(bodies, colours, "front")[0], 48)
-    words = f"run {p.number}, top {millimetres(p.numbers.top - float(grid.low[2]))}"
+    words = f"run {p.number}, top {millimetres(1e-3 * _top(p))}"
     image = tag("img", src=address, alt=f"pile of {words}")
     said = markup(image, words, *(tag("b", mark) for mark in marks))
     button = tag("button", said, type="button", data_pile=p.number)
@@ -271,7 +280,7 @@ def _thumbnail(p: Pile, marks: list[str]) -> Markup:
 
 def _scenes(ensemble: Ensemble) -> dict[str, Any]:
     """The last row of every run for the player; the tank and the shapes once."""
-    tank = motion.tank(ensemble.whole[0].run)
+    tank = motion.tank(ensemble.example.run)
     return {"tank": tank, "runs": {p.number: _shown(p) for p in ensemble.piles}}
 
 
@@ -285,7 +294,7 @@ def _shown(p: Pile) -> dict[str, Any]:
              f"{n.coordination:.2f} contacts per block",
              f"{count(n.on_floor, 'dropped block')} on the floor",
              f"folder {p.row['folder']}"]  # fmt: skip
-    top = millimetres(n.top - float(p.run.grid.low[2]))
+    top = millimetres(1e-3 * _top(p))
     return {
         "title": f"Run {p.number}: pattern {p.pattern}, top {top}",
         "about": "; ".join(about) + ".",
@@ -301,7 +310,7 @@ def _running(ensemble: Ensemble) -> Markup:
     percent = steps * np.array([1, 100, 100, 100])
     names = ("number of runs", f"share of pattern {name} [%]")
     drawn = [charts.band(percent, names, (0, 100))]
-    tops = [1e3 * p.numbers.top for p in ensemble.whole]
+    tops = [_top(p) for p in ensemble.whole]
     known = [
         [n, float(np.median(tops[:n])), *pile_ensemble.median_interval(tops[:n])]
         for n in range(6, len(tops) + 1)
@@ -348,7 +357,7 @@ def _case(ensemble: Ensemble, run: Run) -> Markup:
     about = ensemble.about
     p = run.provenance
     words = [tag("p", text) for text in run_words.case(run)]
-    which = f"As in run {ensemble.whole[0].number}; seeds differ from run to run."
+    which = f"As in run {ensemble.example.number}; seeds differ from run to run."
     words.append(tag("p", which, class_="note"))
     command = f"mics-tools ensemble case.nml --runs {about['runs']} --seed {about['seed']}"
     if about.get("spread") is not None:
@@ -385,7 +394,7 @@ def _table(ensemble: Ensemble) -> Markup:
             *(str(p.row.get(name, "")) for name in varied),
             p.pattern,
             f"{p.numbers.blocks} of {p.run.bodies.n}",
-            f"{1e3 * p.numbers.top:.1f}",
+            f"{_top(p):.1f}",
             f"{1e4 * p.numbers.plan_area:.1f}",
             f"{p.numbers.coordination:.2f}",
             number(p.numbers.porosity),
