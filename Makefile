@@ -59,7 +59,7 @@ help:
 	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
 	@echo 'make SAN=1    ./mics_san, under the address and undefined behaviour sanitizers'
-	@echo 'make run      deps, build, run $(CASE), draw the pictures'
+	@echo 'make run      deps, build, run $(CASE), draw the pictures, make the page'
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
@@ -150,6 +150,7 @@ run: deps
 	./mics < $(CASE)
 	$(PYTHON) tools/plot_pile.py $(CASE)
 	$(PYTHON) tools/plot_history.py $(CASE)
+	$(PYTHON) -m micstools.cli report $(CASE)
 
 test:
 	@$(deps) test shape ensemble

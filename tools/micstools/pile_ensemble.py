@@ -108,7 +108,7 @@ def open_ensemble(
 ) -> Ensemble:
     """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
     the tank; `box` is that of the porosity, by default the one around each pile."""
-    about = json.loads((folder / "ensemble.json").read_text())
+    about = _about(folder / "ensemble.json")
     table = about["table"]
     done = [row for row in table if row["outcome"] in OUTCOMES]
     left = {int(row["run"]): str(row["outcome"]) for row in table if row not in done}
@@ -119,6 +119,19 @@ def open_ensemble(
         step = float((grid.high - grid.low)[:2].max()) / 300
     piles = [_pile(folder, row, step, box) for row in done]
     return Ensemble(folder, about, piles, step, left)
+
+
+def _about(path: Path) -> dict[str, Any]:
+    """What an ensemble says of itself."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text())
+        if found["format"] != "mics-ensemble":
+            raise KeyError("format")
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadRun(
+            f"{path}: cannot be read; the same `mics-tools ensemble` writes it anew"
+        ) from error
+    return found
 
 
 def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:

@@ -48,5 +48,7 @@ def test_every_extra_has_its_packages() -> None:
     root = Path(__file__).parents[2]
     for extra, names in extras.PACKAGES.items():
         text = (root / f"requirements-{extra}.txt").read_text()
-        pinned = {line.split("==")[0].replace("-", "_") for line in text.splitlines() if "==" in line}
+        pinned = {
+            line.split("==")[0].replace("-", "_") for line in text.splitlines() if "==" in line
+        }
         assert pinned == set(names)

@@ -3,8 +3,10 @@
 import base64
 import json
 import re
+import subprocess
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -65,6 +67,22 @@ def test_a_title_stays_a_title(report: Path) -> None:
         and "document.title = "
         not in text.replace("&#x27;", "'").split("&lt;script&gt;document.title = ")[0]
     )
+
+
+def test_a_run_without_blocks_has_a_page(make_run) -> None:
+    run = make_run(Motion(t_end=0.1))
+    run.__dict__["bodies"] = replace(run.bodies, shape=[])
+    text = run_page.page(run)
+    assert "without blocks" in text and "There are no blocks." in text
+    assert "drift of the liquid volume" in text and "overlap" not in text.split("<main>")[1]
+
+
+def test_make_run_makes_the_page() -> None:
+    """The newcomer's one command ends with the page of its case."""
+    root = Path(__file__).parents[2]
+    words = ["make", "-n", "run", "CASE=input/dam_break.nml"]
+    done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].endswith(" report input/dam_break.nml")
 
 
 def test_nothing_is_loaded_from_outside(report: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from micstools import labels, plots, scene
+from micstools import cli, labels, plots, scene
 from micstools.reader import Run
 from micstools.shapes import hexapod
 from synthetic import UPRIGHT, Motion
@@ -129,6 +129,13 @@ def test_camera_holds_the_tank() -> None:
             half = np.tan(np.radians(camera.angle / 2))
             assert height < half
             assert width < half / camera.aspect
+
+
+def test_a_time_beyond_the_end_is_refused(loose_pile: Run, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main(["plot", str(loose_pile.folder), "--times", "1e3"])
+    assert end.value.code == 2
+    assert "--times 1000: the run goes from 0 to" in capsys.readouterr().err
 
 
 def test_missing_libraries_end_the_program_with_the_command(monkeypatch, capsys) -> None:

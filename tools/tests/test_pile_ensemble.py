@@ -119,6 +119,16 @@ def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:
         pile_ensemble.open_ensemble(write_ensemble(tmp_path, []))
 
 
+@pytest.mark.parametrize("text", ['{"format": "mics-ens', "{}", "[]", '{"format": "x"}'])
+def test_a_damaged_table_is_one_line(tmp_path: Path, text: str, capsys) -> None:
+    (tmp_path / "ensemble.json").write_text(text)
+    for command in ("pile", "report"):
+        with pytest.raises(SystemExit) as end:
+            cli.main([command, str(tmp_path)])
+        assert end.value.code == 2
+        assert "ensemble.json: cannot be read; the same" in capsys.readouterr().err
+
+
 def test_interval_of_a_median() -> None:
     """Ranks 6 and 15 of 20: Conover, table A3 (binomial, 20, one half); none below six."""
     assert pile_ensemble.median_interval(list(range(1, 21))) == (6, 15)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from micstools import command, pile, plots, scene
 from micstools.commands.base import Command
+from micstools.reader import BadRun
 
 
 def picture_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +24,10 @@ def draw_pictures(given: argparse.Namespace) -> int:
     out = given.out or run.folder / "pictures"
     out.mkdir(parents=True, exist_ok=True)
     times = given.times or pile.telling_times(run)
+    last = float(run.series.time[-1])
+    for t in given.times or []:
+        if not 0 <= t <= last + 1e-9:
+            raise BadRun(f"--times {t:g}: the run goes from 0 to {last:g} s")
     views = given.view or scene.telling_views(run)
     speed = scene.arrow_speed(run, times, views)
     style = scene.Style(width=given.width, speed=speed)

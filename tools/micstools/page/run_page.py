@@ -16,7 +16,7 @@ from micstools.page.parts import number, player, swatch
 from micstools.page.run_words import count, millimetres
 from micstools.page.views import Sheet, bed_of, block_colours
 from micstools.pile_numbers import PileNumbers
-from micstools.reader import BadRun, Run
+from micstools.reader import Run
 
 _START = """
 const runPlayer = startPlayer(document.getElementById('player'));
@@ -39,24 +39,29 @@ class Found:
 
 
 def page(run: Run) -> str:
-    """The page of a run as text."""
+    """The page of a run as text; without blocks it tells of the case and of the numbers only."""
+    title = run_words.title(run)
+    case = section("case", "The case", *(tag("p", words) for words in run_words.case(run)))
+    last = (_settings(run), _provenance(run))
     if not run.bodies.n:
-        raise BadRun(f"{run.folder} holds no blocks: there is no fall to show")
+        lead = (
+            f"A run of {run.series.time[-1]:.3g} s without blocks; mics-tools plot draws its water."
+        )
+        return document(title, tag("h1", title), tag("p", lead, class_="lead"), case,
+                        _health(run), *last, script="")  # fmt: skip
     step = float((run.grid.high - run.grid.low)[:2].max()) / 300
     found = Found(pile_numbers.numbers(run, step), overlap(run), block_numbers.of_blocks(run), step)
-    title = run_words.title(run)
     return document(
         title,
         tag("h1", title),
         tag("p", outcome(run, found), class_="lead"),
         player("player", "the fall of the blocks; arrow keys turn it, + and - zoom, space plays"),
         _facts(run, found),
-        section("case", "The case", *(tag("p", words) for words in run_words.case(run))),
+        case,
         _pile(run),
         _blocks(run, found),
         _health(run, found),
-        _settings(run),
-        _provenance(run),
+        *last,
         data("scene", motion.scene(run)),
         script=_START,
     )
@@ -184,12 +189,14 @@ def _each(run: Run, shown: list[int], values: Array) -> list[Curve]:
     return found
 
 
-def _health(run: Run, found: Found) -> Markup:
-    """Whether the numbers can be trusted."""
+def _health(run: Run, found: Found | None = None) -> Markup:
+    """Whether the numbers can be trusted, those of the blocks, too, where there are any."""
     s = run.series
     rows = [_mark(*row) for row in _checks(run, found)]
-    drawn = [charts.lines([Curve(s.time, 1e3 * s.max_overlap, 6)], "time [s]",
-                          "largest overlap [mm]")]  # fmt: skip
+    drawn = []
+    if found:
+        drawn.append(charts.lines([Curve(s.time, 1e3 * s.max_overlap, 6)], "time [s]",
+                                  "largest overlap [mm]"))  # fmt: skip
     if np.isfinite(s.liquid_volume_drift).any():
         drawn.append(charts.lines([Curve(s.time, s.liquid_volume_drift, 2)], "time [s]",
                                   "drift of the liquid volume [-]"))  # fmt: skip
@@ -206,19 +213,11 @@ def _mark(name: str, found: str, wanted: str, good: bool) -> list[object]:
     return [name, found, wanted, mark]
 
 
-def _checks(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
+def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
     s, code = run.series, int(run.provenance.get("exit_status", -1))
-    length = min(_length(run, k) for k in range(run.bodies.n))
-    cells = length / float(run.grid.spacing.max())
-    deepest = found.overlap.largest
-    highest, band = float(np.nanmax(s.max_overlap)), _OVERLAP * length
     rows = [("end of the run", _ending(code), "regular end", code == 0)]
-    for name, value, limit in (
-        ("overlap of the true shapes at the end", deepest, band),
-        ("largest overlap at any time", highest, 3 * band),
-    ):
-        wanted = f"below {millimetres(limit)}"
-        rows.append((name, millimetres(value), wanted, value < limit))
+    if found:
+        rows += _overlaps(run, found)
     if np.isfinite(s.liquid_volume_drift).any():
         drift = float(np.nanmax(np.abs(s.liquid_volume_drift)))
         rows.append(("drift of the liquid volume", f"{drift:.1e}", f"below {_DRIFT:.0e}",
@@ -227,9 +226,27 @@ def _checks(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
         limit = float(run.value("numerics", "divergence_tolerance", 1e-6))
         rows.append(("largest divergence", f"{worst:.1e} 1/s", f"below {limit:.0e} 1/s",
                      worst < limit))  # fmt: skip
-        rows.append(("cells along the smallest block", f"{cells:.3g}", f"{_CELLS:.0f} or more",
-                     cells >= _CELLS - 1e-9))  # fmt: skip
+        if found:
+            cells = _smallest(run) / float(run.grid.spacing.max())
+            rows.append(("cells along the smallest block", f"{cells:.3g}", f"{_CELLS:.0f} or more",
+                         cells >= _CELLS - 1e-9))  # fmt: skip
     return rows
+
+
+def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
+    highest, band = float(np.nanmax(run.series.max_overlap)), _OVERLAP * _smallest(run)
+    return [
+        (name, millimetres(value), f"below {millimetres(limit)}", value < limit)
+        for name, value, limit in (
+            ("overlap of the true shapes at the end", found.overlap.largest, band),
+            ("largest overlap at any time", highest, 3 * band),
+        )
+    ]
+
+
+def _smallest(run: Run) -> float:
+    """Length of the smallest block [m]."""
+    return min(_length(run, k) for k in range(run.bodies.n))
 
 
 def _length(run: Run, k: int) -> float:
