@@ -3,6 +3,7 @@
 from itertools import permutations, product
 
 import numpy as np
+from contourpy import contour_generator
 
 from micstools.geometry import Array, rotation_matrix, volume_in_box
 from micstools.overlap import Placed
@@ -23,6 +24,15 @@ def porosity(bodies: list[Placed], low: Array, high: Array) -> float:
     overlap they count twice, and a bed is not looked at."""
     filled = sum(volume_in_box(body.tets, low, high) for body in bodies)
     return float(1 - filled / np.prod(high - low))
+
+
+def outline(top: Array, low: Array, step: float) -> list[Array]:
+    """Closed lines (k, 2) [m] around what a pile covers, seen from above, from its height map
+    (ny, nx) of squares of `step` [m] from the corner `low`: outer ones counter-clockwise, holes
+    clockwise, each half a square off at most."""
+    covered = np.pad(np.isfinite(top), 1).astype(float)
+    found = contour_generator(z=covered).lines(0.5)
+    return [low[:2] + (np.asarray(line, float) - 0.5) * step for line in found]
 
 
 def slopes(top: Array, floor: float, step: float) -> tuple[float, float, float, float]:

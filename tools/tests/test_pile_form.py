@@ -6,6 +6,7 @@ import pytest
 from micstools import pile_form, shapes
 from micstools.geometry import quaternion_from_axis
 from micstools.overlap import Placed
+from micstools.pile_numbers import height_map
 from synthetic import UPRIGHT
 
 EDGE, STEP = 0.02, 0.001
@@ -29,6 +30,27 @@ def test_porosity_of_two_stacked_cubes() -> None:
 def test_the_box_around_a_pile_ends_at_the_tank() -> None:
     low, high = pile_form.around([cube_at(0.005, 0.05, 0.01)], np.zeros(3), np.full(3, 0.1))
     assert low[0] == 0.0 and high[0] == pytest.approx(0.015)
+
+
+def test_outline_of_a_ring_of_cubes() -> None:
+    """Eight cubes around a hole, and one apart."""
+    low = np.array([-0.1, 0.2, 0.0])
+    places = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)] + [(4, 0)]
+    blocks = [cube_at(low[0] + 0.02 + EDGE * i, low[1] + 0.02 + EDGE * j, 0.01) for i, j in places]
+    top = height_map(blocks, low, low + [0.15, 0.1, 0.1], STEP)
+    found = pile_form.outline(top, low, STEP)
+    areas = sorted(_area(line) for line in found)
+    assert areas == pytest.approx([-(EDGE**2), EDGE**2, 9 * EDGE**2], abs=3 * STEP**2)
+    everything = np.concatenate(found)
+    assert everything.min(axis=0) == pytest.approx(low[:2] + 0.01, abs=1e-9)
+    assert everything.max(axis=0) == pytest.approx(low[:2] + [0.11, 0.07], abs=1e-9)
+    assert all((line[0] == line[-1]).all() for line in found)
+
+
+def _area(line: np.ndarray) -> float:
+    """Enclosed, positive when it lies to the left [m2]."""
+    (x, y), (u, v) = line[:-1].T, line[1:].T
+    return 0.5 * float((x * v - u * y).sum())
 
 
 def test_slopes_of_a_roof() -> None:

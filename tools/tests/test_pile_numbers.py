@@ -1,10 +1,12 @@
 """Numbers of a pile on arrangements that are known exactly."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
 
-from micstools import pile_numbers, shapes
+from micstools import cli, pile_numbers, shapes
 from micstools.reader import Run
 from synthetic import UPRIGHT, Motion
 
@@ -60,3 +62,21 @@ def test_height_map_of_a_cube_and_a_tilted_one() -> None:
     seen = np.isfinite(both[50]) & (x > 0.05)
     assert seen.sum() == np.sum(np.abs(x - 0.07) < EDGE / np.sqrt(2))
     assert both[50, seen] == pytest.approx(roof[seen])
+
+
+def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
+    """One cube beside the three fixed ones: four outlines, and its top in the map."""
+    place = (np.array([0.03, 0.03, 0.05]), UPRIGHT)
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=[place], history_step=0.05))
+    with pytest.raises(SystemExit) as end:
+        cli.main(["pile", str(run.folder)])
+    assert end.value.code == 0
+    content = json.loads((run.folder / "pile.json").read_text())
+    corners = np.concatenate(content["outline"])
+    assert len(content["outline"]) == 4
+    assert corners[:, 0].min() == pytest.approx(0.02, abs=1e-9)
+    with h5py.File(run.folder / "pile_maps.h5") as h5:
+        x, y, top = (h5[name][:] for name in ("x", "y", "top"))
+        assert h5["top"].attrs["units"] == "m"
+    assert top[np.abs(y - 0.03).argmin(), np.abs(x - 0.03).argmin()] == pytest.approx(0.06)
+    assert np.isfinite(top).sum() * 1e-6 == pytest.approx(content["plan_area"])

@@ -10,9 +10,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from micstools import block_numbers, command, pile, pile_ensemble, pile_numbers
+from micstools import block_numbers, command, pile, pile_ensemble, pile_form, pile_numbers
 from micstools.commands.base import Command
 from micstools.geometry import Array
+from micstools.overlap import present_bodies
 from micstools.pile_ensemble import Ensemble
 from micstools.reader import BadRun
 from micstools.shares import in_words
@@ -61,15 +62,22 @@ def _box(values: list[float] | None) -> tuple[Array, Array] | None:
 
 
 def _of_run(given: argparse.Namespace) -> int:
-    """Print the findings and the numbers, which go into `pile.json`."""
-    box = _box(given.box)
+    """Print the findings and the numbers; these and the outline go into `pile.json`, the height map
+    into `pile_maps.h5`."""
+    box, step = _box(given.box), given.step or 0.001
     findings(given)
     run = command.open_run(given.run)
-    found = asdict(pile_numbers.numbers(run, given.step or 0.001, box=box))
+    found = asdict(pile_numbers.numbers(run, step, box=box))
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
         words = ["-" if v != v else f"{v:.5g}" for v in values]
         print(f"     {name:20}{', '.join(words)}")
+    top = pile_numbers.height_map(
+        list(present_bodies(run, -1).values()), run.grid.low, run.grid.high, step
+    )
+    x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
+    _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
+    found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
     _write_json(run.folder / "pile.json", found)
     return 0
@@ -102,8 +110,10 @@ def _of_ensemble(ensemble: Ensemble) -> int:
 
 
 def _write_maps(ensemble: Ensemble) -> None:
-    found = asdict(pile_ensemble.maps(ensemble))
-    path = ensemble.folder / "pile_maps.h5"
+    _write_h5(ensemble.folder / "pile_maps.h5", asdict(pile_ensemble.maps(ensemble)))
+
+
+def _write_h5(path: Path, found: dict[str, Array]) -> None:
     with h5py.File(path, "w") as h5:
         for name, values in found.items():
             h5[name] = values
@@ -127,9 +137,10 @@ def _known(value: Any) -> Any:
 
 PILE = Command(
     "pile",
-    "Say what can be said of the pile of a run, with its numbers in SI units (pile.json), or of\n"
-    "the piles of an ensemble: shares of the patterns, spread of the numbers (pile.json,\n"
-    "pile.csv), maps of the mean pile and of the probability of cover (pile_maps.h5).\n"
+    "Say what can be said of the pile of a run, with its numbers in SI units and its outline\n"
+    "(pile.json) and its height map (pile_maps.h5); or of the piles of an ensemble: shares of the\n"
+    "patterns, spread of the numbers (pile.json, pile.csv), maps of the mean pile and of the\n"
+    "probability of cover (pile_maps.h5).\n"
     "The exit code is 0 whatever is seen.",
     (
         "pile mics-coarse",
