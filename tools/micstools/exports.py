@@ -1,6 +1,5 @@
 """A run in the formats of other programs: a named object per block, SI units, z up."""
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -17,23 +16,8 @@ Writer = Callable[[Run, int, Path], Path]
 
 
 def to_csv(run: Run, _row: int, folder: Path) -> Path:
-    """Place, attitude and velocity of every block at every row."""
-    path, b = folder / "blocks.csv", run.bodies
-    heads = ["time", "block", "shape", "released", "x", "y", "z", "qw", "qx", "qy", "qz",
-             "vx", "vy", "vz", "wx", "wy", "wz"]  # fmt: skip
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(heads)
-        for row, time in enumerate(b.time):
-            present = b.present(row)
-            for k in range(b.n):
-                values = np.concatenate(
-                    [b.position[row, k], b.quaternion[row, k], b.velocity[row, k],
-                     b.angular_velocity[row, k]]
-                )  # fmt: skip
-                named = [repr(float(time)), k + 1, b.shape[k], int(present[k])]
-                writer.writerow(named + [repr(float(v)) for v in values])
-    return path
+    """Place, attitude, velocity and forces of every block at every row."""
+    return run.to_csv(folder / "blocks.csv")
 
 
 def to_stl(run: Run, row: int, folder: Path) -> Path:

@@ -70,6 +70,15 @@ class Grid:
         return np.array([f[-1] for f in self.faces])
 
 
+_LOADS = {
+    "fluid_f": "fluid_force",
+    "fluid_t": "fluid_torque",
+    "contact_f": "contact_force",
+    "contact_t": "contact_torque",
+}
+"""Columns of a table, and what they hold."""
+
+
 @dataclass(frozen=True)
 class Bodies:
     """Poses, velocities and forces of the N bodies in T rows; space frame."""
@@ -274,6 +283,24 @@ class Run:
         from micstools import vtk_data
 
         return vtk_data.at(self, t)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write time, number, place, attitude, velocities, forces [N] and torques [N m] of every
+        block at every row as a table; blocks count from 1."""
+        b = self.bodies
+        heads = ["time", "block", "shape", "released", "x", "y", "z", "qw", "qx", "qy", "qz"]
+        heads += [f"{name}{axis}" for name in ("v", "w", *_LOADS) for axis in "xyz"]
+        with Path(path).open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(heads)
+            for row, time in enumerate(b.time.tolist()):
+                parts = [b.position, b.quaternion, b.velocity, b.angular_velocity]
+                parts += [getattr(b, name) for name in _LOADS.values()]
+                values = np.concatenate([part[row] for part in parts], axis=1).tolist()
+                present = b.present(row)
+                for k in range(b.n):
+                    writer.writerow([time, k + 1, b.shape[k], int(present[k]), *values[k]])
+        return Path(path)
 
     def series_to_csv(self, path: str | Path) -> Path:
         """Write the numbers of every row as a table with the names of the result file."""

@@ -133,6 +133,24 @@ def test_series_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
     assert float(rows[-1]["time"]) == loose_pile.series.time[-1]
 
 
+def test_blocks_become_a_table(loose_pile: Run, tmp_path: Path) -> None:
+    b = loose_pile.bodies
+    rows = table(loose_pile.to_csv(tmp_path / "blocks.csv"))
+    assert len(rows) == b.n * len(b.time)
+    found = rows[b.n * 5 + 3]  # the fourth block in the sixth row
+    assert (found["block"], found["shape"]) == ("4", b.shape[3])
+    for name, value in (
+        ("time", b.time[5]),
+        ("z", b.position[5, 3, 2]),
+        ("qw", b.quaternion[5, 3, 0]),
+        ("vz", b.velocity[5, 3, 2]),
+        ("wx", b.angular_velocity[5, 3, 0]),
+        ("fluid_fz", b.fluid_force[5, 3, 2]),
+        ("contact_ty", b.contact_torque[5, 3, 1]),
+    ):
+        assert float(found[name]) == value
+
+
 def test_the_scene_of_a_time(loose_pile: Run, tmp_path: Path) -> None:
     """Blocks and water belong together: all are of the written time nearest to the wish."""
     scene = loose_pile.vtk(2.2)  # fields every 0.5 s
