@@ -5,9 +5,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import f90nml
 import h5py
 
+from micstools import settings
 from micstools.reader import BadRun, Run
 
 OUTPUT = "mics-out"
@@ -27,12 +27,13 @@ def results_of(path: Path) -> Path:
     if h5py.is_hdf5(path):
         return path.parent
     try:
-        case = f90nml.Parser().reads(path.read_text())
-    except Exception as error:  # f90nml raises what Python has for a text it cannot follow
+        case = path.read_text()
+        output = settings.value(case, "run", "output")
+    except (UnicodeDecodeError, BadRun) as error:
         raise BadRun(f"{path}: neither a folder of results nor a case file ({error})") from error
-    if "grid" not in case:
+    if "grid" not in (name for name, _, _ in settings.groups(case)):
         raise BadRun(f"{path}: neither a folder of results nor a case file (it has no &grid)")
-    folder = Path(str(case.get("run", {}).get("output", OUTPUT)).strip())
+    folder = Path(str(output or OUTPUT).strip())
     if not (folder / "run.h5").is_file():
         raise BadRun(f"{folder}, the output of {path}, holds no run.h5: run the case first")
     return folder

@@ -105,14 +105,35 @@ def set_group(
 
 
 def _patched(group: str, name: str, variables: dict[str, Any]) -> str:
+    """A group with variables set. f90nml keeps its remarks, but spoils a list with a repeated
+    value, `2*0.01`: then the group is written anew."""
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder, "before.nml"), Path(folder, "after.nml")
         before.write_text(group + "\n")
         try:
+            wanted = _read(group)
+            wanted[name].update(f90nml.Namelist({name: variables})[name])
             f90nml.patch(str(before), {name: variables}, str(after))
+        except BadRun:
+            raise
         except Exception as error:  # f90nml raises what Python has for a text it cannot follow
             raise BadRun(f"&{name}: cannot be changed, write it anew ({error})") from error
-        return after.read_text().rstrip("\n")
+        text = after.read_text().rstrip("\n")
+    try:
+        if _read(text) == wanted:
+            return text
+    except BadRun:
+        pass
+    return str(wanted).rstrip("\n")
+
+
+def _read(group: str) -> f90nml.Namelist:
+    """A group as f90nml understands it."""
+    try:
+        return f90nml.Parser().reads(group + "\n")
+    except Exception as error:  # f90nml raises what Python has for a text it cannot follow
+        words = " ".join(group.split())
+        raise BadRun(f"{words[:60]}: cannot be understood ({type(error).__name__})") from error
 
 
 def value(text: str, group: str, variable: str, occurrence: int = 0) -> Any:
@@ -121,4 +142,4 @@ def value(text: str, group: str, variable: str, occurrence: int = 0) -> Any:
     if occurrence >= len(places):
         return None
     start, end = places[occurrence]
-    return f90nml.Parser().reads(text[start:end] + "\n")[group].get(variable)
+    return _read(text[start:end])[group].get(variable)

@@ -96,6 +96,25 @@ def test_one_group_of_several_is_set() -> None:
     assert "seed = 3 /" in text and text.index("seed = 8") > text.index("'b'")
 
 
+def test_a_list_with_a_repeated_value_is_set_right() -> None:
+    text = "&drop a = 3*1.0 b = 2*0.02, 0 ! why\n c = 1 /\n"
+    other = settings.set_group(text, "drop", {"c": 4})
+    assert "2*0.02, 0 ! why" in other and "c = 4" in other
+    new = settings.set_group(text, "drop", {"a": [4, 5, 6], "b": [0.01, 0.01, 0.5]})
+    assert settings.value(new, "drop", "a") == [4, 5, 6]
+    assert settings.value(new, "drop", "b") == [0.01, 0.01, 0.5]
+    assert settings.value(new, "drop", "c") == 1
+
+
+def test_a_group_that_cannot_be_read_is_told() -> None:
+    for work in (
+        lambda text: settings.value(text, "drop", "a"),
+        lambda text: settings.set_group(text, "drop", {"c": 1}),
+    ):
+        with pytest.raises(BadRun, match="&drop a = 0.5\\*0.02 /: cannot be understood"):
+            work("&drop a = 0.5*0.02 /\n")
+
+
 @pytest.mark.parametrize("word", ["", "a", "a.b", "a.b=", "a b.c=1", "=3", "a.b.c=1"])
 def test_a_setting_has_a_form(word: str) -> None:
     with pytest.raises(BadRun, match="must be group.variable=value"):

@@ -40,6 +40,8 @@ def test_the_results_of_a_case_are_in_the_folder_it_names(tmp_path: Path, monkey
     assert command.results_of(Path("named.nml")) == Path("here/results")
     assert command.results_of(Path("silent.nml")) == Path("mics-out")
     assert command.results_of(Path("mics-out/run.h5")) == Path("mics-out")
+    Path("twice.nml").write_text(2 * Path("named.nml").read_text())  # for the program to refuse
+    assert command.results_of(Path("twice.nml")) == Path("here/results")
     assert command.open_run(Path("mics-out")).bodies.n == 9
 
 

@@ -12,7 +12,7 @@ from micstools import cli, comparison
 from micstools.commands.study import finer
 from micstools.convergence import converge
 from micstools.geometry import quaternion_from_axis
-from micstools.reader import Run
+from micstools.reader import BadRun, Run
 from synthetic import UPRIGHT, Motion, write_run
 
 END = np.array([0.2, 0.05, 0.1])
@@ -88,6 +88,12 @@ def test_order_and_error_of_a_known_law(order: float, grids: tuple[float, ...]) 
 def test_what_does_not_converge_says_so(values: tuple[float, ...], words: str) -> None:
     found = converge((1, 2, 4), values)
     assert words in found.words and np.isnan(found.order)
+
+
+@pytest.mark.parametrize("cells", ["30", "'a'", "30, 'a', 4"])
+def test_cells_that_are_none_are_told(cells: str) -> None:
+    with pytest.raises(BadRun, match="no &grid cells = nx, ny, nz"):
+        finer(f"&grid cells = {cells} /\n", 2.0)
 
 
 def test_cells_are_refined() -> None:

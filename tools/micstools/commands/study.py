@@ -36,8 +36,8 @@ def _factors(word: str) -> list[float]:
 def finer(text: str, factor: float) -> str:
     """The case with `factor` times its cells in each direction that has more than one."""
     cells = settings.value(text, "grid", "cells")
-    if cells is None:
-        raise BadRun("the case has no &grid cells: there is nothing to refine")
+    if not isinstance(cells, list) or not all(isinstance(n, int) for n in cells):
+        raise BadRun("the case has no &grid cells = nx, ny, nz: there is nothing to refine")
     wanted = [n if n == 1 else max(1, round(factor * n)) for n in cells]
     return settings.set_group(text, "grid", {"cells": wanted})
 
