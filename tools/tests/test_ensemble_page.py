@@ -67,6 +67,12 @@ def test_an_ensemble_without_a_complete_pile_tells_so(tmp_path: Path) -> None:
     assert text.count("data-pile=") == 2 and 'id="plan"' not in text
 
 
+def test_an_ensemble_without_a_title_bears_the_name_of_its_folder(tmp_path: Path) -> None:
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path / "my reef", ENDS[:1]), 0.002)
+    found.piles[0].run.__dict__["parameters"] = {}
+    assert "<h1>my reef: one run</h1>" in ensemble_page.page(found)
+
+
 def test_one_pile_is_an_ensemble(tmp_path: Path) -> None:
     found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, ENDS[:1]), 0.002)
     text = ensemble_page.page(found).replace("\u00a0", " ")

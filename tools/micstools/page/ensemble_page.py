@@ -71,7 +71,7 @@ _QUANTITIES = (
 def page(ensemble: Ensemble) -> str:
     """The page of an ensemble as text."""
     run = ensemble.example.run
-    title = f"{run_words.title(run)}: {count(len(ensemble.piles), 'run')}"
+    title = f"{run_words.title(run, ensemble.folder)}: {count(len(ensemble.piles), 'run')}"
     return document(
         title,
         tag("h1", title),

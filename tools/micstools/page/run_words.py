@@ -23,10 +23,10 @@ def millimetres(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g} m" if abs(value) >= 10 else f"{1e3 * value:.{digits}g} mm"
 
 
-def title(run: Run) -> str:
-    """The title of the case, else the name of its folder."""
+def title(run: Run, folder: Path | None = None) -> str:
+    """The title of the case, else the name of a folder, by default its own."""
     said = str(run.value("run", "title", "") or "").strip()
-    return said or run.folder.resolve().name
+    return said or (folder or run.folder).resolve().name
 
 
 def capital(text: str) -> str:
