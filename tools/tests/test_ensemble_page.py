@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_what_is_taken_along_is_whole(report: Path) -> None:
     assert len(base64.b64decode(table).decode().splitlines()) == 13
     (content,) = re.findall(r'data:application/json;base64,([^"]*)', text)
     assert json.loads(base64.b64decode(content))["complete"] == 10
+
+
+def test_health_is_the_worst_of_all_runs(tmp_path: Path) -> None:
+    found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, ENDS[:2]), 0.002)
+    good = ensemble_page.page(found).split('id="health"')[1].split("</section>")[0]
+    series = found.piles[1].run.series
+    deep = replace(series, max_overlap=np.full_like(series.max_overlap, 0.5))
+    found.piles[1].run.__dict__["series"] = deep
+    bad = ensemble_page.page(found).split('id="health"')[1].split("</section>")[0]
+    assert bad.count("! look") == good.count("! look") + 1
+    assert "<td>500</td>" in bad and "run 2" in bad
 
 
 def test_an_ensemble_without_a_complete_pile_tells_so(tmp_path: Path) -> None:

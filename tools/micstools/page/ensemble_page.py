@@ -12,7 +12,7 @@ import numpy as np
 
 from micstools import pile_ensemble
 from micstools.overlap import present_bodies
-from micstools.page import charts, motion, run_words, views
+from micstools.page import charts, motion, run_page, run_words, views
 from micstools.page.html import (
     Markup,
     data,
@@ -328,23 +328,28 @@ def _running(ensemble: Ensemble) -> Markup:
 
 
 def _health(ensemble: Ensemble) -> Markup:
-    """The worst of all runs."""
+    """The worst of all runs, against what a run should keep."""
     rows: list[list[object]] = []
     series = {p.number: p.run.series for p in ensemble.piles}
-    for words, values, form in (
-        ("largest overlap of true shapes [mm]", _worst(series, "max_overlap", 1e3), ".3g"),
-        ("largest drift of the liquid volume", _worst(series, "liquid_volume_drift", 1.0), ".1e"),
-        ("largest divergence [1/s]", _worst(series, "divergence_max", 1.0), ".1e"),
-    ):
+    for words, values, limit, form in (
+        ("largest overlap of true shapes [mm]", _worst(series, "max_overlap", 1e3),
+         1e3 * run_page.overlap_limit(ensemble.example.run), ".3g"),
+        ("largest drift of the liquid volume", _worst(series, "liquid_volume_drift", 1.0),
+         run_page.DRIFT, ".1e"),
+        ("largest divergence [1/s]", _worst(series, "divergence_max", 1.0),
+         run_page.divergence_limit(ensemble.example.run), ".1e"),
+    ):  # fmt: skip
         if values:
             where = max(values, key=lambda k: values[k])
-            rows.append([words, f"{values[where]:{form}}", f"run {where}"])
+            found, wanted = f"{values[where]:{form}}", f"below {limit:{form}}"
+            mark = run_page.mark(values[where] < limit)
+            rows.append([words, found, wanted, mark, f"run {where}"])
     outcomes: dict[str, int] = {}
     for row in ensemble.about["table"]:
         outcomes[row["outcome"]] = outcomes.get(row["outcome"], 0) + 1
     for name, n in outcomes.items():
-        rows.append([f"runs that ended: {name}", str(n), ""])
-    said = table(["of all runs, the worst", "found", "where"], rows, numbers=False)
+        rows.append([f"runs that ended: {name}", str(n), "", "", ""])
+    said = table(["of all runs, the worst", "found", "wanted", "", "where"], rows, numbers=False)
     return section("health", "Health of the computations", said)
 
 

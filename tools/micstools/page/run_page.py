@@ -22,7 +22,7 @@ _START = """
 const runPlayer = startPlayer(document.getElementById('player'));
 if (runPlayer) runPlayer.load(read('scene'));
 """
-_DRIFT = 1e-9  # of the liquid: what rounding explains
+DRIFT = 1e-9  # of the liquid: what rounding explains
 _CELLS = 10.0  # along a block, as the readme asks for
 _MANY = 16  # blocks with a curve of their own
 _OVERLAP = 0.01  # of a block's length
@@ -192,7 +192,7 @@ def _each(run: Run, shown: list[int], values: Array) -> list[Curve]:
 def _health(run: Run, found: Found | None = None) -> Markup:
     """Whether the numbers can be trusted, those of the blocks, too, where there are any."""
     s = run.series
-    rows = [_mark(*row) for row in _checks(run, found)]
+    rows: list[list[object]] = [[*row[:3], mark(row[3])] for row in _checks(run, found)]
     drawn = []
     if found:
         drawn.append(charts.lines([Curve(s.time, 1e3 * s.max_overlap, 6)], "time [s]",
@@ -208,9 +208,19 @@ def _health(run: Run, found: Found | None = None) -> Markup:
     )
 
 
-def _mark(name: str, found: str, wanted: str, good: bool) -> list[object]:
-    mark = tag("span", "✓ good", class_="good") if good else tag("span", "! look", class_="look")
-    return [name, found, wanted, mark]
+def mark(good: bool) -> Markup:
+    """Is a number as it should be?"""
+    return tag("span", "✓ good", class_="good") if good else tag("span", "! look", class_="look")
+
+
+def overlap_limit(run: Run) -> float:
+    """What no overlap should exceed at any time [m]."""
+    return 3 * _OVERLAP * _smallest(run)
+
+
+def divergence_limit(run: Run) -> float:
+    """What the case allows [1/s]."""
+    return float(run.value("numerics", "divergence_tolerance", 1e-6))
 
 
 def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
@@ -220,10 +230,10 @@ def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
         rows += _overlaps(run, found)
     if np.isfinite(s.liquid_volume_drift).any():
         drift = float(np.nanmax(np.abs(s.liquid_volume_drift)))
-        rows.append(("drift of the liquid volume", f"{drift:.1e}", f"below {_DRIFT:.0e}",
-                     drift < _DRIFT))  # fmt: skip
+        rows.append(("drift of the liquid volume", f"{drift:.1e}", f"below {DRIFT:.0e}",
+                     drift < DRIFT))  # fmt: skip
         worst = float(np.nanmax(s.divergence_max[1:], initial=0.0))
-        limit = float(run.value("numerics", "divergence_tolerance", 1e-6))
+        limit = divergence_limit(run)
         rows.append(("largest divergence", f"{worst:.1e} 1/s", f"below {limit:.0e} 1/s",
                      worst < limit))  # fmt: skip
         if found:
@@ -234,12 +244,16 @@ def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
 
 
 def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
-    highest, band = float(np.nanmax(run.series.max_overlap)), _OVERLAP * _smallest(run)
+    highest = float(np.nanmax(run.series.max_overlap))
     return [
         (name, millimetres(value), f"below {millimetres(limit)}", value < limit)
         for name, value, limit in (
-            ("overlap of the true shapes at the end", found.overlap.largest, band),
-            ("largest overlap at any time", highest, 3 * band),
+            (
+                "overlap of the true shapes at the end",
+                found.overlap.largest,
+                _OVERLAP * _smallest(run),
+            ),
+            ("largest overlap at any time", highest, overlap_limit(run)),
         )
     ]
 
