@@ -88,13 +88,13 @@ contains
       if (b == 0) cycle
       do d = 1, 3
         n = i - unit_step(:, d)
-        if (n(d) >= painting%low(d) .and. solid%leg_low(i(1), i(2), i(3), d) > 1.0_wp) then
+        if (n(d) >= painting%low(d) .and. solid%leg_number(i(1), i(2), i(3), d) == 0) then
           if (solid%inside(n(1), n(2), n(3)) == 0) call shorten_leg([i, d], 1.0_wp, b, solid)
         end if
         n = i + unit_step(:, d)
         if (n(d) > painting%high(d)) cycle
         if (solid%inside(n(1), n(2), n(3)) == 0 .and. &
-            solid%leg_low(n(1), n(2), n(3), d) > 1.0_wp) call shorten_leg([n, d], 0.0_wp, b, solid)
+            solid%leg_number(n(1), n(2), n(3), d) == 0) call shorten_leg([n, d], 0.0_wp, b, solid)
       end do
     end do
   end subroutine guard_legs

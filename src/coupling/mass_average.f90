@@ -148,14 +148,15 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
 
-    associate (a => stage%acceleration, rho => stage%rho_mixture)
+    ! `y` is free until the viscous stage.
+    associate (a => stage%acceleration, rho => stage%rho_mixture, by_stress => stage%viscous%y)
       call face_acceleration(grid, case%fluid%gravity, flow%rho, rho, flow%p, a%face, flow%sides)
       call add_tension(grid, rho, stage%tension, a%face)
       call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
       if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
-      call surface_stress(grid, solid%alpha, rho, flow%mu, flow%u, stage%a_stress)
+      call surface_stress(grid, solid%alpha, rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(grid, dt, flow, stage)
-      call add_product(grid, dt, stage%a_stress, flow%u)
+      call add_product(grid, dt, by_stress, flow%u)
       call build_viscous(grid, stage%whole, stage%bodies, rho, flow%mu, dt, stage%viscous)
       call predict_velocity(grid, rho, flow, stage)
       if (stage%implicit_momentum) then   ! the force on a body has no part in advection

@@ -108,14 +108,15 @@ contains
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
 
-    associate (a => stage%acceleration, balance => stage%balance)
+    ! `y` is free until the viscous stage.
+    associate (a => stage%acceleration, by_stress => stage%viscous%y)
       call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, stage%rho, stage%tension, a%face)
       call accelerations_of_groups(grid, solid, dt, stage)
-      call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, stage%a_stress)
+      call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(grid, dt, flow, stage)
-      call add_product(grid, dt, stage%a_stress, flow%u)
+      call add_product(grid, dt, by_stress, flow%u)
       if (stage%implicit_momentum) return
       call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
       call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &

@@ -11,6 +11,7 @@ module painting_m
   public :: paint_cells, paint_faces, paint_legs, shorten_leg
 
   real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
+  real(wp), parameter :: no_hit = 2.0_wp            !! longer than any leg
 
   !> What is painted where.
   type :: painting_t
@@ -119,6 +120,8 @@ contains
     call ensure_room(faces, solid%face_beta)
     call ensure_room(faces, solid%face_centroid)
     call ensure_room(legs, solid%leg)
+    call ensure_room(legs, solid%leg_length)
+    call ensure_room(legs, solid%leg_body)
     if (size(solid%tets%corner, 3) < tets) then
       tets = max(tets, 2*size(solid%tets%corner, 3))
       deallocate (solid%tets%corner)
@@ -285,20 +288,17 @@ contains
     real(wp), intent(in) :: at
     type(solid_geometry_t), intent(inout) :: solid
 
-    associate (low => solid%leg_low(f(1), f(2), f(3), f(4)), &
-               high => solid%leg_high(f(1), f(2), f(3), f(4)))
-      if (low > 1.0_wp) then
+    associate (m => solid%leg_number(f(1), f(2), f(3), f(4)))
+      if (m == 0) then
         solid%n_leg = solid%n_leg + 1
-        solid%leg(:, solid%n_leg) = f
+        m = solid%n_leg
+        solid%leg(:, m) = f
+        solid%leg_length(:, m) = no_hit
       end if
-      if (max(at, least_leg) < low) then
-        low = max(at, least_leg)
-        solid%leg_body_low(f(1), f(2), f(3), f(4)) = b
-      end if
-      if (max(1.0_wp - at, least_leg) < high) then
-        high = max(1.0_wp - at, least_leg)
-        solid%leg_body_high(f(1), f(2), f(3), f(4)) = b
-      end if
+      where (max([at, 1.0_wp - at], least_leg) < solid%leg_length(:, m))
+        solid%leg_length(:, m) = max([at, 1.0_wp - at], least_leg)
+        solid%leg_body(:, m) = b
+      end where
     end associate
   end subroutine shorten_leg
 

@@ -44,7 +44,6 @@ module velocity_stage_m
     real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: total(:, :)           !! (6, n)
     real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
-    real(wp), allocatable :: a_stress(:, :, :, :)  !! acceleration by the surface stress [m/s2]
     ! Of the monolithic coupling.
     type(rigid_motion_t) :: foreseen               !! the motion at the end, by `trend`
     real(wp), allocatable :: trend(:, :)
@@ -88,11 +87,10 @@ contains
     allocate (stage%from_level, stage%total, stage%dry_motion, source=stage%from_pressure)
     allocate (stage%lack(6, 3, n), source=0.0_wp)
     allocate (stage%terms(0, 6))
-    allocate (stage%a_stress(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     if (numerics%coupling == 'mics') then
       call solid_geometry_init(grid, stage%whole, n)
       allocate (stage%rho_mixture(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-      allocate (stage%u_before, source=stage%a_stress)
+      allocate (stage%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     else
       allocate (stage%links_before, stage%links)
       call linked_cells_init(grid, stage%links_before)
@@ -100,7 +98,7 @@ contains
       call mid_step_init(grid, stage%mid_step)
       call wall_balance_init(stage%balance)
       allocate (stage%from_mid_step, stage%late, stage%trend, source=stage%total)
-      allocate (stage%deviation, source=stage%a_stress)
+      allocate (stage%deviation(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
       allocate (stage%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if
   end subroutine stage_init

@@ -7,10 +7,8 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces, no_hit
+  public :: solid_geometry_t, solid_geometry_init, set_faces
   public :: clear_cells, clear_faces, clear_legs
-
-  real(wp), parameter :: no_hit = 2.0_wp   !! leg that meets no surface
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
   !! hold is taken away again (see `bed_solid_m`).
@@ -28,11 +26,15 @@ module solid_geometry_m
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
-    !> Legs between the centres of the two cells of a lower face d, in units of h(d), 0..1:
-    !! distance from the lower cell (i-1) up to the first surface, and from the upper cell (i) down
-    !! to the first surface; `no_hit` where the leg is free. The bodies hit stand in `leg_body_*`.
-    real(wp), allocatable :: leg_low(:, :, :, :), leg_high(:, :, :, :)
-    integer, allocatable :: leg_body_low(:, :, :, :), leg_body_high(:, :, :, :)
+    !> Legs between the centres of the two cells of a lower face d: `leg_number(i,j,k,d)` is the
+    !! number of one that meets a surface in the lists, 0 where it is free.
+    integer, allocatable :: leg_number(:, :, :, :)
+    integer :: n_leg = 0
+    integer, allocatable :: leg(:, :)           !! (4, n_leg) cell index and direction of the face
+    !> Distances from the lower cell (i-1) up to the first surface and from the upper cell (i) down
+    !! to the first surface, in units of h(d), 0..1, and the bodies that are hit there.
+    real(wp), allocatable :: leg_length(:, :)   !! (2, n_leg)
+    integer, allocatable :: leg_body(:, :)      !! (2, n_leg)
 
     type(solid_tets_t) :: tets
     !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0.
@@ -51,10 +53,9 @@ module solid_geometry_m
     real(wp), allocatable :: face_beta(:)       !! share of the face area [-]
     real(wp), allocatable :: face_centroid(:, :) !! (3, *) [m]
     !> The lists hold the cells and faces of the halo too, also as images in other periods, with the
-    !! centroids at the place of the image. What else to clear before the next filling: legs with a
-    !! hit, and cells closed all round because bodies overlap there or the cell is sealed in.
-    integer :: n_leg = 0, n_closed = 0
-    integer, allocatable :: leg(:, :)           !! (4, *) cell index and direction of the lower face
+    !! centroids at the place of the image. What else to clear before the next filling: cells closed
+    !! all round because bodies overlap there or the cell is sealed in.
+    integer :: n_closed = 0
     integer, allocatable :: closed_cell(:, :)   !! (3, *)
     integer :: n_sealed = 0                     !! cut cells of the domain that are sealed in
   end type solid_geometry_t
@@ -73,10 +74,8 @@ contains
     allocate (solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
     allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (solid%leg_low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=no_hit)
-    allocate (solid%leg_high, source=solid%leg_low)
-    allocate (solid%leg_body_low(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
-    allocate (solid%leg_body_high, source=solid%leg_body_low)
+    allocate (solid%leg_number(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
+    allocate (solid%leg(4, 0), solid%leg_length(2, 0), solid%leg_body(2, 0))
     allocate (solid%cut(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (solid%tets%corner(3, 4, 0), solid%tets%list(0), solid%tets%of_cell(2, 0))
     allocate (solid%tets%first(1), source=1)
@@ -85,7 +84,7 @@ contains
     allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%tets%of_body(n + 1), source=1)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
-    allocate (solid%leg(4, 0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
+    allocate (solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
   !> Take away what the lists of the last time say was there: what bodies fill of cells.
@@ -126,10 +125,7 @@ contains
 
     do m = 1, solid%n_leg
       associate (i => solid%leg(:, m))
-        solid%leg_low(i(1), i(2), i(3), i(4)) = no_hit
-        solid%leg_high(i(1), i(2), i(3), i(4)) = no_hit
-        solid%leg_body_low(i(1), i(2), i(3), i(4)) = 0
-        solid%leg_body_high(i(1), i(2), i(3), i(4)) = 0
+        solid%leg_number(i(1), i(2), i(3), i(4)) = 0
       end associate
     end do
     solid%n_leg = 0

@@ -163,8 +163,7 @@ contains
         do i = grid%lo(1), upper(1)
           ordinary = solid%inside(i, j, k) == 0 &
                      .and. solid%inside(i - e(1), j - e(2), k - e(3)) == 0 &
-                     .and. solid%leg_low(i, j, k, d) > 1.0_wp &
-                     .and. solid%leg_high(i, j, k, d) > 1.0_wp
+                     .and. solid%leg_number(i, j, k, d) == 0
           leg(i, j, k) = merge(conductance*harmonic_mean(mu(i - e(1), j - e(2), k - e(3)), &
                                                          mu(i, j, k)), 0.0_wp, ordinary)
         end do
@@ -186,8 +185,8 @@ contains
         d = solid%leg(4, m)
         low = [i, j, k] - unit_step(:, d)
         if (grid%side_of_face(low(d) + 1, d) /= no_side) cycle
-        call wall_leg(low, solid%leg_low(i, j, k, d), 1, solid%leg_body_low(i, j, k, d))
-        call wall_leg([i, j, k], solid%leg_high(i, j, k, d), -1, solid%leg_body_high(i, j, k, d))
+        call wall_leg(low, solid%leg_length(1, m), 1, solid%leg_body(1, m))
+        call wall_leg([i, j, k], solid%leg_length(2, m), -1, solid%leg_body(2, m))
       end associate
     end do
   contains

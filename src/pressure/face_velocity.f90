@@ -13,7 +13,7 @@ module face_velocity_m
   use wall_profile_m, only: slip_at
   implicit none
   private
-  public :: acceleration_t, acceleration_init, face_acceleration, cell_mean_of_faces
+  public :: acceleration_t, acceleration_init, face_acceleration, push_faces, cell_mean_of_faces
   public :: predict_face_velocity, face_velocity_at_walls, shorten_at_walls, compact_time
 
   real(wp), parameter :: compact_courant = 0.125_wp   !! Courant number of the longest compact_time
@@ -102,6 +102,65 @@ contains
       end do
     end subroutine sides_of_direction
   end subroutine face_acceleration
+
+  !> Add to the velocity of the faces what a pressure correction gives them in dt:
+  !! u_f += -dt (phi_high - phi_low)/(h rho_f) [m/s], by `face_acceleration` without weight.
+  subroutine push_faces(grid, dt, rho, phi, sides, uf)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    real(wp), intent(in), contiguous :: phi(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
+      !! [Pa], halo of other processes and periods filled
+    type(outflow_t), intent(in) :: sides(2, 3)
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, d, e(3), low(3), high(3)
+
+    do d = 1, 3
+      e = unit_step(:, d)
+      low = grid%lo
+      high = grid%hi + e
+      if (.not. grid%periodic(d)) then
+        if (grid%at_side(1, d)) low = low + e
+        if (grid%at_side(2, d)) high = high - e
+        call push_sides()
+      end if
+      !$omp parallel do private(i, j) schedule(static)
+      do k = low(3), high(3)
+        do j = low(2), high(2)
+          do i = low(1), high(1)
+            uf(i, j, k, d) = uf(i, j, k, d) &
+              - dt*((phi(i, j, k) - phi(i - e(1), j - e(2), k - e(3)))/grid%h(d) &
+                    /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k)))
+          end do
+        end do
+      end do
+    end do
+  contains
+    !> Sides where the pressure is given; the correction is zero there.
+    subroutine push_sides()
+      integer :: s, lower(3), upper(3), c(3)
+      real(wp) :: outward
+
+      do s = 1, 2
+        if (.not. grid%at_side(s, d) .or. .not. gives_pressure(grid%side(s, d))) cycle
+        lower = grid%lo
+        upper = grid%hi
+        lower(d) = merge(1, grid%n(d) + 1, s == 1)
+        upper(d) = lower(d)
+        outward = merge(-1.0_wp, 1.0_wp, s == 1)
+        do k = lower(3), upper(3)
+          do j = lower(2), upper(2)
+            do i = lower(1), upper(1)
+              c = [i, j, k] - merge(0, 1, s == 1)*e
+              uf(i, j, k, d) = uf(i, j, k, d) + dt*(outward*phi(c(1), c(2), c(3)) &
+                /(side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides)*rho(c(1), c(2), c(3))))
+            end do
+          end do
+        end do
+      end do
+    end subroutine push_sides
+  end subroutine push_faces
 
   !> Cell vector from a face vector: mean of the two faces of each direction by their open shares.
   subroutine cell_mean_of_faces(grid, open, a_face, a_cell)
@@ -369,12 +428,12 @@ contains
 
     !$omp parallel do schedule(static)
     do m = 1, solid%n_leg
-      call set_face(solid%leg(1:3, m), solid%leg(4, m))
+      call set_face(m, solid%leg(1:3, m), solid%leg(4, m))
     end do
   contains
-    !> The lower face of cell f in direction d: mean of what the cells with a leg through it see.
-    subroutine set_face(f, d)
-      integer, intent(in) :: f(3), d
+    !> The lower face of cell f in direction d, with leg m: mean of what the cells of the leg see.
+    subroutine set_face(m, f, d)
+      integer, intent(in) :: m, f(3), d
       integer :: low(3), sides
       real(wp) :: total
 
@@ -385,15 +444,13 @@ contains
       total = 0.0_wp
       associate (i => f(1), j => f(2), k => f(3))
         if (solid%open(i, j, k, d) <= 0.0_wp) return
-        if (solid%inside(low(1), low(2), low(3)) == 0 .and. solid%leg_body_low(i, j, k, d) > 0) then
+        if (solid%inside(low(1), low(2), low(3)) == 0) then
           sides = sides + 1
-          total = total + seen_from(low, 1, solid%leg_low(i, j, k, d), &
-                                    solid%leg_body_low(i, j, k, d), f, d)
+          total = total + seen_from(low, 1, solid%leg_length(1, m), solid%leg_body(1, m), f, d)
         end if
-        if (solid%inside(i, j, k) == 0 .and. solid%leg_body_high(i, j, k, d) > 0) then
+        if (solid%inside(i, j, k) == 0) then
           sides = sides + 1
-          total = total + seen_from(f, -1, solid%leg_high(i, j, k, d), &
-                                    solid%leg_body_high(i, j, k, d), f, d)
+          total = total + seen_from(f, -1, solid%leg_length(2, m), solid%leg_body(2, m), f, d)
         end if
         if (sides > 0) flow%uf(i, j, k, d) = total/real(sides, wp)
       end associate

@@ -5,18 +5,18 @@
 module pressure_m
   use kinds_m, only: wp
   use case_types_m, only: numerics_t
-  use fields_m, only: flow_t, add_product
+  use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use grid_m, only: grid_t
   use boundary_m, only: fill_scalar_halo
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: solid_face_flux, force_from_cells
-  use face_velocity_m, only: face_acceleration
+  use face_velocity_m, only: push_faces
   use pressure_system_m, only: pressure_system_t, pressure_system_init, set_bodies, solve_linear, &
                                motion_of_force
   use krylov_m, only: krylov_work_t
   use exact_sum_m, only: exact_dot
-  use parallel_m, only: global_max
+  use parallel_m, only: global_max, halo_exchange
   implicit none
   private
   public :: pressure_t, pressure_report_t, pressure_init, solve_pressure, divergence
@@ -36,8 +36,7 @@ module pressure_m
     logical :: rough = .false.             !! the next solve may leave `rough_factor` times that
     integer :: max_passes = 0
     real(wp), allocatable :: rhs(:, :, :), phi(:, :, :)              !! one halo cell
-    real(wp), allocatable :: phi_pass(:, :, :), phi_total(:, :, :)   !! full halo [Pa]
-    real(wp), allocatable :: a_pass(:, :, :, :)   !! of the lower faces, by phi_pass [m/s2]
+    real(wp), allocatable :: phi_total(:, :, :)                      !! full halo [Pa]
     integer, allocatable :: known(:, :, :)        !! work of `extend_pressure`
     type(pressure_report_t) :: report             !! of the last solve
   end type pressure_t
@@ -62,9 +61,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (self%phi_pass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%phi_total, source=self%phi_pass)
-    allocate (self%a_pass(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%phi_total(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine pressure_init
 
   !> Make the face velocity free of divergence; pressure and motion of the free bodies follow.
@@ -159,21 +156,17 @@ contains
     type(rigid_motion_t), intent(inout) :: bodies
     type(flow_t), intent(inout) :: flow
     type(pressure_t), intent(inout) :: self
-    real(wp), parameter :: weightless(3) = 0.0_wp
     integer :: b, k
 
-    associate (a => grid%lo, z => grid%hi, phi => self%phi, pass => self%phi_pass, &
-               total => self%phi_total)
+    associate (a => grid%lo, z => grid%hi, phi => self%phi, total => self%phi_total)
       !$omp parallel do schedule(static)
       do k = grid%lo(3), grid%hi(3)
-        pass(a(1):z(1), a(2):z(2), k) = phi(a(1):z(1), a(2):z(2), k)
         total(a(1):z(1), a(2):z(2), k) = total(a(1):z(1), a(2):z(2), k) &
                                          + phi(a(1):z(1), a(2):z(2), k)
       end do
     end associate
-    call fill_scalar_halo(grid, self%phi_pass)
-    call face_acceleration(grid, weightless, rho, rho, self%phi_pass, self%a_pass, flow%sides)
-    call add_product(grid, dt, self%a_pass, flow%uf)
+    call halo_exchange(self%phi, 1)
+    call push_faces(grid, dt, rho, self%phi, flow%sides, flow%uf)
     associate (op => self%system%operator)
       call force_from_cells(bodies, op%flux, self%phi, grid%lo - 1, op%push)
       call motion_of_force(bodies, op%push)

@@ -72,7 +72,6 @@ contains
     allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%operator%push(6, n_bodies), source=0.0_wp)
     allocate (self%operator%swallowed, source=self%operator%push)
-    allocate (self%operator%is_open(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     a = grid%first
     b = grid%last
     allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)

@@ -20,18 +20,20 @@ module krylov_m
   type :: krylov_work_t
     real(wp), allocatable, dimension(:, :, :) :: r, z   !! residual, M r
     real(wp), allocatable, dimension(:, :, :) :: p, q   !! direction, A p or A M p
-    real(wp), allocatable, dimension(:, :, :) :: shadow, y, t   !! BiCGSTAB: first r, M p, A M r
+    real(wp), allocatable, dimension(:, :, :) :: shadow, y, t
+      !! BiCGSTAB, which makes them: first r, M p, A M r
     !> First and last cell of each line that take part, (2, j, k), from 1: all if not set otherwise.
     !! What stands in the others is not touched and must be finite.
     integer, allocatable :: line(:, :, :)
     logical :: singular = .false.                !! constants are in the null space of the operator
-    real(wp), allocatable :: is_open(:, :, :)    !! 1 in own cells with an open face, else 0
+    real(wp), allocatable :: is_open(:, :, :)
+      !! 1 in own cells with an open face, else 0; made as soon as a system is singular
     real(wp) :: n_open = 0.0_wp                  !! cells of all processes with an open face
   end type krylov_work_t
 
 contains
 
-  !> Allocate the arrays of both solvers.
+  !> Allocate the arrays of conjugate gradients.
   subroutine krylov_init(grid, work)
     type(grid_t), intent(in) :: grid
     type(krylov_work_t), intent(out) :: work
@@ -43,10 +45,6 @@ contains
     allocate (work%z, source=work%r)
     allocate (work%p, source=work%r)
     allocate (work%q, source=work%r)
-    allocate (work%shadow, source=work%r)
-    allocate (work%y, source=work%r)
-    allocate (work%t, source=work%r)
-    allocate (work%is_open, source=work%r)
     allocate (work%line(2, size(work%r, 2), size(work%r, 3)))
     work%line(1, :, :) = 2
     work%line(2, :, :) = size(work%r, 1) - 1
@@ -73,6 +71,8 @@ contains
     call global_max(side)
     work%singular = side(1) <= 0.0_wp
     if (.not. work%singular) return
+    if (.not. allocated(work%is_open)) allocate (work%is_open, mold=work%r)
+    work%is_open = 0.0_wp
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
@@ -138,6 +138,12 @@ contains
     real(wp) :: bound, alpha, omega, rho, rho_before, norms(2), sums(2), p_max
     logical :: fresh   !! the iteration starts at the residual at hand
 
+    if (.not. allocated(work%shadow)) then
+      allocate (work%shadow, work%y, work%t, mold=work%r)
+      work%shadow = 0.0_wp
+      work%y = 0.0_wp
+      work%t = 0.0_wp
+    end if
     call first_residual(op, b, x, work, report%residual)
     bound = max(control%tolerance, control%relative*report%residual)
     fresh = .true.

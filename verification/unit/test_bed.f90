@@ -8,6 +8,7 @@ program test_bed
   use case_types_m, only: case_t
   use grid_m, only: grid_t, grid_init, n_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use legs_on_grid_m, only: legs_t, legs_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
   use shapes_builtin_m, only: make_shape
@@ -240,6 +241,7 @@ contains
     type(blocks_t) :: blocks
     type(solid_fraction_t) :: fraction
     type(solid_geometry_t) :: solid, of_bed
+    type(legs_t) :: legs, legs_of_bed
     type(bed_form_t) :: form
     type(cut_cell_t) :: a, b
     character(:), allocatable :: message
@@ -262,8 +264,10 @@ contains
       call fill(case, form, grid, of_bed)
       worst(1) = max(worst(1), maxval(abs(solid%alpha - of_bed%alpha)))
       worst(2) = max(worst(2), maxval(abs(solid%open - of_bed%open)))
-      worst(3) = max(worst(3), maxval(abs(solid%leg_low - of_bed%leg_low)))
-      worst(4) = max(worst(4), maxval(abs(solid%leg_high - of_bed%leg_high)))
+      legs = legs_on_grid(solid)
+      legs_of_bed = legs_on_grid(of_bed)
+      worst(3) = max(worst(3), maxval(abs(legs%low - legs_of_bed%low)))
+      worst(4) = max(worst(4), maxval(abs(legs%high - legs_of_bed%high)))
       worst(5) = max(worst(5), real(maxval(abs(solid%inside - of_bed%inside)), wp))
       do k = 1, grid%n(3)
         do j = 1, grid%n(2)

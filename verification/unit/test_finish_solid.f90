@@ -2,8 +2,8 @@
 program test_finish_solid
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces, &
-    no_hit
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces
+  use legs_on_grid_m, only: legs_t, legs_on_grid, no_hit
   use painting_m, only: painting_t, painting_init
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs
   use box_solid_m, only: simple_grid
@@ -13,6 +13,7 @@ program test_finish_solid
   type(grid_t) :: grid
   type(solid_geometry_t) :: solid
   type(painting_t) :: painting
+  type(legs_t) :: legs
 
   call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
   call painting_init(grid, 2, painting)
@@ -46,12 +47,13 @@ program test_finish_solid
   call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
 
   call guard_legs(painting, solid)
-  call check('the wall is at the centre inside, below', solid%leg_high(c(1), c(2), c(3), 1), &
+  legs = legs_on_grid(solid)
+  call check('the wall is at the centre inside, below', legs%high(c(1), c(2), c(3), 1), &
              1.0e-3_wp, 0.0_wp)
-  call check('and above', solid%leg_low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
+  call check('and above', legs%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
   call check('six legs, of the body', solid%n_leg == 6 &
-             .and. solid%leg_body_low(c(1), c(2), c(3), 2) == 1)
-  call check('no others', count(solid%leg_low < no_hit), 6)
+             .and. legs%body_low(c(1), c(2), c(3), 2) == 1)
+  call check('no others', count(legs%low < no_hit), 6)
   call finish_checks()
 
 contains
@@ -75,8 +77,9 @@ contains
     solid%body_cell = [1, 2, 3]
     solid%cell = reshape([c, c], [3, 2])
     solid%cell_alpha = [first, second]
-    deallocate (solid%cut_cell, solid%closed_cell, solid%leg)
-    allocate (solid%cut_cell(3, 2), solid%closed_cell(3, 2), solid%leg(4, 12))
+    deallocate (solid%cut_cell, solid%closed_cell, solid%leg, solid%leg_length, solid%leg_body)
+    allocate (solid%cut_cell(3, 2), solid%closed_cell(3, 2), solid%leg(4, 12), &
+              solid%leg_length(2, 12), solid%leg_body(2, 12))
     solid%alpha(c(1), c(2), c(3)) = first + second
     solid%inside(c(1), c(2), c(3)) = 1
   end subroutine shared_cell

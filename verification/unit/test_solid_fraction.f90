@@ -12,6 +12,7 @@ program test_solid_fraction
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use legs_on_grid_m, only: legs_t, legs_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   implicit none
 
@@ -411,7 +412,7 @@ contains
         do j = 2, grid%n(2)
           do i = 2, grid%n(1)
             low = [i, j, k] - unit_step(:, m)
-            if (solid%leg_low(i, j, k, m) <= 1 .and. solid%leg_high(i, j, k, m) <= 1) cycle
+            if (solid%leg_number(i, j, k, m) > 0) cycle
             if (solid%inside(i, j, k) /= solid%inside(low(1), low(2), low(3))) n = n + 1
           end do
         end do
@@ -444,6 +445,7 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
+    type(legs_t) :: legs
     real(wp) :: worst, r(3, 3), a(3), b(3), enter, leave, e(3)
     integer :: p, i, j, k, m, n(3)
     logical :: same, flags
@@ -460,6 +462,7 @@ contains
       if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
       e = maxval(blocks%shapes(1)%point, 2)
       call fill(grid, blocks, solid)
+      legs = legs_on_grid(solid)
       r = transpose(rotation_matrix(blocks%q(:, 1)))
       do k = 1, grid%n(3)
         do j = 1, grid%n(2)
@@ -471,11 +474,11 @@ contains
               if (n(m) < 1) cycle
               a = matmul(r, grid%centre(n, [1, 2, 3]) - blocks%x(:, 1))
               call cross_box(a, b, e, enter, leave)
-              same = same .and. ((enter <= 1) .eqv. (solid%leg_low(i, j, k, m) <= 1)) .and. &
-                     ((enter <= 1) .eqv. (solid%leg_body_high(i, j, k, m) == 1))
-              if (enter > 1 .or. solid%leg_low(i, j, k, m) > 1) cycle
-              worst = max(worst, abs(solid%leg_low(i, j, k, m) - max(enter, 1e-3_wp)), &
-                          abs(solid%leg_high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
+              same = same .and. ((enter <= 1) .eqv. (legs%low(i, j, k, m) <= 1)) .and. &
+                     ((enter <= 1) .eqv. (legs%body_high(i, j, k, m) == 1))
+              if (enter > 1 .or. legs%low(i, j, k, m) > 1) cycle
+              worst = max(worst, abs(legs%low(i, j, k, m) - max(enter, 1e-3_wp)), &
+                          abs(legs%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
             end do
           end do
         end do
@@ -520,6 +523,7 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
+    type(legs_t) :: legs
     real(wp) :: x(3), worst
     integer :: i, j, k, m, n(3)
     logical :: complete
@@ -529,6 +533,7 @@ contains
                      reshape([0.041_wp, 0.0405_wp, 0.039_wp], [3, 1]), &
                      reshape(identity, [4, 1]), blocks)
     call fill(grid, blocks, solid)
+    legs = legs_on_grid(solid)
     worst = 0.0_wp
     complete = .true.
     do m = 1, 3
@@ -536,11 +541,11 @@ contains
         do j = 2, 16
           do i = 2, 16
             n = [i, j, k] - unit_step(:, m)
-            if (solid%leg_low(i, j, k, m) > 1) then
+            if (legs%low(i, j, k, m) > 1) then
               complete = complete .and. (solid%inside(i, j, k) == solid%inside(n(1), n(2), n(3)))
             else
               x = grid%centre(n, [1, 2, 3]) - blocks%x(:, 1)
-              x(m) = x(m) + solid%leg_low(i, j, k, m)*grid%h(m)
+              x(m) = x(m) + legs%low(i, j, k, m)*grid%h(m)
               worst = max(worst, abs(norm2(x) - 0.025_wp))
             end if
           end do
@@ -549,7 +554,7 @@ contains
     end do
     call check('sphere: hits lie on the sphere', worst/0.025_wp, 0.0_wp, 0.012_wp)
     call check('sphere: legs between inside and outside are cut', complete)
-    call check('sphere: most legs are free', count(solid%leg_low <= 1) < 1000)
+    call check('sphere: most legs are free', solid%n_leg < 1000)
   end subroutine legs_of_a_sphere
 
   !> A box through the open top: what is outside the domain is not in the grid.
@@ -570,11 +575,11 @@ contains
     call check('half outside: lists end at the side', &
                maxval(solid%face(3, 1:solid%body_face(2) - 1)) == 11 .and. &
                maxval(solid%cell(3, 1:solid%body_cell(2) - 1)) == 10)
-    call check('half outside: no leg beyond the side', all(solid%leg_low(:, :, 11:, 3) > 1))
+    call check('half outside: no leg beyond the side', all(solid%leg_number(:, :, 11:, 3) == 0))
     blocks%x(3, 1) = 0.049_wp - 0.01_wp   ! its top 1 mm below the side
     call fill(grid, blocks, solid)
-    call check('below the side: leg from the last centre', solid%leg_low(6, 6, 11, 3), 0.3_wp, &
-               1e-12_wp)
+    call check('below the side: leg from the last centre', &
+               solid%leg_length(1, solid%leg_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
   end subroutine partly_outside
 
   !> Two boxes that overlap by half a cell, and two that share a cell without overlap.
@@ -648,6 +653,7 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks, far
     type(solid_geometry_t) :: solid, other
+    type(legs_t) :: legs
     real(wp) :: worst
     integer :: i, m
 
@@ -662,13 +668,14 @@ contains
     far%x(1, 1) = far%x(1, 1) - 3*grid%length(1)
     call fill(grid, blocks, solid)
     call fill(grid, far, other)
+    legs = legs_on_grid(solid)
     call check('periods: the whole volume', sum(solid%alpha(1:24, 1:24, 1:24))*grid%volume, &
                7*0.015_wp**3, 1e-12_wp*0.015_wp**3)
     worst = 0.0_wp
     do i = 1, n_halo
       worst = max(worst, maxval(abs(solid%alpha(i, :, :) - solid%alpha(24 + i, :, :))), &
                   maxval(abs(solid%open(:, :, i, :) - solid%open(:, :, 24 + i, :))), &
-                  maxval(abs(solid%leg_low(1 - i, :, 4:20, :) - solid%leg_low(25 - i, :, 4:20, :))))
+                  maxval(abs(legs%low(1 - i, :, 4:20, :) - legs%low(25 - i, :, 4:20, :))))
     end do
     call check('periods: halos are images, bit by bit', worst, 0.0_wp, 0.0_wp)
     call check('periods: three periods away the same bits', same_bits(solid, other))
@@ -704,12 +711,14 @@ contains
   function same_bits(a, b) result(same)
     type(solid_geometry_t), intent(in) :: a, b
     logical :: same
+    type(legs_t) :: of_a, of_b
 
+    of_a = legs_on_grid(a)
+    of_b = legs_on_grid(b)
     same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. maxval(abs(a%open - b%open)) <= 0 .and. &
-           maxval(abs(a%leg_low - b%leg_low)) <= 0 .and. maxval(abs(a%leg_high - b%leg_high)) <= 0 &
-           .and. all(a%inside == b%inside) .and. all(a%leg_body_low == b%leg_body_low) .and. &
-           all(a%leg_body_high == b%leg_body_high) .and. a%n_cut == b%n_cut .and. &
-           all(a%cut == b%cut)
+           maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) <= 0 &
+           .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) .and. &
+           all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
   end function same_bits
 
   !> A process that owns a part of the grid gets the bits of the one that owns all.
@@ -717,6 +726,7 @@ contains
     type(grid_t) :: grid, part
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: whole, piece
+    type(legs_t) :: of_whole, of_piece
     real(wp) :: x(3, 3), q(4, 3)
     integer :: lo(3), a(3), b(3), i, c
     logical :: same, tets
@@ -728,6 +738,7 @@ contains
     end do
     call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
     call fill(grid, blocks, whole)
+    of_whole = legs_on_grid(whole)
     same = .true.
     tets = .true.
     do i = 0, 3
@@ -735,6 +746,7 @@ contains
       lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
       call part%own(lo, lo + [15, 15, 11])
       call fill(part, blocks, piece)
+      of_piece = legs_on_grid(piece)
       a = part%first
       b = part%last
       associate (low => max(a, 1), high => min(b, grid%n))
@@ -744,8 +756,8 @@ contains
           piece%open(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
           whole%open(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
         same = same .and. all(abs( &
-          piece%leg_high(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
-          whole%leg_high(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
+          of_piece%high(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
+          of_whole%high(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
         same = same .and. all(piece%inside(low(1):high(1), low(2):high(2), low(3):high(3)) == &
                               whole%inside(low(1):high(1), low(2):high(2), low(3):high(3)))
       end associate

@@ -162,24 +162,28 @@ contains
       if (grid%centre(k, 3) < z0) solid%inside(:, :, k) = 1
       if (k == 1) cycle
       if (grid%centre(k - 1, 3) < z0 .and. grid%centre(k, 3) > z0) then
-        solid%leg_high(:, :, k, 3) = (grid%centre(k, 3) - z0)/grid%h(3)
-        solid%leg_body_high(:, :, k, 3) = 1
-        call list_legs(k)
+        call list_legs(k, (grid%centre(k, 3) - z0)/grid%h(3))
       end if
     end do
     call list_slab(1, 0.0_wp, z0)
   end subroutine make_wall
 
-  !> The legs through the lower faces of the cells of plane k.
-  subroutine list_legs(k)
+  !> The legs through the lower faces of the cells of plane k, so long above the wall of body 1.
+  subroutine list_legs(k, length)
     integer, intent(in) :: k
+    real(wp), intent(in) :: length   !! [h]
     integer :: i, j
 
     call ensure_room(product(grid%n), solid%leg)
+    call ensure_room(product(grid%n), solid%leg_length)
+    call ensure_room(product(grid%n), solid%leg_body)
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
         solid%n_leg = solid%n_leg + 1
         solid%leg(:, solid%n_leg) = [i, j, k, 3]
+        solid%leg_number(i, j, k, 3) = solid%n_leg
+        solid%leg_length(:, solid%n_leg) = [1.0_wp - length, length]
+        solid%leg_body(:, solid%n_leg) = 1
       end do
     end do
   end subroutine list_legs
