@@ -80,9 +80,11 @@ def test_a_run_without_blocks_has_a_page(make_run) -> None:
 def test_make_run_makes_the_page() -> None:
     """The newcomer's one command ends with the page of its case."""
     root = Path(__file__).parents[2]
-    words = ["make", "-n", "run", "CASE=input/dam_break.nml"]
+    words = ["make", "--no-print-directory", "-n", "run", "CASE=input/dam_break.nml"]
     done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1].endswith(" report input/dam_break.nml")
+    said = [line for line in done.stdout.splitlines() if "input/dam_break.nml" in line]
+    assert said[0] == "./mics < input/dam_break.nml"
+    assert said[-1].endswith(" report input/dam_break.nml")
 
 
 def test_nothing_is_loaded_from_outside(report: Path) -> None:
