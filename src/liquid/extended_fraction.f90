@@ -29,6 +29,7 @@ module extended_fraction_m
   real(wp), parameter :: same_liquid = 1.0e-6_wp
   real(wp), parameter :: nearly_pure = 1.0e-8_wp     !! share of gas or liquid that has no plane
   integer, parameter :: plane_passes = 2             !! their normals depend on each other
+  integer, parameter :: worth_threads = 500          !! fewer cells are looked at by one thread
 
   type :: extended_fraction_t
     type(vertical_t) :: vertical
@@ -196,9 +197,9 @@ contains
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, kept, at(3)
 
+    !$omp parallel do schedule(static) if (left > worth_threads)
     do l = 1, left
-      at = self%cell(:, self%open_list(l))
-      self%value(self%open_list(l)) = mean_of_neighbours(at)
+      self%value(self%open_list(l)) = mean_of_neighbours(self%cell(:, self%open_list(l)))
     end do
     kept = 0
     do l = 1, left

@@ -37,6 +37,7 @@ module linked_cells_m
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
     real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
+    real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the film in a cell, 0 to 1
     !> Of a wall cell: share of its velocity, seen from the wall, that its centre has.
     real(wp), allocatable :: centre(:)
@@ -61,6 +62,7 @@ contains
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0), self%centre(0))
     allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
     allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
+    allocate (self%distance(masters_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -209,10 +211,11 @@ contains
     call ensure_room(self%n_films, self%master)
     call ensure_room(self%n_films, self%share)
     call ensure_room(self%n_films, self%nearer)
+    call ensure_room(self%n_films, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_films
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
-                     self%share(:, m), self%nearer(:, m))
+                     self%share(:, m), self%nearer(:, m), self%distance(:, m))
     end do
     do m = 1, self%n_films
       body = self%body(m)
@@ -226,22 +229,29 @@ contains
     end do
   end subroutine find_masters
 
-  !> Normal of the wall of film c, the steps to its masters, their shares of it, and 1 - r.
-  subroutine find_wall(grid, solid, c, normal, steps, share, nearer)
+  !> Normal of the wall of film c, the steps to its masters, their shares of it, 1 - r, and the
+  !! distances of their fluid; r and distances as without a wall where there is no normal.
+  subroutine find_wall(grid, solid, c, normal, steps, share, nearer, distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(out) :: normal(3)
     integer, intent(out) :: steps(3, masters_at_most)
-    real(wp), intent(out) :: share(masters_at_most), nearer(masters_at_most)
+    real(wp), intent(out), dimension(masters_at_most) :: share, nearer, distance
+    integer, parameter :: here(3) = 0
+    real(wp) :: own   !! distance of the fluid of the film [m]
     integer :: n
 
     normal = wall_normal(grid, solid, c)
     nearer = 0.0_wp
+    distance = 0.0_wp
     call to_masters(grid, solid, c, normal, steps, share)
+    if (all(abs(normal) <= 0.0_wp)) return
+    own = distance_to_fluid(grid, solid, c, here, normal)
     do n = 1, masters_at_most
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
-      nearer(n) = nearer_than(grid, solid, c, steps(:, n), normal)
+      distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
+      nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
     end do
   end subroutine find_wall
 
@@ -311,23 +321,6 @@ contains
       n = 0.0_wp
     end if
   end function wall_normal
-
-  !> 1 - r of film c and a master, zero without a normal.
-  pure function nearer_than(grid, solid, c, step, n) result(nearer)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3), step(3)   !! from the film to the master
-    real(wp), intent(in) :: n(3)           !! of the wall
-    real(wp) :: nearer
-    integer, parameter :: here(3) = 0
-    real(wp) :: far
-
-    nearer = 0.0_wp
-    if (all(abs(n) <= 0.0_wp)) return
-    far = distance_to_fluid(grid, solid, c, step, n)
-    nearer = 1.0_wp - max(0.0_wp, min(1.0_wp, distance_to_fluid(grid, solid, c, here, n) &
-                                              /max(far, tiny(far))))
-  end function nearer_than
 
   !> Distance of the middle of the fluid of a cell from the wall in a cut cell c, taken as a plane
   !! [m].

@@ -12,7 +12,7 @@ module viscous_legs_m
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, wall_legs_t, add_wall, add_side
+  use viscous_system_m, only: viscous_t, wall_legs_t, room_for_walls, set_wall, add_side
   use film_legs_m, only: film_legs
   use linked_cells_m, only: linked_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
@@ -20,6 +20,7 @@ module viscous_legs_m
   private
   public :: build_viscous
 
+  integer, parameter :: worth_threads = 1000        !! fewer wall legs are the work of one thread
   real(wp), parameter :: least_theta = 1.0e-3_wp    !! shortest leg, in cells
   real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
 
@@ -178,21 +179,24 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
-    integer :: m, d, low(3)
+    integer :: m, f(3)
 
+    self%walls%n = 2*solid%n_leg
+    call room_for_walls(self%walls%n, self%walls)
+    !$omp parallel do private(f) schedule(static)
     do m = 1, solid%n_leg
-      associate (i => solid%leg(1, m), j => solid%leg(2, m), k => solid%leg(3, m))
-        d = solid%leg(4, m)
-        low = [i, j, k] - unit_step(:, d)
-        if (grid%side_of_face(low(d) + 1, d) /= no_side) cycle
-        call wall_leg(low, solid%leg_length(1, m), 1, solid%leg_body(1, m))
-        call wall_leg([i, j, k], solid%leg_length(2, m), -1, solid%leg_body(2, m))
+      self%walls%found_body(2*m - 1:2*m) = 0
+      f = solid%leg(1:3, m)
+      associate (d => solid%leg(4, m), theta => solid%leg_length(:, m), body => solid%leg_body(:, m))
+        if (grid%side_of_face(f(d), d) /= no_side) cycle
+        call wall_leg(2*m - 1, f - unit_step(:, d), d, theta(1), 1, body(1))
+        call wall_leg(2*m, f, d, theta(2), -1, body(2))
       end associate
     end do
   contains
-    !> Leg from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
-    subroutine wall_leg(c, theta, sense, body)
-      integer, intent(in) :: c(3), sense, body
+    !> Leg n from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
+    subroutine wall_leg(n, c, d, theta, sense, body)
+      integer, intent(in) :: n, c(3), d, sense, body
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: x_wall(3), t
       integer :: a
@@ -204,8 +208,8 @@ contains
         x_wall(a) = grid%centre(c(a), a)
       end do
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
-      call add_wall(self, c, body, mu(c(1), c(2), c(3))*grid%area(d)/(grid%h(d)*t), &
-                    nearest_arm(grid, x_wall, bodies%x(:, body)))
+      call set_wall(n, c, body, mu(c(1), c(2), c(3))*grid%area(d)/(grid%h(d)*t), &
+                    nearest_arm(grid, x_wall, bodies%x(:, body)), self%walls)
     end subroutine wall_leg
   end subroutine legs_to_bodies
 
@@ -240,7 +244,8 @@ contains
     end do
   end subroutine legs_to_sides
 
-  !> Bring the wall legs into the order of the bodies, keeping the order of the cells.
+  !> Bring the wall legs into the order of the bodies, keeping the order in which they were found,
+  !! and into the diagonal.
   subroutine group_by_body(n_bodies, self)
     integer, intent(in) :: n_bodies
     type(viscous_t), intent(inout) :: self
@@ -248,7 +253,8 @@ contains
 
     self%walls%first = 0
     do m = 1, self%walls%n
-      self%walls%first(self%walls%found_body(m)) = self%walls%first(self%walls%found_body(m)) + 1
+      b = self%walls%found_body(m)
+      if (b > 0) self%walls%first(b) = self%walls%first(b) + 1
     end do
     place = 1
     do b = 1, n_bodies + 1
@@ -258,6 +264,11 @@ contains
     end do
     do m = 1, self%walls%n
       b = self%walls%found_body(m)
+      if (b == 0) cycle
+      associate (c => self%walls%found_cell(:, m))
+        self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) &
+                                             + self%walls%found_k(m)
+      end associate
       place = self%walls%first(b)
       self%walls%first(b) = place + 1
       self%walls%cell(:, place) = self%walls%found_cell(:, m)
@@ -268,6 +279,7 @@ contains
       self%walls%first(b) = self%walls%first(b - 1)
     end do
     self%walls%first(1) = 1
+    self%walls%n = self%walls%first(n_bodies + 1) - 1
   end subroutine group_by_body
 
   !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
@@ -286,10 +298,12 @@ contains
     integer :: b, c
 
     bins = spread(no_terms, 2, sums*bodies%n)
+    !$omp parallel private(b) if (self%walls%n > worth_threads)
     do b = 1, bodies%n
       call add_moments(self%walls, b, bins(:, sums*b - 10:sums*b - 1))
       call add_viscosity_times_volume(b, bins(:, sums*b:sums*b))
     end do
+    !$omp end parallel
     call exact_totals(bins, total)
     do b = 1, bodies%n
       self%body_matrix(:, :, b) = held_by(total(sums*b - 10:sums*b - 1))
@@ -299,13 +313,15 @@ contains
       end do
     end do
   contains
-    !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3].
+    !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3]; the threads share
+    !! the work.
     subroutine add_viscosity_times_volume(body, bins)
       integer, intent(in) :: body
       integer(i8), intent(inout) :: bins(:, :)
       real(wp) :: term(terms_at_once, 1)
       integer :: m, n, from, i(3)
 
+      !$omp do schedule(static)
       do from = solid%body_cell(body), solid%body_cell(body + 1) - 1, terms_at_once
         n = 0
         do m = from, min(from + terms_at_once, solid%body_cell(body + 1)) - 1
@@ -316,10 +332,12 @@ contains
         end do
         call exact_add_columns(term(:n, :), bins)
       end do
+      !$omp end do nowait
     end subroutine add_viscosity_times_volume
   end subroutine bodies_seen_by_legs
 
-  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the legs of a body to their sums.
+  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the legs of a body to their sums; the threads share
+  !! the work.
   subroutine add_moments(walls, body, bins)
     type(wall_legs_t), intent(in) :: walls
     integer, intent(in) :: body
@@ -327,6 +345,7 @@ contains
     real(wp) :: term(terms_at_once, 10)
     integer :: from, m, n
 
+    !$omp do schedule(static)
     do from = walls%first(body), walls%first(body + 1) - 1, terms_at_once
       n = min(terms_at_once, walls%first(body + 1) - from)
       do m = 1, n
@@ -339,6 +358,7 @@ contains
       end do
       call exact_add_columns(term(:n, :), bins)
     end do
+    !$omp end do nowait
   end subroutine add_moments
 
   !> The 6 x 6 block from K, S and M.

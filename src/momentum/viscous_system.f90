@@ -4,10 +4,11 @@
 module viscous_system_m
   use kinds_m, only: wp
   use vectors_m, only: cross
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t
   implicit none
   private
-  public :: viscous_t, wall_legs_t, viscous_init, add_wall, add_side, wrench
+  public :: viscous_t, wall_legs_t, viscous_init, add_wall, room_for_walls, set_wall, add_side, wrench
 
   !> Legs between cells and bodies, grouped by body.
   type :: wall_legs_t
@@ -16,7 +17,7 @@ module viscous_system_m
     integer, allocatable :: cell(:, :)        !! (3, *)
     real(wp), allocatable :: k(:)             !! conductance [kg/s]
     real(wp), allocatable :: arm(:, :)        !! (3, *) from the centre of mass to the wall [m]
-    integer, allocatable :: found_body(:)     !! body of each leg as found, before grouping
+    integer, allocatable :: found_body(:)     !! body of each leg as found, before grouping; 0: none
     integer, allocatable :: found_cell(:, :)
     real(wp), allocatable :: found_k(:), found_arm(:, :)
   end type wall_legs_t
@@ -96,39 +97,38 @@ contains
     integer, intent(in) :: c(3), body
     real(wp), intent(in) :: k        !! [kg/s]
     real(wp), intent(in) :: arm(3)   !! [m]
-    integer :: n
 
-    n = self%walls%n + 1
-    if (n > size(self%walls%found_k)) call grow(self)
-    self%walls%n = n
-    self%walls%found_cell(:, n) = c
-    self%walls%found_body(n) = body
-    self%walls%found_k(n) = k
-    self%walls%found_arm(:, n) = arm
-    self%diagonal(c(1), c(2), c(3), :) = self%diagonal(c(1), c(2), c(3), :) + k
+    self%walls%n = self%walls%n + 1
+    call room_for_walls(self%walls%n, self%walls)
+    call set_wall(self%walls%n, c, body, k, arm, self%walls)
   end subroutine add_wall
 
-  !> Double the length of the lists of wall legs.
-  subroutine grow(self)
-    type(viscous_t), intent(inout) :: self
-    integer, allocatable :: cells(:, :), body(:)
-    real(wp), allocatable :: k(:), arm(:, :)
-    integer :: n, m
+  !> Room for n wall legs.
+  subroutine room_for_walls(n, walls)
+    integer, intent(in) :: n
+    type(wall_legs_t), intent(inout) :: walls
 
-    n = self%walls%n
-    m = max(1024, 2*n)
-    allocate (cells(3, m), body(m), k(m), arm(3, m))
-    cells(:, :n) = self%walls%found_cell(:, :n)
-    body(:n) = self%walls%found_body(:n)
-    k(:n) = self%walls%found_k(:n)
-    arm(:, :n) = self%walls%found_arm(:, :n)
-    call move_alloc(cells, self%walls%found_cell)
-    call move_alloc(body, self%walls%found_body)
-    call move_alloc(k, self%walls%found_k)
-    call move_alloc(arm, self%walls%found_arm)
-    deallocate (self%walls%cell, self%walls%k, self%walls%arm)
-    allocate (self%walls%cell(3, m), self%walls%k(m), self%walls%arm(3, m))
-  end subroutine grow
+    call ensure_room(n, walls%found_cell)
+    call ensure_room(n, walls%found_body)
+    call ensure_room(n, walls%found_k)
+    call ensure_room(n, walls%found_arm)
+    call ensure_room(n, walls%cell)
+    call ensure_room(n, walls%k)
+    call ensure_room(n, walls%arm)
+  end subroutine room_for_walls
+
+  !> What was found as number n.
+  pure subroutine set_wall(n, c, body, k, arm, walls)
+    integer, intent(in) :: n, c(3), body
+    real(wp), intent(in) :: k        !! [kg/s]
+    real(wp), intent(in) :: arm(3)   !! [m]
+    type(wall_legs_t), intent(inout) :: walls
+
+    walls%found_cell(:, n) = c
+    walls%found_body(n) = body
+    walls%found_k(n) = k
+    walls%found_arm(:, n) = arm
+  end subroutine set_wall
 
   !> Note what a side that may move does to cell c: conductance k and velocity of the side.
   subroutine add_side(self, c, k, velocity)

@@ -15,7 +15,7 @@ module wall_layer_m
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, velocity_at_wall, distance_to_fluid
+  use linked_cells_m, only: linked_cells_t, velocity_at_wall
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -75,7 +75,7 @@ contains
         wall = velocity_at_wall(grid, links, m, bodies)
         slip_beside = slip_by_two(u(c(1), c(2), c(3), :) - wall, &
                                   u(next(1), next(2), next(3), :) - wall, normal, &
-                                  distance_to_fluid(grid, solid, f, c - f, normal), &
+                                  links%distance(n, m), &
                                   dot_product(normal, (c - f)*grid%h))
       end associate
     end function slip_beside
