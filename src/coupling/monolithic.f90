@@ -114,6 +114,7 @@ contains
                              flow%sides)
       call add_tension(grid, stage%rho, stage%tension, a%face)
       call accelerations_of_groups(grid, solid, dt, stage)
+      if (stage%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(grid, dt, flow, stage)
       call add_product(grid, dt, by_stress, flow%u)
