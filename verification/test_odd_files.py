@@ -148,3 +148,13 @@ def test_threads_of_the_environment(given: str, code: int, tmp_path: Path) -> No
         )
         assert done.returncode == wanted, done.stderr
         assert wanted == 0 or "OMP_NUM_THREADS = " in done.stderr
+
+
+@pytest.mark.parametrize("name", [25 * ("d" * 200 + "/"), "x" * 5000])
+def test_folder_of_a_name_too_long(name: str, tmp_path: Path) -> None:
+    """It is refused at once, and no part of the way to it is made."""
+    (tmp_path / "case.nml").write_text(case())
+    done = mics(tmp_path, "--output", name, "case.nml")
+    assert done.returncode == 2, done.stderr
+    assert f"has {len(name)} characters, must have at most 4000" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]

@@ -150,18 +150,27 @@ contains
   end function printable
 
   !> A text as a terminal may see it: each control character, those that UTF-8 writes with two bytes
-  !! too, is a question mark, but for tabs. A terminal would obey them: change colours, its title.
+  !! and older terminals know as one too, is a question mark, but for tabs. A terminal would obey
+  !! them: change colours, its title.
   pure function tame(raw) result(text)
     character(*), intent(in) :: raw
     character(len(raw)) :: text
-    integer :: i, byte
+    integer :: i, byte, following   ! bytes that belong to the UTF-8 character begun
 
     text = raw
+    following = 0
     do i = 1, len(raw)
       byte = ichar(raw(i:i))
       if ((byte < 32 .and. byte /= 9) .or. byte == 127) text(i:i) = '?'
-      if (i == 1 .or. byte < 128 .or. byte > 159) cycle
-      if (ichar(raw(i - 1:i - 1)) == 194) text(i - 1:i) = '??'
+      if (byte < 128 .or. byte > 191) then
+        following = count(byte >= [194, 224, 240] .and. byte < 245)
+        cycle
+      end if
+      if (byte <= 159 .and. following == 0) text(i:i) = '?'
+      if (byte <= 159 .and. i > 1) then
+        if (ichar(raw(max(1, i - 1):max(1, i - 1))) == 194) text(i - 1:i) = '??'
+      end if
+      following = max(0, following - 1)
     end do
   end function tame
 

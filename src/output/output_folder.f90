@@ -16,6 +16,7 @@ module output_folder_m
 
   character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
     'blocks.vtkhdf']
+  integer, parameter :: longest_path = 4000   !! characters; Linux takes 4095, files of it included
 
   character(*), &
     parameter :: refused = 'no permission, no room, or a part of the path is not a folder'
@@ -71,7 +72,10 @@ contains
     message = ''
     code = exit_ok
     if (is_root()) then
-      if (.not. exists(path)) then
+      if (len(path) > longest_path) then
+        message = '&run output = '''//path(:40)//'...'': has '//to_text(len(path)) &
+          //' characters, must have at most '//to_text(longest_path)
+      else if (.not. exists(path)) then
         continue
       else if (.not. is_folder(path)) then
         message = '&run output = '''//path//''': is a file, must be a folder'

@@ -125,6 +125,9 @@ contains
     call check('nearest of none', nearest_name('a', [character(4) ::]) == '')
     call check('control characters', printable('a'//achar(7)//'b') == 'a?b')
     call check('control characters of two bytes', tame('a'//char(194)//char(155)//'b') == 'a??b')
+    call check('control characters of one byte', tame(char(155)//'31m'//char(144)) == '?31m?')
+    call check('letters of three bytes stay', tame(char(226)//char(155)//char(143)) == &
+               char(226)//char(155)//char(143))
     call check('letters of two bytes stay', tame(char(195)//char(159)) == char(195)//char(159))
     call check('long value', len(printable(repeat('x', 1000))) == 60)
     call check('quotes inside', quoted_text('it''s') == '''it''''s''')
