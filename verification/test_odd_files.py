@@ -158,3 +158,12 @@ def test_folder_of_a_name_too_long(name: str, tmp_path: Path) -> None:
     assert done.returncode == 2, done.stderr
     assert f"has {len(name)} characters, must have at most 4000" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
+
+
+@pytest.mark.parametrize("text", ["&{} /\n", "&{} 1 /\n", "&water {} = 1 /\n", "&water {} /\n"])
+def test_names_without_end(text: str, tmp_path: Path) -> None:
+    """A message shows the beginning of a name of a group or variable."""
+    (tmp_path / "case.nml").write_text(case() + text.format("x" * 5000))
+    done = mics(tmp_path, "case.nml")
+    assert done.returncode == 2
+    assert "xxx..." in done.stderr and max(map(len, done.stderr.splitlines())) < 300

@@ -108,7 +108,7 @@ contains
 
     group%line = cursor%line
     cursor%at = cursor%at + 1
-    group%name = lower_case(take_run(cursor, name_characters))
+    group%name = printable(lower_case(take_run(cursor, name_characters)))
     allocate (group%assignment(16))
     if (len(group%name) == 0) then
       call problems%add_message('''&'' without the name of a group', cursor%line)
@@ -202,7 +202,7 @@ contains
 
     call check_last(group, problems)
     new%line = cursor%line
-    new%name = lower_case(take_run(cursor, name_characters))
+    new%name = printable(lower_case(take_run(cursor, name_characters)))
     allocate (new%value(4))
     same = group%find(new%name)
     if (group%n == most_variables .and. .not. group%faulty) then
