@@ -1,8 +1,9 @@
 !> Copying of halo layers, shared by both parallel layers.
 !!
-!! An array of any rank with an exchanged direction of `m` layers is seen as
+!! For periodic images an array of any rank with a direction of `m` layers is seen as
 !! `a(before, m, after)`, where `before` and `after` are the products of the extents of the
 !! directions before and after it; so each copy is written once for all directions and ranks.
+!! What goes to other processes is a box of an array of four directions, from one corner to another.
 module halo_copy_m
   use kinds_m, only: wp, sp
   implicit none
@@ -61,54 +62,54 @@ contains
     end do
   end subroutine wrap_integer
 
-  !> Copy the layers first .. first+width-1 into a buffer.
-  pure subroutine pack_wp(a, before, m, after, first, width, buffer)
-    integer, intent(in) :: before, m, after, first, width
-    real(wp), intent(in) :: a(before, m, after)
-    real(wp), intent(inout) :: buffer(before, width, after)
+  !> Copy a box into a buffer.
+  pure subroutine pack_wp(a, n, from, to, buffer)
+    integer, intent(in) :: n(4), from(4), to(4)
+    real(wp), intent(in) :: a(n(1), n(2), n(3), n(4))
+    real(wp), intent(inout) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
 
-    buffer = a(:, first:first + width - 1, :)
+    buffer = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
   end subroutine pack_wp
 
-  pure subroutine pack_sp(a, before, m, after, first, width, buffer)
-    integer, intent(in) :: before, m, after, first, width
-    real(sp), intent(in) :: a(before, m, after)
-    real(sp), intent(inout) :: buffer(before, width, after)
+  pure subroutine pack_sp(a, n, from, to, buffer)
+    integer, intent(in) :: n(4), from(4), to(4)
+    real(sp), intent(in) :: a(n(1), n(2), n(3), n(4))
+    real(sp), intent(inout) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
 
-    buffer = a(:, first:first + width - 1, :)
+    buffer = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
   end subroutine pack_sp
 
-  pure subroutine pack_integer(a, before, m, after, first, width, buffer)
-    integer, intent(in) :: before, m, after, first, width
-    integer, intent(in) :: a(before, m, after)
-    integer, intent(inout) :: buffer(before, width, after)
+  pure subroutine pack_integer(a, n, from, to, buffer)
+    integer, intent(in) :: n(4), from(4), to(4)
+    integer, intent(in) :: a(n(1), n(2), n(3), n(4))
+    integer, intent(inout) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
 
-    buffer = a(:, first:first + width - 1, :)
+    buffer = a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
   end subroutine pack_integer
 
-  !> Copy a buffer into the layers first .. first+width-1.
-  pure subroutine unpack_wp(buffer, before, m, after, first, width, a)
-    integer, intent(in) :: before, m, after, first, width
-    real(wp), intent(in) :: buffer(before, width, after)
-    real(wp), intent(inout) :: a(before, m, after)
+  !> Copy a buffer into a box.
+  pure subroutine unpack_wp(buffer, n, from, to, a)
+    integer, intent(in) :: n(4), from(4), to(4)
+    real(wp), intent(in) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
+    real(wp), intent(inout) :: a(n(1), n(2), n(3), n(4))
 
-    a(:, first:first + width - 1, :) = buffer
+    a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = buffer
   end subroutine unpack_wp
 
-  pure subroutine unpack_sp(buffer, before, m, after, first, width, a)
-    integer, intent(in) :: before, m, after, first, width
-    real(sp), intent(in) :: buffer(before, width, after)
-    real(sp), intent(inout) :: a(before, m, after)
+  pure subroutine unpack_sp(buffer, n, from, to, a)
+    integer, intent(in) :: n(4), from(4), to(4)
+    real(sp), intent(in) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
+    real(sp), intent(inout) :: a(n(1), n(2), n(3), n(4))
 
-    a(:, first:first + width - 1, :) = buffer
+    a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = buffer
   end subroutine unpack_sp
 
-  pure subroutine unpack_integer(buffer, before, m, after, first, width, a)
-    integer, intent(in) :: before, m, after, first, width
-    integer, intent(in) :: buffer(before, width, after)
-    integer, intent(inout) :: a(before, m, after)
+  pure subroutine unpack_integer(buffer, n, from, to, a)
+    integer, intent(in) :: n(4), from(4), to(4)
+    integer, intent(in) :: buffer(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4))
+    integer, intent(inout) :: a(n(1), n(2), n(3), n(4))
 
-    a(:, first:first + width - 1, :) = buffer
+    a(from(1):to(1), from(2):to(2), from(3):to(3), from(4):to(4)) = buffer
   end subroutine unpack_integer
 
 end module halo_copy_m

@@ -20,6 +20,9 @@ module parallel_m
   !! `halo_exchange(a, width, d)` fills those of direction d over the full extent of the other
   !! directions, so d = 1, 2, 3 in turn fill edges and corners too; without d that is done.
   !! Halos at sides of the domain that are not periodic stay as they are.
+  !!
+  !! With `layers` less than the width only so many layers beside the block are filled, edges and
+  !! corners of that width too: for who reads no others. Those beyond may then hold anything.
   interface halo_exchange
     procedure :: halo_wp_3, halo_wp_4, halo_sp_3, halo_integer_3
   end interface halo_exchange
@@ -98,21 +101,21 @@ module parallel_m
 
     !> Layers of the neighbours, or periodic images, into the halos of an array of up to four
     !! directions.
-    module subroutine fill_wp(a, extent, width, chosen)
+    module subroutine fill_wp(a, extent, width, layers, chosen)
       real(wp), intent(inout) :: a(*)
-      integer, intent(in) :: extent(4), width
+      integer, intent(in) :: extent(4), width, layers
       logical, intent(in) :: chosen(3)   !! directions to fill
     end subroutine fill_wp
 
-    module subroutine fill_sp(a, extent, width, chosen)
+    module subroutine fill_sp(a, extent, width, layers, chosen)
       real(sp), intent(inout) :: a(*)
-      integer, intent(in) :: extent(4), width
+      integer, intent(in) :: extent(4), width, layers
       logical, intent(in) :: chosen(3)
     end subroutine fill_sp
 
-    module subroutine fill_integer(a, extent, width, chosen)
+    module subroutine fill_integer(a, extent, width, layers, chosen)
       integer, intent(inout) :: a(*)
-      integer, intent(in) :: extent(4), width
+      integer, intent(in) :: extent(4), width, layers
       logical, intent(in) :: chosen(3)
     end subroutine fill_integer
 
@@ -204,6 +207,15 @@ contains
     if (present(d)) chosen = [1, 2, 3] == d
   end function asked_for
 
+  !> Layers of a halo that are filled: all, unless fewer are asked for.
+  pure integer function asked_layers(width, layers)
+    integer, intent(in) :: width
+    integer, intent(in), optional :: layers
+
+    asked_layers = width
+    if (present(layers)) asked_layers = min(layers, width)
+  end function asked_layers
+
   !> What passed between all processes in so many steps; counting ends. All processes call.
   subroutine total_traffic(steps, traffic)
     integer, intent(in) :: steps
@@ -237,22 +249,26 @@ contains
     end do
   end subroutine note_layers
 
-  subroutine halo_wp_3(a, width, d)
+  subroutine halo_wp_3(a, width, d, layers)
     real(wp), intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
-    integer, intent(in), optional :: d
+    integer, intent(in), optional :: d, layers
+    integer :: filled
 
-    call note_layers(storage_size(a)/8, width, asked_for(d))
-    call fill_wp(a, [shape(a), 1], width, asked_for(d))
+    filled = asked_layers(width, layers)
+    call note_layers(storage_size(a)/8, filled, asked_for(d))
+    call fill_wp(a, [shape(a), 1], width, filled, asked_for(d))
   end subroutine halo_wp_3
 
-  subroutine halo_wp_4(a, width, d)
+  subroutine halo_wp_4(a, width, d, layers)
     real(wp), intent(inout), contiguous :: a(:, :, :, :)
     integer, intent(in) :: width
-    integer, intent(in), optional :: d
+    integer, intent(in), optional :: d, layers
+    integer :: filled
 
-    call note_layers(size(a, 4)*storage_size(a)/8, width, asked_for(d))
-    call fill_wp(a, shape(a), width, asked_for(d))
+    filled = asked_layers(width, layers)
+    call note_layers(size(a, 4)*storage_size(a)/8, filled, asked_for(d))
+    call fill_wp(a, shape(a), width, filled, asked_for(d))
   end subroutine halo_wp_4
 
   !> For levels of the multigrid, whose cycles and set-ups tell what is asked.
@@ -261,16 +277,18 @@ contains
     integer, intent(in) :: width
     integer, intent(in), optional :: d
 
-    call fill_sp(a, [shape(a), 1], width, asked_for(d))
+    call fill_sp(a, [shape(a), 1], width, width, asked_for(d))
   end subroutine halo_sp_3
 
-  subroutine halo_integer_3(a, width, d)
+  subroutine halo_integer_3(a, width, d, layers)
     integer, intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
-    integer, intent(in), optional :: d
+    integer, intent(in), optional :: d, layers
+    integer :: filled
 
-    call note_layers(storage_size(a)/8, width, asked_for(d))
-    call fill_integer(a, [shape(a), 1], width, asked_for(d))
+    filled = asked_layers(width, layers)
+    call note_layers(storage_size(a)/8, filled, asked_for(d))
+    call fill_integer(a, [shape(a), 1], width, filled, asked_for(d))
   end subroutine halo_integer_3
 
 end module parallel_m

@@ -121,91 +121,141 @@ contains
   end function rank_beside
 
   module procedure fill_wp
-    real(wp), pointer, contiguous :: layers(:)
-    integer :: e, s, before, m, after, n, bytes
+    real(wp), pointer, contiguous :: box(:)
+    integer :: e, s, n, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
-      before = product(extent(:e - 1))
-      m = extent(e)
-      after = product(extent(e + 1:))
-      n = before*width*after
-      if (wraps(e)) call wrap_wp(a, before, m, after, width)
+      if (wraps(e)) call wrap_wp(a, product(extent(:e - 1)), extent(e), &
+                                product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      bytes = n*storage_size(layers)/8
+      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      if (layers < width) then
+        block
+          use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+          real(wp) :: poison(extent(1)*extent(2)*extent(3)*extent(4))
+          poison = ieee_value(1.0_wp, ieee_quiet_nan)
+          do s = 1, 2
+            if (neighbour(s, e) == MPI_PROC_NULL) cycle
+            from = 1
+            to = extent
+            call shift_box(e, merge(1, extent(e) - width + 1, s == 1), width, from, to)
+            call unpack_wp(poison, extent, from, to, a)
+          end do
+        end block
+      end if
+      call box_of_layers(extent, width, layers, e, from, to)
+      n = product(to - from + 1)
+      bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), layers, [n])
-        call pack_wp(a, before, m, after, inner(s, m, width), width, layers)
+        call c_f_pointer(going(s), box, [n])
+        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call pack_wp(a, extent, from, to, box)
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), layers, [n])
-        call unpack_wp(layers, before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), box, [n])
+        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call unpack_wp(box, extent, from, to, a)
       end do
     end do
   end procedure fill_wp
 
   module procedure fill_sp
-    real(sp), pointer, contiguous :: layers(:)
-    integer :: e, s, before, m, after, n, bytes
+    real(sp), pointer, contiguous :: box(:)
+    integer :: e, s, n, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
-      before = product(extent(:e - 1))
-      m = extent(e)
-      after = product(extent(e + 1:))
-      n = before*width*after
-      if (wraps(e)) call wrap_sp(a, before, m, after, width)
+      if (wraps(e)) call wrap_sp(a, product(extent(:e - 1)), extent(e), &
+                                product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      bytes = n*storage_size(layers)/8
+      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      call box_of_layers(extent, width, layers, e, from, to)
+      n = product(to - from + 1)
+      bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), layers, [n])
-        call pack_sp(a, before, m, after, inner(s, m, width), width, layers)
+        call c_f_pointer(going(s), box, [n])
+        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call pack_sp(a, extent, from, to, box)
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), layers, [n])
-        call unpack_sp(layers, before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), box, [n])
+        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call unpack_sp(box, extent, from, to, a)
       end do
     end do
   end procedure fill_sp
 
   module procedure fill_integer
-    integer, pointer, contiguous :: layers(:)
-    integer :: e, s, before, m, after, n, bytes
+    integer, pointer, contiguous :: box(:)
+    integer :: e, s, n, bytes, from(4), to(4)
 
     do e = 1, 3
       if (.not. chosen(e)) cycle
-      before = product(extent(:e - 1))
-      m = extent(e)
-      after = product(extent(e + 1:))
-      n = before*width*after
-      if (wraps(e)) call wrap_integer(a, before, m, after, width)
+      if (wraps(e)) call wrap_integer(a, product(extent(:e - 1)), extent(e), &
+                                product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
-      if (m < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      bytes = n*storage_size(layers)/8
+      if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
+      if (layers < width) then
+        block
+          integer :: poison(extent(1)*extent(2)*extent(3)*extent(4))
+          poison = 123456789
+          do s = 1, 2
+            if (neighbour(s, e) == MPI_PROC_NULL) cycle
+            from = 1
+            to = extent
+            call shift_box(e, merge(1, extent(e) - width + 1, s == 1), width, from, to)
+            call unpack_integer(poison, extent, from, to, a)
+          end do
+        end block
+      end if
+      call box_of_layers(extent, width, layers, e, from, to)
+      n = product(to - from + 1)
+      bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), layers, [n])
-        call pack_integer(a, before, m, after, inner(s, m, width), width, layers)
+        call c_f_pointer(going(s), box, [n])
+        call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
+        call pack_integer(a, extent, from, to, box)
         call send_layers(e, s, bytes)
       end do
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), layers, [n])
-        call unpack_integer(layers, before, m, after, outer(s, m, width), width, a)
+        call c_f_pointer(coming(s), box, [n])
+        call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
+        call unpack_integer(box, extent, from, to, a)
       end do
     end do
   end procedure fill_integer
+
+  !> Corners of the layers that pass in direction e: all of the block in the other directions, with
+  !! as many layers of its halos.
+  pure subroutine box_of_layers(extent, width, layers, e, from, to)
+    integer, intent(in) :: extent(4), width, layers, e
+    integer, intent(out) :: from(4), to(4)
+
+    from = [width - layers + [1, 1, 1], 1]
+    to = [extent(:3) - width + layers, extent(4)]
+    call shift_box(e, 1, layers, from, to)
+  end subroutine box_of_layers
+
+  !> The same box with its layers from `first` on in direction e.
+  pure subroutine shift_box(e, first, layers, from, to)
+    integer, intent(in) :: e, first, layers
+    integer, intent(inout) :: from(4), to(4)
+
+    from(e) = first
+    to(e) = first + layers - 1
+  end subroutine shift_box
 
   !> Get ready for layers of so many bytes through the two sides of direction e.
   !!
@@ -261,17 +311,17 @@ contains
   end subroutine free_buffers
 
   !> First of the layers that side s sends.
-  pure integer function inner(s, m, width)
-    integer, intent(in) :: s, m, width
+  pure integer function inner(s, m, width, layers)
+    integer, intent(in) :: s, m, width, layers
 
-    inner = merge(width + 1, m - 2*width + 1, s == 1)
+    inner = merge(width + 1, m - width - layers + 1, s == 1)
   end function inner
 
-  !> First of the halo layers of side s.
-  pure integer function outer(s, m, width)
-    integer, intent(in) :: s, m, width
+  !> First of the halo layers of side s, those beside the block.
+  pure integer function outer(s, m, width, layers)
+    integer, intent(in) :: s, m, width, layers
 
-    outer = merge(1, m - width + 1, s == 1)
+    outer = merge(width - layers + 1, m - width + 1, s == 1)
   end function outer
 
   module procedure gather_wp

@@ -51,7 +51,7 @@ contains
     integer :: e
 
     do e = 1, 3
-      if (.not. (chosen(e) .and. wraps(e))) cycle
+      if (.not. (chosen(e) .and. wraps(e) .and. layers > 0)) cycle
       call wrap_wp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
     end do
   end procedure fill_wp
@@ -60,7 +60,7 @@ contains
     integer :: e
 
     do e = 1, 3
-      if (.not. (chosen(e) .and. wraps(e))) cycle
+      if (.not. (chosen(e) .and. wraps(e) .and. layers > 0)) cycle
       call wrap_sp(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
     end do
   end procedure fill_sp
@@ -69,7 +69,7 @@ contains
     integer :: e
 
     do e = 1, 3
-      if (.not. (chosen(e) .and. wraps(e))) cycle
+      if (.not. (chosen(e) .and. wraps(e) .and. layers > 0)) cycle
       call wrap_integer(a, product(extent(:e - 1)), extent(e), product(extent(e + 1:)), width)
     end do
   end procedure fill_integer

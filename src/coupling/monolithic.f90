@@ -202,7 +202,7 @@ contains
       call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links)
       call predict_velocity(grid, stage%rho, flow, stage)
       call to_means(grid, links, stage%at_start, flow%u)
-      call fill_velocity_halo(grid, flow%u)
+      call fill_velocity_halo(grid, flow%u, layers=1)
       call follow_masters(grid, links, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = stage%dry_motion
@@ -221,8 +221,8 @@ contains
 
     stage%foreseen%x = stage%bodies%x
     stage%foreseen%motion = stage%at_start%motion + stage%trend
-    call fill_velocity_halo(grid, flow%u)
-    call halo_exchange(stage%acceleration%cell, n_halo)
+    call fill_velocity_halo(grid, flow%u, layers=1)
+    call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
     call predict_face_velocity(grid, dt, stage%rho, stage%acceleration, flow, stage%deviation)
     call shorten_at_walls(grid, dt, stage%bodies, stage%links%cell(:, :stage%links%n), &
                           stage%links%body, stage%links%number, stage%mid_step%takes_part, &

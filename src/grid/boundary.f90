@@ -31,13 +31,14 @@ contains
   end subroutine set_side_velocity
 
   !> Halo of a cell value with zero normal gradient at every side of the domain.
-  subroutine fill_scalar_halo(grid, a)
+  subroutine fill_scalar_halo(grid, a, layers)
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(in), optional :: layers   !! that are read; all by default
     integer :: d, s, m
 
     do d = 1, 3
-      call halo_exchange(a, n_halo, d)
+      call halo_exchange(a, n_halo, d, layers)
       do s = 1, 2
         if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
         do m = 1, n_halo
@@ -51,14 +52,15 @@ contains
   !> Halo of the cell velocity: walls mirror it (no-slip: odd about the wall velocity; slip: odd in
   !! the normal component only), an inflow has its own velocity outside, open sides and outflows
   !! carry the value of the last cell outward.
-  subroutine fill_velocity_halo(grid, u)
+  subroutine fill_velocity_halo(grid, u, layers)
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
+    integer, intent(in), optional :: layers   !! that are read; all by default
     integer :: d, s, c
 
     do d = 1, 3
-      call halo_exchange(u, n_halo, d)
+      call halo_exchange(u, n_halo, d, layers)
       if (grid%periodic(d)) cycle
       !$omp parallel do collapse(2) schedule(static)
       do c = 1, 3

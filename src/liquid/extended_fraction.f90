@@ -164,7 +164,7 @@ contains
     sideways = self%vertical%axis > 0
     do
       count(2) = int(left, i8)
-      call halo_exchange(c, n_halo)
+      call halo_exchange(c, n_halo, layers=1)
       call spread_once(grid, solid, sideways, self, left, c)
       count(1) = count(2) - int(left, i8)
       count(2) = int(left, i8)
@@ -184,7 +184,7 @@ contains
                                               room(at(1), at(2), at(3)))
       end associate
     end do
-    call halo_exchange(c, n_halo)
+    call halo_exchange(c, n_halo, layers=1)
   end subroutine spread_sideways
 
   !> One ring: new values only from values of before the pass. Cells that find one leave the list.
@@ -274,7 +274,7 @@ contains
       at = self%cell(:, l)
       if (self%has_plane(l)) c(at(1), at(2), at(3)) = self%value(l)
     end do
-    call halo_exchange(c, n_halo)
+    call halo_exchange(c, n_halo, layers=1)
   end subroutine planes_of_cut_cells
 
   !> Is the row's value good for the cut cell, and which share lies below its own plane if not?

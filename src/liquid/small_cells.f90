@@ -72,7 +72,7 @@ contains
     call ensure_room(self%n, self%amount)
     call ensure_room(self%n, self%mass)
     call ensure_room(self%n, self%ratio)
-    call halo_exchange(self%number, n_halo)
+    call halo_exchange(self%number, n_halo, layers=1)
     call find_late_faces(grid, volumes, self)
   end subroutine find_small_cells
 
@@ -192,13 +192,13 @@ contains
     if (faces(1) == 0_i8) return
     call first_values()
     do it = 1, max_late_iterations
-      call halo_exchange(value, n_halo)
+      call halo_exchange(value, n_halo, layers=1)
       call next_values()
       call global_max(change)
       self%iterations = it
       if (change(1) <= 4.0_wp*epsilon(1.0_wp)*change(2)) exit
     end do
-    call halo_exchange(value, n_halo)
+    call halo_exchange(value, n_halo, layers=1)
   contains
     !> What they hold after the sweeps, and their mass with all that comes in.
     subroutine first_values()

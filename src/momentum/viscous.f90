@@ -242,7 +242,7 @@ contains
     real(wp) :: pull(6, bodies%n)
     integer :: i, j, k, c, b, m
 
-    call halo_exchange(self%s, n_halo)
+    call halo_exchange(self%s, n_halo, layers=1)
     !$omp parallel do collapse(2) private(i, j) schedule(static)
     do c = 1, 3
       do k = grid%lo(3), grid%hi(3)

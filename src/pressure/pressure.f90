@@ -105,7 +105,7 @@ contains
         call add_correction(grid, rho, dt, bodies, flow, self)
       end do
     end associate
-    call fill_scalar_halo(grid, self%phi_total)
+    call fill_scalar_halo(grid, self%phi_total, layers=1)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       flow%p(:, :, k) = flow%p(:, :, k) + self%phi_total(:, :, k)

@@ -32,8 +32,8 @@ contains
     sideways = .true.
     pass = 1
     do
-      call halo_exchange(p, n_halo)
-      call halo_exchange(known, n_halo)
+      call halo_exchange(p, n_halo, layers=1)
+      call halo_exchange(known, n_halo, layers=1)
       pass = pass + 1
       n_found = 0
       do k = grid%lo(3), grid%hi(3)
@@ -49,7 +49,7 @@ contains
       if (.not. sideways) exit
       sideways = .false.
     end do
-    call fill_scalar_halo(grid, p)
+    call fill_scalar_halo(grid, p, layers=1)
   contains
     !> Mean over the neighbours known before this pass.
     subroutine from_neighbours(c)

@@ -83,7 +83,7 @@ contains
     logical, intent(in) :: periodic(3)
     integer :: lo(3), hi(3), i, j, k, wrong
     logical :: at_side(2, 3)
-    real(wp), allocatable :: a(:, :, :), b(:, :, :, :)
+    real(wp), allocatable :: a(:, :, :), b(:, :, :, :), thin(:, :, :)
 
     call decompose(n, periodic, lo, hi, at_side)
     allocate (a(lo(1) - w:hi(1) + w, lo(2) - w:hi(2) + w, lo(3) - w:hi(3) + w), source=-1.0_wp)
@@ -97,7 +97,13 @@ contains
     end do
     b(:, :, :, 1) = a
     b(:, :, :, 2) = merge(-2.0_wp - a, -1.0_wp, a > 0)
+    thin = a
+    call halo_exchange(thin, w, layers=1)
     call halo_exchange(a, w)
+    associate (p => lo - 1, q => hi + 1)
+      call check('one layer, its edges and corners', &
+        all(abs(thin(p(1):q(1), p(2):q(2), p(3):q(3)) - a(p(1):q(1), p(2):q(2), p(3):q(3))) <= 0))
+    end associate
     do i = 1, 3
       call halo_exchange(b, w, i)
     end do
