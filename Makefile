@@ -63,7 +63,7 @@ help:
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
-	@echo 'make soak     faults many times: full disks, programs at once, broken files; an hour'
+	@echo 'make soak     faults many times: kills, full disks, broken files, all builds, ranks; many hours'
 	@echo 'make bench    time jobs, growth and the pressure system; writes build/bench.json'
 	@echo '               PEERS=1: other programs too; FULL=1: whole jobs; AGAINST=old.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
@@ -167,7 +167,7 @@ mutate:
 # Every script of the folder, though one finds a fault.
 soak:
 	@$(deps) test
-	@$(MAKE) --no-print-directory
+	@for build in '' MPI=1 DEBUG=1 SAN=1; do $(MAKE) --no-print-directory $$build || exit 1; done
 	@status=0; for script in verification/soak/*.py; do \
 	  echo "$$script"; $(PYTHON) $$script || status=1; done; exit $$status
 

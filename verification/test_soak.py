@@ -1,13 +1,15 @@
 """A few trials of the long fault tests in soak/, which `make test` has time for."""
 
+import random
+import signal
 from pathlib import Path
 
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import full_disk, memory, still_pile, two_programs
+from soak import any_number, full_disk, kills, memory, mpi_signals, still_pile, two_programs
 
-MICS = ROOT / "mics"
+MICS, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
@@ -45,6 +47,34 @@ def test_late_comers(shop: two_programs.Workshop, tmp_path: Path) -> None:
 
 def test_lock_of_a_killed_run(shop: two_programs.Workshop, tmp_path: Path) -> None:
     assert two_programs.killed(shop, tmp_path / "run") == []
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.15, 0.25, 0.35])
+def test_kill(disk_shop: full_disk.Workshop, seconds: float, tmp_path: Path) -> None:
+    """What a killed run has written can be read, and goes on to the same bits."""
+    said, found = kills.trial(disk_shop, seconds, random.Random(1), tmp_path)
+    assert found == [], said
+
+
+@pytest.fixture(scope="module")
+def parallel_shop(tmp_path_factory: pytest.TempPathFactory) -> full_disk.Workshop:
+    return full_disk.open_shop(Machine(PARALLEL, 2, 1), tmp_path_factory.mktemp("signals"))
+
+
+@pytest.mark.xdist_group("ranks")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1, signal.SIGKILL])
+def test_signal_to_mpirun(parallel_shop: full_disk.Workshop, number: int, tmp_path: Path) -> None:
+    """The run ends in good order; what a process that is killed leaves behind goes on, too."""
+    said, found = mpi_signals.trial(parallel_shop, number, 1.0, False, tmp_path)
+    assert found == [], said
+
+
+@pytest.mark.xdist_group("ranks")
+def test_stop_and_go_on_elsewhere(tmp_path: Path) -> None:
+    """A whole job in small: stopped in the middle of a contact, gone on with on other numbers."""
+    case = tmp_path / "case.nml"
+    case.write_text(any_number.SMALL)
+    assert any_number.try_case(case, ["1x2", "2x1"], 1, tmp_path) == 0
 
 
 def test_memory_does_not_grow(tmp_path: Path) -> None:

@@ -221,7 +221,7 @@ def soak(kinds: list[str], n: int, machine: Machine, work: Path) -> int:
 def main() -> None:
     """Print a line per size; the exit code says whether any failed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("n", type=int, nargs="?", default=60, help="sizes")
+    parser.add_argument("n", type=int, nargs="?", default=200, help="sizes")
     parser.add_argument("--kind", choices=("disk", "limit"), action="append")
     parser.add_argument("--ranks", type=int, default=1)
     parser.add_argument("--program", type=Path)
