@@ -49,8 +49,9 @@ contains
   function exact_dot(x, y, width, line) result(s)
     real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)   !! blocks with halos
     integer, intent(in) :: width   !! halo cells on every side of both
-    integer, intent(in), contiguous, optional :: line(:, :, :)
-      !! (2, j, k) first and last cell of each line that take part, from 1; all if not given
+    integer, intent(in), optional :: line(:, :, :)
+      !! (2, j, k) first and last cell of each line that take part, from 1; all if not given (not
+      !! contiguous: handing one on that is not given, gfortran would look into it)
     real(wp) :: s
     integer(i8) :: bins(bin_size, 1)
     real(wp) :: total(1)
@@ -65,7 +66,7 @@ contains
   function exact_dots(x1, y1, x2, y2, width, line) result(s)
     real(wp), intent(in), contiguous :: x1(:, :, :), y1(:, :, :), x2(:, :, :), y2(:, :, :)
     integer, intent(in) :: width   !! halo cells on every side of all four
-    integer, intent(in), contiguous, optional :: line(:, :, :)   !! see `exact_dot`
+    integer, intent(in), optional :: line(:, :, :)   !! see `exact_dot`
     real(wp) :: s(2)
     integer(i8) :: bins(bin_size, 2)
 
@@ -144,7 +145,7 @@ contains
   subroutine add_products(x, y, width, line, bins)
     real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)
     integer, intent(in) :: width
-    integer, intent(in), contiguous, optional :: line(:, :, :)
+    integer, intent(in), optional :: line(:, :, :)
     integer(i8), intent(inout) :: bins(bin_size)
     integer(i8) :: mine(bin_size)
     integer :: k, first(3), last(3), range(2, size(x, 2))

@@ -63,8 +63,9 @@ def complete(name: str, file: dict[str, np.ndarray]) -> int:
     return int(file.get("VTKHDF/Steps@NSteps", np.int64(0)))
 
 
-def wrong_files(folder: Path, whole: Path) -> list[str]:
-    """Files that cannot be read, and whole rows or frames that are not those of the whole run."""
+def wrong_files(folder: Path, whole: Path, extra: int = 0) -> list[str]:
+    """Files that cannot be read, and whole rows or frames that are not those of the whole run.
+    A run that was stopped in good order has an `extra` last one."""
     found = []
     for path in sorted(folder.glob("*")):
         if path.suffix == ".part" or path.name == LOCK:
@@ -78,6 +79,7 @@ def wrong_files(folder: Path, whole: Path) -> list[str]:
             there = contents(whole / path.name)
             rows, total = complete(path.name, here), complete(path.name, there)
             total += path.name == "run.h5"  # its last row is whole, too
+            rows = max(0, rows - extra)
             for key, a in here.items():
                 growing = "@" not in key and a.ndim and a.dtype != object
                 if not growing or key == "bodies/release_time":

@@ -83,7 +83,7 @@ def trial(
         return said + ", nothing was written yet", found
     if not list(folder.glob("restart-?.h5")) and not (begun and number != signal.SIGKILL):
         return said + ", left no restart file", found + begins_again(shop, folder)
-    found += wrong_files(folder, shop.whole)
+    found += wrong_files(folder, shop.whole, int(number != signal.SIGKILL))
     if not found and number != signal.SIGKILL:
         found += last_step_is_saved(folder)
     return said, found or goes_on(shop, folder, spare)
