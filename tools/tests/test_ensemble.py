@@ -307,7 +307,8 @@ def test_the_table_is_the_same_after_ctrl_c_and_with_any_jobs(tmp_path: Path) ->
         assert (one.time == two.time).all() and (one.position == two.position).all()
 
 
-# Stand-ins for sbatch and scancel, qsub and qdel: the job begins at once, on this machine.
+# Stand-ins for sbatch and scancel, qsub and qdel: the job begins at once, on this machine. Its end
+# is asked for, then made, as queues do: a worker of dask told twice to end may wait for ever.
 SUBMIT = """\
 #!/bin/sh
 if [ -e {folder}/full ]; then echo "the queue is full" >&2; exit 1; fi
@@ -317,6 +318,7 @@ echo "Submitted batch job $!"
 CANCEL = """\
 #!/bin/sh
 kill -- -"$1"
+(sleep 3; kill -s KILL -- -"$1") > {folder}/said.$$ 2>&1 &
 """
 
 
