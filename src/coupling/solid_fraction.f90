@@ -20,6 +20,7 @@ module solid_fraction_m
   use painting_m, only: painting_t, painting_init, find_images, ensure_lists, place_bodies, &
     paint_cells, paint_faces, paint_legs
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
+  use wall_edges_m, only: find_edges
   use pockets_m, only: pockets_t, pockets_init, close_pockets
   implicit none
   private
@@ -92,6 +93,7 @@ contains
     call guard_legs(self%painting, solid)
     !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
+    call find_edges(grid, solid)
   end subroutine update_solid
 
   !> Shares of every body that is near the cells of this process and has moved.

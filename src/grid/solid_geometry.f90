@@ -41,6 +41,8 @@ module solid_geometry_m
     integer :: n_cut = 0
     integer, allocatable :: cut(:, :, :)
     integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
+    real(wp), allocatable :: edge(:)
+      !! (n_cut) 0: the wall in the cell is nearly plane, 1: it has an edge (`wall_edges_m`)
 
     !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
@@ -84,7 +86,7 @@ contains
     allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%tets%of_body(n + 1), source=1)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
-    allocate (solid%cut_cell(3, 0), solid%closed_cell(3, 0))
+    allocate (solid%edge(0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
   !> Take away what the lists of the last time say was there: what bodies fill of cells.

@@ -230,7 +230,8 @@ contains
   end subroutine find_masters
 
   !> Normal of the wall of film c, the steps to its masters, their shares of it, 1 - r, and the
-  !! distances of their fluid; r and distances as without a wall where there is no normal.
+  !! distances of their fluid; r and distances as without a wall where there is no normal, r also
+  !! where the wall has an edge, which the stream of the masters passes straight.
   subroutine find_wall(grid, solid, c, normal, steps, share, nearer, distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -240,9 +241,12 @@ contains
     real(wp), intent(out), dimension(masters_at_most) :: share, nearer, distance
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the film [m]
+    real(wp) :: edge
     integer :: n
 
     normal = wall_normal(grid, solid, c)
+    edge = 0.0_wp
+    if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
     nearer = 0.0_wp
     distance = 0.0_wp
     call to_masters(grid, solid, c, normal, steps, share)
@@ -252,6 +256,7 @@ contains
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
       distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
       nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
+      nearer(n) = (1.0_wp - edge)*nearer(n)
     end do
   end subroutine find_wall
 

@@ -404,6 +404,8 @@ contains
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
   !! that of the cell to that of the wall, where the leg through the face ends; the rest by the
   !! layer along the wall, as with the film on the other side of the face.
+  !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
+  !! `solid%edge` goes to 1: the stream leaves the edge straight.
   !!
   !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
   !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
@@ -435,7 +437,7 @@ contains
     subroutine set_face(m, f, d)
       integer, intent(in) :: m, f(3), d
       integer :: low(3), sides
-      real(wp) :: total
+      real(wp) :: total, plane
 
       low = f - unit_step(:, d)
       if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
@@ -452,9 +454,28 @@ contains
           sides = sides + 1
           total = total + seen_from(f, -1, solid%leg_length(2, m), solid%leg_body(2, m), f, d)
         end if
-        if (sides > 0) flow%uf(i, j, k, d) = total/real(sides, wp)
+        if (sides == 0) return
+        plane = behind_plane(low, f, d)
+        flow%uf(i, j, k, d) = (1.0_wp - plane)*flow%uf(i, j, k, d) + plane*(total/real(sides, wp))
       end associate
     end subroutine set_face
+
+    !> Is what lies behind face f a plane wall, 1, or an edge that the stream passes straight, 0?
+    pure function behind_plane(low, f, d) result(share)
+      integer, intent(in) :: low(3), f(3), d
+      real(wp) :: share
+
+      share = 1.0_wp
+      if (solid%open(f(1), f(2), f(3), d) >= 1.0_wp) share = 1.0_wp - max(edge_in(low), edge_in(f))
+    end function behind_plane
+
+    pure function edge_in(c) result(edge)
+      integer, intent(in) :: c(3)
+      real(wp) :: edge
+
+      edge = 0.0_wp
+      if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
+    end function edge_in
 
     !> Velocity of face f as seen from cell c, whose leg along +d or -d ends at theta cells.
     pure function seen_from(c, sense, theta, body, f, d) result(velocity)

@@ -102,6 +102,7 @@ contains
         solid%tets%list(solid%tets%first(m + 1)) = t
         solid%tets%first(m + 1) = solid%tets%first(m + 1) + 1
       end do
+      solid%edge = spread(0.0_wp, 1, m)
       solid%n_cut = m
       solid%cut(c(1), c(2), c(3)) = m
     end subroutine add_cut_cell

@@ -120,8 +120,9 @@ contains
                + time(x)*(a%face(3, 4, 5, 1) - a%cell(2, 4, 5, 1)), tolerance)
   end subroutine normal_to_the_wall
 
-  !> At an edge of the box at rest: with a line to the wall the velocity of a face comes from the
-  !! same component of the cell, with free slip the wall turns the rest of it.
+  !> At an edge of the box at rest, taken for a plane wall: with a line to the wall the velocity of
+  !! a face comes from the same component of the cell, with free slip the wall turns the rest of it.
+  !! As far as it is an edge, the face has what it had.
   subroutine along_the_wall()
     real(wp), parameter :: share = 0.3_wp/0.8_wp   !! of the cell's distance from the wall
 
@@ -129,6 +130,15 @@ contains
     a%cell = 0.0_wp
     box%bodies%motion = 0.0_wp
     links%slip = 0.0_wp
+    call check('the box has edges', box%solid%edge(box%solid%cut(6, 6, 5)), 1.0_wp, 0.0_wp)
+    box%flow%uf(7, 6, 5, 1) = 5.0_wp
+    call at_walls()
+    call check('at an edge', box%flow%uf(7, 6, 5, 1), 5.0_wp, 0.0_wp)
+    box%solid%edge = 0.75_wp
+    call at_walls()
+    call check('three quarters of an edge', box%flow%uf(7, 6, 5, 1), &
+               0.75_wp*5.0_wp + 0.25_wp*share*stream(1), tolerance)
+    box%solid%edge = 0.0_wp
     call at_walls()
     call check('a line to the wall', box%flow%uf(7, 6, 5, 1), share*stream(1), tolerance)
     links%slip = 0.25_wp

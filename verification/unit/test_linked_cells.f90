@@ -57,6 +57,8 @@ contains
     call check('at an edge to both beside it, most to the one along the normal', &
                links%share(:, links%number(4, 6, top)), &
                [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
+    call check('no profile at an edge', links%nearer(:, links%number(4, 6, top)), &
+               spread(0.0_wp, 1, 3), 0.0_wp)
     call check('the normal of the top', links%normal(:, links%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a film lies at half of it', &

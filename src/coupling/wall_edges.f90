@@ -1,0 +1,78 @@
+!> Cut cells with their centre in a block in which the wall is no plane but has an edge.
+!!
+!! Measure is a plane wall with the same normal that leaves the cell as much fluid: where the cell
+!! has an edge of a block, its faces are open more than behind that, by 0.2 of a face and more where
+!! an upright edge takes the centre of the cell, by less than 0.1 with a sphere eight cells wide.
+module wall_edges_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use grid_m, only: grid_t, unit_step
+  use solid_geometry_m, only: solid_geometry_t
+  use plic_m, only: unit_constant, unit_volume
+  implicit none
+  private
+  public :: find_edges, openings_of_plane
+
+  real(wp), parameter :: round_edge = 0.1_wp, sharp_edge = 0.2_wp
+    !! excess of openings up to which a wall counts as plane, and from which it has an edge [faces]
+  real(wp), parameter :: least = 1.0e-6_wp   !! of a normal or its parts that count
+
+contains
+
+  !> How much of an edge each cut cell has, `solid%edge`; none if its centre lies in fluid.
+  subroutine find_edges(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: m
+
+    call ensure_room(solid%n_cut, solid%edge)
+    !$omp parallel do schedule(static)
+    do m = 1, solid%n_cut
+      associate (c => solid%cut_cell(:, m))
+        solid%edge(m) = 0.0_wp
+        if (solid%inside(c(1), c(2), c(3)) == 0 .or. any(c >= grid%last)) cycle
+        solid%edge(m) = edge_of(solid, c)
+      end associate
+    end do
+  end subroutine find_edges
+
+  !> Of a cut cell: 0 behind a wall that is nearly plane, 1 with an edge.
+  pure function edge_of(solid, c) result(edge)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: edge
+    real(wp) :: low(3), high(3), excess
+    integer :: d, f(3)
+
+    do d = 1, 3
+      f = c + unit_step(:, d)
+      low(d) = solid%open(c(1), c(2), c(3), d)
+      high(d) = solid%open(f(1), f(2), f(3), d)
+    end do
+    edge = 0.0_wp
+    if (maxval(abs(high - low)) < least) return
+    excess = maxval(low + high - openings_of_plane(high - low, solid%alpha(c(1), c(2), c(3))))
+    edge = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
+  end function edge_of
+
+  !> Open share of both faces of each direction together behind a plane wall in the unit cube; 2
+  !! where the wall lies along these faces, since to round-off it is on either side of them.
+  pure function openings_of_plane(normal, alpha) result(both)
+    real(wp), intent(in) :: normal(3)   !! of the wall, into the fluid, of any length
+    real(wp), intent(in) :: alpha       !! solid share of the cell
+    real(wp) :: both(3)
+    real(wp) :: n(3), across(3), at
+    integer :: d
+
+    n = normal/sum(abs(normal))
+    at = unit_constant(n, alpha)
+    both = 2.0_wp
+    do d = 1, 3
+      across = n
+      across(d) = 0.0_wp
+      if (sum(abs(across)) < least) cycle
+      both(d) = 2.0_wp - unit_volume(across, at) - unit_volume(across, at - n(d))
+    end do
+  end function openings_of_plane
+
+end module wall_edges_m

@@ -1,0 +1,75 @@
+!> Openings behind plane walls, and which cut cells have an edge: those at the edges of an upright
+!! box, none of a sphere.
+program test_wall_edges
+  use kinds_m, only: wp
+  use wall_edges_m, only: openings_of_plane
+  use one_body_m, only: one_body_t, describe, place
+  use check_m, only: check, finish_checks
+  implicit none
+  character(8), parameter :: sides(2, 3) = 'slip'
+  type(one_body_t) :: body
+
+  call behind_planes()
+  call upright_box()
+  call turned_box()
+  call sphere()
+  call finish_checks()
+
+contains
+
+  !> A triangle of solid with legs of a half, one that reaches past the next faces, a flat wall.
+  subroutine behind_planes()
+    call check('small triangle', openings_of_plane([1.0_wp, 1.0_wp, 0.0_wp], 0.125_wp), &
+               [1.5_wp, 1.5_wp, 1.75_wp], 1.0e-12_wp)
+    call check('large triangle, from the other side', &
+               openings_of_plane([0.0_wp, -3.0_wp, 3.0_wp], 0.5625_wp), &
+               [2.0_wp - 2.0_wp*0.5625_wp, sqrt(0.875_wp), sqrt(0.875_wp)], 1.0e-12_wp)
+    call check('flat wall', openings_of_plane([0.0_wp, 0.0_wp, 0.2_wp], 0.7_wp), &
+               [0.6_wp, 0.6_wp, 2.0_wp], 1.0e-12_wp)
+  end subroutine behind_planes
+
+  !> x and y from 0.24 to 0.53, z from 0.21 to 0.57, cells of 0.1.
+  subroutine upright_box()
+    call build('box', [0.29_wp, 0.29_wp, 0.36_wp], [0.385_wp, 0.385_wp, 0.39_wp])
+    call check('along a flat side', edge([6, 4, 4]) + edge([4, 6, 4]) + edge([4, 4, 3]), 0.0_wp, &
+               0.0_wp)
+    call check('an edge that holds the centre of its cell', edge([3, 3, 4]), 1.0_wp, 0.0_wp)
+    call check('a corner', edge([3, 3, 3]), 1.0_wp, 0.0_wp)
+    call check('an edge beside the centre of its cell', edge([6, 6, 4]), 0.0_wp, 0.0_wp)
+  end subroutine upright_box
+
+  !> By 45 degrees about z, its edges on planes of the grid: all walls are plane.
+  subroutine turned_box()
+    real(wp), parameter :: width = 0.4_wp*sqrt(2.0_wp)
+
+    call build('box', [width, width, 0.4_wp], [0.5_wp, 0.5_wp, 0.5_wp], turned=.true.)
+    call check('plane walls', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 1.0e-9_wp)
+    call check('there are some', body%solid%n_cut > 10)
+  end subroutine turned_box
+
+  !> Eight cells wide.
+  subroutine sphere()
+    call build('sphere', [0.8_wp, 0.0_wp, 0.0_wp], [0.513_wp, 0.487_wp, 0.505_wp])
+    call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 0.0_wp)
+  end subroutine sphere
+
+  subroutine build(kind, size, position, turned)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3), position(3)   !! [m]
+    logical, intent(in), optional :: turned
+    type(one_body_t) :: fresh
+    real(wp), parameter :: eighth = atan(1.0_wp)/2.0_wp
+
+    body = fresh
+    call describe([10, 10, 10], [1.0_wp, 1.0_wp, 1.0_wp], sides, kind, size, position, body%case)
+    body%case%shape(1)%refinement = 5
+    if (present(turned)) body%case%body(1)%quaternion = [cos(eighth), 0.0_wp, 0.0_wp, sin(eighth)]
+    call place(body)
+  end subroutine build
+
+  real(wp) function edge(c)
+    integer, intent(in) :: c(3)
+
+    edge = body%solid%edge(body%solid%cut(c(1), c(2), c(3)))
+  end function edge
+end program test_wall_edges
