@@ -187,7 +187,8 @@ contains
     do m = 1, solid%n_leg
       self%walls%found_body(2*m - 1:2*m) = 0
       f = solid%leg(1:3, m)
-      associate (d => solid%leg(4, m), theta => solid%leg_length(:, m), body => solid%leg_body(:, m))
+      associate (d => solid%leg(4, m), theta => solid%leg_length(:, m), &
+                 body => solid%leg_body(:, m))
         if (grid%side_of_face(f(d), d) /= no_side) cycle
         call wall_leg(2*m - 1, f - unit_step(:, d), d, theta(1), 1, body(1))
         call wall_leg(2*m, f, d, theta(2), -1, body(2))

@@ -8,7 +8,8 @@ module viscous_system_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: viscous_t, wall_legs_t, viscous_init, add_wall, room_for_walls, set_wall, add_side, wrench
+  public :: viscous_t, wall_legs_t, viscous_init, add_wall, room_for_walls, set_wall, add_side
+  public :: wrench
 
   !> Legs between cells and bodies, grouped by body.
   type :: wall_legs_t
