@@ -61,26 +61,30 @@ contains
     call check('a single layer', all(a(1, :) == 8) .and. all(a(2, :) == 9))
   end subroutine thinner_than_its_halo
 
-  !> What is packed is what lies in the layers; unpacked elsewhere it is there and nowhere else.
+  !> What is packed is what lies in the box; unpacked elsewhere it is there and nowhere else.
   subroutine packed()
-    integer :: a(3, 5, 2), b(3, 5, 2), layers(3, 2, 2), k
-    real(wp) :: x(3, 5, 2), y(3, 2, 2)
-    real(sp) :: s(3, 5, 2), t(3, 2, 2)
+    integer, parameter :: n(4) = [3, 5, 4, 2], box(4) = [2, 3, 2, 2]
+    integer, parameter :: from(4) = [1, 2, 3, 1], there(4) = [2, 1, 2, 1]   !! first corners
+    integer, dimension(n(1), n(2), n(3), n(4)) :: a, b
+    integer, dimension(box(1), box(2), box(3), box(4)) :: layers
+    real(wp) :: x(n(1), n(2), n(3), n(4)), y(box(1), box(2), box(3), box(4))
+    real(sp) :: s(n(1), n(2), n(3), n(4)), t(box(1), box(2), box(3), box(4))
+    integer :: k
 
     a = reshape([(k, k=1, size(a))], shape(a))
     x = a
     s = real(a, sp)
-    call pack_integer(a, 3, 5, 2, 2, 2, layers)
-    call pack_wp(x, 3, 5, 2, 2, 2, y)
-    call pack_sp(s, 3, 5, 2, 2, 2, t)
-    call check('packed integers', all(layers == a(:, 2:3, :)))
+    call pack_integer(a, n, from, from + box - 1, layers)
+    call pack_wp(x, n, from, from + box - 1, y)
+    call pack_sp(s, n, from, from + box - 1, t)
+    call check('packed integers', all(layers == a(1:2, 2:4, 3:4, :)))
     call check('packed reals', all(nint(y) == layers))
     call check('packed short reals', all(nint(t) == layers))
     b = a
-    b(:, 4:5, :) = a(:, 2:3, :)
-    call unpack_integer(layers, 3, 5, 2, 4, 2, a)
-    call unpack_wp(y, 3, 5, 2, 4, 2, x)
-    call unpack_sp(t, 3, 5, 2, 4, 2, s)
+    b(2:3, 1:3, 2:3, :) = a(1:2, 2:4, 3:4, :)
+    call unpack_integer(layers, n, there, there + box - 1, a)
+    call unpack_wp(y, n, there, there + box - 1, x)
+    call unpack_sp(t, n, there, there + box - 1, s)
     call check('unpacked integers', all(a == b))
     call check('unpacked reals', all(nint(x) == b))
     call check('unpacked short reals', all(nint(s) == b))
