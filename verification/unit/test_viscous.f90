@@ -252,6 +252,8 @@ contains
           solid%n_cut = solid%n_cut + 1
           solid%cut(i, j, k) = solid%n_cut
           solid%cut_cell(:, solid%n_cut) = [i, j, k]
+          call ensure_room(solid%n_cut, solid%edge)
+          solid%edge(solid%n_cut) = 0.0_wp
         end do
       end do
     end do
