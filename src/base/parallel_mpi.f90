@@ -130,20 +130,6 @@ contains
                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      if (layers < width) then
-        block
-          use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-          real(wp) :: poison(extent(1)*extent(2)*extent(3)*extent(4))
-          poison = ieee_value(1.0_wp, ieee_quiet_nan)
-          do s = 1, 2
-            if (neighbour(s, e) == MPI_PROC_NULL) cycle
-            from = 1
-            to = extent
-            call shift_box(e, merge(1, extent(e) - width + 1, s == 1), width, from, to)
-            call unpack_wp(poison, extent, from, to, a)
-          end do
-        end block
-      end if
       call box_of_layers(extent, width, layers, e, from, to)
       n = product(to - from + 1)
       bytes = n*storage_size(box)/8
@@ -204,19 +190,6 @@ contains
                                 product(extent(e + 1:)), width)
       if (all(neighbour(:, e) == MPI_PROC_NULL)) cycle
       if (extent(e) < 3*width) error stop 'halo_exchange: the block is thinner than its halo'
-      if (layers < width) then
-        block
-          integer :: poison(extent(1)*extent(2)*extent(3)*extent(4))
-          poison = 123456789
-          do s = 1, 2
-            if (neighbour(s, e) == MPI_PROC_NULL) cycle
-            from = 1
-            to = extent
-            call shift_box(e, merge(1, extent(e) - width + 1, s == 1), width, from, to)
-            call unpack_integer(poison, extent, from, to, a)
-          end do
-        end block
-      end if
       call box_of_layers(extent, width, layers, e, from, to)
       n = product(to - from + 1)
       bytes = n*storage_size(box)/8
