@@ -7,7 +7,7 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces
+  public :: solid_geometry_t, solid_geometry_init, set_faces, edge_in
   public :: clear_cells, clear_faces, clear_legs
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
@@ -88,6 +88,16 @@ contains
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
     allocate (solid%edge(0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
+
+  !> How much of an edge cell c has, 0 if it is not cut.
+  pure function edge_in(solid, c) result(edge)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: edge
+
+    edge = 0.0_wp
+    if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
+  end function edge_in
 
   !> Take away what the lists of the last time say was there: what bodies fill of cells.
   pure subroutine clear_cells(solid)

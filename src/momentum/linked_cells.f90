@@ -9,7 +9,7 @@ module linked_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use plic_m, only: unit_constant
@@ -241,12 +241,9 @@ contains
     real(wp), intent(out), dimension(masters_at_most) :: share, nearer, distance
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the film [m]
-    real(wp) :: edge
     integer :: n
 
     normal = wall_normal(grid, solid, c)
-    edge = 0.0_wp
-    if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
     nearer = 0.0_wp
     distance = 0.0_wp
     call to_masters(grid, solid, c, normal, steps, share)
@@ -256,7 +253,7 @@ contains
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
       distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
       nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
-      nearer(n) = (1.0_wp - edge)*nearer(n)
+      nearer(n) = (1.0_wp - edge_in(solid, c))*nearer(n)
     end do
   end subroutine find_wall
 

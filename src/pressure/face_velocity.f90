@@ -6,7 +6,7 @@ module face_velocity_m
   use boundary_kinds_m, only: gives_pressure, no_side
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: face_mean
@@ -466,16 +466,10 @@ contains
       real(wp) :: share
 
       share = 1.0_wp
-      if (solid%open(f(1), f(2), f(3), d) >= 1.0_wp) share = 1.0_wp - max(edge_in(low), edge_in(f))
+      if (solid%open(f(1), f(2), f(3), d) >= 1.0_wp) then
+        share = 1.0_wp - max(edge_in(solid, low), edge_in(solid, f))
+      end if
     end function behind_plane
-
-    pure function edge_in(c) result(edge)
-      integer, intent(in) :: c(3)
-      real(wp) :: edge
-
-      edge = 0.0_wp
-      if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
-    end function edge_in
 
     !> Velocity of face f as seen from cell c, whose leg along +d or -d ends at theta cells.
     pure function seen_from(c, sense, theta, body, f, d) result(velocity)
