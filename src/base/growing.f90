@@ -83,9 +83,9 @@ contains
     logical, allocatable, intent(inout) :: list(:)
     logical, allocatable :: longer(:)
 
-    if (.not. allocated(list)) allocate (list(grown(n, 0)))
+    if (.not. allocated(list)) allocate (list(grown(n, 0)), source=.false.)
     if (n <= size(list)) return
-    allocate (longer(grown(n, size(list))))
+    allocate (longer(grown(n, size(list))), source=.false.)   ! anything else is no logical
     longer(:size(list)) = list
     call move_alloc(longer, list)
   end subroutine ensure_logicals
