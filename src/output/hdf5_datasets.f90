@@ -4,7 +4,8 @@ module hdf5_datasets_m
   use hdf5, only: hid_t, hsize_t, size_t, h5dclose_f, h5dcreate_f, h5dget_space_f, h5dopen_f
   use hdf5, only: h5dread_f, h5dwrite_f, h5pclose_f, h5pcreate_f, h5pset_fill_time_f, h5sclose_f
   use hdf5, only: h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f
-  use hdf5, only: h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tset_size_f, h5tset_strpad_f
+  use hdf5, only: h5dget_type_f, h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tget_size_f
+  use hdf5, only: h5tset_size_f, h5tset_strpad_f
   use hdf5, only: H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, H5S_SELECT_SET_F
   use hdf5, only: H5S_UNLIMITED_F, H5T_C_S1, H5T_STR_NULLPAD_F
   use kinds_m, only: wp, i8
@@ -224,10 +225,34 @@ contains
       self%info = 1
       self%message = self%path//': '//name//' has another size than this case needs'
     end if
+    call check_size(self, name, id, mem_type)
     if (n > 0 .and. self%info == 0) call h5dread_f(id, mem_type, data, status)
     call self%check(status, 'read '//name)
     call h5dclose_f(id, status)
   end subroutine read_whole
+
+  !> Refuse elements larger than any number and than what is to be read: in a damaged file they make
+  !! the library read past its buffers.
+  subroutine check_size(self, name, id, mem_type)
+    class(h5_datasets_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(hid_t), intent(in) :: id, mem_type
+    integer(size_t), parameter :: largest_number = 16   ! [B]
+    integer(size_t) :: in_file, asked
+    integer(hid_t) :: file_type
+    integer :: status
+
+    if (self%info /= 0) return
+    call h5dget_type_f(id, file_type, status)
+    call self%check(status, 'read '//name)
+    if (self%info /= 0) return
+    call h5tget_size_f(file_type, in_file, status)
+    call h5tget_size_f(mem_type, asked, status)
+    call h5tclose_f(file_type, status)
+    if (in_file <= max(asked, largest_number)) return
+    self%info = 1
+    self%message = self%path//': '//name//' has elements of a size that no number has'
+  end subroutine check_size
 
   !> Create a dataset of doubles that all processes fill block by block; zero where none is written.
   subroutine new_blocks(self, name, units, extent)
@@ -284,6 +309,7 @@ contains
     if (self%info /= 0) return
     call h5dopen_f(self%id, name, id, status)
     call self%check(status, 'open '//name)
+    call check_size(self, name, id, memory_type(file_real64))
     call self%select(name, id, int(first - 1, hsize_t), int(extent, hsize_t), there, here)
     if (self%info == 0) then
       data = c_loc(a)
