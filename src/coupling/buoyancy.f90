@@ -75,7 +75,7 @@ contains
     integer :: b, d
 
     displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, bodies%present)
-    counted = mass_at_faces(grid, solid, bodies, flux, flow%rho)
+    counted = mass_at_faces(grid, bodies, flux, flow%rho)
     lack = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
@@ -190,9 +190,8 @@ contains
 
   !> What the faces count of the fluid in the place of each body present, rho_f h times the flux of
   !! the unit motions: for an acceleration along each direction mass and torque.
-  function mass_at_faces(grid, solid, bodies, flux, rho) result(counted)
+  function mass_at_faces(grid, bodies, flux, rho) result(counted)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -206,13 +205,13 @@ contains
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
       !$omp do schedule(static)
-      do from = solid%body_face(b), solid%body_face(b + 1) - 1, terms_at_once
+      do from = flux%first_face(b), flux%first_face(b + 1) - 1, terms_at_once
         do d = 1, 3
           n = 0
-          do m = from, min(from + terms_at_once, solid%body_face(b + 1)) - 1
-            if (solid%face(4, m) /= d .or. .not. flux%mine(m)) cycle
+          do m = from, min(from + terms_at_once, flux%first_face(b + 1)) - 1
+            if (flux%face(4, m) /= d .or. .not. flux%mine(m)) cycle
             n = n + 1
-            term(n, :) = mass_between(grid, rho, solid%face(1:3, m), d)*flux%s([d, 4, 5, 6], m)
+            term(n, :) = mass_between(grid, rho, flux%face(1:3, m), d)*flux%s([d, 4, 5, 6], m)
           end do
           row = 12*(b - 1) + 4*(d - 1)
           call exact_add_columns(term(:n, :), bins(:, row + 1:row + 4))

@@ -9,7 +9,7 @@ module coupling_m
   use face_memory_m, only: note_deviation
   use linked_cells_m, only: linked_cells_t, link_cells
   use mid_step_m, only: to_mid_step
-  use rigid_flux_m, only: solid_face_flux
+  use rigid_flux_m, only: all_fluid_of_faces
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
   use velocity_stage_m, only: stage_t, stage_report_t, copy_motion, keep_acceleration
@@ -37,8 +37,8 @@ contains
     end if
     if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
-      call to_mid_step(grid, case%fluid, solid, stage%links_before, dt, flow, stage%acceleration, &
-                       stage%mid_step)
+      call to_mid_step(grid, case%fluid, solid, stage%links_before, stage%bodies, stage%trend, dt, &
+                       flow, stage%acceleration, stage%mid_step)
     end if
     if (.not. stage%implicit_momentum) return
     call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
@@ -113,8 +113,8 @@ contains
       call monolithic_stage(case, grid, solid, dt, flow, stage, report)
       blocks%late_force = stage%late(:, :blocks%n)
       call set_velocity()
-      call solid_face_flux(grid, solid, stage%bodies, stage%pressure%system%operator%flux, &
-                           flow%solid_flux)
+      call all_fluid_of_faces(grid, solid, stage%bodies, stage%pressure%system%operator%flux, &
+                              flow%uf, flow%solid_flux)
     end if
   contains
     !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.

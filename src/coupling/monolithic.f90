@@ -12,13 +12,13 @@ module monolithic_m
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
-  use rigid_flux_m, only: build_rigid_flux, force_from_faces, solid_face_flux, nearest_arm
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, nearest_arm
   use viscous_legs_m, only: build_viscous
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
-  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity, &
-                             face_velocity_at_walls, shorten_at_walls
+  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
+                             predict_face_velocity, face_velocity_at_walls, shorten_at_walls
   use buoyancy_m, only: uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
@@ -59,7 +59,7 @@ contains
     call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, &
                         stage%balance%before, flow%u, stage%balance%to_wall)
     associate (system => stage%pressure%system)
-      call set_pressure_system(grid, solid%open, stage%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%free, stage%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
     end associate
     call accelerate_fluid(case, grid, solid, dt, flow, stage)
@@ -113,7 +113,8 @@ contains
       call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, stage%rho, stage%tension, a%face)
-      call accelerations_of_groups(grid, solid, dt, stage)
+      stage%counted = stage%at_start%motion + stage%trend
+      call accelerations_of_groups(grid, solid, dt, stage%trend, stage)
       if (stage%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(grid, dt, flow, stage)
@@ -126,14 +127,16 @@ contains
   end subroutine accelerate_fluid
 
   !> Accelerations of the cells from those of the faces, and what groups make of them.
-  subroutine accelerations_of_groups(grid, solid, dt, stage)
+  subroutine accelerations_of_groups(grid, solid, dt, change, stage)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
+    real(wp), intent(in) :: change(:, :)   !! (6, bodies) of their motion that held fluid gets
     type(stage_t), intent(inout) :: stage
 
     associate (a => stage%acceleration, balance => stage%balance)
       call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+      call hold_in_cells(grid, solid, stage%bodies, change/dt, a%face, a%cell)
       call note_change(grid, stage%links, dt, a%cell, balance%pushed)
       call halo_exchange(a%cell, n_halo)
       call share_acceleration(grid, solid%open, stage%rho, stage%links, a%cell)
@@ -172,8 +175,8 @@ contains
     type(stage_t), intent(inout) :: stage
 
     associate (bodies => stage%bodies, flux => stage%pressure%system%operator%flux)
-      call force_from_faces(grid, solid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
-      call force_from_tension(grid, solid, bodies, flux, stage%tension, stage%terms, &
+      call force_from_faces(grid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
+      call force_from_tension(grid, bodies, flux, stage%tension, stage%terms, &
                               stage%from_pressure)
       stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
@@ -253,8 +256,8 @@ contains
         call solve_pressure(grid, solid, stage%rho, dt, flow, bodies, pressure)
         report%pressure = added(report%pressure, pressure%report)
         call correct_cells(grid, solid, dt, flow, stage)
-        call force_from_faces(grid, solid, bodies, pressure%system%operator%flux, &
-                              pressure%phi_total, from_faces)
+        call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
+                              from_faces)
         stage%total = stage%total + from_faces
         call force_of_walls(grid, solid, links, bodies, stage%at_start, dt, stage%rho, balance, &
                             from_walls)
@@ -295,7 +298,8 @@ contains
     associate (a => stage%acceleration)
       call face_acceleration(grid, weightless, stage%rho, stage%rho, stage%pressure%phi_total, &
                              a%face, flow%sides)
-      call accelerations_of_groups(grid, solid, dt, stage)
+      call accelerations_of_groups(grid, solid, dt, stage%bodies%motion - stage%counted, stage)
+      stage%counted = stage%bodies%motion
       call add_product(grid, dt, a%cell, flow%u)
     end associate
   end subroutine correct_cells
@@ -354,7 +358,7 @@ contains
     held%free = .false.
     associate (p => stage%pressure, system => stage%pressure%system, a => stage%acceleration, &
                dt => case%run%dt)
-      call set_pressure_system(grid, solid%open, flow%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, held, system%active, system%operator%flux)
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       allocate (uf, source=flow%uf)
@@ -368,7 +372,8 @@ contains
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       call extend_pressure(grid, case%fluid%gravity, flow%rho, system%active, p%known, flow%p)
       flow%uf = uf
-      call solid_face_flux(grid, solid, stage%bodies, system%operator%flux, flow%solid_flux)
+      call all_fluid_of_faces(grid, solid, stage%bodies, system%operator%flux, flow%uf, &
+                              flow%solid_flux)
     end associate
   end subroutine start_flow
 

@@ -21,6 +21,7 @@ module solid_fraction_m
     paint_cells, paint_faces, paint_legs
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
   use wall_edges_m, only: find_edges
+  use held_fluid_m, only: hold_fluid
   use pockets_m, only: pockets_t, pockets_init, close_pockets
   implicit none
   private
@@ -94,6 +95,7 @@ contains
     !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
     call find_edges(grid, solid)
+    call hold_fluid(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
   end subroutine update_solid
 
   !> Shares of every body that is near the cells of this process and has moved.

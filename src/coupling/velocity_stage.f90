@@ -56,6 +56,7 @@ module velocity_stage_m
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
+    real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
     real(wp), allocatable :: deviation(:, :, :, :) !! of the faces at the start (`face_memory_m`)
     ! Of the mixture.
     type(solid_geometry_t) :: whole                !! the domain without solids
@@ -97,7 +98,7 @@ contains
       call linked_cells_init(grid, stage%links)
       call mid_step_init(grid, stage%mid_step)
       call wall_balance_init(stage%balance)
-      allocate (stage%from_mid_step, stage%late, stage%trend, source=stage%total)
+      allocate (stage%from_mid_step, stage%late, stage%counted, stage%trend, source=stage%total)
       allocate (stage%deviation(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
       allocate (stage%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if

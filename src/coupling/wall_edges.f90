@@ -11,11 +11,11 @@ module wall_edges_m
   use plic_m, only: unit_constant, unit_volume
   implicit none
   private
-  public :: find_edges, openings_of_plane
+  public :: find_edges, openings, openings_of_plane, least_normal, round_edge
 
   real(wp), parameter :: round_edge = 0.1_wp, sharp_edge = 0.2_wp
     !! excess of openings up to which a wall counts as plane, and from which it has an edge [faces]
-  real(wp), parameter :: least = 1.0e-6_wp   !! of a normal or its parts that count
+  real(wp), parameter :: least_normal = 1.0e-6_wp   !! of a normal or its parts that count
 
 contains
 
@@ -41,19 +41,29 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp) :: edge
-    real(wp) :: low(3), high(3), excess
+    real(wp) :: w(3, 2), normal(3), excess
+
+    w = openings(solid, c)
+    normal = w(:, 2) - w(:, 1)
+    edge = 0.0_wp
+    if (maxval(abs(normal)) < least_normal) return
+    excess = maxval(sum(w, 2) - openings_of_plane(normal, solid%alpha(c(1), c(2), c(3))))
+    edge = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
+  end function edge_of
+
+  !> Open shares of the lower (:, 1) and upper (:, 2) faces of a cell.
+  pure function openings(solid, c) result(w)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: w(3, 2)
     integer :: d, f(3)
 
     do d = 1, 3
       f = c + unit_step(:, d)
-      low(d) = solid%open(c(1), c(2), c(3), d)
-      high(d) = solid%open(f(1), f(2), f(3), d)
+      w(d, 1) = solid%open(c(1), c(2), c(3), d)
+      w(d, 2) = solid%open(f(1), f(2), f(3), d)
     end do
-    edge = 0.0_wp
-    if (maxval(abs(high - low)) < least) return
-    excess = maxval(low + high - openings_of_plane(high - low, solid%alpha(c(1), c(2), c(3))))
-    edge = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
-  end function edge_of
+  end function openings
 
   !> Open share of both faces of each direction together behind a plane wall in the unit cube; 2
   !! where the wall lies along these faces, since to round-off it is on either side of them.
@@ -70,7 +80,7 @@ contains
     do d = 1, 3
       across = n
       across(d) = 0.0_wp
-      if (sum(abs(across)) < least) cycle
+      if (sum(abs(across)) < least_normal) cycle
       both(d) = 2.0_wp - unit_volume(across, at) - unit_volume(across, at - n(d))
     end do
   end function openings_of_plane

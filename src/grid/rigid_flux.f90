@@ -16,14 +16,17 @@ module rigid_flux_m
     terms_at_once
   implicit none
   private
-  public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux
-  public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm
+  public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, all_fluid_of_faces
+  public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm, closed_side
 
   integer, parameter :: worth_threads = 1000   !! fewer faces or cells are looked at by one thread
 
   type :: rigid_flux_t
-    real(wp), allocatable :: s(:, :)
-      !! (6, faces of `solid%face`) flux of the unit motions [m2, m3]
+    !> Faces that body b pushes on: `first_face(b):first_face(b+1)-1`, those that it fills in part,
+    !! then from `held_from(b)` those in which it holds fluid.
+    integer, allocatable :: first_face(:), held_from(:)
+    integer, allocatable :: face(:, :)       !! (4, faces) cell index and direction of the lower face
+    real(wp), allocatable :: s(:, :)         !! (6, faces) flux of the unit motions [m2, m3]
     logical, allocatable :: mine(:)          !! (faces) this process adds the face to sums
     integer, allocatable :: first(:)
       !! (bodies + 1) entries of each body in the lists below; held bodies have none
@@ -46,7 +49,8 @@ contains
     b = grid%last
     allocate (self%slot(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%first(n + 1), source=1)
-    allocate (self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(0, 6))
+    allocate (self%first_face(n + 1), self%held_from(n), source=1)
+    allocate (self%face(4, 0), self%s(6, 0), self%mine(0), self%cell(3, 0), self%j(0, 6))
   end subroutine rigid_flux_init
 
   !> Lever arm from a centre of mass, by the nearest periodic image [m].
@@ -70,26 +74,26 @@ contains
     type(rigid_flux_t), intent(inout) :: self
     integer :: b, m, n_face, n_entry, entry_of_body, high(3)
 
-    n_face = solid%body_face(bodies%n + 1) - 1
+    n_face = solid%body_face(bodies%n + 1) + solid%first_held(bodies%n + 1) - 2
     call make_room(self, n_face)
+    do b = 1, bodies%n
+      self%first_face(b) = solid%body_face(b) + solid%first_held(b) - 1
+      self%held_from(b) = solid%body_face(b + 1) + solid%first_held(b) - 1
+    end do
+    self%first_face(bodies%n + 1) = n_face + 1
     !$omp parallel private(b) if (n_face > worth_threads)
     do b = 1, bodies%n
-      !$omp do schedule(static)
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        self%mine(m) = owned(grid, solid%face(1:3, m), solid%face(4, m))
-        self%s(:, m) = unit_fluxes(grid, solid, m, bodies%x(:, b))
-      end do
-      !$omp end do nowait
+      call faces_of_body(b)
     end do
     !$omp end parallel
     n_entry = 0
     do b = 1, bodies%n
       self%first(b) = n_entry + 1
       if (.not. bodies%free(b)) cycle
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        high = solid%face(1:3, m)
-        if (closed_side(grid, high(solid%face(4, m)), solid%face(4, m))) cycle
-        call add_to_cell(high - unit_step(:, solid%face(4, m)), self%s(:, m))
+      do m = self%first_face(b), self%first_face(b + 1) - 1
+        high = self%face(1:3, m)
+        if (closed_side(grid, high(self%face(4, m)), self%face(4, m))) cycle
+        call add_to_cell(high - unit_step(:, self%face(4, m)), self%s(:, m))
         call add_to_cell(high, -self%s(:, m))
       end do
       do entry_of_body = self%first(b), n_entry
@@ -100,6 +104,37 @@ contains
     end do
     self%first(bodies%n + 1) = n_entry + 1
   contains
+    !> Faces of body b and their unit fluxes; each thread some of them.
+    subroutine faces_of_body(b)
+      integer, intent(in) :: b
+      integer :: m, n
+
+      !$omp do schedule(static)
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        n = m - solid%body_face(b) + self%first_face(b)
+        call set_face(n, b, solid%face(:, m), solid%face_beta(m), solid%face_centroid(:, m))
+      end do
+      !$omp end do nowait
+      !$omp do schedule(static)
+      do m = solid%first_held(b), solid%first_held(b + 1) - 1
+        n = m - solid%first_held(b) + self%held_from(b)
+        call set_face(n, b, solid%held_face(:, m), solid%held_share(m), &
+                      middle_of_face(grid, solid%held_face(:, m)))
+      end do
+      !$omp end do nowait
+    end subroutine faces_of_body
+
+    !> Face n of the list, a share of which moves with body b.
+    subroutine set_face(n, b, f, share, x)
+      integer, intent(in) :: n, b, f(4)
+      real(wp), intent(in) :: share
+      real(wp), intent(in) :: x(3)   !! centroid of the share [m]
+
+      self%face(:, n) = f
+      self%mine(n) = owned(grid, f(1:3), f(4))
+      self%s(:, n) = unit_fluxes(grid, f, share, nearest_arm(grid, x, bodies%x(:, b)))
+    end subroutine set_face
+
     subroutine add_to_cell(c, outflow)
       integer, intent(in) :: c(3)
       real(wp), intent(in) :: outflow(6)
@@ -119,22 +154,31 @@ contains
     end subroutine add_to_cell
   end subroutine build_rigid_flux
 
-  !> Flux of the unit motions of a body with its centre at x through face m, upwards; none through a
-  !! closed side of the domain.
-  pure function unit_fluxes(grid, solid, m, x) result(s)
+  !> Flux of the unit motions of a body through its share of a face, upwards; none through a closed
+  !! side of the domain.
+  pure function unit_fluxes(grid, f, share, arm) result(s)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: m
-    real(wp), intent(in) :: x(3)   !! [m]
-    real(wp) :: s(6)               !! [m2, m3]
+    integer, intent(in) :: f(4)      !! cell and direction of the lower face
+    real(wp), intent(in) :: share    !! of the face area [-]
+    real(wp), intent(in) :: arm(3)   !! from the centre of the body [m]
+    real(wp) :: s(6)                 !! [m2, m3]
+
+    s = 0.0_wp
+    if (closed_side(grid, f(f(4)), f(4))) return
+    s(1:3) = grid%area(f(4))*share*real(unit_step(:, f(4)), wp)
+    s(4:6) = cross(arm, s(1:3))
+  end function unit_fluxes
+
+  !> Middle of a lower face [m].
+  pure function middle_of_face(grid, f) result(x)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: f(4)   !! cell and direction
+    real(wp) :: x(3)
     integer :: d
 
-    d = solid%face(4, m)
-    s = 0.0_wp
-    if (closed_side(grid, solid%face(d, m), d)) return
-    s(1:3) = grid%area(d)*solid%face_beta(m)*real(unit_step(:, d), wp)
-    s(4:6) = cross(nearest_arm(grid, solid%face_centroid(:, m), x), s(1:3))
-  end function unit_fluxes
+    x = [(grid%centre(f(d), d), d=1, 3)]
+    x(f(4)) = grid%face(f(f(4)), f(4))
+  end function middle_of_face
 
   !> Lists long enough for n_face faces; a face gives at most two cells.
   subroutine make_room(self, n_face)
@@ -142,8 +186,8 @@ contains
     integer, intent(in) :: n_face
 
     if (size(self%s, 2) >= n_face) return
-    deallocate (self%s, self%mine, self%cell, self%j)
-    allocate (self%s(6, 2*n_face), self%mine(2*n_face))
+    deallocate (self%face, self%s, self%mine, self%cell, self%j)
+    allocate (self%face(4, 2*n_face), self%s(6, 2*n_face), self%mine(2*n_face))
     allocate (self%cell(3, 4*n_face), self%j(4*n_face, 6))
   end subroutine make_room
 
@@ -172,14 +216,14 @@ contains
     mine = all(f >= grid%lo) .and. all(f <= last)
   end function owned
 
-  !> Volume rate of all bodies through the lower faces [m3/s].
-  subroutine solid_face_flux(grid, solid, bodies, self, flux)
+  !> Volume rate of all bodies through the lower faces [m3/s], with that of the fluid they hold.
+  subroutine solid_face_flux(grid, bodies, self, flux, held)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: self
-    real(wp), intent(out), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: b, k, m, f(4)
+    real(wp), intent(inout), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    logical, intent(in) :: held
+    integer :: b, k
 
     !$omp parallel private(b)
     !$omp do schedule(static)
@@ -188,23 +232,57 @@ contains
     end do
     do b = 1, bodies%n
       if (all(abs(bodies%motion(:, b)) <= 0.0_wp)) cycle
-      !$omp do private(f) schedule(static)
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
-        f = solid%face(:, m)
-        flux(f(1), f(2), f(3), f(4)) = flux(f(1), f(2), f(3), f(4)) + &
-                                       dot_product(self%s(:, m), bodies%motion(:, b))
-      end do
+      call add_faces(bodies%motion(:, b), self%first_face(b), self%held_from(b) - 1)
+      if (held) call add_faces(bodies%motion(:, b), self%held_from(b), self%first_face(b + 1) - 1)
     end do
     !$omp end parallel
+  contains
+    !> Faces of the list, none of them twice; each thread some of them.
+    subroutine add_faces(motion, from, to)
+      real(wp), intent(in) :: motion(6)
+      integer, intent(in) :: from, to
+      integer :: m, f(4)
+
+      !$omp do schedule(static)
+      do m = from, to
+        f = self%face(:, m)
+        flux(f(1), f(2), f(3), f(4)) = flux(f(1), f(2), f(3), f(4)) + &
+                                       dot_product(self%s(:, m), motion)
+      end do
+    end subroutine add_faces
   end subroutine solid_face_flux
+
+  !> Velocity of all the fluid in a face, the held part included, from that of the free part; and
+  !! the volume rate of the bodies alone, as the transport has them.
+  subroutine all_fluid_of_faces(grid, solid, bodies, self, uf, flux)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    real(wp), intent(inout), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m3/s]
+    integer :: b, m
+
+    call solid_face_flux(grid, bodies, self, flux, held=.false.)
+    do b = 1, bodies%n
+      do m = self%held_from(b), self%first_face(b + 1) - 1
+        associate (i => self%face(1, m), j => self%face(2, m), k => self%face(3, m), &
+                   d => self%face(4, m))
+          uf(i, j, k, d) = (solid%free(i, j, k, d)*uf(i, j, k, d) &
+            + dot_product(self%s(:, m), bodies%motion(:, b))/grid%area(d))/solid%open(i, j, k, d)
+        end associate
+      end do
+    end do
+  end subroutine all_fluid_of_faces
 
   !> Force and torque of a cell field of pressure on each body, face by face:
   !! $$ F_k = \sum_f s_f (p_{low} - p_{high}) $$
   !! The pressure of cells without open faces counts as it stands. With `sides` that outside an
   !! outflow counts, too; a pressure correction is zero there.
-  subroutine force_from_faces(grid, solid, bodies, self, p, force, sides)
+  subroutine force_from_faces(grid, bodies, self, p, force, sides)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: self
     real(wp), intent(in), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -217,15 +295,15 @@ contains
     integer :: b, m, n, from, f(3), e(3)
 
     bins = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b, m, n, f, e, term) if (solid%body_face(bodies%n + 1) > worth_threads)
+    !$omp parallel private(b, m, n, f, e, term) if (self%first_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(static)
-      do from = solid%body_face(b), solid%body_face(b + 1) - 1, terms_at_once
+      do from = self%first_face(b), self%first_face(b + 1) - 1, terms_at_once
         n = 0
-        do m = from, min(from + terms_at_once, solid%body_face(b + 1)) - 1
+        do m = from, min(from + terms_at_once, self%first_face(b + 1)) - 1
           if (.not. self%mine(m)) cycle
-          f = solid%face(1:3, m)
-          e = unit_step(:, solid%face(4, m))
+          f = self%face(1:3, m)
+          e = unit_step(:, self%face(4, m))
           n = n + 1
           term(n, :) = self%s(:, m)*(side_value(f - e) - side_value(f))
         end do

@@ -25,6 +25,9 @@ module solid_geometry_m
   type :: solid_geometry_t
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
+    !> Share of the lower face through which pressure moves fluid; what it lacks of `open` moves with
+    !! a body (`held_fluid_m`).
+    real(wp), allocatable :: free(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
     !> Legs between the centres of the two cells of a lower face d: `leg_number(i,j,k,d)` is the
     !! number of one that meets a surface in the lists, 0 where it is free.
@@ -54,6 +57,10 @@ module solid_geometry_m
     integer, allocatable :: face(:, :)          !! (4, *) cell index and direction of the lower face
     real(wp), allocatable :: face_beta(:)       !! share of the face area [-]
     real(wp), allocatable :: face_centroid(:, :) !! (3, *) [m]
+    !> Per body b: faces `first_held(b):first_held(b+1)-1` with fluid that moves with it.
+    integer, allocatable :: first_held(:)
+    integer, allocatable :: held_face(:, :)     !! (4, *) cell index and direction of the lower face
+    real(wp), allocatable :: held_share(:)      !! of the face area [-]
     !> The lists hold the cells and faces of the halo too, also as images in other periods, with the
     !! centroids at the place of the image. What else to clear before the next filling: cells closed
     !! all round because bodies overlap there or the cell is sealed in.
@@ -75,6 +82,7 @@ contains
     b = grid%last
     allocate (solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
+    allocate (solid%free, source=solid%open)
     allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (solid%leg_number(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
     allocate (solid%leg(4, 0), solid%leg_length(2, 0), solid%leg_body(2, 0))
@@ -84,6 +92,8 @@ contains
     n = 0
     if (present(n_bodies)) n = n_bodies
     allocate (solid%body_cell(n + 1), solid%body_face(n + 1), solid%tets%of_body(n + 1), source=1)
+    allocate (solid%held_face(4, 0), solid%held_share(0))
+    allocate (solid%first_held, source=solid%body_face)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
     allocate (solid%edge(0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))

@@ -135,7 +135,7 @@ contains
   end subroutine add_cell
 
   !> The cut cells with their centre in the fluid, each at the wall of the body that fills most of
-  !! it, and the cells at faces that a body fills in part.
+  !! it, and the cells at faces that a body fills, or in which it holds fluid, in part.
   subroutine add_cut_cells(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -164,6 +164,10 @@ contains
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         call add_beside(solid%face(1:3, m))
         call add_beside(solid%face(1:3, m) - unit_step(:, solid%face(4, m)))
+      end do
+      do m = solid%first_held(b), solid%first_held(b + 1) - 1
+        call add_beside(solid%held_face(1:3, m))
+        call add_beside(solid%held_face(1:3, m) - unit_step(:, solid%held_face(4, m)))
       end do
     end do
   contains

@@ -21,7 +21,8 @@ module mid_step_m
   use linked_cells_m, only: linked_cells_t
   use group_momentum_m, only: share_acceleration
   use solid_geometry_m, only: solid_geometry_t
-  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces
+  use rigid_motion_m, only: rigid_motion_t
+  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces, hold_in_cells
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -49,11 +50,13 @@ contains
   end subroutine mid_step_init
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine to_mid_step(grid, fluid, solid, links, dt, flow, a, self)
+  subroutine to_mid_step(grid, fluid, solid, links, bodies, trend, dt, flow, a, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
     type(linked_cells_t), intent(in) :: links     !! likewise
+    type(rigid_motion_t), intent(in) :: bodies    !! likewise
+    real(wp), intent(in) :: trend(:, :)           !! (6, bodies) foreseen change of their motion
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
     type(acceleration_t), intent(inout) :: a      !! work
@@ -64,6 +67,7 @@ contains
     call find_part(grid, flow, self%takes_part)
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
     call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+    call hold_in_cells(grid, solid, bodies, trend/dt, a%face, a%cell)
     call leave_out(grid, self%takes_part, a%cell)
     call halo_exchange(a%cell, n_halo)
     call share_acceleration(grid, solid%open, flow%rho, links, a%cell)

@@ -126,9 +126,8 @@ contains
   !> Add force and torque of the surface on each body to those of the pressure: the tension of the
   !! surface as continued through the body acts on the solid part of the faces, as the pressure
   !! does. With an angle of 90 degrees that is the pull along the line of contact.
-  subroutine force_from_tension(grid, solid, bodies, flux, self, work, force)
+  subroutine force_from_tension(grid, bodies, flux, self, work, force)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     type(surface_tension_t), intent(in) :: self
@@ -141,16 +140,16 @@ contains
     if (.not. self%acts) return
     bins = spread(no_terms, 2, 6*bodies%n)
     do b = 1, bodies%n
-      n = solid%body_face(b + 1) - solid%body_face(b)
+      n = flux%first_face(b + 1) - flux%first_face(b)
       if (size(work, 1) < n) then
         deallocate (work)
         allocate (work(2*n, 6))
       end if
       t = 0
-      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+      do m = flux%first_face(b), flux%first_face(b + 1) - 1
         if (.not. flux%mine(m)) cycle
         t = t + 1
-        associate (f => solid%face(:, m))
+        associate (f => flux%face(:, m))
           work(t, :) = flux%s(:, m)*grid%h(f(4))*self%force(f(1), f(2), f(3), f(4))
         end associate
       end do

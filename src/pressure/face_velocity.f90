@@ -14,6 +14,7 @@ module face_velocity_m
   implicit none
   private
   public :: acceleration_t, acceleration_init, face_acceleration, push_faces, cell_mean_of_faces
+  public :: hold_in_cells
   public :: predict_face_velocity, face_velocity_at_walls, shorten_at_walls, compact_time
 
   real(wp), parameter :: compact_courant = 0.125_wp   !! Courant number of the longest compact_time
@@ -187,6 +188,38 @@ contains
       end do
     end do
   end subroutine cell_mean_of_faces
+
+  !> In the mean of the cells, fluid that a block holds in a face accelerates with the block.
+  subroutine hold_in_cells(grid, solid, bodies, a_body, a_face, a_cell)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: a_body(:, :)   !! (6, bodies) rate of their motion [m/s2, rad/s2]
+    real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    real(wp) :: x(3), a_wall(3), missing
+    integer :: b, d, m, s, c(3)
+
+    do b = 1, bodies%n
+      do m = solid%first_held(b), solid%first_held(b + 1) - 1
+        associate (f => solid%held_face(1:3, m))
+          d = solid%held_face(4, m)
+          x = [grid%centre(f(1), 1), grid%centre(f(2), 2), grid%centre(f(3), 3)]
+          x(d) = grid%face(f(d), d)
+          a_wall = wall_velocity(a_body(:, b), nearest_arm(grid, x, bodies%x(:, b)))
+          missing = solid%held_share(m)*(a_wall(d) - a_face(f(1), f(2), f(3), d))
+          do s = 0, 1
+            c = f - s*unit_step(:, d)
+            if (.not. grid%owns(c)) cycle
+            a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing &
+              /sum(solid%open(c(1):c(1) + unit_step(1, d), c(2):c(2) + unit_step(2, d), &
+                              c(3):c(3) + unit_step(3, d), d))
+          end do
+        end associate
+      end do
+    end do
+  end subroutine hold_in_cells
 
   !> Face velocity before the pressure stage, interpolated from the cells:
   !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu

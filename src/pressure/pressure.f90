@@ -89,8 +89,8 @@ contains
     tolerance = 0.5_wp*allowed*grid%volume/dt
     associate (system => self%system, report => self%report)
       do
-        call solid_face_flux(grid, solid, bodies, system%operator%flux, flow%solid_flux)
-        call divergence(grid, solid%open, flow, system%active, self%rhs, report%divergence)
+        call solid_face_flux(grid, bodies, system%operator%flux, flow%solid_flux, held=.true.)
+        call divergence(grid, solid%free, flow, system%active, self%rhs, report%divergence)
         if (system%work%singular) report%divergence = uneven(grid, self%rhs, system%work)
         report%converged = report%divergence < allowed
         if (report%converged .or. report%passes == self%max_passes) exit

@@ -2,8 +2,8 @@
 
 usage: python verification/trials/sharp_edges.py PART [CELLS ...] [--program ./mics]
 
-PART: added_mass (added over displaced mass, second step), noise (of the force on a cube moved at a
-steady speed) or held (drag coefficient at Re 2e4, mean from 12 edges of way on); cells per edge.
+PART: added_mass (added over displaced mass, second step) or held (drag coefficient at Re 2e4, mean
+from 12 edges of way on); cells per edge. The noise of the force is the case `moved_cube`.
 """
 
 import argparse
@@ -16,12 +16,11 @@ import numpy as np
 from micstools.reader import Run
 
 ROOT = Path(__file__).resolve().parents[2]
-EDGE, DENSITY, G = 0.02, 2300.0, 9.81  # [m], [kg/m3], [m/s2]
+EDGE, G = 0.02, 9.81  # [m], [m/s2]
 ACROSS = "x_min='periodic' x_max='periodic' y_min='periodic' y_max='periodic'"
 CLOSED = "x_min='slip' x_max='slip' y_min='slip' y_max='slip' z_min='slip' z_max='slip'"
 CELLS = {
     "added_mass": [5, 5.33, 5.67, 5.95, 6.05, 6.33, 6.67, 7, 7.5, 7.95, 8.05, 8.33, 8.67, 9, 9.5],
-    "noise": [4, 4.5, 5.5],
     "held": [4.5, 5.1, 5.3, 5.5],
 }
 
@@ -55,25 +54,6 @@ def added_mass(program: Path, m: float) -> str:
     return f"{0.5 * G / (b.velocity[-1, 0, 2] / b.time[-1]) - 0.5:.3f}"
 
 
-def noise(program: Path, m: float) -> str:
-    """Of the force, about its mean over one cell of way, after one edge of way."""
-    h, speed = EDGE / m, 0.3
-    n, high = 2 * round(2.5 * m), 2 * round(4 * m)
-    body = f"&shape name='c' kind='cube' size={EDGE} density={DENSITY} /\n&body shape='c' "
-    body += f"position={n / 2 * h},{n / 2 * h},{high * h - 2 * EDGE} fixed=.true. "
-    body += f"velocity=0.0,0.0,{-speed} /\n"
-    fluid = "liquid_viscosity=1e-3 gravity=0.0,0.0,0.0"
-    head = f"title='noise' t_end={3 * EDGE / speed} dt=2e-3 cfl_max=0.25"
-    sides = f"{ACROSS} z_min='slip' z_max='open'"
-    b = run(program, case(head, (n, high, h), sides, fluid, body)).bodies
-    force, way = b.fluid_force[:, 0, 2], b.time * speed / h
-    level = np.array([force[abs(way - w) <= 0.5].mean() for w in way])
-    late = (way >= m) & (way < way[-1] - 0.5)
-    off = (force - level)[late] / (DENSITY * EDGE**3 * G)
-    drag = force[late].mean() / (500 * speed**2 * EDGE**2)
-    return f"largest {abs(off).max():.3f}, scatter {off.std():.3f} weights; drag {drag:.2f}"
-
-
 def held(program: Path, m: float) -> str:
     """Drag coefficient of a cube face on in a stream of 1 m/s."""
     h, n, high = EDGE / m, 2 * round(3.5 * m), 2 * round(5 * m)
@@ -95,7 +75,7 @@ def main() -> None:
     parser.add_argument("cells", nargs="*", type=float)
     parser.add_argument("--program", type=Path, default=ROOT / "mics")
     args = parser.parse_args()
-    measure = {"added_mass": added_mass, "noise": noise, "held": held}[args.part]
+    measure = {"added_mass": added_mass, "held": held}[args.part]
     for m in args.cells or CELLS[args.part]:
         print(f"{m:g} cells per edge: {measure(args.program.resolve(), m)}", flush=True)
 

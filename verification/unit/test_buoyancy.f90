@@ -122,7 +122,7 @@ contains
       active = solid%alpha < 1.0_wp
       call rigid_flux_init(block%grid, 1, flux)
       call build_rigid_flux(block%grid, solid, block%bodies, active, flux)
-      call force_from_faces(block%grid, solid, block%bodies, flux, block%flow%p, by_faces)
+      call force_from_faces(block%grid, block%bodies, flux, block%flow%p, by_faces)
       lack = uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow)
       force(:, 1) = -matmul(lack(:, :, 1), fluid%gravity)
       call check('faces and correction: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &

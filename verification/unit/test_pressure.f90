@@ -91,7 +91,7 @@ contains
     call pressure_init(box%grid, 1, box%case%numerics, pressure)
     if (present(rough)) pressure%rough = rough
     associate (system => pressure%system)
-      call set_pressure_system(box%grid, box%solid%open, box%flow%rho, system)
+      call set_pressure_system(box%grid, box%solid%free, box%flow%rho, system)
       call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
     end associate
     call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
@@ -112,7 +112,7 @@ contains
             do s = 0, 1
               f = [i, j, k] + s*unit_step(:, d)
               net = net + real(2*s - 1, wp)*(box%flow%solid_flux(f(1), f(2), f(3), d) &
-                + box%solid%open(f(1), f(2), f(3), d)*box%grid%area(d)*box%flow%uf(f(1), f(2), &
+                + box%solid%free(f(1), f(2), f(3), d)*box%grid%area(d)*box%flow%uf(f(1), f(2), &
                                                                                   f(3), d))
             end do
           end do
@@ -185,7 +185,7 @@ contains
     call check('free box: it was pushed', all(abs(box%bodies%motion(:, 1) - motion) > 1.0e-5_wp))
     gain(1:3) = box%bodies%mass(1)*(box%bodies%motion(1:3, 1) - motion(1:3))
     gain(4:6) = matmul(box%bodies%inertia(:, :, 1), box%bodies%motion(4:6, 1) - motion(4:6))
-    call force_from_faces(box%grid, box%solid, box%bodies, pressure%system%operator%flux, &
+    call force_from_faces(box%grid, box%bodies, pressure%system%operator%flux, &
                           pressure%phi_total, force)
     call check('free box: momentum is force times step', gain(1:3), dt*force(1:3, 1), 1.0e-14_wp)
     call check('free box: spin is torque times step', gain(4:6), dt*force(4:6, 1), 1.0e-15_wp)
@@ -193,7 +193,7 @@ contains
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          fluid_gain = fluid_gain + box%grid%volume*box%solid%open(i, j, k, 1) &
+          fluid_gain = fluid_gain + box%grid%volume*box%solid%free(i, j, k, 1) &
             *face_mean(box%flow%rho(i, j, k), box%flow%rho(merge(cells(1), i - 1, i == 1), j, k)) &
             *(box%flow%uf(i, j, k, 1) - before(i, j, k, 1))
         end do
@@ -224,14 +224,14 @@ contains
       swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
     end associate
-    call divergence(box%grid, box%solid%open, box%flow, pressure%system%active, pressure%rhs, &
+    call divergence(box%grid, box%solid%free, box%flow, pressure%system%active, pressure%rhs, &
                     force(1, 1))
     associate (net => pressure%rhs(1:12, 1:8, 1:12)/box%grid%volume)
       call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
                  pressure%system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
     end associate
     call check('pressed box: it moves on', abs(swallowed) > 1.0e-3_wp)
-    call force_from_faces(box%grid, box%solid, box%bodies, pressure%system%operator%flux, &
+    call force_from_faces(box%grid, box%bodies, pressure%system%operator%flux, &
                           pressure%phi_total, force)
     call check('pressed box: momentum is force times step', box%bodies%mass(1) &
                *(box%bodies%motion(1:3, 1) - motion(1:3)), dt*force(1:3, 1), 1.0e-13_wp)
@@ -301,7 +301,7 @@ contains
     call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
     call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
     box%flow%solid_flux = 0.0_wp
-    call divergence(box%grid, 0.0_wp*box%solid%open + 1.0_wp, box%flow, &
+    call divergence(box%grid, 0.0_wp*box%solid%free + 1.0_wp, box%flow, &
                     pressure%system%active, pressure%rhs, largest)
     call check('divergence: largest', largest, maxval(abs(pressure%rhs(1:12, 1:8, 1:12))) &
                /box%grid%volume, 1.0e-12_wp)

@@ -365,11 +365,11 @@ contains
       end do
       call rigid_flux_init(g, 1, flux)
       call build_rigid_flux(g, block%solid, block%bodies, active, flux)
-      call force_from_faces(g, block%solid, block%bodies, flux, p, force)
+      call force_from_faces(g, block%bodies, flux, p, force)
       size_of_force = norm2(force(1:3, 1))
       allocate (work(0, 6))
       pull = 0.0_wp
-      call force_from_tension(g, block%solid, block%bodies, flux, tension, work, pull)
+      call force_from_tension(g, block%bodies, flux, tension, work, pull)
       call check('the pressure pushes the body', size_of_force > 1.0e-5_wp)
       call check('the surface pulls it back', maxval(abs(force + pull)), 0.0_wp, &
                  1.0e-12_wp*size_of_force)

@@ -1,5 +1,5 @@
-!> Openings behind plane walls, and which cut cells have an edge: those at the edges of an upright
-!! box, none of a sphere.
+!> Openings behind plane walls, which cut cells have an edge, and what a block holds in faces: at the
+!! edges of an upright box, and none of a sphere.
 program test_wall_edges
   use kinds_m, only: wp
   use wall_edges_m, only: openings_of_plane
@@ -36,7 +36,29 @@ contains
     call check('an edge that holds the centre of its cell', edge([3, 3, 4]), 1.0_wp, 0.0_wp)
     call check('a corner', edge([3, 3, 3]), 1.0_wp, 0.0_wp)
     call check('an edge beside the centre of its cell', edge([6, 6, 4]), 0.0_wp, 0.0_wp)
+    call held_at_edge()
   end subroutine upright_box
+
+  !> Cell (3, 3, 4) holds 0.36 of solid: a plane wall would leave 2 - sqrt(0.72) of the faces of a
+  !! direction open, the edge leaves 1.4.
+  subroutine held_at_edge()
+    real(wp), parameter :: plane = 2.0_wp - sqrt(0.72_wp)
+    real(wp), parameter :: inertia = 0.5_wp + 0.5_wp*(1.0_wp + (1.4_wp - plane - 0.1_wp)/plane)**3.5_wp
+    integer :: m, n
+
+    associate (solid => body%solid)
+      call check('held beside an edge', solid%free(3, 3, 4, 1), 1.0_wp/inertia, 1.0e-12_wp)
+      call check('and in it', solid%free(4, 3, 4, 1), 0.4_wp/inertia, 1.0e-12_wp)
+      call check('none along the edge', solid%free(3, 3, 5, 3), solid%open(3, 3, 5, 3), 0.0_wp)
+      call check('none at a flat side', solid%free(4, 6, 4, 2), solid%open(4, 6, 4, 2), 0.0_wp)
+      n = 0
+      do m = solid%first_held(1), solid%first_held(2) - 1
+        if (all(solid%held_face(:, m) == [3, 3, 4, 1])) n = m
+      end do
+      call check('the list has it', n > 0)
+      if (n > 0) call check('with its share', solid%held_share(n), 1.0_wp - 1.0_wp/inertia, 1.0e-12_wp)
+    end associate
+  end subroutine held_at_edge
 
   !> By 45 degrees about z, its edges on planes of the grid: all walls are plane.
   subroutine turned_box()
@@ -45,12 +67,14 @@ contains
     call build('box', [width, width, 0.4_wp], [0.5_wp, 0.5_wp, 0.5_wp], turned=.true.)
     call check('plane walls', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 1.0e-9_wp)
     call check('there are some', body%solid%n_cut > 10)
+    call check('no held fluid', maxval(abs(body%solid%open - body%solid%free)), 0.0_wp, 1.0e-9_wp)
   end subroutine turned_box
 
   !> Eight cells wide.
   subroutine sphere()
     call build('sphere', [0.8_wp, 0.0_wp, 0.0_wp], [0.513_wp, 0.487_wp, 0.505_wp])
     call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 0.0_wp)
+    call check('sphere: little held fluid', maxval(body%solid%open - body%solid%free) < 0.1_wp)
   end subroutine sphere
 
   subroutine build(kind, size, position, turned)

@@ -1,0 +1,171 @@
+!> Fluid that a block holds in a face, where the flow would have to turn in what little fluid an edge
+!! of the block leaves in a cut cell.
+!!
+!! Measure is a plane wall that leaves the cell as much fluid. Where the faces of a direction are
+!! open R times as wide as behind that, beyond what the face of a round block makes,
+!! $$ R = 1 + \max (0, w_{low} + w_{high} - w_{plane} - 0.1)/w_{plane} $$
+!! the inertia of the half of the face in the cell is R^(7/2) times as large, since a thin layer has
+!! to move faster along the block than across the face:
+!! $$ \frac{w}{w_{free}} = \tfrac12 (R_{low}^{7/2} + R_{high}^{7/2}) $$
+!! with w the open share. Pressure moves the free share; the rest moves with the block, as if it
+!! were a part of it. Volume and transport know the open share only. The exponent is measured, 3
+!! follows for thin layers (docs/decisions/sharp_edges.md).
+module held_fluid_m
+  use kinds_m, only: wp
+  use growing_m, only: ensure_room
+  use grid_m, only: grid_t, unit_step
+  use solid_geometry_m, only: solid_geometry_t
+  use rigid_flux_m, only: closed_side
+  use wall_edges_m, only: openings, openings_of_plane, least_normal, round_edge
+  implicit none
+  private
+  public :: hold_fluid
+
+  real(wp), parameter :: power = 3.5_wp        !! of R in the inertia
+  real(wp), parameter :: widest = 100.0_wp     !! limit of R
+  real(wp), parameter :: least = 1.0e-6_wp     !! opening, or excess of inertia, that counts
+  integer, parameter :: several = -1           !! bodies in a cell
+
+contains
+
+  !> Free shares of the faces, and the list of those with held fluid.
+  subroutine hold_fluid(grid, n_blocks, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_blocks   !! of the bodies of `solid`: the bed, which comes last, is none
+    type(solid_geometry_t), intent(inout) :: solid
+    real(wp) :: more(3, solid%n_cut)   ! R^power - 1 of the cut cells
+    integer :: k, m
+
+    !$omp parallel
+    !$omp do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      solid%free(:, :, k, :) = solid%open(:, :, k, :)
+    end do
+    !$omp end do nowait
+    !$omp do schedule(static)
+    do m = 1, solid%n_cut
+      more(:, m) = more_inertia(grid, solid, solid%cut_cell(:, m))
+    end do
+    !$omp end parallel
+    call narrow_faces(grid, n_blocks, more, solid)
+    do m = 1, solid%first_held(size(solid%first_held)) - 1
+      associate (f => solid%held_face(:, m))
+        solid%held_share(m) = solid%open(f(1), f(2), f(3), f(4)) &
+                              - solid%free(f(1), f(2), f(3), f(4))
+      end associate
+    end do
+  end subroutine hold_fluid
+
+  !> R^power - 1 of each direction of a cut cell.
+  pure function more_inertia(grid, solid, c) result(more)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: more(3)
+    real(wp) :: w(3, 2), normal(3), plane(3)
+
+    more = 0.0_wp
+    if (any(c >= grid%last)) return
+    w = openings(solid, c)
+    normal = w(:, 2) - w(:, 1)
+    if (maxval(abs(normal)) < least_normal) return
+    plane = openings_of_plane(normal, solid%alpha(c(1), c(2), c(3)))
+    more = max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
+    more = (1.0_wp + min(widest, more))**power - 1.0_wp
+  end function more_inertia
+
+  !> Make the faces of cut cells narrower, and list them by blocks; not where another body is in a
+  !! cell around: in gaps the water beyond the edge is not open.
+  subroutine narrow_faces(grid, n_blocks, more, solid)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n_blocks
+    real(wp), intent(in) :: more(:, :)   !! (3, cut cells)
+    type(solid_geometry_t), intent(inout) :: solid
+    integer :: owner(solid%n_cut)        ! the body that cuts a cell, `several` bodies
+    integer :: b, d, m, n, s, next
+
+    call find_owners(solid, owner)
+    n = size(solid%body_cell)
+    if (size(solid%first_held) /= n) then
+      deallocate (solid%first_held)
+      allocate (solid%first_held(n))
+    end if
+    next = 1
+    do b = 1, n - 1
+      solid%first_held(b) = next
+      if (b > n_blocks) cycle
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        associate (c => solid%cell(:, m))
+          associate (cut => solid%cut(c(1), c(2), c(3)))
+            if (cut == 0) cycle
+            if (maxval(more(:, cut)) < least) cycle
+            if (others_around(grid, solid, owner, b, c)) cycle
+            do d = 1, 3
+              if (more(d, cut) < least) cycle
+              do s = 0, 1
+                call narrow([c + s*unit_step(:, d), d], 0.5_wp*more(d, cut))
+              end do
+            end do
+          end associate
+        end associate
+      end do
+    end do
+    solid%first_held(n) = next
+  contains
+    !> Add to w/w_free of face f.
+    subroutine narrow(f, part)
+      integer, intent(in) :: f(4)
+      real(wp), intent(in) :: part
+
+      associate (open => solid%open(f(1), f(2), f(3), f(4)), &
+                 free => solid%free(f(1), f(2), f(3), f(4)))
+        if (open < least .or. closed_side(grid, f(f(4)), f(4))) return
+        if (free >= open) then
+          call ensure_room(next, solid%held_face)
+          call ensure_room(next, solid%held_share)
+          solid%held_face(:, next) = f
+          next = next + 1
+        end if
+        free = open/(open/free + part)
+      end associate
+    end subroutine narrow
+  end subroutine narrow_faces
+
+  !> The body that cuts each cut cell, or `several`.
+  subroutine find_owners(solid, owner)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(out) :: owner(:)   !! (cut cells)
+    integer :: b, m
+
+    owner = 0
+    do b = 1, size(solid%body_cell) - 1
+      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
+        associate (cut => solid%cut(solid%cell(1, m), solid%cell(2, m), solid%cell(3, m)))
+          if (cut > 0) owner(cut) = merge(b, several, any(owner(cut) == [0, b]))
+        end associate
+      end do
+    end do
+  end subroutine find_owners
+
+  !> Is another body than b in cell c or one of the 26 around?
+  pure function others_around(grid, solid, owner, b, c) result(yes)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: owner(:)   !! (cut cells)
+    integer, intent(in) :: b, c(3)
+    logical :: yes
+    integer :: i, j, k, found
+
+    yes = .false.
+    do k = max(c(3) - 1, grid%first(3)), min(c(3) + 1, grid%last(3))
+      do j = max(c(2) - 1, grid%first(2)), min(c(2) + 1, grid%last(2))
+        do i = max(c(1) - 1, grid%first(1)), min(c(1) + 1, grid%last(1))
+          found = solid%inside(i, j, k)
+          if (solid%cut(i, j, k) > 0) found = owner(solid%cut(i, j, k))
+          yes = yes .or. (found /= 0 .and. found /= b)
+        end do
+      end do
+    end do
+  end function others_around
+
+end module held_fluid_m

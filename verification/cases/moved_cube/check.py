@@ -1,0 +1,32 @@
+"""Noise of the force on an upright cube whose flat faces cross planes of the grid."""
+
+import numpy as np
+
+from micstools.checks import Checks, sound
+from micstools.reader import Run
+
+BAND = 0.1  # of the weight of the cube
+G = 9.81
+
+
+def check(runs: list[Run]) -> Checks:
+    """Largest deviation of the force from its mean over a cell of way, after one edge of way."""
+    checks, curves = Checks("moved cube"), {}
+    for run in runs:
+        b, h = run.bodies, float(run.grid.spacing[2])
+        cells = float(run.value("shape", "size", 1.0)) / h
+        speed = -float(b.velocity[0, 0, 2])
+        weight = float(run.shapes["cube"].density * run.shapes["cube"].volume * G)
+        force, way = b.fluid_force[:, 0, 2] / weight, b.time * speed / h
+        level = np.array([force[abs(way - w) <= 0.5].mean() for w in way])
+        late = (way >= cells) & (way < way[-1] - 0.5)
+        name = f"{cells:.3g} cells per edge"
+        noise = float(abs(force - level)[late].max())
+        checks.below(f"{name}: largest noise of the force, in weights", noise, BAND)
+        checks.below(
+            f"{name}: its scatter", float((force - level)[late].std()), BAND, counts=False
+        )
+        curves[name] = (way / cells, force)
+        sound(run, checks)
+    checks.figure("force", "way / edge", "weights", curves)
+    return checks
