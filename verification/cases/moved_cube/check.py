@@ -23,9 +23,7 @@ def check(runs: list[Run]) -> Checks:
         name = f"{cells:.3g} cells per edge"
         noise = float(abs(force - level)[late].max())
         checks.below(f"{name}: largest noise of the force, in weights", noise, BAND)
-        checks.below(
-            f"{name}: its scatter", float((force - level)[late].std()), BAND, counts=False
-        )
+        checks.below(f"{name}: its scatter", float((force - level)[late].std()), BAND, counts=False)
         curves[name] = (way / cells, force)
         sound(run, checks)
     checks.figure("force", "way / edge", "weights", curves)
