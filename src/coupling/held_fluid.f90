@@ -1,5 +1,5 @@
-!> Fluid that a block holds in a face, where the flow would have to turn in what little fluid an edge
-!! of the block leaves in a cut cell.
+!> Fluid that a block holds in a face, where the flow would have to turn in what little fluid an
+!! edge of the block leaves in a cut cell.
 !!
 !! Measure is a plane wall that leaves the cell as much fluid. Where the faces of a direction are
 !! open R times as wide as behind that, beyond what the face of a round block makes,
@@ -31,7 +31,7 @@ contains
   !> Free shares of the faces, and the list of those with held fluid.
   subroutine hold_fluid(grid, n_blocks, solid)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: n_blocks   !! of the bodies of `solid`: the bed, which comes last, is none
+    integer, intent(in) :: n_blocks   !! bodies of `solid` without the bed, which comes last
     type(solid_geometry_t), intent(inout) :: solid
     real(wp) :: more(3, solid%n_cut)   ! R^power - 1 of the cut cells
     integer :: k, m

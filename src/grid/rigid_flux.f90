@@ -25,7 +25,7 @@ module rigid_flux_m
     !> Faces that body b pushes on: `first_face(b):first_face(b+1)-1`, those that it fills in part,
     !! then from `held_from(b)` those in which it holds fluid.
     integer, allocatable :: first_face(:), held_from(:)
-    integer, allocatable :: face(:, :)       !! (4, faces) cell index and direction of the lower face
+    integer, allocatable :: face(:, :)       !! (4, faces) cell and direction of the lower face
     real(wp), allocatable :: s(:, :)         !! (6, faces) flux of the unit motions [m2, m3]
     logical, allocatable :: mine(:)          !! (faces) this process adds the face to sums
     integer, allocatable :: first(:)

@@ -25,8 +25,8 @@ module solid_geometry_m
   type :: solid_geometry_t
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
-    !> Share of the lower face through which pressure moves fluid; what it lacks of `open` moves with
-    !! a body (`held_fluid_m`).
+    !> Share of the lower face through which pressure moves fluid; what it lacks of `open` moves
+    !! with a body (`held_fluid_m`).
     real(wp), allocatable :: free(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
     !> Legs between the centres of the two cells of a lower face d: `leg_number(i,j,k,d)` is the

@@ -118,8 +118,8 @@ contains
     call check('some fluid is held', box%solid%first_held(2) > 10)
     call check('linear pressure: force', force(1:3, 1), expected(1:3), 1.0e-12_wp)
     call check('linear pressure: torque', force(4:6, 1), expected(4:6), 1.0e-13_wp)
-    call check('volume by faces is near the volume', maxval(abs(solid_volume/product(edges) - 1.0_wp)) &
-               < 0.03_wp)
+    call check('volume by faces is near the volume', &
+               maxval(abs(solid_volume/product(edges) - 1.0_wp)) < 0.03_wp)
   end subroutine linear_pressure
 
   !> Net fluxes of cells, the transposed product, and the force by cells against that by faces.

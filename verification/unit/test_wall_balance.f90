@@ -159,7 +159,8 @@ contains
       change(d) = gained(d)
       call begin()
       a%cell = 0.0_wp
-      call hold_in_cells(box%grid, box%solid, box%bodies, reshape(change/dt, [6, 1]), a%face, a%cell)
+      call hold_in_cells(box%grid, box%solid, box%bodies, reshape(change/dt, [6, 1]), a%face, &
+                         a%cell)
       call note_change(box%grid, links, dt, a%cell, balance%pushed)
       call find(change)
       call check('the part of the wall is the uncounted fluid', force(1:3, 1), &

@@ -1,5 +1,5 @@
-!> Openings behind plane walls, which cut cells have an edge, and what a block holds in faces: at the
-!! edges of an upright box, and none of a sphere.
+!> Openings behind plane walls, which cut cells have an edge, and what a block holds in faces: at
+!! the edges of an upright box, and none of a sphere.
 program test_wall_edges
   use kinds_m, only: wp
   use wall_edges_m, only: openings_of_plane
@@ -43,7 +43,8 @@ contains
   !! direction open, the edge leaves 1.4.
   subroutine held_at_edge()
     real(wp), parameter :: plane = 2.0_wp - sqrt(0.72_wp)
-    real(wp), parameter :: inertia = 0.5_wp + 0.5_wp*(1.0_wp + (1.4_wp - plane - 0.1_wp)/plane)**3.5_wp
+    real(wp), parameter :: r = 1.0_wp + (1.4_wp - plane - 0.1_wp)/plane
+    real(wp), parameter :: inertia = 0.5_wp*(1.0_wp + r**3.5_wp)
     integer :: m, n
 
     associate (solid => body%solid)
@@ -56,7 +57,8 @@ contains
         if (all(solid%held_face(:, m) == [3, 3, 4, 1])) n = m
       end do
       call check('the list has it', n > 0)
-      if (n > 0) call check('with its share', solid%held_share(n), 1.0_wp - 1.0_wp/inertia, 1.0e-12_wp)
+      if (n > 0) call check('with its share', solid%held_share(n), 1.0_wp - 1.0_wp/inertia, &
+                            1.0e-12_wp)
     end associate
   end subroutine held_at_edge
 
