@@ -18,6 +18,7 @@ module rigid_flux_m
   private
   public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, all_fluid_of_faces
   public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm, closed_side
+  public :: middle_of_face
 
   integer, parameter :: worth_threads = 1000   !! fewer faces or cells are looked at by one thread
 

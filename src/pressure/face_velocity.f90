@@ -8,7 +8,7 @@ module face_velocity_m
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
   use solid_geometry_m, only: solid_geometry_t, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm
+  use rigid_flux_m, only: nearest_arm, middle_of_face
   use mixture_m, only: face_mean
   use wall_profile_m, only: slip_at
   implicit none
@@ -198,16 +198,15 @@ contains
     real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
-    real(wp) :: x(3), a_wall(3), missing
+    real(wp) :: arm(3), a_wall(3), missing
     integer :: b, d, m, s, c(3)
 
     do b = 1, bodies%n
       do m = solid%first_held(b), solid%first_held(b + 1) - 1
         associate (f => solid%held_face(1:3, m))
           d = solid%held_face(4, m)
-          x = [grid%centre(f(1), 1), grid%centre(f(2), 2), grid%centre(f(3), 3)]
-          x(d) = grid%face(f(d), d)
-          a_wall = wall_velocity(a_body(:, b), nearest_arm(grid, x, bodies%x(:, b)))
+          arm = nearest_arm(grid, middle_of_face(grid, solid%held_face(:, m)), bodies%x(:, b))
+          a_wall = wall_velocity(a_body(:, b), arm)
           missing = solid%held_share(m)*(a_wall(d) - a_face(f(1), f(2), f(3), d))
           do s = 0, 1
             c = f - s*unit_step(:, d)

@@ -4,7 +4,7 @@ program test_rigid_flux
   use vectors_m, only: cross, quaternion_from_axis
   use grid_m, only: n_halo, unit_step
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, &
-    force_from_faces, force_from_cells, add_cell_flux, nearest_arm
+    force_from_faces, force_from_cells, add_cell_flux, nearest_arm, middle_of_face
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -107,8 +107,7 @@ contains
       else
         d = box%solid%held_face(4, m - n)
         part = box%grid%volume*box%solid%held_share(m - n)
-        x = [(box%grid%centre(box%solid%held_face(i, m - n), i), i=1, 3)]
-        x(d) = box%grid%face(box%solid%held_face(d, m - n), d)
+        x = middle_of_face(box%grid, box%solid%held_face(:, m - n))
       end if
       volume(d) = volume(d) + part
       if (m == n) solid_volume = volume
