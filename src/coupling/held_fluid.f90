@@ -4,12 +4,13 @@
 !! Measure is a plane wall that leaves the cell as much fluid. Where the faces of a direction are
 !! open R times as wide as behind that, beyond what the face of a round block makes,
 !! $$ R = 1 + \max (0, w_{low} + w_{high} - w_{plane} - 0.1)/w_{plane} $$
-!! the inertia of the half of the face in the cell is R^(7/2) times as large, since a thin layer has
-!! to move faster along the block than across the face:
-!! $$ \frac{w}{w_{free}} = \tfrac12 (R_{low}^{7/2} + R_{high}^{7/2}) $$
-!! with w the open share. Pressure moves the free share; the rest moves with the block, as if it
-!! were a part of it. Volume and transport know the open share only. The exponent is measured, 3
-!! follows for thin layers (docs/decisions/sharp_edges.md).
+!! the inertia of the half of the face in the cell is m times as large,
+!! $$ m = \min (R^{7/2}, 1 + \tfrac23 S^2/a), \qquad
+!! \frac{w}{w_{free}} = \tfrac12 (m_{low} + m_{high}) $$
+!! with w the open share. A layer of depth a before a wall that is seen through the share S of the
+!! face, fed from one end, has to move so much faster along the wall than across the face. Pressure
+!! moves the free share; the rest moves with the block, as if it were a part of it. Volume and
+!! transport know the open share only. 7/2 is measured (docs/decisions/sharp_edges.md).
 module held_fluid_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
@@ -19,10 +20,10 @@ module held_fluid_m
   use wall_edges_m, only: openings, openings_of_plane, least_normal, round_edge
   implicit none
   private
-  public :: hold_fluid
+  public :: hold_fluid, more_inertia
 
-  real(wp), parameter :: power = 3.5_wp        !! of R in the inertia
-  real(wp), parameter :: widest = 100.0_wp     !! limit of R
+  real(wp), parameter :: power = 3.5_wp        !! of R
+  real(wp), parameter :: thinnest = 0.01_wp    !! layer [cells]
   real(wp), parameter :: least = 1.0e-6_wp     !! opening, or excess of inertia, that counts
   integer, parameter :: several = -1           !! bodies in a cell
 
@@ -33,7 +34,7 @@ contains
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_blocks   !! bodies of `solid` without the bed, which comes last
     type(solid_geometry_t), intent(inout) :: solid
-    real(wp) :: more(3, solid%n_cut)   ! R^power - 1 of the cut cells
+    real(wp) :: more(3, solid%n_cut)   ! m - 1 of the cut cells
     integer :: k, m
 
     !$omp parallel
@@ -44,7 +45,11 @@ contains
     !$omp end do nowait
     !$omp do schedule(static)
     do m = 1, solid%n_cut
-      more(:, m) = more_inertia(grid, solid, solid%cut_cell(:, m))
+      associate (c => solid%cut_cell(:, m))
+        more(:, m) = 0.0_wp
+        if (all(c < grid%last)) more(:, m) = more_inertia(openings(solid, c), &
+                                                          solid%alpha(c(1), c(2), c(3)))
+      end associate
     end do
     !$omp end parallel
     call narrow_faces(grid, n_blocks, more, solid)
@@ -56,22 +61,20 @@ contains
     end do
   end subroutine hold_fluid
 
-  !> R^power - 1 of each direction of a cut cell.
-  pure function more_inertia(grid, solid, c) result(more)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
+  !> By how much the inertia of each direction of a cell is larger, m - 1.
+  pure function more_inertia(w, alpha) result(more)
+    real(wp), intent(in) :: w(3, 2)   !! open shares of the lower and upper faces
+    real(wp), intent(in) :: alpha     !! solid share of the cell
     real(wp) :: more(3)
-    real(wp) :: w(3, 2), normal(3), plane(3)
+    real(wp) :: normal(3), plane(3), r(3), depth(3)
 
     more = 0.0_wp
-    if (any(c >= grid%last)) return
-    w = openings(solid, c)
     normal = w(:, 2) - w(:, 1)
     if (maxval(abs(normal)) < least_normal) return
-    plane = openings_of_plane(normal, solid%alpha(c(1), c(2), c(3)))
-    more = max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
-    more = (1.0_wp + min(widest, more))**power - 1.0_wp
+    plane = openings_of_plane(normal, alpha)
+    r = 1.0_wp + max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
+    depth = 1.0_wp - alpha/max(abs(normal), least)
+    more = min(r**power - 1.0_wp, normal**2/(1.5_wp*max(depth, thinnest)))
   end function more_inertia
 
   !> Make the faces of cut cells narrower, and list them by blocks; not where another body is in a

@@ -3,6 +3,7 @@
 program test_wall_edges
   use kinds_m, only: wp
   use wall_edges_m, only: openings_of_plane
+  use held_fluid_m, only: more_inertia
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -12,6 +13,7 @@ program test_wall_edges
   call behind_planes()
   call upright_box()
   call turned_box()
+  call tip_and_layer()
   call sphere()
   call finish_checks()
 
@@ -61,6 +63,24 @@ contains
                             1.0e-12_wp)
     end associate
   end subroutine held_at_edge
+
+  !> A slightly turned edge that reaches into a cell by 0.2 through one face, of which it takes 0.4:
+  !! behind it are 0.9 of fluid, so the inertia is larger by (2/3) 0.4^2/0.9 only. An edge that
+  !! fills a cell but for a layer of 0.1 on two sides: by R or that bound.
+  subroutine tip_and_layer()
+    real(wp), parameter :: plane = sqrt(2.0_wp*0.19_wp)
+    real(wp) :: w(3, 2), more(3), layer
+
+    w(:, 1) = [0.6_wp, 0.99_wp, 0.96_wp]
+    w(:, 2) = [1.0_wp, 1.0_wp, 0.96_wp]
+    more = more_inertia(w, 0.04_wp)
+    call check('tip', more(1), 0.16_wp/1.35_wp, 1.0e-12_wp)
+    w(:, 1) = [0.1_wp, 0.1_wp, 0.19_wp]
+    w(:, 2) = [1.0_wp, 1.0_wp, 0.19_wp]
+    more = more_inertia(w, 0.81_wp)
+    layer = min(0.81_wp/0.15_wp, (1.0_wp/plane)**3.5_wp - 1.0_wp)
+    call check('layer', more, [layer, layer, 0.0_wp], 1.0e-10_wp)
+  end subroutine tip_and_layer
 
   !> By 45 degrees about z, its edges on planes of the grid: all walls are plane.
   subroutine turned_box()
