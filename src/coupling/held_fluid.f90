@@ -15,9 +15,9 @@ module held_fluid_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, openings
   use rigid_flux_m, only: closed_side
-  use wall_edges_m, only: openings, openings_of_plane, least_normal, round_edge
+  use wall_edges_m, only: least_normal, round_edge
   implicit none
   private
   public :: hold_fluid, more_inertia
@@ -47,8 +47,8 @@ contains
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m))
         more(:, m) = 0.0_wp
-        if (all(c < grid%last)) more(:, m) = more_inertia(openings(solid, c), &
-                                                          solid%alpha(c(1), c(2), c(3)))
+        if (all(c < grid%last)) more(:, m) = more_inertia(openings(grid, solid%open, c), &
+          solid%behind_plane(:, m), solid%alpha(c(1), c(2), c(3)))
       end associate
     end do
     !$omp end parallel
@@ -62,16 +62,16 @@ contains
   end subroutine hold_fluid
 
   !> By how much the inertia of each direction of a cell is larger, m - 1.
-  pure function more_inertia(w, alpha) result(more)
-    real(wp), intent(in) :: w(3, 2)   !! open shares of the lower and upper faces
-    real(wp), intent(in) :: alpha     !! solid share of the cell
+  pure function more_inertia(w, plane, alpha) result(more)
+    real(wp), intent(in) :: w(3, 2)    !! open shares of the lower and upper faces
+    real(wp), intent(in) :: plane(3)   !! those of both together behind a plane wall
+    real(wp), intent(in) :: alpha      !! solid share of the cell
     real(wp) :: more(3)
-    real(wp) :: normal(3), plane(3), r(3), depth(3)
+    real(wp) :: normal(3), r(3), depth(3)
 
     more = 0.0_wp
     normal = w(:, 2) - w(:, 1)
     if (maxval(abs(normal)) < least_normal) return
-    plane = openings_of_plane(normal, alpha)
     r = 1.0_wp + max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
     depth = 1.0_wp - alpha/max(abs(normal), least)
     more = min(r**power - 1.0_wp, normal**2/(1.5_wp*max(depth, thinnest)))

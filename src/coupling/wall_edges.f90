@@ -6,12 +6,12 @@
 module wall_edges_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
-  use grid_m, only: grid_t, unit_step
-  use solid_geometry_m, only: solid_geometry_t
+  use grid_m, only: grid_t
+  use solid_geometry_m, only: solid_geometry_t, openings
   use plic_m, only: unit_constant, unit_volume
   implicit none
   private
-  public :: find_edges, openings, openings_of_plane, least_normal, round_edge
+  public :: find_edges, openings_of_plane, least_normal, round_edge
 
   real(wp), parameter :: round_edge = 0.1_wp, sharp_edge = 0.2_wp
     !! excess of openings up to which a wall counts as plane, and from which it has an edge [faces]
@@ -19,51 +19,32 @@ module wall_edges_m
 
 contains
 
-  !> How much of an edge each cut cell has, `solid%edge`; none if its centre lies in fluid.
+  !> Of each cut cell the openings behind a plane wall, `solid%behind_plane`, and how much of an
+  !! edge it has, `solid%edge`: 0 behind a wall that is nearly plane, 1 with an edge; none if its
+  !! centre lies in fluid.
   subroutine find_edges(grid, solid)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(inout) :: solid
+    real(wp) :: w(3, 2), excess
     integer :: m
 
     call ensure_room(solid%n_cut, solid%edge)
-    !$omp parallel do schedule(static)
+    call ensure_room(solid%n_cut, solid%behind_plane)
+    !$omp parallel do private(w, excess) schedule(static)
     do m = 1, solid%n_cut
-      associate (c => solid%cut_cell(:, m))
+      associate (c => solid%cut_cell(:, m), plane => solid%behind_plane(:, m))
         solid%edge(m) = 0.0_wp
-        if (solid%inside(c(1), c(2), c(3)) == 0 .or. any(c >= grid%last)) cycle
-        solid%edge(m) = edge_of(solid, c)
+        plane = 2.0_wp
+        if (any(c >= grid%last)) cycle
+        w = openings(grid, solid%open, c)
+        if (maxval(abs(w(:, 2) - w(:, 1))) < least_normal) cycle
+        plane = openings_of_plane(w(:, 2) - w(:, 1), solid%alpha(c(1), c(2), c(3)))
+        if (solid%inside(c(1), c(2), c(3)) == 0) cycle
+        excess = maxval(sum(w, 2) - plane)
+        solid%edge(m) = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
       end associate
     end do
   end subroutine find_edges
-
-  !> Of a cut cell: 0 behind a wall that is nearly plane, 1 with an edge.
-  pure function edge_of(solid, c) result(edge)
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    real(wp) :: edge
-    real(wp) :: w(3, 2), normal(3), excess
-
-    w = openings(solid, c)
-    normal = w(:, 2) - w(:, 1)
-    edge = 0.0_wp
-    if (maxval(abs(normal)) < least_normal) return
-    excess = maxval(sum(w, 2) - openings_of_plane(normal, solid%alpha(c(1), c(2), c(3))))
-    edge = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
-  end function edge_of
-
-  !> Open shares of the lower (:, 1) and upper (:, 2) faces of a cell.
-  pure function openings(solid, c) result(w)
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    real(wp) :: w(3, 2)
-    integer :: d, f(3)
-
-    do d = 1, 3
-      f = c + unit_step(:, d)
-      w(d, 1) = solid%open(c(1), c(2), c(3), d)
-      w(d, 2) = solid%open(f(1), f(2), f(3), d)
-    end do
-  end function openings
 
   !> Open share of both faces of each direction together behind a plane wall in the unit cube; 2
   !! where the wall lies along these faces, since to round-off it is on either side of them.

@@ -7,7 +7,7 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces, edge_in
+  public :: solid_geometry_t, solid_geometry_init, set_faces, openings, edge_in
   public :: clear_cells, clear_faces, clear_legs
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
@@ -46,6 +46,8 @@ module solid_geometry_m
     integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
     real(wp), allocatable :: edge(:)
       !! (n_cut) 0: the wall in the cell is nearly plane, 1: it has an edge (`wall_edges_m`)
+    real(wp), allocatable :: behind_plane(:, :)
+      !! (3, n_cut) open share of both faces together, were the wall plane
 
     !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
@@ -96,8 +98,24 @@ contains
     allocate (solid%first_held, source=solid%body_face)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
-    allocate (solid%edge(0), solid%cut_cell(3, 0), solid%closed_cell(3, 0))
+    allocate (solid%edge(0), solid%behind_plane(3, 0), solid%cut_cell(3, 0))
+    allocate (solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
+
+  !> Open shares of the lower (:, 1) and upper (:, 2) faces of cell c.
+  pure function openings(grid, open, c) result(w)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer, intent(in) :: c(3)
+    real(wp) :: w(3, 2)
+    integer :: d, f(3)
+
+    do d = 1, 3
+      f = c + unit_step(:, d)
+      w(d, 1) = open(c(1), c(2), c(3), d)
+      w(d, 2) = open(f(1), f(2), f(3), d)
+    end do
+  end function openings
 
   !> How much of an edge cell c has, 0 if it is not cut.
   pure function edge_in(solid, c) result(edge)

@@ -9,7 +9,7 @@ module linked_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
-  use solid_geometry_m, only: solid_geometry_t, edge_in
+  use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm
   use plic_m, only: unit_constant
@@ -500,12 +500,8 @@ contains
     real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer, intent(in) :: c(3)
     real(wp) :: w(3)
-    integer :: d, e(3)
 
-    do d = 1, 3
-      e = c + unit_step(:, d)
-      w(d) = 0.5_wp*(open(c(1), c(2), c(3), d) + open(e(1), e(2), e(3), d))
-    end do
+    w = 0.5_wp*sum(openings(grid, open, c), 2)
   end function open_shares
 
 end module linked_cells_m

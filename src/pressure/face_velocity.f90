@@ -6,7 +6,7 @@ module face_velocity_m
   use boundary_kinds_m, only: gives_pressure, no_side
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
-  use solid_geometry_m, only: solid_geometry_t, edge_in
+  use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm, middle_of_face
   use mixture_m, only: face_mean
@@ -198,7 +198,7 @@ contains
     real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
-    real(wp) :: arm(3), a_wall(3), missing
+    real(wp) :: arm(3), a_wall(3), w(3, 2), missing
     integer :: b, d, m, s, c(3)
 
     do b = 1, bodies%n
@@ -211,9 +211,8 @@ contains
           do s = 0, 1
             c = f - s*unit_step(:, d)
             if (.not. grid%owns(c)) cycle
-            a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing &
-              /sum(solid%open(c(1):c(1) + unit_step(1, d), c(2):c(2) + unit_step(2, d), &
-                              c(3):c(3) + unit_step(3, d), d))
+            w = openings(grid, solid%open, c)
+            a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing/sum(w(d, :))
           end do
         end associate
       end do

@@ -73,11 +73,11 @@ contains
 
     w(:, 1) = [0.6_wp, 0.99_wp, 0.96_wp]
     w(:, 2) = [1.0_wp, 1.0_wp, 0.96_wp]
-    more = more_inertia(w, 0.04_wp)
+    more = more_inertia(w, openings_of_plane(w(:, 2) - w(:, 1), 0.04_wp), 0.04_wp)
     call check('tip', more(1), 0.16_wp/1.35_wp, 1.0e-12_wp)
     w(:, 1) = [0.1_wp, 0.1_wp, 0.19_wp]
     w(:, 2) = [1.0_wp, 1.0_wp, 0.19_wp]
-    more = more_inertia(w, 0.81_wp)
+    more = more_inertia(w, openings_of_plane(w(:, 2) - w(:, 1), 0.81_wp), 0.81_wp)
     layer = min(0.81_wp/0.15_wp, (1.0_wp/plane)**3.5_wp - 1.0_wp)
     call check('layer', more, [layer, layer, 0.0_wp], 1.0e-10_wp)
   end subroutine tip_and_layer
