@@ -7,9 +7,9 @@
 module time_step_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
-  use grid_m, only: grid_t, grid_init
-  use fields_m, only: flow_t, flow_init
-  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use grid_m, only: grid_init
+  use fields_m, only: flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, hand_over_faces
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use liquid_fill_m, only: fill_liquid, raise_surface
   use initial_state_m, only: read_initial_liquid, read_initial_velocity
@@ -19,10 +19,10 @@ module time_step_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t, blocks_init
+  use rigid_body_m, only: blocks_init
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
-  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  use contacts_m, only: contacts_init, contact_report_t, move_blocks
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
   use release_m, only: release_due_blocks, next_release, none_to_come
@@ -237,7 +237,8 @@ contains
     end do
   end subroutine first_force
 
-  !> The present solids become those of the start of the step.
+  !> The present solids become those of the start of the step. Of these nobody asks for the legs
+  !! and the free share, which stay with the present ones.
   subroutine swap_solids(sim)
     type(simulation_t), intent(inout) :: sim
     type(solid_geometry_t), allocatable :: keep
@@ -245,6 +246,7 @@ contains
     call move_alloc(sim%solid, keep)
     call move_alloc(sim%before, sim%solid)
     call move_alloc(keep, sim%before)
+    call hand_over_faces(sim%before, sim%solid)
   end subroutine swap_solids
 
   !> Length of the step: `cfl_max` of liquid and blocks, `&run dt` and surface tension, or less to

@@ -29,6 +29,7 @@ module mass_average_m
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
+  use growing_m, only: ensure_rows
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
@@ -76,7 +77,6 @@ contains
         stage%total = stage%total + stage%from_pressure
       end do
     end associate
-    report%viscous_iterations = stage%viscous%iterations
     report%viscous_converged = stage%viscous%converged
   end subroutine mass_average_stage
 
@@ -218,7 +218,7 @@ contains
     bins = spread(no_terms, 2, 6*stage%bodies%n)
     do b = 1, stage%bodies%n
       n = 0
-      call make_room(stage, solid%body_cell(b + 1) - solid%body_cell(b))
+      call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), stage%terms)
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
           if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
@@ -235,16 +235,6 @@ contains
     call exact_totals(bins, total)
     stage%from_pressure(:, :stage%bodies%n) = reshape(total, [6, stage%bodies%n])
   end subroutine momentum_gained
-
-  !> Terms for n cells.
-  subroutine make_room(stage, n)
-    type(stage_t), intent(inout) :: stage
-    integer, intent(in) :: n
-
-    if (size(stage%terms, 1) >= n) return
-    deallocate (stage%terms)
-    allocate (stage%terms(2*n, 6))
-  end subroutine make_room
 
   !> Give cells and faces the final rigid velocity by mass average; what divergence that leaves is
   !! reported, since it is what the next step transports with.

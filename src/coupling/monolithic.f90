@@ -70,7 +70,6 @@ contains
     call extend_pressure(grid, case%fluid%gravity, flow%rho, stage%pressure%system%active, &
                          stage%pressure%known, flow%p)
     call sum_forces(dt, stage)
-    report%viscous_iterations = stage%viscous%iterations
     report%viscous_converged = stage%viscous%converged
   end subroutine monolithic_stage
 
@@ -200,7 +199,6 @@ contains
       if (.not. stage%implicit_momentum) then   ! that carries the mean in the same solve
         call find_centres(grid, solid, stage%at_start, flow%u, links)
         call to_centres(grid, links, stage%at_start, flow%u)
-        call fill_velocity_halo(grid, flow%u)
       end if
       call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links)
       call predict_velocity(grid, stage%rho, flow, stage)

@@ -24,7 +24,6 @@ module velocity_stage_m
 
   type :: stage_report_t
     type(pressure_report_t) :: pressure
-    integer :: viscous_iterations = 0
     logical :: viscous_converged = .true.
   end type stage_report_t
 

@@ -6,7 +6,7 @@
 module boundary_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
-  use boundary_kinds_m, only: is_wall, gives_pressure, gives_velocity, side_no_slip, side_inflow
+  use boundary_kinds_m, only: is_wall, gives_velocity, side_no_slip, side_inflow
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -35,13 +35,15 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, m
+    integer :: d, s, m, n_filled
 
+    n_filled = n_halo
+    if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(a, n_halo, d, layers)
       do s = 1, 2
         if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
-        do m = 1, n_halo
+        do m = 1, n_filled
           call mirror_plane(a, d, ghost_layer(grid, s, d, m), mirror_layer(grid, s, d, 1), &
                             1.0_wp, 0.0_wp)
         end do
@@ -57,24 +59,26 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, c
+    integer :: d, s, c, n_filled
 
+    n_filled = n_halo
+    if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(u, n_halo, d, layers)
       if (grid%periodic(d)) cycle
       !$omp parallel do collapse(2) schedule(static)
       do c = 1, 3
         do s = 1, 2
-          if (grid%at_side(s, d)) call fill_component(grid, s, d, c, u(:, :, :, c))
+          if (grid%at_side(s, d)) call fill_component(grid, s, d, c, n_filled, u(:, :, :, c))
         end do
       end do
     end do
   end subroutine fill_velocity_halo
 
-  !> Halo of component c of the velocity outside side s of direction d.
-  pure subroutine fill_component(grid, s, d, c, u)
+  !> Halo of component c of the velocity outside side s of direction d, so many layers.
+  pure subroutine fill_component(grid, s, d, c, layers, u)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: s, d, c
+    integer, intent(in) :: s, d, c, layers
     real(wp), intent(inout), contiguous :: u(:, :, :)
     real(wp) :: factor, shift
     integer :: m
@@ -88,7 +92,7 @@ contains
       factor = 0.0_wp
       shift = grid%side_velocity(c, s, d)
     end if
-    do m = 1, n_halo
+    do m = 1, layers
       call mirror_plane(u, d, ghost_layer(grid, s, d, m), &
                         mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), &
                         factor, shift)

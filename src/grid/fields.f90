@@ -48,7 +48,7 @@ contains
     allocate (flow%mu, source=flow%p)
   end subroutine flow_init
 
-  !> b := b + s*a in the own cells and the lower faces lo..hi+1, all components.
+  !> b := b + s*a in the own cells, all components.
   subroutine add_product(grid, s, a, b)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: s
@@ -58,9 +58,9 @@ contains
 
     !$omp parallel do collapse(2) private(i, j) schedule(static)
     do c = 1, size(b, 4)
-      do k = grid%lo(3), grid%hi(3) + 1
-        do j = grid%lo(2), grid%hi(2) + 1
-          do i = grid%lo(1), grid%hi(1) + 1
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
             b(i, j, k, c) = b(i, j, k, c) + s*a(i, j, k, c)
           end do
         end do

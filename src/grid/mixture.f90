@@ -24,9 +24,15 @@ contains
   subroutine mix_fluid(fluid, flow)
     type(fluid_t), intent(in) :: fluid
     type(flow_t), intent(inout) :: flow
+    integer :: k
 
-    flow%rho = fluid%gas_density + (fluid%liquid_density - fluid%gas_density)*flow%c
-    flow%mu = fluid%gas_viscosity + (fluid%liquid_viscosity - fluid%gas_viscosity)*flow%c
+    !$omp parallel do schedule(static)
+    do k = lbound(flow%c, 3), ubound(flow%c, 3)
+      flow%rho(:, :, k) = fluid%gas_density &
+                          + (fluid%liquid_density - fluid%gas_density)*flow%c(:, :, k)
+      flow%mu(:, :, k) = fluid%gas_viscosity &
+                         + (fluid%liquid_viscosity - fluid%gas_viscosity)*flow%c(:, :, k)
+    end do
   end subroutine mix_fluid
 
   !> Density on a face: arithmetic mean, which makes 1/rho the harmonic mean of the paper's C-HSMAC.

@@ -223,13 +223,14 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: flux(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! none on entry but through faces of the list
     logical, intent(in) :: held
-    integer :: b, k
+    integer :: b, m
 
-    !$omp parallel private(b)
+    !$omp parallel private(b) if (self%first_face(bodies%n + 1) > worth_threads)
     !$omp do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      flux(:, :, k, :) = 0.0_wp
+    do m = 1, self%first_face(bodies%n + 1) - 1
+      flux(self%face(1, m), self%face(2, m), self%face(3, m), self%face(4, m)) = 0.0_wp
     end do
     do b = 1, bodies%n
       if (all(abs(bodies%motion(:, b)) <= 0.0_wp)) cycle

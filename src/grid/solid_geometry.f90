@@ -8,7 +8,7 @@ module solid_geometry_m
   implicit none
   private
   public :: solid_geometry_t, solid_geometry_init, set_faces, openings, edge_in
-  public :: clear_cells, clear_faces, clear_legs
+  public :: clear_cells, clear_faces, clear_legs, hand_over_faces
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
   !! hold is taken away again (see `bed_solid_m`).
@@ -170,6 +170,19 @@ contains
     end do
     solid%n_leg = 0
   end subroutine clear_legs
+
+  !> Free shares and legs go from one geometry to another.
+  subroutine hand_over_faces(from, to)
+    type(solid_geometry_t), intent(inout) :: from, to
+
+    call move_alloc(from%free, to%free)
+    call move_alloc(from%leg_number, to%leg_number)
+    call move_alloc(from%leg, to%leg)
+    call move_alloc(from%leg_length, to%leg_length)
+    call move_alloc(from%leg_body, to%leg_body)
+    to%n_leg = from%n_leg
+    from%n_leg = 0
+  end subroutine hand_over_faces
 
   !> Give the six faces of a cell an open share, as far as they are in the arrays.
   pure subroutine set_faces(grid, cell, open, solid)

@@ -150,8 +150,6 @@ contains
       !! work: liquid share of what the small cells give
     integer :: l, n, at(3)
 
-    volumes%w_before = volumes%w
-    volumes%v_before = volumes%v
     n = self%n_late
     call late_values(grid, volumes%w, volumes%v, abs(self%q_late(1:n)), self, share)
     do l = 1, n

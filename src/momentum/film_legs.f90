@@ -1,4 +1,4 @@
-!> Wall legs of film cells, whose centre lies inside a body but which have open faces.
+!> Wall legs of film cells without a master: their centre lies inside a body, their faces are open.
 module film_legs_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
@@ -27,6 +27,7 @@ contains
     integer :: b, m, n, c(3)
     real(wp) :: least   !! smallest sum of the areas that counts [m2]
 
+    if (.not. self%lone_films) return
     if (size(self%films%sum, 2) < solid%n_cut) then
       deallocate (self%films%sum)
       allocate (self%films%sum(7, 2*solid%n_cut))
@@ -57,7 +58,7 @@ contains
       end do
     end do
   contains
-    !> Number of a cut cell if it is an own film cell with a component that is an unknown, else 0.
+    !> Number of a cut cell if it is an own film cell whose velocity is an unknown, else 0.
     pure function film_number(c) result(n)
       integer, intent(in) :: c(3)
       integer :: n

@@ -11,6 +11,7 @@
 !! domain: the surface meets walls and upright sides of bodies at 90 degrees.
 module surface_tension_m
   use kinds_m, only: wp, i8
+  use growing_m, only: ensure_rows
   use case_types_m, only: fluid_t
   use boundary_kinds_m, only: no_side
   use grid_m, only: grid_t, unit_step
@@ -42,11 +43,15 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! C^, halo filled [-]
     type(surface_tension_t), intent(inout) :: self
+    integer :: k
 
     self%acts = .not. fluid%single_phase
     if (.not. self%acts) return
     if (.not. allocated(self%force)) call allocate_tension(grid, fluid%surface_tension, self)
-    self%force = 0.0_wp
+    !$omp parallel do schedule(static)
+    do k = lbound(self%force, 3), ubound(self%force, 3)
+      self%force(:, :, k, :) = 0.0_wp
+    end do
     call weight_at_faces(grid, fluid, c, self%force)
     if (fluid%surface_tension <= 0.0_wp) return
     call find_curvature(grid, solid, c, self%surface)
@@ -141,10 +146,7 @@ contains
     bins = spread(no_terms, 2, 6*bodies%n)
     do b = 1, bodies%n
       n = flux%first_face(b + 1) - flux%first_face(b)
-      if (size(work, 1) < n) then
-        deallocate (work)
-        allocate (work(2*n, 6))
-      end if
+      call ensure_rows(n, work)
       t = 0
       do m = flux%first_face(b), flux%first_face(b + 1) - 1
         if (.not. flux%mine(m)) cycle

@@ -36,12 +36,16 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
     type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
-    integer :: d
+    integer :: d, k
 
     self%dt = dt
     self%walls%n = 0
     self%sides%n = 0
-    self%diagonal = 0.0_wp
+    !$omp parallel do schedule(static)
+    do k = lbound(self%diagonal, 3), ubound(self%diagonal, 3)
+      self%diagonal(:, :, k, :) = 0.0_wp
+    end do
+    self%lone_films = .false.
     call unknown_masses(grid, solid, rho, dt, self)
     if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
     do d = 1, 3
@@ -132,6 +136,7 @@ contains
           self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/links%centre(m)
         else if (is_alone(links, m)) then
           self%mass(c(1), c(2), c(3)) = film_mass(c)
+          self%lone_films = .true.
         end if
       end associate
     end do

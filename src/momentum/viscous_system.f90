@@ -50,6 +50,7 @@ module viscous_system_m
     type(wall_legs_t) :: walls
     type(side_legs_t) :: sides
     type(film_walls_t) :: films
+    logical :: lone_films = .false.   !! there are own films without a master
     real(wp), allocatable :: body_matrix(:, :, :)
       !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
     real(wp), allocatable :: spin_drag(:)

@@ -404,6 +404,7 @@ contains
       do d = 1, 3
         call shorten(wall_cell(:, m), d, body(m))
         c = wall_cell(:, m) + unit_step(:, d)
+        if (c(d) > grid%hi(d) + 1) cycle
         if (number(c(1), c(2), c(3)) == 0) call shorten(c, d, body(m))
       end do
     end do

@@ -78,12 +78,15 @@ contains
     type(flow_t), intent(inout) :: flow
     type(rigid_motion_t), intent(inout) :: bodies
     type(pressure_t), intent(inout) :: self
-    integer :: iterations, k
+    integer :: d, iterations, k
     real(wp) :: allowed     !! divergence [1/s]
     real(wp) :: tolerance   !! of the residual of the linear system [m3/s2]
 
     self%report = pressure_report_t()
     call start_from_none(self%phi_total)
+    do d = 1, 3
+      call start_from_none(flow%solid_flux(:, :, :, d))
+    end do
     call set_bodies(grid, bodies, self%system)
     allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
     tolerance = 0.5_wp*allowed*grid%volume/dt

@@ -26,6 +26,7 @@ program test_coupling
   call block_at_rest()
   call fall_together('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
   call fall_together('box', [0.043_wp, 0.031_wp, 0.037_wp], 600.0_wp)
+  call fall_together('sphere', [0.05_wp, 0.0_wp, 0.0_wp], 2300.0_wp, across_the_corner=.true.)
   call wherever_it_lies()
   call momentum_kept('in the open', spread(0.06_wp, 1, 3), 1.0e-7_wp)
   call momentum_kept('at a wall', [0.033_wp, 0.06_wp, 0.06_wp], 4.0e-4_wp)   ! it turns
@@ -167,13 +168,15 @@ contains
   end subroutine block_at_rest
 
   !> Where nothing holds block and water, they fall together, whatever their densities: no force
-  !! acts between them.
-  subroutine fall_together(kind, size, density)
+  !! acts between them. Across the corner walls of its images stand in the last halo layers.
+  subroutine fall_together(kind, size, density, across_the_corner)
     character(*), intent(in) :: kind
     real(wp), intent(in) :: size(3), density
+    logical, intent(in), optional :: across_the_corner
     integer :: d
 
     call build(12, kind, size, density)
+    if (present(across_the_corner)) block%case%body(1)%position = 0.119_wp
     block%case%boundary%kind = 'periodic'
     block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
     block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
