@@ -7,7 +7,7 @@ module contact_forces_m
   use touching_m, only: touching_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
-  use contact_response_m, only: opening_speed, push_to_weight
+  use contact_response_m, only: opening_speed, push_apart
   implicit none
   private
   public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
@@ -164,8 +164,7 @@ contains
           if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
           opening = opening_speed(touch, law%gamma_n, motion)
           force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
-          call act(-force_n*touch%normal, touch%arm_a, touch%arm_b, wrench)
-          if (touch%weight < 1.0_wp) call push_to_weight(touch, law%gamma_n, force_n, wrench)
+          call push_apart(touch, law%gamma_n, force_n, wrench)
           report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
           report%overlap_max = max(report%overlap_max, touch%depth)
         end associate

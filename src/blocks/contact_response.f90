@@ -11,7 +11,7 @@ module contact_response_m
     inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
   implicit none
   private
-  public :: response_t, respond, add_frequencies, highest_frequency2, opening_speed, push_to_weight
+  public :: response_t, respond, add_frequencies, highest_frequency2, opening_speed, push_apart
   public :: impact_turn
 
   !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
@@ -132,6 +132,9 @@ contains
       highest = max(highest, k*total*inverse)
       share = response%eta(t)
       call law%damping(share, k, total, inverse, response%eta(t), response%decay(t))
+      if (touches%item(t)%weight < 1.0_wp .and. touches%item(t)%depth > 0.0_wp) &
+        call damp_alone(touches%item(t), share, k, law, of, response%eta(t), response%decay(t), &
+                        highest)
     end do
     if (law%damping_ratio > 0.0_wp) call damp_as_one(touches, first, last, law, of, response, &
                                                      highest)
@@ -144,6 +147,45 @@ contains
     if (of%a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
     if (of%b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
+
+  !> Damping of a touch whose weight changes with position: no more than it needs when it acts alone.
+  !!
+  !! Its force goes along the gradient of its energy. Where the weight begins, that is steep, and the
+  !! mass that the touch moves by a change of its depth a million times smaller than along the normal:
+  !! a dashpot for that mass would throw the bodies.
+  pure subroutine damp_alone(touch, share, k, law, of, eta, decay, highest)
+    type(touch_t), intent(in) :: touch
+    real(wp), intent(in) :: share, k   !! of the touch in the stiffness k of a whole one [-, N/m]
+    class(contact_law_t), intent(in) :: law
+    type(couple_t), intent(in) :: of
+    real(wp), intent(inout) :: eta, decay   !! lowered, raised [N s/m, 1/s]
+    real(wp), intent(inout) :: highest      !! square of the frequency of the pair, raised [1/s2]
+    type(wrench_t) :: wrench
+    type(motion_t) :: motion
+    real(wp) :: inverse   ! of the mass [1/kg]
+    real(wp) :: eta_alone, decay_alone
+
+    call push_apart(touch, law%gamma_n, 1.0_wp, wrench)
+    call drive(of, wrench, motion, inverse)
+    call law%damping(share, k, share, inverse, eta_alone, decay_alone)
+    eta = min(eta, eta_alone)
+    decay = max(decay, 0.5_wp*eta*inverse)
+    highest = max(highest, k*share*inverse)
+  end subroutine damp_alone
+
+  !> The motion M^-1 W that a wrench gives the pair at once, and its power W.M^-1 W.
+  pure subroutine drive(of, wrench, motion, power)
+    type(couple_t), intent(in) :: of
+    type(wrench_t), intent(in) :: wrench
+    type(motion_t), intent(out) :: motion   !! of b against a
+    real(wp), intent(out) :: power
+
+    motion%v = -(of%a%inverse_mass + of%b%inverse_mass)*wrench%force
+    if (of%a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of%a%inverse_inertia, wrench%torque_a)
+    if (of%b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of%b%inverse_inertia, wrench%torque_b)
+    power = dot_product(motion%omega_a, wrench%torque_a) &
+      + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
+  end subroutine drive
 
   !> Scale the damping of the touches of a pair so that together they damp the swing they drive
   !! like one spring and dashpot.
@@ -160,29 +202,18 @@ contains
     real(wp), intent(inout) :: highest   !! square of the frequency of the pair, raised [1/s2]
     type(wrench_t) :: wrench
     type(motion_t) :: motion   ! that the wrench drives
-    real(wp) :: push(3), by_weight, energy, mass, drag, omega2
+    real(wp) :: energy, mass, drag, omega2
     integer :: t
 
     energy = 0.0_wp
     do t = first, last
       associate (touch => touches%item(t))
         if (touch%depth <= 0.0_wp) cycle
-        push = -response%elastic(t)*touch%normal
-        if (touch%weight < 1.0_wp) then
-          by_weight = energy_of_force(response%elastic(t), law%gamma_n, touch%depth)
-          push = push - by_weight*touch%weight_shift
-          wrench%torque_a = wrench%torque_a - by_weight*touch%weight_turn
-          wrench%torque_b = wrench%torque_b + by_weight*touch%weight_turn
-        end if
-        call act(push, touch%arm_a, touch%arm_b, wrench)
+        call push_apart(touch, law%gamma_n, response%elastic(t), wrench)
       end associate
       energy = energy + response%energy(t)
     end do
-    motion%v = -(of%a%inverse_mass + of%b%inverse_mass)*wrench%force
-    if (of%a%inverse_mass > 0.0_wp) motion%omega_a = matmul(of%a%inverse_inertia, wrench%torque_a)
-    if (of%b%inverse_mass > 0.0_wp) motion%omega_b = matmul(of%b%inverse_inertia, wrench%torque_b)
-    mass = dot_product(motion%omega_a, wrench%torque_a) &
-      + dot_product(motion%omega_b, wrench%torque_b) - dot_product(motion%v, wrench%force)
+    call drive(of, wrench, motion, mass)
     drag = 0.0_wp
     do t = first, last
       if (touches%item(t)%depth <= 0.0_wp) cycle
@@ -274,19 +305,22 @@ contains
         + dot_product(motion%omega_b - motion%omega_a, touch%weight_turn))
   end function opening_speed
 
-  !> The part of the force of a touch by which its weight changes with position: the energy of the
-  !! spring is k(position) d^(gamma+1)/(gamma+1). Damping changes it as it changes the normal force.
-  pure subroutine push_to_weight(touch, gamma, force_n, wrench)
+  !> The force of a touch on its bodies: along the normal, and where its weight changes with position
+  !! by that, too: the energy of the spring is k(position) d^(gamma+1)/(gamma+1). Damping changes
+  !! that part as it changes the normal force.
+  pure subroutine push_apart(touch, gamma, force_n, wrench)
     type(touch_t), intent(in) :: touch
     real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]
     real(wp), intent(in) :: force_n   !! normal force of the touch, damping included [N]
     type(wrench_t), intent(inout) :: wrench
     real(wp) :: energy
 
+    call act(-force_n*touch%normal, touch%arm_a, touch%arm_b, wrench)
+    if (touch%weight >= 1.0_wp) return
     energy = energy_of_force(force_n, gamma, touch%depth)
     call act(-energy*touch%weight_shift, touch%arm_a, touch%arm_b, wrench)
     wrench%torque_a = wrench%torque_a - energy*touch%weight_turn
     wrench%torque_b = wrench%torque_b + energy*touch%weight_turn
-  end subroutine push_to_weight
+  end subroutine push_apart
 
 end module contact_response_m

@@ -10,7 +10,7 @@ program test_contact_response
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, motion_t, wrench_t, act
   use contact_response_m, only: response_t, respond, highest_frequency2, opening_speed, &
-    push_to_weight, impact_turn
+    push_apart, impact_turn
   implicit none
 
   real(wp), parameter :: mass(3) = [2.0_wp, 3.0_wp, 6.0_wp]   !! of three balls [kg]
@@ -20,6 +20,7 @@ program test_contact_response
 
   call make_balls()
   call check_damping()
+  call check_beginning()
   call check_frequencies()
   call check_power()
   call finish_checks()
@@ -75,6 +76,24 @@ contains
     call check('with one decay', response%decay(2), 0.5_wp*eta/reduced, 1.0e-6_wp*eta/reduced)
   end subroutine check_damping
 
+  !> Deep inside a touch begins across another one, with next to no weight that grows steeply with a
+  !! shift. It moves as little mass as that says, and damps no more than it would alone.
+  subroutine check_beginning()
+    real(wp), parameter :: depth = 2.2e-3_wp, weight = 3.0e-10_wp, growth = 7.0e6_wp
+    type(touches_t) :: touches
+    type(response_t) :: response
+    real(wp) :: lever   ! change of depth that stands for a shift [-]
+
+    allocate (response%frequency2(bed_partner:3))
+    call touch_balls(2, 1, [1.0_wp], touches)
+    call add_touch(touch_t(2, 1, 2, normal=[1.0_wp, 0.0_wp, 0.0_wp], depth=depth, weight=weight, &
+                           weight_shift=[0.0_wp, growth, 0.0_wp]), touches)
+    call respond(touches, law, partners, response)
+    lever = sqrt(1.0_wp + (0.5_wp*depth*growth)**2)
+    call check('a touch that begins: damping', response%eta(2)/response%eta(1), &
+               sqrt(weight)/lever, 1.0e-6_wp*sqrt(weight)/lever)
+  end subroutine check_beginning
+
   !> A pair swings with sqrt(k/m*); a ball between two swings with both pairs, which only has to be
   !! stable.
   subroutine check_frequencies()
@@ -116,8 +135,7 @@ contains
       gamma = 1.0_wp + 0.05_wp*i
       motion = motion_t(vector(i, 6), vector(i, 7), vector(i, 8))
       wrench = wrench_t()
-      call act(-force*touch%normal, touch%arm_a, touch%arm_b, wrench)
-      if (touch%weight < 1.0_wp) call push_to_weight(touch, gamma, force, wrench)
+      call push_apart(touch, gamma, force, wrench)
       power = -dot_product(wrench%force, motion%v) + dot_product(wrench%torque_a, motion%omega_a) &
         + dot_product(wrench%torque_b, motion%omega_b)
       call check('power of a touch', power, force*opening_speed(touch, gamma, motion), 1.0e-13_wp)
