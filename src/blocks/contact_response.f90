@@ -132,9 +132,10 @@ contains
       highest = max(highest, k*total*inverse)
       share = response%eta(t)
       call law%damping(share, k, total, inverse, response%eta(t), response%decay(t))
-      if (touches%item(t)%weight < 1.0_wp .and. touches%item(t)%depth > 0.0_wp) &
+      if (touches%item(t)%weight < 1.0_wp .and. touches%item(t)%depth > 0.0_wp) then
         call damp_alone(touches%item(t), share, k, law, of, response%eta(t), response%decay(t), &
                         highest)
+      end if
     end do
     if (law%damping_ratio > 0.0_wp) call damp_as_one(touches, first, last, law, of, response, &
                                                      highest)
@@ -148,11 +149,11 @@ contains
     if (of%b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
 
-  !> Damping of a touch whose weight changes with position: no more than it needs when it acts alone.
+  !> Damping of a touch whose weight changes with position: no more than it needs alone.
   !!
-  !! Its force goes along the gradient of its energy. Where the weight begins, that is steep, and the
-  !! mass that the touch moves by a change of its depth a million times smaller than along the normal:
-  !! a dashpot for that mass would throw the bodies.
+  !! Its force goes along the gradient of its energy. Where the weight begins, that is steep, and
+  !! the mass that the touch moves by a change of its depth a million times smaller than along the
+  !! normal: a dashpot for that mass would throw the bodies.
   pure subroutine damp_alone(touch, share, k, law, of, eta, decay, highest)
     type(touch_t), intent(in) :: touch
     real(wp), intent(in) :: share, k   !! of the touch in the stiffness k of a whole one [-, N/m]
@@ -305,9 +306,9 @@ contains
         + dot_product(motion%omega_b - motion%omega_a, touch%weight_turn))
   end function opening_speed
 
-  !> The force of a touch on its bodies: along the normal, and where its weight changes with position
-  !! by that, too: the energy of the spring is k(position) d^(gamma+1)/(gamma+1). Damping changes
-  !! that part as it changes the normal force.
+  !> The force of a touch on its bodies: along the normal, and where its weight changes with
+  !! position by that, too: the energy of the spring is k(position) d^(gamma+1)/(gamma+1). Damping
+  !! changes that part as it changes the normal force.
   pure subroutine push_apart(touch, gamma, force_n, wrench)
     type(touch_t), intent(in) :: touch
     real(wp), intent(in) :: gamma     !! power of the spring; 1 where it hardens [-]

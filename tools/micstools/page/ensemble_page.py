@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from micstools import pile_ensemble
+from micstools.energy import made_by_contact
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
 from micstools.page.html import (
@@ -338,6 +339,9 @@ def _health(ensemble: Ensemble) -> Markup:
          run_page.DRIFT, ".1e"),
         ("largest divergence [1/s]", _worst(series, "divergence_max", 1.0),
          run_page.divergence_limit(ensemble.example.run), ".1e"),
+        ("largest energy that contact made in a step [J]",
+         {p.number: float(made_by_contact(p.run).max()) for p in ensemble.piles},
+         run_page.energy_limit(ensemble.example.run), ".1e"),
     ):  # fmt: skip
         if values:
             where = max(values, key=lambda k: values[k])

@@ -7,6 +7,7 @@ import numpy as np
 
 from micstools import block_numbers, pile, pile_numbers
 from micstools.block_numbers import BlockNumbers
+from micstools.energy import made_by_contact
 from micstools.geometry import Array
 from micstools.overlap import Overlap, Placed, overlap, present_bodies
 from micstools.page import charts, motion, run_words
@@ -26,6 +27,7 @@ DRIFT = 1e-9  # of the liquid: what rounding explains
 _CELLS = 10.0  # along a block, as the readme asks for
 _MANY = 16  # blocks with a curve of their own
 _OVERLAP = 0.01  # of a block's length
+_MADE = 3e-3  # of a block's weight times its length
 
 
 @dataclass(frozen=True)
@@ -218,6 +220,13 @@ def overlap_limit(run: Run) -> float:
     return 3 * _OVERLAP * _smallest(run)
 
 
+def energy_limit(run: Run) -> float:
+    """What contact may make in a step by rounding and by the length of its substeps [J]; infinite
+    where nothing has weight."""
+    g = float(np.linalg.norm(run.value("fluid", "gravity", [0.0, 0.0, -9.81])))
+    return _MADE * float(run.bodies.mass.min()) * g * _smallest(run) if g > 0 else np.inf
+
+
 def divergence_limit(run: Run) -> float:
     """What the case allows [1/s]."""
     return float(run.value("numerics", "divergence_tolerance", 1e-6))
@@ -245,6 +254,9 @@ def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
 
 def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
     highest = float(np.nanmax(run.series.max_overlap))
+    made, most = float(made_by_contact(run).max()), energy_limit(run)
+    energy = ("largest energy that contact made in a step", f"{made:.1e} J", f"below {most:.1e} J",
+              made < most)  # fmt: skip
     return [
         (name, millimetres(value), f"below {millimetres(limit)}", value < limit)
         for name, value, limit in (
@@ -255,7 +267,7 @@ def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
             ),
             ("largest overlap at any time", highest, overlap_limit(run)),
         )
-    ]
+    ] + [energy]
 
 
 def _smallest(run: Run) -> float:
