@@ -67,8 +67,8 @@ contains
     call add_viscosity(grid, solid, dt, flow, stage)
     call predict_faces(grid, solid, dt, flow, stage)
     call find_pressure(grid, solid, dt, flow, stage, report)
-    call extend_pressure(grid, case%fluid%gravity, flow%rho, stage%pressure%system%active, &
-                         stage%pressure%known, flow%p)
+    call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
+                         stage%pressure%system%active, stage%pressure%known, flow%p)
     call sum_forces(dt, stage)
     report%viscous_converged = stage%viscous%converged
   end subroutine monolithic_stage
@@ -368,7 +368,8 @@ contains
       call add_tension(grid, flow%rho, stage%tension, a%face)
       flow%uf = dt*a%face
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
-      call extend_pressure(grid, case%fluid%gravity, flow%rho, system%active, p%known, flow%p)
+      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
+                           p%known, flow%p)
       flow%uf = uf
       call all_fluid_of_faces(grid, solid, stage%bodies, system%operator%flux, flow%uf, &
                               flow%solid_flux)

@@ -11,25 +11,35 @@ module pressure_extension_m
 
 contains
 
-  !> Pressure of cells without open faces, for the cells that will open and for looking: mean of the
-  !! known neighbours of the same height, and only where there are none, hydrostatic from above or
-  !! below.
-  subroutine extend_pressure(grid, gravity, rho, active, known, p)
+  !> Pressure of cells without open faces, for the cells that will open, for looking, and for the
+  !! force on blocks that touch there: mean of the known neighbours of the same height, and only where
+  !! there are none, hydrostatic from above or below.
+  !!
+  !! Cells that are nearly full of solid do not lend theirs while others can: what water is left
+  !! between two faces that lie on one another may have any pressure, and it would push the blocks
+  !! apart wherever they touch.
+  subroutine extend_pressure(grid, gravity, rho, alpha, active, known, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! solid share
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(inout), contiguous :: known(grid%first(1):, grid%first(2):, grid%first(3):)
                                                   !! work: pass in which p was found, 0 unknown
     real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [Pa]
-    integer :: i, j, k, pass, n_found
+    real(wp), parameter :: least_fluid = 0.1_wp   ! share of a cell that lends its pressure
+    integer :: i, j, k, pass, n_found, round
     integer(i8) :: left(1)
     logical :: sideways
 
-    known = 0
-    where (active) known = 1
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - least_fluid)
+    end do
     sideways = .true.
+    round = 1
     pass = 1
     do
       call halo_exchange(p, n_halo, layers=1)
@@ -39,15 +49,17 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            if (known(i, j, k) == 0) call from_neighbours([i, j, k])
+            if (known(i, j, k) == 0 .and. .not. active(i, j, k)) call from_neighbours([i, j, k])
           end do
         end do
       end do
       left = n_found
       call global_sum(left)
       if (left(1) > 0_i8) cycle
-      if (.not. sideways) exit
+      if (round == 3) exit
+      round = round + 1
       sideways = .false.
+      if (round == 3) where (active) known = 1
     end do
     call fill_scalar_halo(grid, p, layers=1)
   contains
