@@ -12,8 +12,8 @@ module pressure_extension_m
 contains
 
   !> Pressure of cells without open faces, for the cells that will open, for looking, and for the
-  !! force on blocks that touch there: mean of the known neighbours of the same height, and only where
-  !! there are none, hydrostatic from above or below.
+  !! force on blocks that touch there: mean of the known neighbours of the same height, and only
+  !! where there are none, hydrostatic from above or below.
   !!
   !! Cells that are nearly full of solid do not lend theirs while others can: what water is left
   !! between two faces that lie on one another may have any pressure, and it would push the blocks
