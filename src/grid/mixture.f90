@@ -43,12 +43,13 @@ contains
     m = 0.5_wp*(a + b)
   end function face_mean
 
-  !> Viscosity on the leg between two cells: continuous stress across a jump halfway.
+  !> Viscosity on the leg between two cells: continuous stress across a jump halfway, none between
+  !! two fluids without.
   elemental function harmonic_mean(a, b) result(m)
     real(wp), intent(in) :: a, b
     real(wp) :: m
 
-    m = 2.0_wp*a*b/(a + b)
+    m = 2.0_wp*a*b/max(a + b, tiny(a))
   end function harmonic_mean
 
 end module mixture_m
