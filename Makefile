@@ -9,7 +9,7 @@ VERSION := 0.1.0
 
 FC_SERIAL := h5fc
 FC_MPI := h5pfc
-OPT := -O3 -march=native
+OPT := -O3 -march=native -finline-limit=2000
 LTO := -flto=auto -ffat-lto-objects
 # -Og halves the time of these tests against -O0; of what gcc thinks perhaps not set there, all is.
 OPT_DEBUG := -Og -Wno-maybe-uninitialized -g -fbacktrace -fcheck=all,no-array-temps -finit-real=snan \

@@ -29,7 +29,7 @@ module courant_m
       !! largest |u_d|/h_d of the cells that are at least half liquid, and of the flow past the
       !! blocks; at least an eighth of `carried`
     real(wp) :: carried = 0.0_wp
-      !! largest of all cells, summed over the directions: what a cell may lose in a step
+      !! largest share of itself that a cell gives through its faces
     logical :: has_surface = .false.   !! are there cells of liquid and cells of gas?
   end type courant_rate_t
 
@@ -68,41 +68,47 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share
     real(wp) :: rates(4)
-    real(wp) :: x, y, z, followed, carried, liquid, gas
+    real(wp) :: west, east, front, back, below, above   !! velocities at the faces [cells/s]
+    real(wp) :: followed, carried, liquid, gas
     integer :: i, j, k
 
     followed = 0.0_wp
     carried = 0.0_wp
     liquid = 0.0_wp
     gas = 0.0_wp
-    !$omp parallel do private(i, j, x, y, z) schedule(static) &
+    !$omp parallel do private(i, j, west, east, front, back, below, above) schedule(static) &
     !$omp reduction(max: followed, carried, liquid, gas)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        !$omp simd private(x, y, z) reduction(max: followed, carried, liquid, gas)
+        !$omp simd private(west, east, front, back, below, above) &
+        !$omp reduction(max: followed, carried, liquid, gas)
         do i = grid%lo(1), grid%hi(1)
-          x = max(speed(uf(i, j, k, 1), open(i, j, k, 1)), &
-                  speed(uf(i + 1, j, k, 1), open(i + 1, j, k, 1)))/grid%h(1)
-          y = max(speed(uf(i, j, k, 2), open(i, j, k, 2)), &
-                  speed(uf(i, j + 1, k, 2), open(i, j + 1, k, 2)))/grid%h(2)
-          z = max(speed(uf(i, j, k, 3), open(i, j, k, 3)), &
-                  speed(uf(i, j, k + 1, 3), open(i, j, k + 1, 3)))/grid%h(3)
-          carried = max(carried, x + y + z)
+          west = through(uf(i, j, k, 1), open(i, j, k, 1))/grid%h(1)
+          east = through(uf(i + 1, j, k, 1), open(i + 1, j, k, 1))/grid%h(1)
+          front = through(uf(i, j, k, 2), open(i, j, k, 2))/grid%h(2)
+          back = through(uf(i, j + 1, k, 2), open(i, j + 1, k, 2))/grid%h(2)
+          below = through(uf(i, j, k, 3), open(i, j, k, 3))/grid%h(3)
+          above = through(uf(i, j, k + 1, 3), open(i, j, k + 1, 3))/grid%h(3)
+          carried = max(carried, (max(0.0_wp, east) - min(0.0_wp, west)) &
+                        + (max(0.0_wp, back) - min(0.0_wp, front)) &
+                        + (max(0.0_wp, above) - min(0.0_wp, below)))
           liquid = max(liquid, c(i, j, k))
           gas = max(gas, 1.0_wp - c(i, j, k))
-          followed = max(followed, merge(max(x, y, z), 0.0_wp, c(i, j, k) >= least_liquid))
+          followed = max(followed, merge(max(abs(west), abs(east), abs(front), abs(back), &
+                                             abs(below), abs(above)), 0.0_wp, &
+                                         c(i, j, k) >= least_liquid))
         end do
       end do
     end do
     rates = [followed, carried, liquid, gas]
   end function fluid_rates
 
-  !> Speed at a face, zero where it is mostly closed.
-  elemental function speed(u, open)
+  !> Velocity through a face, none where it is mostly closed.
+  elemental function through(u, open)
     real(wp), intent(in) :: u, open
-    real(wp) :: speed
+    real(wp) :: through
 
-    speed = merge(abs(u), 0.0_wp, open >= least_open)
-  end function speed
+    through = merge(u, 0.0_wp, open >= least_open)
+  end function through
 
 end module courant_m

@@ -177,6 +177,7 @@ contains
         bodies%motion(4:6, b) = merge(blocks%omega(:, b), 0.0_wp, blocks%present(b))
         bodies%mass(b) = blocks%mass(b)
         bodies%volume(b) = shape%volume
+        bodies%radius(b) = shape%radius
         bodies%inertia(:, :, b) = space_tensor(blocks%q(:, b), shape%inertia)
         bodies%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
                                                        blocks%inverse_inertia(:, :, &

@@ -20,6 +20,7 @@ module rigid_motion_m
     real(wp), allocatable :: inertia(:, :, :)  !! (3, 3, n) space frame [kg m2]
     real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, n) [1/(kg m2)]
     real(wp), allocatable :: volume(:)         !! (n) [m3]
+    real(wp), allocatable :: radius(:)         !! (n) of the ball around `x` that holds it [m]
     real(wp), allocatable :: lack(:, :, :)
       !! (6, 6, n) of what a body displaces, the inertia that the faces of the grid do not count
     real(wp), allocatable :: apparent(:, :, :)
@@ -36,12 +37,14 @@ contains
 
     bodies%n = n
     allocate (bodies%present(n), bodies%free(n), source=.false.)
-    allocate (bodies%x(3, n), bodies%motion(6, n), bodies%mass(n), bodies%volume(n))
+    allocate (bodies%x(3, n), bodies%motion(6, n), bodies%mass(n), bodies%volume(n), &
+              bodies%radius(n))
     allocate (bodies%inertia(3, 3, n), bodies%inverse_inertia(3, 3, n))
     bodies%x = 0.0_wp
     bodies%motion = 0.0_wp
     bodies%mass = 1.0_wp   ! of the bed, which never moves
     bodies%volume = 1.0_wp
+    bodies%radius = 1.0_wp
     bodies%inertia = 0.0_wp
     bodies%inverse_inertia = 0.0_wp
     allocate (bodies%lack(6, 6, n), bodies%apparent(6, 6, n), bodies%mobility(6, 6, n), &

@@ -25,7 +25,7 @@ module fluid_transport_m
   !> The step at hand.
   type :: span_t
     real(wp) :: dt = 0.0_wp        !! [s]
-    real(wp) :: courant = 0.0_wp   !! of all fluid, summed over the directions [-]
+    real(wp) :: courant = 0.0_wp   !! largest share of itself that a cell gives [-]
     integer :: number = 0          !! of the step, which decides the order of the sweeps
   end type span_t
 

@@ -6,7 +6,8 @@
 !! viscosity, `docs/theory.md`, section 8). So the liquid gets \( (\Delta t/2)(g - \nabla p/\rho) \)
 !! on the surface of the bodies at the start of the step, before the transport, and the other half
 !! in the velocity stage, on the surface at its end: the impulse of a pressure acts on the surface
-!! of the middle of the step, and each half is a gradient on its own surface.
+!! of the middle of the step, and each half is a gradient on its own surface. Near the bodies the
+!! old pressure is carried along with them first (`carried_pressure_m`).
 !!
 !! Only liquid away from the free surface takes part: there and in the gas beside it density and
 !! acceleration jump. Cells at an outflow do not either: the drag of the side, half of which they
@@ -23,6 +24,7 @@ module mid_step_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces, hold_in_cells
+  use carried_pressure_m, only: carry_pressure
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -65,6 +67,8 @@ contains
     real(wp) :: mass
 
     call find_part(grid, flow, self%takes_part)
+    call carry_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, bodies, &
+                        self%takes_part, dt, a, flow%p)
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
     call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
     call hold_in_cells(grid, solid, bodies, trend/dt, a%face, a%cell)

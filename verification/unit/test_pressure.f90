@@ -11,6 +11,8 @@ program test_pressure
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
   use pressure_extension_m, only: extend_pressure
+  use carried_pressure_m, only: carry_pressure
+  use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -22,6 +24,9 @@ program test_pressure
   integer, parameter :: cells(3) = [12, 8, 12]
   real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
+  real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
+  logical, dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                     1 - n_halo:cells(3) + n_halo) :: takes_part   !! in `carry`
   type(one_body_t) :: box
   type(pressure_t) :: pressure
   type(acceleration_t) :: a
@@ -37,6 +42,7 @@ program test_pressure
   call still_water()
   call accelerations_at_faces()
   call closed_cells()
+  call carried_with_a_body()
   call finish_checks()
 
 contains
@@ -338,6 +344,89 @@ contains
     call check('closed cells: hydrostatic', worst, 0.0_wp, 1.0e-9_wp)
     call check('closed cells: halo', box%flow%p(5, 5, 0), hydrostatic(1), 1.0e-9_wp)
   end subroutine closed_cells
+
+  !> What is quadratic comes from where the way of the body leads back to, but for the weight of
+  !! the water; what is far, what does not take part, and everything around a body at rest stays.
+  !! What is linear does so beside the body, too, whatever stands in its cells.
+  subroutine carried_with_a_body()
+    real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                        1 - n_halo:cells(3) + n_halo) :: before, alpha
+
+    call build(tank, .false.)
+    alpha = box%solid%alpha
+    takes_part = .true.
+    takes_part(5, 4, 6) = .false.
+    box%solid%alpha = 0.0_wp
+    call set_bowl(1.0e5_wp)
+    before = box%flow%p
+    call carry()
+    call check('carried pressure: from where the body came', worst(1.0e5_wp), 0.0_wp, 1.0e-9_wp)
+    call check('carried pressure: it did move', maxval(abs(box%flow%p - before)) > 0.1_wp)
+    call check('carried pressure: far away', box%flow%p(12, 8, 12), before(12, 8, 12), 0.0_wp)
+    box%solid%alpha = alpha
+    call set_bowl(0.0_wp)
+    where (alpha >= 1.0_wp) box%flow%p = 1.0e9_wp
+    call carry()
+    call check('carried pressure: continued into the body', worst(0.0_wp), 0.0_wp, 1.0e-9_wp)
+    before = box%flow%p
+    box%bodies%motion = 0.0_wp
+    call carry()
+    call check('carried pressure: at rest', maxval(abs(box%flow%p - before)), 0.0_wp, 0.0_wp)
+  end subroutine carried_with_a_body
+
+  !> One call, of the case as it is.
+  subroutine carry()
+    call carry_pressure(box%grid, weight, box%solid%alpha, box%bodies, takes_part, dt, a, &
+                        box%flow%p)
+  end subroutine carry
+
+  !> Largest error of the open cells.
+  function worst(curvature) result(error)
+    real(wp), intent(in) :: curvature
+    real(wp) :: error, way(3), arm(3), share, x(3)
+    integer :: i, j, k
+
+    error = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          if (box%solid%alpha(i, j, k) >= 1.0_wp) cycle
+          x = ([i, j, k] - 0.5_wp)*box%grid%h
+          arm = x - box%bodies%x(:, 1)
+          share = min(1.0_wp, max(0.0_wp, 3.0_wp - 2.0_wp*norm2(arm)/box%bodies%radius(1)))
+          if (.not. takes_part(i, j, k)) share = 0.0_wp
+          way = share*dt*wall_velocity(box%bodies%motion(:, 1), arm)
+          error = max(error, abs(box%flow%p(i, j, k) - dot_product(weight, x) &
+                                 - bowl(x - way, curvature)))
+        end do
+      end do
+    end do
+  end function worst
+
+  !> Pressure of the weight and of a bowl everywhere.
+  subroutine set_bowl(curvature)
+    real(wp), intent(in) :: curvature
+    real(wp) :: x(3)
+    integer :: i, j, k
+
+    do k = 1 - n_halo, cells(3) + n_halo
+      do j = 1 - n_halo, cells(2) + n_halo
+        do i = 1 - n_halo, cells(1) + n_halo
+          x = ([i, j, k] - 0.5_wp)*box%grid%h
+          box%flow%p(i, j, k) = dot_product(weight, x) + bowl(x, curvature)
+        end do
+      end do
+    end do
+  end subroutine set_bowl
+
+  !> What moves with the body, all second derivatives there [Pa].
+  pure function bowl(x, curvature) result(p)
+    real(wp), intent(in) :: x(3), curvature   !! [m, Pa/m2]
+    real(wp) :: p
+
+    p = 3.0e3_wp*x(1) - 2.0e3_wp*x(2) + 1.0e3_wp*x(3) + curvature* &
+        (x(1)**2 - 2*x(2)**2 + 3*x(3)**2 + x(1)*x(2) - 2*x(2)*x(3) + 4*x(3)*x(1))
+  end function bowl
 
   !> Weight per area above the centre of the cells of height k, zero half a cell above the top [Pa].
   function hydrostatic(k) result(p)
