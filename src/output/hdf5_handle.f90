@@ -6,8 +6,8 @@
 !! others.
 !!
 !! A `shared` file is opened by all processes together: every procedure is then called by all of
-!! them, and blocks of cells are written collectively. Any other file belongs to the process that
-!! opens it.
+!! them, and blocks of cells are written collectively. Any other file, and all files of a run on one
+!! process, belong to the process that opens them.
 !!
 !! The files keep the oldest format and no locks, and columns without compression never move a chunk
 !! once it is there: a file that was flushed opens again whatever happens to the program. Whoever
@@ -21,8 +21,8 @@ module hdf5_handle_m
   use hdf5, only: H5P_DATASET_XFER_F, H5P_FILE_ACCESS_F
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, exit_files
-  use parallel_m, only: is_root, my_rank, set_file_access, set_collective, global_max, global_min
-  use parallel_m, only: broadcast, share_trouble
+  use parallel_m, only: is_root, my_rank, nproc, set_file_access, set_collective, global_max
+  use parallel_m, only: global_min, broadcast, share_trouble
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   use plain_file_m, only: cut_file, delete_file, is_pipe
   use file_room_m, only: lengthen_file, shorten_file
@@ -162,7 +162,7 @@ contains
     integer :: status
 
     self%path = path
-    self%shared = shared
+    self%shared = shared .and. nproc() > 1
     self%info = 0
     self%complete = .false.
     self%broken = .false.
@@ -179,7 +179,7 @@ contains
     call self%check(status, 'set the access')
     call h5pcreate_f(H5P_DATASET_XFER_F, self%collective, status)
     call self%check(status, 'set the access')
-    if (.not. shared) return
+    if (.not. self%shared) return
     call set_file_access(access, status)
     call self%check(status, 'set the access')
     call set_collective(self%collective, status)
