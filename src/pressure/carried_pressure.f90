@@ -21,7 +21,7 @@ module carried_pressure_m
   public :: carry_pressure
 
   real(wp), parameter :: far = 1.5_wp
-    !! radii of a body from its centre, where nothing moves with it any more (docs/theory.md)
+    !! radii of a body from its centre, where nothing moves with it (docs/decisions/time_step.md)
   real(wp), parameter :: longest = 1.0_wp   !! way in a step, more is not carried [cells]
 
 contains
