@@ -19,9 +19,9 @@ module tvd_m
   real(wp), parameter :: limit_inner = 2.0_wp   !! b_1
   real(wp), parameter :: steepest = 2.0_wp
     !! alpha: the value is at most this times the step below the cell away from the cell's. With the
-    !! mean of the slab monotone while alpha <= 1/(Courant number): 0.5 in liquid. Gas may
-    !! reach C = 0.9 in a sweep: there a step overshoots by (1 - C)(2 C - 1) of the step before, an
-    !! eighth of it at most
+    !! mean of the slab monotone while alpha <= 1/(Courant number): 0.5 in liquid, the default of
+    !! `cfl_max`. Gas, and liquid in longer steps, may reach C = 0.9 in a sweep: there a step
+    !! overshoots by (1 - C)(2 C - 1) of the step before, an eighth of it at most
 
 contains
 

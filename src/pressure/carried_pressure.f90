@@ -43,6 +43,7 @@ contains
     integer :: k
 
     if (.not. any(abs(bodies%motion) > 0.0_wp)) return
+    ! A plane of `work%face` is free for the change once its way is known.
     !$omp parallel do schedule(dynamic)
     do k = grid%lo(3), grid%hi(3)
       call find_way(grid, bodies, dt, k, work%face(:, :, :, 1), work%cell)
@@ -66,7 +67,7 @@ contains
     real(wp), intent(inout), contiguous :: way(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [cells]
     real(wp) :: arm(3), share
-    integer :: b, i, j, a(3), z(3)
+    integer :: b, d, i, j, a(3), z(3)
 
     near(:, :, k) = 0.0_wp
     way(:, :, k, :) = 0.0_wp
@@ -86,12 +87,10 @@ contains
         end do
       end do
     end do
-    where (near(:, :, k) > 1.0_wp)
-      way(:, :, k, 1) = way(:, :, k, 1)/near(:, :, k)
-      way(:, :, k, 2) = way(:, :, k, 2)/near(:, :, k)
-      way(:, :, k, 3) = way(:, :, k, 3)/near(:, :, k)
-    end where
-    way(:, :, k, :) = max(-longest, min(longest, way(:, :, k, :)))
+    do d = 1, 3
+      way(:, :, k, d) = way(:, :, k, d)/max(1.0_wp, near(:, :, k))
+      way(:, :, k, d) = max(-longest, min(longest, way(:, :, k, d)))
+    end do
   end subroutine find_way
 
   !> Own cells that hold a ball; in a direction in which it passes the end of a period, all.
