@@ -8,6 +8,7 @@ module solid_geometry_m
   implicit none
   private
   public :: solid_geometry_t, solid_geometry_init, set_faces, openings, edge_in
+  public :: leg_to_wall, bounded_leg
   public :: clear_cells, clear_faces, clear_legs, hand_over_faces
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
@@ -126,6 +127,30 @@ contains
     edge = 0.0_wp
     if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
   end function edge_in
+
+  !> Length of the leg from the centre of cell c along +d or -d to the surface of a body [cells]; 0:
+  !! it meets none.
+  pure function leg_to_wall(solid, c, d, sense) result(length)
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3), d, sense
+    real(wp) :: length
+    integer :: f(3), m
+
+    f = c
+    if (sense > 0) f = c + unit_step(:, d)
+    m = solid%leg_number(f(1), f(2), f(3), d)
+    length = 0.0_wp
+    if (m > 0) length = bounded_leg(solid%leg_length(merge(1, 2, sense > 0), m))
+  end function leg_to_wall
+
+  !> Length of a leg that pulls: no centre is nearer to a wall than this [cells].
+  elemental function bounded_leg(theta) result(length)
+    real(wp), intent(in) :: theta   !! to the surface [cells]
+    real(wp) :: length
+    real(wp), parameter :: least = 1.0e-3_wp
+
+    length = min(max(theta, least), 1.0_wp)
+  end function bounded_leg
 
   !> Take away what the lists of the last time say was there: what bodies fill of cells.
   pure subroutine clear_cells(solid)

@@ -4,15 +4,19 @@
 !! fluid; legs of viscosity pull at the centre, which lies nearer to the wall. With the layer along
 !! the wall (`wall_layer_m`),
 !! $$ u_c = U_w + T_c (u - U_w), \qquad T_c = r + (1 - r) s $$
-!! with r the distance of the centre from the wall over that of the middle of the fluid and s the
+!! with r the distance y of the centre from the wall over that of the middle of the fluid and s the
 !! slip of the layer there (`wall_profile_m`). The viscous stage solves for u_c with the mass m/T_c,
 !! so that m du is what the legs give. In a plane layer the shear at the wall is then right wherever
-!! the wall lies in the cell; with the mean at the centre the layer is pulled too hard
-!! (docs/decisions/cut_cells.md).
+!! the wall lies in the cell; with the mean at the centre the layer is pulled too hard.
+!!
+!! A leg pulls with mu over its length, so T_c must fall with that when the wall passes the centre,
+!! or a body that moves pays for every centre that it passes. Two things see to it: y is that of a
+!! plane wall that pulls as the legs of the cell do together, and no layer is taken for thinner
+!! than the middle of the fluid is far from the wall (docs/decisions/cut_cells.md).
 module centre_velocity_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, leg_to_wall
   use rigid_motion_m, only: rigid_motion_t
   use linked_cells_m, only: linked_cells_t, velocity_at_wall, wall_normal, distance_to_fluid, &
                             distance_to_centre
@@ -24,6 +28,8 @@ module centre_velocity_m
 
   real(wp), parameter :: least_share = 1.0e-3_wp
     !! T_c of a centre on the wall: what it has of the velocity means nothing, its leg holds it
+  real(wp), parameter :: most_slip = 0.5_wp
+    !! s of a layer as thick as the middle of the fluid is far from the wall
 
 contains
 
@@ -36,24 +42,46 @@ contains
       !! halo filled [m/s]
     type(linked_cells_t), intent(inout) :: links
     integer, parameter :: here(3) = 0
-    real(wp) :: n(3), centre, middle, r
+    real(wp) :: n(3), y, middle, r, slip
     integer :: m
 
-    !$omp parallel do private(n, centre, middle, r) schedule(static)
+    !$omp parallel do private(n, y, middle, r, slip) schedule(static)
     do m = links%n_films + 1, links%n
       associate (c => links%cell(:, m))
         links%centre(m) = 1.0_wp
         if (.not. grid%owns(c) .or. solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) cycle
         n = wall_normal(grid, solid, c)
         if (all(abs(n) <= 0.0_wp)) cycle
-        centre = distance_to_centre(grid, solid, c, n)
         middle = distance_to_fluid(grid, solid, c, here, n)
-        if (middle <= max(0.0_wp, centre)) cycle
-        r = max(centre/middle, 0.0_wp)
-        links%centre(m) = max(r + (1.0_wp - r)*slip_at(slip_beside(m, n, middle), r), least_share)
+        y = distance_by_legs(c, n)
+        if (y <= 0.0_wp) y = max(0.0_wp, distance_to_centre(grid, solid, c, n))
+        if (middle <= y) cycle
+        r = y/middle
+        slip = slip_at(min(most_slip, slip_beside(m, n, middle)), r)
+        links%centre(m) = max(r + (1.0_wp - r)*slip, least_share)
       end associate
     end do
   contains
+    !> Distance of the centre of cell c from a plane wall of normal n that pulls as its wall legs do
+    !! together; 0 if it has none [m].
+    pure function distance_by_legs(c, n) result(y)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: n(3)
+      real(wp) :: y
+      real(wp) :: length, seen, pull   !! cells; area of the wall along the legs, area over length
+      integer :: d
+
+      seen = 0.0_wp
+      pull = 0.0_wp
+      do d = 1, 3
+        length = leg_to_wall(solid, c, d, -nint(sign(1.0_wp, n(d))))
+        if (length <= 0.0_wp) cycle
+        seen = seen + grid%area(d)*abs(n(d))
+        pull = pull + grid%area(d)/(length*grid%h(d))
+      end do
+      y = seen/max(pull, tiny(pull))
+    end function distance_by_legs
+
     !> Slip of the layer as the cells across the open faces away from the wall tell it, by what
     !! of these faces lies along the wall.
     pure function slip_beside(m, n, middle) result(slip)

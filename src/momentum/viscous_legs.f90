@@ -8,7 +8,7 @@ module viscous_legs_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: drags, is_wall, no_side
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, bounded_leg
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
@@ -21,7 +21,6 @@ module viscous_legs_m
   public :: build_viscous
 
   integer, parameter :: worth_threads = 1000        !! fewer wall legs are the work of one thread
-  real(wp), parameter :: least_theta = 1.0e-3_wp    !! shortest leg, in cells
   real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
 
 contains
@@ -209,7 +208,7 @@ contains
 
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       if (solid%inside(c(1), c(2), c(3)) /= 0) return
-      t = min(max(theta, least_theta), 1.0_wp)
+      t = bounded_leg(theta)
       do a = 1, 3
         x_wall(a) = grid%centre(c(a), a)
       end do

@@ -34,10 +34,12 @@ program test_centre_velocity
   call check('shear: linear', centre(), at_centre/of_fluid, 1.0e-5_wp)
   call there_and_back()
   call run_along(0.0_wp)
-  call check('no layer: free slip', centre(), 1.0_wp, 1.0e-12_wp)
+  call check('no layer: as of one as thick as the fluid is far', centre(), &
+             layer(at_centre, of_fluid)/layer(of_fluid, of_fluid), 1.0e-12_wp)
   call run_along(1.0_wp)
   call check('a layer of one cell', centre(), &
              layer(at_centre, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
+  call as_the_legs_pull()
   call finish_checks()
 
 contains
@@ -52,6 +54,22 @@ contains
     call to_means(box%grid, links, box%bodies, u)
     call check('there and back', maxval(abs(u - means)), 0.0_wp, 1.0e-13_wp)
   end subroutine there_and_back
+
+  !> A leg that ends elsewhere than the plane of the solid share, as at a curved wall, in a layer of
+  !! one cell.
+  subroutine as_the_legs_pull()
+    real(wp), parameter :: near = 0.01_wp   !! [cells]
+
+    associate (leg => box%solid%leg_number(4, 5, top, 3))
+      box%solid%leg_length(2, leg) = near
+      call find_centres(box%grid, box%solid, box%bodies, u, links)
+      call check('a short leg', centre(), layer(near, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
+      box%solid%leg_length(2, leg) = 0.0_wp
+      call find_centres(box%grid, box%solid, box%bodies, u, links)
+      call check('the shortest', centre(), layer(1.0e-3_wp, 1.0_wp)/layer(of_fluid, 1.0_wp), &
+                 1.0e-12_wp)
+    end associate
+  end subroutine as_the_legs_pull
 
   real(wp) function centre()
     centre = links%centre(links%number(4, 5, top))
