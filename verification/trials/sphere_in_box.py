@@ -1,11 +1,12 @@
 """Drag of a sphere held in a stream, by a body-fitted solver: the references of `held_sphere`.
 
-usage: python verification/trials/sphere_in_box.py REYNOLDS ... [--wide] [--out OUT]
+usage: python verification/trials/sphere_in_box.py RE ... [--tank R BEFORE BEHIND] [--out OUT]
 
 Needs blockMesh and simpleFoam of OpenFOAM. The flow is steady and axisymmetric, so a wedge of a
 round tank will do: as wide as the square box of the cases in area (5.4 diameters across), with as
-much before and behind the sphere, slip at its side; --wide: 30 diameters wide, 15 before and 25
-behind. Prints the drag coefficient and its parts by pressure and friction. Some minutes each.
+much before and behind the sphere, slip at its side; --tank: another, in diameters. A wide one is
+15 15 25, those of `rebound` are 3.385 10 12 (St 152) and 5.642 10 12 (St 27). Prints the drag
+coefficient and its parts by pressure and friction. Some minutes each.
 """
 
 import argparse
@@ -19,10 +20,8 @@ from pathlib import Path
 import numpy as np
 
 WEDGE = np.radians(5.0)
-# Radius of the tank, before and behind the centre [diameters].
-BOX, WIDE = (5.4 / np.sqrt(np.pi), 3.0, 6.0), (15.0, 15.0, 25.0)
+BOX = (5.4 / np.sqrt(np.pi), 3.0, 6.0)  # radius of the tank, before, behind [diameters]
 CELLS_ALONG = {"A0 A1 B1 B0": 60, "A1 A2 B2 B1": 90, "A2 A3 B3 B2": 60}  # the arc of each block
-CELLS_OUT, GRADING = {BOX: 150, WIDE: 200}, {BOX: 50, WIDE: 300}
 SCHEMES = """ddtSchemes { default steadyState; }
 gradSchemes { default Gauss linear; }
 divSchemes { default none; div(phi,U) bounded Gauss linearUpwind grad(U);
@@ -56,6 +55,7 @@ def mesh(tank: tuple[float, float, float]) -> str:
     """Three blocks from the sphere (points A) to the tank (B), in diameters, axis along x."""
     radius, before, behind = tank
     half = 0.5 * np.sqrt(0.5)
+    out, grading = (150, 50) if radius < 10 else (200, 300)  # cells from the sphere to the tank
     places = {
         "A0": (-0.5, 0.0), "A1": (-half, half), "A2": (half, half), "A3": (0.5, 0.0),
         "B0": (-before, 0.0), "B1": (-before, radius), "B2": (behind, radius), "B3": (behind, 0.0),
@@ -79,8 +79,8 @@ def mesh(tank: tuple[float, float, float]) -> str:
         return f"({number[a + '-']} {number[b + '-']} {number[b + '+']} {number[a + '+']})"
 
     blocks = "".join(
-        f"hex ({corners(names, '-')} {corners(names, '+')}) ({along} {CELLS_OUT[tank]} 1) "
-        f"simpleGrading (1 {GRADING[tank]} 1)\n"
+        f"hex ({corners(names, '-')} {corners(names, '+')}) ({along} {out} 1) "
+        f"simpleGrading (1 {grading} 1)\n"
         for names, along in CELLS_ALONG.items()
     )
     arcs = "".join(
@@ -143,14 +143,13 @@ def drag(reynolds: float, tank: tuple[float, float, float], folder: Path) -> np.
 def main() -> None:
     """Print a line for each Reynolds number."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("reynolds", type=float, nargs="+")
-    parser.add_argument("--wide", action="store_true")
+    parser.add_argument("reynolds", metavar="RE", type=float, nargs="+")
+    parser.add_argument("--tank", type=float, nargs=3, default=BOX)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    tank = WIDE if options.wide else BOX
     for reynolds in options.reynolds:
         folder = (options.out or Path(tempfile.mkdtemp())) / f"{reynolds:g}"
-        total, pressure, friction = drag(reynolds, tank, folder)
+        total, pressure, friction = drag(reynolds, options.tank, folder)
         print(f"Re {reynolds:g}: {total:.4f} = {pressure:.4f} + {friction:.4f}", flush=True)
 
 
