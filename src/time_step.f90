@@ -83,7 +83,7 @@ contains
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return
     if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
-      minval(sim%grid%h), sim%blocks, sim%contacts%lubrication)
+      sim%grid%h, sim%blocks, sim%contacts%lubrication)
     call flow_init(sim%grid, sim%flow)
     n_solids = sim%blocks%n
     if (bed%there) n_solids = n_solids + 1

@@ -28,7 +28,7 @@ program test_coupling
   call fall_together('box', [0.043_wp, 0.031_wp, 0.037_wp], 600.0_wp)
   call fall_together('sphere', [0.05_wp, 0.0_wp, 0.0_wp], 2300.0_wp, across_the_corner=.true.)
   call wherever_it_lies()
-  call momentum_kept('in the open', spread(0.06_wp, 1, 3), 1.0e-7_wp)
+  call momentum_kept('in the open', spread(0.06_wp, 1, 3), 1.0e-10_wp)
   call momentum_kept('at a wall', [0.033_wp, 0.06_wp, 0.06_wp], 4.0e-4_wp)   ! it turns
   call goes_on_as_before()
   call gas_in_a_cut_cell()
