@@ -162,7 +162,7 @@ def main() -> int:
     chosen, wanted = parser.parse_args().case, level()
     every = {case: planned(case, OUT / case) for case in chosen}
     plans = [plan for runs in every.values() for plan in runs if wanted.takes(plan)]
-    plans.sort(key=lambda plan: plan.cost)
+    plans.sort(key=lambda plan: plan.cost, reverse=True)  # so that none runs alone at the end
     progress, key = Progress(len(plans), wanted.limit), program_key()
     threading.Thread(target=progress.watch, daemon=True).start()
     with ThreadPoolExecutor(AT_ONCE) as pool:
