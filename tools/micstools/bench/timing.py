@@ -38,10 +38,14 @@ def mpirun(ranks: int) -> list[str]:
 
 
 def timed(
-    words: Sequence[object], folder: Path, settings: dict[str, str] | None = None
+    words: Sequence[object],
+    folder: Path,
+    settings: dict[str, str] | None = None,
+    good: Sequence[int] = (0,),
 ) -> tuple[float, float, float, str]:
     """Run a program, with `settings` in its environment: wall and CPU seconds, its own and its
-    children's, largest memory of one of them [bytes], and what it said."""
+    children's, largest memory of one of them [bytes], and what it said. Exit codes other than
+    the `good` ones are an error."""
     with tempfile.TemporaryFile("w+") as said:
         began = time.perf_counter()
         running = subprocess.Popen(
@@ -56,7 +60,7 @@ def timed(
         running.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)
         text = said.read()
-    if running.returncode:
+    if running.returncode not in good:
         last = text.strip().splitlines()[-1:] or ["nothing said"]
         raise subprocess.SubprocessError(f"{words[0]} ended with {running.returncode}: {last[0]}")
     unit = 1 if sys.platform == "darwin" else 1024
