@@ -56,8 +56,8 @@ contains
       example='0.05')
     call v%logical('sleep', contact%sleep, 'blocks at rest cost nothing until something ' &
       //'disturbs them')
-    call v%logical('lubrication', contact%lubrication, 'films of liquid thinner than a cell ' &
-      //'brake spheres that come near a wall or another sphere')
+    call v%logical('lubrication', contact%lubrication, 'what the grid misses of the films of ' &
+      //'liquid between spheres, and between spheres and walls, brakes them')
   end subroutine visit_contact
 
   !> `&bed`
