@@ -101,17 +101,18 @@ contains
     real(wp), intent(in) :: inverse   !! sum of the inverse masses [1/kg]
     real(wp), intent(in) :: dt        !! [s]
     real(wp) :: f
-    real(wp) :: cell, half, resistance
+    real(wp) :: cell, a, half, resistance
 
     cell = norm(n*lubrication%h)
     f = 0.0_wp
     if (gap >= reach*cell) return
+    a = sqrt(2.0_wp)*cell
+    half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*roughness*radius)
     associate (mu => lubrication%viscosity)
-      half = 0.5_wp*max(dt*abs(opening), 2.0e-3_wp*roughness*radius)
-      resistance = (film_impulse(mu, radius, cell, gap + half) &
-        - film_impulse(mu, radius, cell, gap - half))/(2*half)
+      resistance = (film_impulse(mu, radius, a, gap + half) &
+        - film_impulse(mu, radius, a, gap - half))/(2*half)
       if (opening > 0.0_wp) resistance = min(resistance, &
-                                             film_pull(mu, radius, cell, gap, opening)/opening)
+                                             film_pull(mu, radius, a, gap, opening)/opening)
     end associate
     f = -resistance*opening/(1.0_wp + 0.5_wp*resistance*inverse*dt)
   end function push
@@ -119,19 +120,18 @@ contains
   !> What the grid misses of the resistance of a film [N s/m].
   !!
   !! Of the pressure gradient 6 mu r v/s^3 where the film is s thick the grid has
-  !! 6 mu r v/(s^3 + a^2 s), with a^2 = 2 cells^2. The difference, summed over the film:
+  !! 6 mu r v/(s^3 + a^2 s), where a is the thickness of which it lets pass twice what it should,
+  !! sqrt(2) cells. The difference, summed over the film:
   !! \( 6\pi\mu R^2 [1/h - (2/a) \arctan(a/h) + (h/a^2) \ln(1 + a^2/h^2)] \).
   !!
   !! Source: leading term of Brenner (1961), Chem. Eng. Sci. 16, 242, for a sphere and a plane, the
   !! first part; the rest is ours.
-  pure function film_resistance(viscosity, radius, cell, gap) result(resistance)
-    real(wp), intent(in) :: viscosity      !! of the liquid [Pa s]
-    real(wp), intent(in) :: radius, cell   !! of the film; of the grid across it [m]
-    real(wp), intent(in) :: gap            !! > 0 [m]
+  pure function film_resistance(viscosity, radius, a, gap) result(resistance)
+    real(wp), intent(in) :: viscosity   !! of the liquid [Pa s]
+    real(wp), intent(in) :: radius, a   !! [m]
+    real(wp), intent(in) :: gap         !! > 0 [m]
     real(wp) :: resistance
-    real(wp) :: a
 
-    a = sqrt(2.0_wp)*cell
     resistance = 6*pi*viscosity*radius**2 &
       *(1/gap - 2/a*atan(a/gap) + gap/a**2*log(1.0_wp + (a/gap)**2))
   end function film_resistance
@@ -139,14 +139,14 @@ contains
   !> What a film takes from the momentum between the two sides while it opens from nothing to a gap:
   !! the integral of `film_resistance` down to the roughness, and below that of the roughness; none
   !! while the sides touch, for the touch lasts longer than it does in truth [N s].
-  pure function film_impulse(viscosity, radius, cell, gap) result(impulse)
-    real(wp), intent(in) :: viscosity           !! of the liquid [Pa s]
-    real(wp), intent(in) :: radius, cell, gap   !! [m]
+  pure function film_impulse(viscosity, radius, a, gap) result(impulse)
+    real(wp), intent(in) :: viscosity        !! of the liquid [Pa s]
+    real(wp), intent(in) :: radius, a, gap   !! [m]
     real(wp) :: impulse
     real(wp) :: thinnest
 
     thinnest = roughness*radius
-    impulse = min(max(gap, 0.0_wp), thinnest)*film_resistance(viscosity, radius, cell, thinnest)
+    impulse = min(max(gap, 0.0_wp), thinnest)*film_resistance(viscosity, radius, a, thinnest)
     if (gap > thinnest) then
       impulse = impulse + 6*pi*viscosity*radius**2*(integral(gap) - integral(thinnest))
     end if
@@ -154,9 +154,7 @@ contains
     !> Of what stands in the brackets of `film_resistance`.
     pure real(wp) function integral(h)
       real(wp), intent(in) :: h
-      real(wp) :: a
 
-      a = sqrt(2.0_wp)*cell
       integral = -2*h/a*atan(a/h) - 0.5_wp*(1.0_wp - (h/a)**2)*log(1.0_wp + (a/h)**2)
     end function integral
   end function film_impulse
@@ -167,16 +165,16 @@ contains
   !! passes the pressure of the atmosphere, it cavitates. With s_0 the thickness where it just does,
   !! \( F = 2\pi R [p (s_0 - h) + 3\mu R v/s_0] \) for h < s_0, the integral over the film; less
   !! what the grid resolves.
-  pure function film_pull(viscosity, radius, cell, gap, opening) result(force)
-    real(wp), intent(in) :: viscosity           !! of the liquid [Pa s]
-    real(wp), intent(in) :: radius, cell, gap   !! [m]
-    real(wp), intent(in) :: opening             !! rate at which the gap opens, > 0 [m/s]
+  pure function film_pull(viscosity, radius, a, gap, opening) result(force)
+    real(wp), intent(in) :: viscosity        !! of the liquid [Pa s]
+    real(wp), intent(in) :: radius, a, gap   !! [m]
+    real(wp), intent(in) :: opening          !! rate at which the gap opens, > 0 [m/s]
     real(wp) :: force
     real(wp) :: h, s, less
 
     h = max(gap, roughness*radius)
     s = max(h, sqrt(3*viscosity*radius*opening/atmosphere))
-    less = 6*pi*viscosity*radius**2/h - film_resistance(viscosity, radius, cell, h)
+    less = 6*pi*viscosity*radius**2/h - film_resistance(viscosity, radius, a, h)
     force = 2*pi*radius*(atmosphere*(s - h) + 3*viscosity*radius*opening/s) - less*opening
     force = max(0.0_wp, force)
   end function film_pull

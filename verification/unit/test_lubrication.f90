@@ -14,6 +14,7 @@ program test_lubrication
   real(wp), parameter :: d = 0.006_wp           !! diameter of the spheres [m]
   real(wp), parameter :: mu = 0.1_wp            !! [Pa s]
   real(wp), parameter :: cell = d/10            !! [m]
+  real(wp), parameter :: a = sqrt(2.0_wp)*cell  !! film of which twice as much passes [m]
   real(wp), parameter :: dt = 5.0e-4_wp         !! [s]
   type(shape_t) :: shapes(1)
 
@@ -81,17 +82,17 @@ contains
         expected = expected + 12*pi*mu*(d/2)**2*(s - h)*(1/s**3 - 1/(s**3*(1 + 2*(cell/s)**2))) &
                                                        *h/t**2/real(n, wp)
       end do
-      found = film_resistance(mu, d/2, cell, h)
+      found = film_resistance(mu, d/2, a, h)
       call check('resistance of a film', found, expected, 1.0e-6_wp*expected)
       step = 1.0e-4_wp*h
-      found = (film_impulse(mu, d/2, cell, h + step) &
-        - film_impulse(mu, d/2, cell, h - step))/(2*step)
+      found = (film_impulse(mu, d/2, a, h + step) &
+        - film_impulse(mu, d/2, a, h - step))/(2*step)
       call check('change of the impulse', found, expected, 1.0e-6_wp*expected)
     end do
     h = 1.0e-3_wp*d/2
     call check('a thin film', film_resistance(mu, d/2, 1.0e3_wp*d, h), 6*pi*mu*(d/2)**2/h, &
                1.0e-3_wp*6*pi*mu*(d/2)**2/h)
-    call check('none below', film_impulse(mu, d/2, cell, -h), 0.0_wp, 0.0_wp)
+    call check('none below', film_impulse(mu, d/2, a, -h), 0.0_wp, 0.0_wp)
   end subroutine check_resistance
 
   !> A sphere that flies on to a wall loses what the film takes, just once on its way.
@@ -113,8 +114,8 @@ contains
       gap = blocks%x(3, 1) - d/2
       if (gap < 0.02_wp*cell) exit
     end do
-    expected = v - (film_impulse(mu, d/2/sides, cell, 4*cell) &
-      - film_impulse(mu, d/2/sides, cell, sides*gap))/blocks%mass(1)
+    expected = v - (film_impulse(mu, d/2/sides, a, 4*cell) &
+      - film_impulse(mu, d/2/sides, a, sides*gap))/blocks%mass(1)
     call check(kind//': speed lost in the film', -blocks%v(3, 1), expected, &
                1.0e-3_wp*(v - expected))
     call check(kind//': not touched yet', blocks%contacts(1), 0)
@@ -137,8 +138,8 @@ contains
     after = blocks%v(:, 1) + blocks%v(:, 2)
     gap(2) = norm2(blocks%x(:, 2) - blocks%x(:, 1)) - d
     call check('momentum of a pair', after, before, 1.0e-15_wp)
-    expected = 0.1_wp - 2*(film_impulse(mu, d/4, cell, gap(2)) &
-      - film_impulse(mu, d/4, cell, gap(1)))/blocks%mass(1)
+    expected = 0.1_wp - 2*(film_impulse(mu, d/4, a, gap(2)) &
+      - film_impulse(mu, d/4, a, gap(1)))/blocks%mass(1)
     call check('speed of parting', dot_product(blocks%v(:, 2) - blocks%v(:, 1), n), expected, &
                1.0e-3_wp*(0.1_wp - expected))
     call check('contact force tells it', blocks%contact_force(:, 2)*dt/blocks%mass(2), &
@@ -154,8 +155,8 @@ contains
     integer :: i
 
     h = 0.4_wp*cell
-    call check('thick film', film_pull(mu, d/2, cell, h, v), film_resistance(mu, d/2, cell, h)*v, &
-               1.0e-12_wp*film_resistance(mu, d/2, cell, h)*v)
+    call check('thick film', film_pull(mu, d/2, a, h, v), film_resistance(mu, d/2, a, h)*v, &
+               1.0e-12_wp*film_resistance(mu, d/2, a, h)*v)
     h = 1.0e-2_wp*cell
     force = 0.0_wp
     do i = 1, n   ! s = h/t, ds = h/t^2 dt
@@ -163,8 +164,8 @@ contains
       s = h/t
       force = force + 2*pi*(d/2)*min(p, 3*mu*(d/2)*v/s**2)*h/t**2/real(n, wp)
     end do
-    force = force - (6*pi*mu*(d/2)**2/h - film_resistance(mu, d/2, cell, h))*v
-    call check('thin film', film_pull(mu, d/2, cell, h, v), force, 1.0e-4_wp*force)
+    force = force - (6*pi*mu*(d/2)**2/h - film_resistance(mu, d/2, a, h))*v
+    call check('thin film', film_pull(mu, d/2, a, h, v), force, 1.0e-4_wp*force)
   end subroutine check_cavitation
 
 end program test_lubrication
