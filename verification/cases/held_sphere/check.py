@@ -51,7 +51,7 @@ def check(runs: list[Run]) -> Checks:
                 f"{name}: drag coefficient", float(mean[2]), known[reynolds], BAND, cells > 11
             )
         checks.below(
-            f"{name}: lift over drag", float(np.hypot(mean[0], mean[1]) / mean[2]), 0.01, False
+            f"{name}: lift over drag", float(np.hypot(mean[0], mean[1]) / mean[2]), 0.01, cells > 11
         )
         curves[name] = (way, force[:, 2])
         sound(run, checks)
