@@ -158,8 +158,10 @@ contains
         call toc(sim%timer_solid)
         call tic(sim%timer_transport)
         call carry_fluid(case, grid, sim%before, sim%solid, &
-                         span_t(dt, report%cfl_carried, sim%clock%step), flow, sim%transport)
-        if (sim%stage%implicit_momentum) sim%stage%c_ismac%q = sim%transport%liquid%q_step
+                         span_t(dt, report%cfl_carried, sim%clock%step), flow, &
+                         sim%stage%viscous, sim%stage%pressure%system%solver, sim%transport)
+        if (sim%stage%implicit_momentum) sim%stage%c_ismac%q = sim%transport%liquid%parts &
+                                                               *sim%transport%liquid%volumes%q
         call toc(sim%timer_transport)
         call tic(sim%timer_velocity)
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)

@@ -10,7 +10,7 @@ module contact_spheres_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
-  use surface_features_m, only: found_t
+  use surface_search_m, only: found_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
   use touches_m, only: touch_t, touches_t, add_touch
   implicit none

@@ -18,7 +18,8 @@ module contact_surface_m
   use bed_m, only: bed_t, bed_partner, bed_place
   use neighbours_m, only: pair_list_t, near_pairs
   use touches_m, only: touch_t, touches_t, add_touch
-  use surface_features_m, only: surface_t, surface_init, nearest_on_surface
+  use surface_features_m, only: surface_init
+  use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
   use meeting_m, only: poses_t, view_t, meeting_t, know_views, way_between
   use near_features_m, only: near_features_t, search_t, list_features, list_bed, edge_in_view

@@ -5,7 +5,7 @@ module near_features_m
   use growing_m, only: ensure_room
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
-  use surface_features_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
+  use surface_search_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
     gather_facets, search_surface, least_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view

@@ -11,7 +11,7 @@ module overlap_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_place, bed_is_near, bed_covers, bed_distance
-  use surface_features_m, only: found_t, gather_edges
+  use surface_search_m, only: found_t, gather_edges
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
   implicit none
   private

@@ -3,7 +3,7 @@
 module short_list_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
-  use surface_features_m, only: surface_t, nearest_on_surface, nowhere
+  use surface_search_m, only: surface_t, nearest_on_surface, nowhere
   use edge_crossing_m, only: edge_t
   use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
   use near_features_m, only: near_features_t, probes_near_t, append_facets, append_edges, &

@@ -266,8 +266,10 @@ contains
       flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, &
           :, d)
     end do
-    call divergence(grid, solid%open, flow, stage%pressure%system%active, stage%pressure%rhs, &
-                    report%pressure%divergence)
+    associate (system => stage%pressure%system)
+      call divergence(grid, solid%open, flow, system%active, system%solver%rhs, &
+                      report%pressure%divergence)
+    end associate
   end subroutine overlay_bodies
 
   !> Share of the solid in the mass at a face that it covers by `beta`.

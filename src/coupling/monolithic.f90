@@ -389,6 +389,7 @@ contains
     !$omp parallel do private(i, j, b, arm) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
+        if (maxval(solid%inside(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
           if (b == 0 .or. links%number(i, j, k) > 0) cycle

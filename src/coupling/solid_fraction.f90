@@ -27,6 +27,8 @@ module solid_fraction_m
   private
   public :: solid_fraction_t, solid_fraction_init, update_solid
 
+  integer, parameter :: geometries = 2   !! that are filled in turn
+
   !> Work arrays of one thread.
   type :: share_work_t
     type(share_row_t) :: row
@@ -43,6 +45,7 @@ module solid_fraction_m
     type(share_work_t), allocatable :: work(:)    !! (threads)
     type(painting_t) :: painting
     type(pockets_t) :: pockets
+    integer :: empty = 0                          !! last fillings in a row without a body
   end type solid_fraction_t
 
 contains
@@ -73,6 +76,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(solid_geometry_t), intent(inout) :: solid
 
+    self%empty = merge(0, self%empty + 1, self%has_bed .or. any(blocks%present))
+    if (self%empty > geometries) return   ! nothing to paint, and nothing left to clear
     call find_shares(grid, blocks, self)
     call ensure_lists(self%body, self%painting, solid)
     call place_bodies(grid, self%body, self%painting, solid)

@@ -10,7 +10,7 @@ module carried_volumes_m
   public :: carried_volumes_t, carried_volumes_init
 
   type :: carried_volumes_t
-    !> Volumes through the lower faces in this part of the step, all and liquid, positive along the
+    !> Volumes through the lower faces in a part of the step, all and liquid, positive along the
     !! axis; faces lo..hi+1 [m3]. Those of small donors are zero during the sweeps and stand there
     !! after the small cells have given.
     real(wp), allocatable :: q(:, :, :, :), g(:, :, :, :)

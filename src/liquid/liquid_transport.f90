@@ -40,10 +40,7 @@ module liquid_transport_m
     integer :: parts = 1                      !! equal parts in which the volumes of a step move;
                                               !! the caller sets it before the step
     integer :: order(3) = [1, 2, 3]           !! directions of the sweeps of this part
-    !> Volumes through the lower faces in the whole step, positive along the axis [m3].
-    real(wp), allocatable :: q_step(:, :, :, :)
     real(wp) :: inflow = 0.0_wp               !! of liquid through the sides in this step [m3]
-    real(wp), allocatable :: share(:, :, :)   !! work: liquid share of what small cells give
     real(wp), allocatable :: side(:)          !! work: liquid through the faces of the sides [m3]
   end type liquid_transport_t
 
@@ -61,8 +58,6 @@ contains
     call liquid_sweep_init(grid, gravity, self%sweeps)
     call small_cells_init(grid, self%small)
     call extended_fraction_init(gravity, self%extension)
-    allocate (self%q_step, source=self%volumes%q)
-    allocate (self%share, source=self%volumes%w)
     m = grid%hi - grid%lo + 1
     allocate (self%side(2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))), source=0.0_wp)
   end subroutine liquid_transport_init
@@ -88,7 +83,7 @@ contains
     call finish_transport(grid, new, self, flow)
   end subroutine transport_liquid
 
-  !> Volumes through the faces in the step, running values.
+  !> Volumes through the faces in a part of the step, running values.
   subroutine begin_transport(grid, old, new, dt, self, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
@@ -97,18 +92,20 @@ contains
     type(flow_t), intent(in) :: flow   !! liquid, room, c (halo filled) and uf of the begin
     integer :: k
 
-    call find_open_flux(grid, old, new, dt, flow, self%flux, self%q_step)
+    call find_open_flux(grid, old, new, dt, flow, self%flux, self%volumes%q)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       self%volumes%w(:, :, k) = flow%liquid(:, :, k)
       self%volumes%v(:, :, k) = flow%room(:, :, k)
       self%volumes%c(:, :, k) = flow%c(:, :, k)
+      if (self%parts == 1) cycle
+      self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :)/real(self%parts, wp)
     end do
     self%sweeps%clamped = 0.0_wp
     self%inflow = 0.0_wp
   end subroutine begin_transport
 
-  !> An equal part of the step's volumes, and the small cells for it.
+  !> The order of the directions and the small cells of an equal part of the step.
   !!
   !! Where the fluid moves further than the sweeps can follow, the same volumes go in several parts.
   !! The open volume of a cell then runs in equal parts too, so the last part ends at that
@@ -119,14 +116,8 @@ contains
     integer, intent(in) :: part   !! 1..parts
     integer, intent(in) :: step   !! number of the step; both pick the order of the directions
     type(liquid_transport_t), intent(inout) :: self
-    integer :: k
 
     self%order = orders(:, 1 + modulo(step + part - 1, size(orders, 2)))
-    !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      self%volumes%q(:, :, k, :) = self%q_step(:, :, k, :)/real(self%parts, wp)
-      self%volumes%g(:, :, k, :) = 0.0_wp
-    end do
     call find_small_cells(grid, old, self%volumes, self%small)
   end subroutine begin_part
 
@@ -145,7 +136,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self
 
-    call give_small_cells(grid, self%volumes, self%small, self%share)
+    call give_small_cells(grid, self%volumes, self%small, self%sweeps%out_low)   ! free by now
     self%inflow = self%inflow + inflow_of_sides(grid, self)
   end subroutine small_cells
 

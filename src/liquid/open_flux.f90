@@ -18,8 +18,8 @@ module open_flux_m
   use flux_band_m, only: flux_band_t, flux_band_init, make_room, find_parts, sum_by_part, &
                          drop_part, find_open_lines
   use cell_list_m, only: list_marked
-  use krylov_m, only: krylov_work_t, krylov_init, conjugate_gradient
-  use multigrid_m, only: multigrid_t
+  use krylov_m, only: conjugate_gradient
+  use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
   use solve_control_m, only: solve_control_t, solve_report_t
   use parallel_m, only: halo_exchange, global_max
   implicit none
@@ -35,10 +35,7 @@ module open_flux_m
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
     type(flux_band_t) :: band
-    type(multigrid_t) :: multigrid
-    type(krylov_work_t) :: work
-    real(wp), allocatable :: rest(:, :, :)   !! r of the cells [V]
-    real(wp), allocatable :: phi(:, :, :)    !! potential, halo filled [V]
+    type(elliptic_solver_t), allocatable :: solver   !! of the potential for the rests r [V]
   end type open_flux_t
 
 contains
@@ -49,10 +46,8 @@ contains
     type(open_flux_t), intent(out) :: self
 
     call flux_band_init(grid, self%band)
-    call self%multigrid%init(grid)
-    call krylov_init(grid, self%work)
-    allocate (self%rest, source=self%work%r)
-    allocate (self%phi, source=self%work%r)
+    allocate (self%solver)
+    call elliptic_solver_init(grid, self%solver)
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
@@ -65,12 +60,15 @@ contains
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m3]
     real(wp) :: cells(1)
+    logical :: solids
 
     self%iterations = 0
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
-    call mark_band(grid, old, new, self%band)
-    call flux_of_velocity(grid, old, new, flow%uf, dt, self%band, q)
+    call mark_solids(grid, old, new, self%band%marked, solids)
+    if (solids) call mark_band(self%band)
+    call flux_of_velocity(grid, old, new, flow%uf, dt, solids, self%band, q)
+    if (.not. solids) return
     call list_band(grid, new, flow%room, q, self%band)
     cells = real(self%band%n, wp)
     call global_max(cells)
@@ -78,25 +76,38 @@ contains
     call find_parts(grid, self%band)
     call balance_parts(grid, self)
     call solve_potential(self)
-    call correct_flux(grid, self%band, self%phi, q)
+    call correct_flux(grid, self%band, self%solver%x, q)
   end subroutine find_open_flux
 
-  !> Cells with solid at the begin or the end of the step, and the ring around them.
-  subroutine mark_band(grid, old, new, band)
+  !> Mark the own cells with solid at the begin or the end of the step.
+  subroutine mark_solids(grid, old, new, mark, there)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
-    type(flux_band_t), intent(inout) :: band
-    integer :: i, j, k
+    integer, intent(inout), contiguous :: mark(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
+    logical, intent(out) :: there   !! some process has such cells
+    integer :: i, j, k, most
+    real(wp) :: of_all(1)
 
-    !$omp parallel do private(i, j) schedule(static)
+    most = 0
+    !$omp parallel do private(i, j) reduction(max: most) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          band%marked(i, j, k) = merge(1, 0, old%alpha(i, j, k) > 0.0_wp &
-                                       .or. new%alpha(i, j, k) > 0.0_wp)
+          mark(i, j, k) = merge(1, 0, old%alpha(i, j, k) > 0.0_wp &
+                                .or. new%alpha(i, j, k) > 0.0_wp)
+          most = max(most, mark(i, j, k))
         end do
       end do
     end do
+    of_all = real(most, wp)
+    call global_max(of_all)
+    there = of_all(1) > 0.0_wp
+  end subroutine mark_solids
+
+  !> The marked cells and the ring around them.
+  subroutine mark_band(band)
+    type(flux_band_t), intent(inout) :: band
+
     call halo_exchange(band%marked, 1)
     call widen(1, band%marked, band%label)
     call widen(2, band%label, band%number)
@@ -129,12 +140,13 @@ contains
   end subroutine widen
 
   !> Volumes of the velocity through the faces as they are at the begin of the step, and the
-  !! conductances of the band.
-  subroutine flux_of_velocity(grid, old, new, uf, dt, band, q)
+  !! conductances of the band, if there are solids.
+  subroutine flux_of_velocity(grid, old, new, uf, dt, solids, band, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
     real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in) :: dt
+    logical, intent(in) :: solids
     type(flux_band_t), intent(inout) :: band
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: d, s, a(3), b(3)
@@ -168,6 +180,10 @@ contains
             w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
             q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
                                   w >= least_open)
+          end do
+          if (.not. solids) cycle
+          do i = a(1), b(1)
+            w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
             band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, w >= least_open .and. &
               band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == cells)
           end do
@@ -249,13 +265,15 @@ contains
     type(open_flux_t), intent(inout) :: self
     type(solve_report_t) :: report   ! the next step makes good what is left
 
-    call put_balances(self%band, lbound(self%rest), self%rest, self%phi)
-    call find_open_lines(self%band%k, self%band%line)
-    self%work%line = self%band%line
-    call self%multigrid%setup(self%band%k)
-    call conjugate_gradient(self%band, self%multigrid, self%rest, self%phi, self%control, &
-                            report, self%work)
-    call halo_exchange(self%phi, 1)
+    associate (s => self%solver)
+      call put_balances(self%band, lbound(s%rhs), s%rhs, s%x)
+      call find_open_lines(self%band%k, self%band%line)
+      s%work%line = self%band%line
+      s%work%singular = .false.   ! parts without an open side have been balanced
+      call s%multigrid%setup(self%band%k)
+      call conjugate_gradient(self%band, s%multigrid, s%rhs, s%x, self%control, report, s%work)
+      call halo_exchange(s%x, 1)
+    end associate
     self%iterations = report%iterations
     self%residual = report%residual
   end subroutine solve_potential

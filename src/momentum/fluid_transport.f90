@@ -1,7 +1,7 @@
 !> Liquid and momentum through the faces that the moving bodies leave open, in one step.
 module fluid_transport_m
   use kinds_m, only: wp
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
@@ -10,6 +10,8 @@ module fluid_transport_m
     begin_part, finish_transport, transport_liquid
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
+  use viscous_system_m, only: viscous_t
+  use elliptic_solver_m, only: elliptic_solver_t
   implicit none
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
@@ -31,7 +33,7 @@ module fluid_transport_m
 
 contains
 
-  !> Allocate, and tell what enters through the sides.
+  !> Allocate what the transport does not borrow, and tell what enters through the sides.
   subroutine fluid_transport_init(case, grid, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -43,41 +45,85 @@ contains
     else
       self%liquid%sweeps%level = case%fluid%water_level
     end if
+    deallocate (self%liquid%flux%solver)
+    if (case%numerics%momentum == 'c_ismac') return
     call momentum_init(grid, self%momentum, case%numerics%advection)
+    deallocate (self%liquid%volumes%q, self%liquid%volumes%g, self%momentum%momentum)
   end subroutine fluid_transport_init
 
+  !> Borrow the solver of the pressure and arrays of the viscous stage, which need them later in the
+  !! step and keep nothing there; called once more, give them back. Nothing is copied.
+  subroutine borrow(viscous, solver, self)
+    type(viscous_t), intent(inout) :: viscous
+    type(elliptic_solver_t), allocatable, intent(inout) :: solver
+    type(fluid_transport_t), intent(inout) :: self
+    type(elliptic_solver_t), allocatable :: other
+
+    call move_alloc(solver, other)
+    call move_alloc(self%liquid%flux%solver, solver)
+    call move_alloc(other, self%liquid%flux%solver)
+    if (allocated(self%momentum%mixed_near)) then
+      call swap(viscous%r, self%liquid%volumes%q)
+      call swap(viscous%s, self%liquid%volumes%g)
+      call swap(viscous%y, self%momentum%momentum)
+    end if
+  contains
+    pure subroutine swap(a, b)
+      real(wp), allocatable, intent(inout) :: a(:, :, :, :), b(:, :, :, :)
+      real(wp), allocatable :: c(:, :, :, :)
+
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+    end subroutine swap
+  end subroutine borrow
+
   !> Carry liquid and momentum, direction by direction; new density and viscosity. With C-ISMAC
-  !! momentum waits for the predictor, which uses the same volumes (`self%liquid%q_step`).
-  subroutine carry_fluid(case, grid, before, after, span, flow, self)
+  !! momentum waits for the predictor, which uses the volumes of the same parts.
+  subroutine carry_fluid(case, grid, before, after, span, flow, viscous, solver, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
     type(span_t), intent(in) :: span
     type(flow_t), intent(inout) :: flow   !! halos filled on entry and return
+    type(viscous_t), intent(inout) :: viscous   !! lends arrays
+    type(elliptic_solver_t), allocatable, intent(inout) :: solver   !! of the pressure, lent too
     type(fluid_transport_t), intent(inout) :: self
+
+    self%liquid%parts = parts_of_step(span%courant)
+    call borrow(viscous, solver, self)
+    if (case%numerics%momentum == 'c_ismac') then
+      call transport_liquid(grid, before, after, span%dt, span%number, self%liquid, flow)
+    else
+      call carry_all(case%fluid, grid, before, after, span, flow, self%liquid, self%momentum)
+    end if
+    call borrow(viscous, solver, self)
+    call mix_fluid(case%fluid, flow)
+  end subroutine carry_fluid
+
+  !> Liquid and momentum together.
+  subroutine carry_all(fluid, grid, before, after, span, flow, liquid, momentum)
+    type(fluid_t), intent(in) :: fluid
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: before, after
+    type(span_t), intent(in) :: span
+    type(flow_t), intent(inout) :: flow
+    type(liquid_transport_t), intent(inout) :: liquid
+    type(momentum_t), intent(inout) :: momentum
     integer :: n, part
 
-    associate (fluid => case%fluid, liquid => self%liquid, momentum => self%momentum)
-      liquid%parts = parts_of_step(span%courant)
-      if (case%numerics%momentum == 'c_ismac') then
-        call transport_liquid(grid, before, after, span%dt, span%number, liquid, flow)
-        call mix_fluid(fluid, flow)
-        return
-      end if
-      call begin_transport(grid, before, after, span%dt, liquid, flow)
-      do part = 1, liquid%parts
-        call begin_part(grid, before, part, span%number, liquid)
-        call momentum_begin(grid, fluid, liquid%volumes%w, liquid%volumes%v, liquid%volumes%c, &
-                            flow%u, momentum)
-        do n = 1, 3
-          call momentum_sweep(grid, fluid, before, liquid%order(n), liquid, flow%u, momentum)
-        end do
-        call momentum_late(grid, fluid, liquid, flow%u, momentum)
+    call begin_transport(grid, before, after, span%dt, liquid, flow)
+    do part = 1, liquid%parts
+      call begin_part(grid, before, part, span%number, liquid)
+      call momentum_begin(grid, fluid, liquid%volumes%w, liquid%volumes%v, liquid%volumes%c, &
+                          flow%u, momentum)
+      do n = 1, 3
+        call momentum_sweep(grid, fluid, before, liquid%order(n), liquid, flow%u, momentum)
       end do
-      call finish_transport(grid, after, liquid, flow)
-      call mix_fluid(fluid, flow)
-    end associate
-  end subroutine carry_fluid
+      call momentum_late(grid, fluid, liquid, flow%u, momentum)
+    end do
+    call finish_transport(grid, after, liquid, flow)
+  end subroutine carry_all
 
   !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
   !! number that the sweeps can follow.

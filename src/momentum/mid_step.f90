@@ -118,15 +118,22 @@ contains
     logical, intent(inout), contiguous :: &
       takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k, low(3), high(3)
+    real(wp) :: least(grid%first(1):grid%last(1))   ! share of the nine cells around a line
+    logical :: inside
 
     low = merge(2, grid%first, flow%sides(1, :)%active)
     high = merge(grid%n - 1, grid%last, flow%sides(2, :)%active)
-    !$omp parallel do private(i, j) schedule(static)
+    !$omp parallel do private(i, j, least, inside) schedule(static)
     do k = grid%first(3) + 1, grid%last(3) - 1
       do j = grid%first(2) + 1, grid%last(2) - 1
+        inside = all([j, k] >= low(2:) .and. [j, k] <= high(2:))
+        associate (c => flow%c(:, j - 1:j + 1, k - 1:k + 1))
+          least = min(c(:, 1, 1), c(:, 2, 1), c(:, 3, 1), c(:, 1, 2), c(:, 2, 2), c(:, 3, 2), &
+                      c(:, 1, 3), c(:, 2, 3), c(:, 3, 3))
+        end associate
         do i = grid%first(1) + 1, grid%last(1) - 1
-          takes_part(i, j, k) = all([i, j, k] >= low .and. [i, j, k] <= high) &
-            .and. all(flow%c(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) >= full)
+          takes_part(i, j, k) = inside .and. i >= low(1) .and. i <= high(1) &
+                                .and. min(least(i - 1), least(i), least(i + 1)) >= full
         end do
       end do
     end do

@@ -11,13 +11,14 @@
 !! Source: consistent transport after Rudman (1998); departs from the velocity form of the paper's
 !! eq. (5), which moves water momentum into air at a density ratio of 830.
 module momentum_conservative_m
+  use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
   use mixture_m, only: pure_share
-  use tvd_m, only: face_values, scheme_of, mp_scheme
+  use tvd_m, only: face_row, scheme_of, mp_scheme
   use carried_volumes_m, only: carried_volumes_t
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
   use small_cells_m, only: late_values, move_late
@@ -28,10 +29,9 @@ module momentum_conservative_m
   type :: momentum_t
     integer :: scheme = mp_scheme                   !! of the carried velocity
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
-    real(wp), allocatable :: carried(:, :, :)       !! momentum through the lower face [kg m/s]
+    !> Momentum through the lower faces of two planes, work of each thread [kg m/s].
+    real(wp), allocatable :: carried(:, :, :, :, :)   !! (i, j, component, 0:1, thread)
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
-    real(wp), allocatable :: mass(:, :, :)
-      !! of the fluid in the cell after the sweeps [kg]
     real(wp), allocatable :: late(:), late_mass(:)
       !! momentum and mass through the faces of small cells
   end type momentum_t
@@ -49,8 +49,8 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%carried(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%mass, source=self%carried)
+    allocate (self%carried(grid%lo(1):grid%hi(1) + 1, grid%lo(2):grid%hi(2) + 1, 3, 0:1, &
+                           0:omp_get_max_threads() - 1), source=0.0_wp)
     allocate (self%late(0), self%late_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
@@ -111,37 +111,123 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
                                                !! halo filled on entry and return [m/s]
     type(momentum_t), intent(inout) :: self
-    integer :: m
 
     call sweep(grid, old, d, transport)
-    do m = 1, 3
-      call carried_momentum(grid, fluid, transport%volumes, d, u(:, :, :, m), self)
-      call move_momentum(grid, unit_step(:, d), self%carried, self%momentum(:, :, :, m))
-    end do
+    call move_momentum(grid, fluid, d, transport%volumes, u, self)
     call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
                               self%momentum, u)
   end subroutine momentum_sweep
 
-  !> One component of the momentum after what crosses the faces in one direction, e along it.
-  subroutine move_momentum(grid, e, carried, momentum)
+  !> The momentum after what crosses the faces in direction d. A thread goes through its planes one
+  !! by one and keeps what crosses the faces of two.
+  subroutine move_momentum(grid, fluid, d, volumes, u, self)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! through the lower faces [kg m/s]
-    real(wp), intent(inout), contiguous :: momentum(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! [kg m/s]
-    integer :: i, j, k
+    type(fluid_t), intent(in) :: fluid
+    integer, intent(in) :: d
+    type(carried_volumes_t), intent(in) :: volumes
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    type(momentum_t), intent(inout) :: self
+    integer :: k, me, e(3), low, high, at_hand   ! place of the lower and of the upper faces
 
-    !$omp parallel do private(i, j) schedule(static)
+    e = unit_step(:, d)
+    !$omp parallel private(k, me, low, high, at_hand)
+    me = omp_get_thread_num()
+    at_hand = grid%lo(3) - 1   ! last plane whose lower faces are known
+    !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
+      low = modulo(k, 2)
+      high = modulo(k + e(3), 2)
+      if (at_hand < k) call carry_plane(grid, fluid, self%scheme, d, k, volumes, u, &
+                                        self%mixed_near, self%carried(:, :, :, low, me))
+      at_hand = k + e(3)
+      if (e(3) == 1) call carry_plane(grid, fluid, self%scheme, d, k + 1, volumes, u, &
+                                      self%mixed_near, self%carried(:, :, :, high, me))
+      call exchange_in_plane(grid, e, k, self%carried(:, :, :, low, me), &
+                             self%carried(:, :, :, high, me), self%momentum)
+    end do
+    !$omp end parallel
+  end subroutine move_momentum
+
+  !> Momentum of the cells of plane k after what crosses their lower and upper faces.
+  subroutine exchange_in_plane(grid, e, k, lower, upper, momentum)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: e(3), k
+    real(wp), intent(in), dimension(grid%lo(1):, grid%lo(2):, :), contiguous :: lower, upper
+      !! [kg m/s]; one and the same if the direction e lies in the plane
+    real(wp), intent(inout), contiguous :: &
+      momentum(grid%first(1):, grid%first(2):, grid%first(3):, :)   !! [kg m/s]
+    integer :: i, j, m
+
+    do m = 1, 3
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          momentum(i, j, k) = momentum(i, j, k) &
-                              - (carried(i + e(1), j + e(2), k + e(3)) - carried(i, j, k))
+          momentum(i, j, k, m) = momentum(i, j, k, m) - (upper(i + e(1), j + e(2), m) &
+                                                         - lower(i, j, m))
         end do
       end do
     end do
-  end subroutine move_momentum
+  end subroutine exchange_in_plane
+
+  !> Momentum through the lower faces of plane k in direction d: mass times the mean velocity of the
+  !! slab that leaves the donor.
+  subroutine carry_plane(grid, fluid, scheme, d, k, volumes, u, near, carried)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    integer, intent(in) :: scheme, d, k
+    type(carried_volumes_t), intent(in) :: volumes
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)   !! [kg m/s]
+    integer :: j, m, e(3)
+
+    e = unit_step(:, d)
+    associate (q => volumes%q(:, :, :, d), g => volumes%g(:, :, :, d))
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        do m = 1, 3
+          call face_row(grid, scheme, e, j, k, q, u(:, :, :, m), &
+                        carried(:grid%hi(1) + e(1), j, m))
+        end do
+        call carry_slabs(grid, fluid, e, j, k, q, g, volumes%v_before, u, near, carried)
+      end do
+    end associate
+  end subroutine carry_plane
+
+  !> The same of one line of faces, from the values on them.
+  subroutine carry_slabs(grid, fluid, e, j, k, q, g, v, u, near, carried)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    integer, intent(in) :: e(3), j, k
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: q, g, v   !! volume and liquid through the faces, open volume [m3]
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s]
+    logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)
+      !! value on the face [m/s], on return momentum through it [kg m/s]
+    real(wp), dimension(grid%lo(1):grid%hi(1) + e(1)) :: mass   ! through the face [kg]
+    real(wp), dimension(grid%lo(1):grid%hi(1) + e(1)) :: keep   ! of the value beyond the donor's
+    real(wp) :: room, donor
+    integer :: i, m
+    logical :: forward, mixed
+
+    !$omp simd private(room, forward, mixed)
+    do i = grid%lo(1), grid%hi(1) + e(1)
+      forward = q(i, j, k) > 0.0_wp
+      room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
+      mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
+      keep(i) = merge(0.0_wp, max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(room, tiny(room))), mixed)
+      mass(i) = mass_through(fluid, q(i, j, k), g(i, j, k))
+    end do
+    do m = 1, 3
+      !$omp simd private(donor)
+      do i = grid%lo(1), grid%hi(1) + e(1)
+        donor = merge(u(i - e(1), j - e(2), k - e(3), m), u(i, j, k, m), q(i, j, k) > 0.0_wp)
+        carried(i, j, m) = mass(i)*(donor + keep(i)*(carried(i, j, m) - donor))
+      end do
+    end do
+  end subroutine carry_slabs
 
   !> Velocity after the small cells have given what they hold, with the same implicit donor value as
   !! their liquid; moves the volumes of the small cells too (`small_cells`).
@@ -154,24 +240,26 @@ contains
     type(momentum_t), intent(inout) :: self
     integer :: m, l, k, at(3)
 
-    !$omp parallel do schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      self%mass(:, :, k) = mass_through(fluid, transport%volumes%v(:, :, k), &
-                                        transport%volumes%w(:, :, k))
-    end do
-    call small_cells(grid, transport)
-    associate (small => transport%small, n => transport%small%n_late)
+    ! the sweeps have done with their arrays
+    associate (small => transport%small, n => transport%small%n_late, &
+               mass => transport%sweeps%out_high, value => transport%sweeps%out_low)
+      !$omp parallel do schedule(static)
+      do k = grid%lo(3), grid%hi(3)
+        mass(:, :, k) = mass_through(fluid, transport%volumes%v(:, :, k), &
+                                     transport%volumes%w(:, :, k))
+      end do
+      call small_cells(grid, transport)
       if (size(self%late) < n) then
         deallocate (self%late, self%late_mass)
         allocate (self%late(2*n), self%late_mass(2*n))
       end if
       self%late_mass(1:n) = mass_through(fluid, small%q_late(1:n), small%g_late(1:n))
       do m = 1, 3
-        call late_values(grid, self%momentum(:, :, :, m), self%mass, abs(self%late_mass(1:n)), &
-                         small, self%carried)
+        call late_values(grid, self%momentum(:, :, :, m), mass, abs(self%late_mass(1:n)), &
+                         small, value)
         do l = 1, n
           at = small%donor(:, l)
-          self%late(l) = self%late_mass(l)*self%carried(at(1), at(2), at(3))
+          self%late(l) = self%late_mass(l)*value(at(1), at(2), at(3))
         end do
         call move_late(grid, small, self%late(1:n), self%momentum(:, :, :, m))
       end do
@@ -208,55 +296,5 @@ contains
     end do
     call fill_velocity_halo(grid, u)
   end subroutine velocity_of_momentum
-
-  !> Momentum through the lower faces in direction d: mass times the mean velocity of the slab that
-  !! leaves the donor.
-  subroutine carried_momentum(grid, fluid, volumes, d, u, self)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    type(carried_volumes_t), intent(in) :: volumes
-    integer, intent(in) :: d
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! one component [m/s]
-    type(momentum_t), intent(inout) :: self
-
-    associate (e => unit_step(:, d))
-      call face_values(grid, self%scheme, e, volumes%q(:, :, :, d), u, self%carried)
-      call carry_slabs(grid, fluid, e, volumes%q(:, :, :, d), volumes%g(:, :, :, d), &
-                       volumes%v_before, u, self%mixed_near, self%carried)
-    end associate
-  end subroutine carried_momentum
-
-  !> The same in one direction, e along it, from the values on the faces.
-  subroutine carry_slabs(grid, fluid, e, q, g, v, u, near, carried)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: q, g, v, u   !! volume and liquid through the faces, open volume [m3], velocity
-    logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: carried(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! value on the face [m/s], on return momentum through it [kg m/s]
-    integer :: i, j, k
-    real(wp) :: donor, room, value
-    logical :: forward, mixed
-
-    !$omp parallel do private(i, j, donor, room, value, forward, mixed) schedule(static)
-    do k = grid%lo(3), grid%hi(3) + e(3)
-      do j = grid%lo(2), grid%hi(2) + e(2)
-        !$omp simd private(donor, room, value, forward, mixed)
-        do i = grid%lo(1), grid%hi(1) + e(1)
-          forward = q(i, j, k) > 0.0_wp
-          donor = merge(u(i - e(1), j - e(2), k - e(3)), u(i, j, k), forward)
-          room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
-          mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
-          value = max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(room, tiny(room))) &
-                  *(carried(i, j, k) - donor)
-          carried(i, j, k) = mass_through(fluid, q(i, j, k), g(i, j, k)) &
-                             *(donor + merge(0.0_wp, value, mixed))
-        end do
-      end do
-    end do
-  end subroutine carry_slabs
 
 end module momentum_conservative_m

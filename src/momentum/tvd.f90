@@ -9,7 +9,7 @@ module tvd_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: face_value, face_values, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
+  public :: face_value, face_values, face_row, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell
@@ -49,27 +49,39 @@ contains
       contiguous :: q, u            !! flux through the lower face, any unit; what is carried
     real(wp), intent(inout), contiguous :: face(grid%first(1):, grid%first(2):, grid%first(3):)
       !! own lower faces and the upper ones of the last cells
-    integer :: i, j, k, n
+    integer :: j, k
 
-    i = grid%lo(1)
-    n = grid%hi(1) + e(1)
     !$omp parallel do private(j) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
-        associate (u_1 => u(i - e(1):n - e(1), j - e(2), k - e(3)), v_1 => u(i:n, j, k))
-          if (scheme == upwind_scheme) then
-            face(i:n, j, k) = merge(u_1, v_1, q(i:n, j, k) > 0.0_wp)
-          else
-            call fifth_order_row(n - i + 1, scheme, q(i:n, j, k), &
-                                 u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
-                                 u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
-                                 u(i + e(1):n + e(1), j + e(2), k + e(3)), &
-                                 u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face(i:n, j, k))
-          end if
-        end associate
+        call face_row(grid, scheme, e, j, k, q, u, face(grid%lo(1):grid%hi(1) + e(1), j, k))
       end do
     end do
   end subroutine face_values
+
+  !> The same for the faces of one line, j and k.
+  subroutine face_row(grid, scheme, e, j, k, q, u, face)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: scheme, e(3), j, k
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: q, u
+    real(wp), intent(inout), contiguous :: face(:)   !! lo(1)..hi(1) + e(1)
+    integer :: i, n
+
+    i = grid%lo(1)
+    n = grid%hi(1) + e(1)
+    associate (u_1 => u(i - e(1):n - e(1), j - e(2), k - e(3)), v_1 => u(i:n, j, k))
+      if (scheme == upwind_scheme) then
+        face = merge(u_1, v_1, q(i:n, j, k) > 0.0_wp)
+      else
+        call fifth_order_row(n - i + 1, scheme, q(i:n, j, k), &
+                             u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
+                             u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
+                             u(i + e(1):n + e(1), j + e(2), k + e(3)), &
+                             u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face)
+      end if
+    end associate
+  end subroutine face_row
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
   pure function face_value(scheme, q) result(value)

@@ -35,7 +35,6 @@ module pressure_m
     real(wp) :: tolerance = 0.0_wp         !! of the divergence [1/s]
     logical :: rough = .false.             !! the next solve may leave `rough_factor` times that
     integer :: max_passes = 0
-    real(wp), allocatable :: rhs(:, :, :), phi(:, :, :)              !! one halo cell
     real(wp), allocatable :: phi_total(:, :, :)                      !! full halo [Pa]
     integer, allocatable :: known(:, :, :)        !! work of `extend_pressure`
     type(pressure_report_t) :: report             !! of the last solve
@@ -54,10 +53,6 @@ contains
     self%tolerance = numerics%divergence_tolerance
     self%max_passes = numerics%max_pressure_passes
     call pressure_system_init(grid, n_bodies, numerics, self%system)
-    a = grid%lo - 1
-    b = grid%hi + 1
-    allocate (self%rhs(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%phi, source=self%rhs)
     a = grid%first
     b = grid%last
     allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
@@ -90,19 +85,20 @@ contains
     call set_bodies(grid, bodies, self%system)
     allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
     tolerance = 0.5_wp*allowed*grid%volume/dt
-    associate (system => self%system, report => self%report)
+    associate (system => self%system, report => self%report, rhs => self%system%solver%rhs, &
+               work => self%system%solver%work)
       do
         call solid_face_flux(grid, bodies, system%operator%flux, flow%solid_flux, held=.true.)
-        call divergence(grid, solid%free, flow, system%active, self%rhs, report%divergence)
-        if (system%work%singular) report%divergence = uneven(grid, self%rhs, system%work)
+        call divergence(grid, solid%free, flow, system%active, rhs, report%divergence)
+        if (work%singular) report%divergence = uneven(grid, rhs, work)
         report%converged = report%divergence < allowed
         if (report%converged .or. report%passes == self%max_passes) exit
-        call start_from_none(self%phi)
+        call start_from_none(system%solver%x)
         !$omp parallel do schedule(static)
-        do k = lbound(self%rhs, 3), ubound(self%rhs, 3)
-          self%rhs(:, :, k) = -self%rhs(:, :, k)/dt
+        do k = lbound(rhs, 3), ubound(rhs, 3)
+          rhs(:, :, k) = -rhs(:, :, k)/dt
         end do
-        call solve_linear(tolerance, system, self%rhs, self%phi, iterations)
+        call solve_linear(tolerance, system, iterations)
         report%passes = report%passes + 1
         report%iterations = report%iterations + iterations
         call add_correction(grid, rho, dt, bodies, flow, self)
@@ -161,17 +157,16 @@ contains
     type(pressure_t), intent(inout) :: self
     integer :: b, k
 
-    associate (a => grid%lo, z => grid%hi, phi => self%phi, total => self%phi_total)
+    associate (a => grid%lo, z => grid%hi, total => self%phi_total, phi => self%system%solver%x, &
+               op => self%system%operator)
       !$omp parallel do schedule(static)
       do k = grid%lo(3), grid%hi(3)
         total(a(1):z(1), a(2):z(2), k) = total(a(1):z(1), a(2):z(2), k) &
                                          + phi(a(1):z(1), a(2):z(2), k)
       end do
-    end associate
-    call halo_exchange(self%phi, 1)
-    call push_faces(grid, dt, rho, self%phi, flow%sides, flow%uf)
-    associate (op => self%system%operator)
-      call force_from_cells(bodies, op%flux, self%phi, grid%lo - 1, op%push)
+      call halo_exchange(phi, 1)
+      call push_faces(grid, dt, rho, phi, flow%sides, flow%uf)
+      call force_from_cells(bodies, op%flux, phi, grid%lo - 1, op%push)
       call motion_of_force(bodies, op%push)
       do b = 1, bodies%n
         if (bodies%free(b)) bodies%motion(:, b) = bodies%motion(:, b) + dt*op%push(:, b)

@@ -19,8 +19,8 @@ module pressure_system_m
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   use exact_sum_m, only: exact_dot
   use solve_control_m, only: solve_control_t, solve_report_t
-  use krylov_m, only: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
-  use multigrid_m, only: multigrid_t
+  use krylov_m, only: take_all_cells, find_null_space, conjugate_gradient, bicgstab
+  use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -47,12 +47,11 @@ module pressure_system_m
 
   type :: pressure_system_t
     type(pressure_operator_t) :: operator
-    type(multigrid_t) :: multigrid
+    type(elliptic_solver_t), allocatable :: solver   !! lent to the transport while it runs
     type(jacobi_t) :: jacobi
     type(identity_t) :: identity
-    type(krylov_work_t) :: work
     logical, allocatable :: active(:, :, :)   !! the cell has an open face
-    character(name_length) :: solver = 'cg', preconditioner = 'multigrid'   !! by their names
+    character(name_length) :: method = 'cg', preconditioner = 'multigrid'   !! by their names
   end type pressure_system_t
 
 contains
@@ -65,7 +64,7 @@ contains
     type(pressure_system_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    self%solver = numerics%pressure_solver
+    self%method = numerics%pressure_solver
     self%preconditioner = numerics%preconditioner
     a = grid%lo - 1
     b = grid%hi + 1
@@ -78,8 +77,8 @@ contains
     call rigid_flux_init(grid, n_bodies, self%operator%flux)
     self%operator%lo = grid%lo
     self%operator%hi = grid%hi
-    call self%multigrid%init(grid)
-    call krylov_init(grid, self%work)
+    allocate (self%solver)
+    call elliptic_solver_init(grid, self%solver)
   end subroutine pressure_system_init
 
   !> Coefficients of the system for the open shares and densities at hand, and of its
@@ -116,9 +115,10 @@ contains
       end do
     end do
     call mark_active(grid, self%operator%cf, self%active)
-    call find_null_space(grid, self%operator%cf, self%work)
+    call take_all_cells(self%solver%work)
+    call find_null_space(grid, self%operator%cf, self%solver%work)
     select case (trim(self%preconditioner))
-    case ('multigrid'); call self%multigrid%setup(self%operator%cf)
+    case ('multigrid'); call self%solver%multigrid%setup(self%operator%cf)
     case ('jacobi'); call self%jacobi%setup(grid, self%operator%cf)
     case default   ! 'none' needs nothing
     end select
@@ -177,15 +177,15 @@ contains
     type(pressure_system_t), intent(inout) :: self
     real(wp), parameter :: rounding = 1.0e-9_wp   !! [area of a face]
 
-    associate (op => self%operator)
+    associate (op => self%operator, work => self%solver%work)
       op%bodies = bodies
       op%pressed = .false.
-      if (.not. (self%work%singular .and. any(op%bodies%free))) return
-      call force_from_cells(op%bodies, op%flux, self%work%is_open, op%lo - 1, op%swallowed)
+      if (.not. (work%singular .and. any(op%bodies%free))) return
+      call force_from_cells(op%bodies, op%flux, work%is_open, op%lo - 1, op%swallowed)
       op%pressed = any(abs(op%swallowed(1:3, :)) > rounding*minval(grid%area))
       if (.not. op%pressed) return
-      op%swallowed = op%swallowed/self%work%n_open
-      op%is_open = self%work%is_open
+      op%swallowed = op%swallowed/work%n_open
+      op%is_open = work%is_open
     end associate
   end subroutine set_bodies
 
@@ -240,15 +240,14 @@ contains
     end do
   end subroutine motion_of_force
 
-  !> One linear solve for phi with the chosen method.
-  subroutine solve_linear(tolerance, self, rhs, phi, iterations)
+  !> One linear solve with the chosen method: phi in `self%solver%x` for what stands in its `rhs`.
+  subroutine solve_linear(tolerance, self, iterations)
     real(wp), intent(in) :: tolerance   !! of the residual [m3/s2]
     type(pressure_system_t), intent(inout) :: self
-    real(wp), intent(inout), dimension(:, :, :), contiguous :: rhs, phi   !! one halo cell
     integer, intent(out) :: iterations
 
     select case (trim(self%preconditioner))
-    case ('multigrid'); call solve_with(self%multigrid)
+    case ('multigrid'); call solve_with(self%solver%multigrid)
     case ('jacobi'); call solve_with(self%jacobi)
     case default; call solve_with(self%identity)
     end select
@@ -260,11 +259,14 @@ contains
 
       control%tolerance = tolerance
       control%max_iterations = max_iterations
-      if (trim(self%solver) == 'bicgstab') then
-        call bicgstab(self%operator, preconditioner, rhs, phi, control, report, self%work)
-      else
-        call conjugate_gradient(self%operator, preconditioner, rhs, phi, control, report, self%work)
-      end if
+      associate (s => self%solver)
+        if (trim(self%method) == 'bicgstab') then
+          call bicgstab(self%operator, preconditioner, s%rhs, s%x, control, report, s%work)
+        else
+          call conjugate_gradient(self%operator, preconditioner, s%rhs, s%x, control, report, &
+                                  s%work)
+        end if
+      end associate
       iterations = report%iterations
     end subroutine solve_with
   end subroutine solve_linear

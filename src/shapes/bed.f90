@@ -13,8 +13,9 @@ module bed_m
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_t, bins_build
-  use surface_features_m, only: surface_t, surface_init, found_t, gather_edges, gather_facets, &
-    nearest_on_surface, pair_edges, nowhere
+  use surface_features_m, only: surface_init, pair_edges
+  use surface_search_m, only: surface_t, found_t, gather_edges, gather_facets, &
+    nearest_on_surface, nowhere
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
   private

@@ -12,7 +12,8 @@ module krylov_m
   use linear_operator_m, only: linear_operator_t, preconditioner_t
   implicit none
   private
-  public :: krylov_work_t, krylov_init, find_null_space, conjugate_gradient, bicgstab
+  public :: krylov_work_t, krylov_init, take_all_cells, find_null_space
+  public :: conjugate_gradient, bicgstab
 
   integer, parameter :: worth_threads = 8192   !! fewer cells are the work of one thread
 
@@ -46,9 +47,16 @@ contains
     allocate (work%p, source=work%r)
     allocate (work%q, source=work%r)
     allocate (work%line(2, size(work%r, 2), size(work%r, 3)))
+    call take_all_cells(work)
+  end subroutine krylov_init
+
+  !> All cells take part.
+  subroutine take_all_cells(work)
+    type(krylov_work_t), intent(inout) :: work
+
     work%line(1, :, :) = 2
     work%line(2, :, :) = size(work%r, 1) - 1
-  end subroutine krylov_init
+  end subroutine take_all_cells
 
   !> Find out whether constants are in the null space: no side of the domain with p given.
   !!

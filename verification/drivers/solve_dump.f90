@@ -42,7 +42,7 @@ program solve_dump
   do repeat = 1, nint(number(3))
     call cpu_time(cpu(1))
     at_start = wall_clock()
-    call system%multigrid%setup(system%operator%cf)
+    call system%solver%multigrid%setup(system%operator%cf)
     after_setup = wall_clock()
     call solve()
     least(2) = min(least(2), wall_clock() - after_setup)
@@ -58,17 +58,17 @@ contains
   !> So many iterations from nothing.
   subroutine solve()
     x = 0.0_wp
-    call conjugate_gradient(system%operator, system%multigrid, b, x, &
-      solve_control_t(max_iterations=iterations), report, system%work)
+    call conjugate_gradient(system%operator, system%solver%multigrid, b, x, &
+      solve_control_t(max_iterations=iterations), report, system%solver%work)
   end subroutine solve
 
   !> |b - A x|/|b|.
   function residual_share() result(share)
     real(wp) :: share
 
-    call system%operator%apply(x, system%work%q)
-    system%work%q = b - system%work%q
-    share = sqrt(exact_dot(system%work%q, system%work%q, 1)/exact_dot(b, b, 1))
+    call system%operator%apply(x, system%solver%work%q)
+    system%solver%work%q = b - system%solver%work%q
+    share = sqrt(exact_dot(system%solver%work%q, system%solver%work%q, 1)/exact_dot(b, b, 1))
   end function residual_share
 
   !> Grid, coefficients and right side of a file, times the volume of a cell.
@@ -104,8 +104,8 @@ contains
     read (unit) part
     b(1:n(1), 1:n(2), 1:n(3)) = grid%volume*part
     close (unit)
-    call find_null_space(grid, system%operator%cf, system%work)
-    call system%multigrid%setup(system%operator%cf)
+    call find_null_space(grid, system%operator%cf, system%solver%work)
+    call system%solver%multigrid%setup(system%operator%cf)
   end subroutine read_system
 
   function argument(m) result(word)

@@ -15,7 +15,7 @@ program test_bed
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t, blocks_init, release_body
   use random_counter_m, only: uniform, random_rotation
-  use surface_features_m, only: found_t, nowhere
+  use surface_search_m, only: found_t, nowhere
   use walls_m, only: walls_t, walls_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, room_for, max_overlap
   use touches_m, only: touches_t

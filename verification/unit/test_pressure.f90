@@ -230,9 +230,9 @@ contains
       swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
     end associate
-    call divergence(box%grid, box%solid%free, box%flow, pressure%system%active, pressure%rhs, &
-                    force(1, 1))
-    associate (net => pressure%rhs(1:12, 1:8, 1:12)/box%grid%volume)
+    call divergence(box%grid, box%solid%free, box%flow, pressure%system%active, &
+                    pressure%system%solver%rhs, force(1, 1))
+    associate (net => pressure%system%solver%rhs(1:12, 1:8, 1:12)/box%grid%volume)
       call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
                  pressure%system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
     end associate
@@ -307,12 +307,14 @@ contains
     call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
     call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
     box%flow%solid_flux = 0.0_wp
-    call divergence(box%grid, 0.0_wp*box%solid%free + 1.0_wp, box%flow, &
-                    pressure%system%active, pressure%rhs, largest)
-    call check('divergence: largest', largest, maxval(abs(pressure%rhs(1:12, 1:8, 1:12))) &
-               /box%grid%volume, 1.0e-12_wp)
-    call check('divergence: wall cell', pressure%rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
-               + 1.5_wp*short), 1.0e-16_wp)
+    associate (rhs => pressure%system%solver%rhs)
+      call divergence(box%grid, 0.0_wp*box%solid%free + 1.0_wp, box%flow, &
+                      pressure%system%active, rhs, largest)
+      call check('divergence: largest', largest, maxval(abs(rhs(1:12, 1:8, 1:12))) &
+                 /box%grid%volume, 1.0e-12_wp)
+      call check('divergence: wall cell', rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
+                 + 1.5_wp*short), 1.0e-16_wp)
+    end associate
   end subroutine accelerations_at_faces
 
   !> Cells that cannot move take the pressure of their height; under a closed floor, from above.

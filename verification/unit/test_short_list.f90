@@ -2,7 +2,7 @@
 program test_short_list
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
-  use surface_features_m, only: surface_t, nearest_on_surface
+  use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: crossing_t, cross_edges
   use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
   use near_features_m, only: near_features_t, search_t, list_features, edge_in_view

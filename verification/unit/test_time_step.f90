@@ -128,7 +128,7 @@ contains
                  + maxval(abs(sim%flow%u(1:12, 1:8, 1:12, 2:3))), 0.0_wp, 1.0e-8_wp)
     end do
     call check('current: as much out as in', abs(sim%flow%liquid_inflow) <= 1.0e-12_wp)
-    call check('current: what enters', -sum(sim%transport%liquid%volumes%g(13, 1:8, 1:12, 1)), &
+    call check('current: what enters', sum(sim%transport%liquid%side(8*12 + 1:2*8*12)), &
                speed*sim%clock%dt*0.08_wp*0.0613_wp, 1.0e-15_wp)
   end subroutine uniform_current
 

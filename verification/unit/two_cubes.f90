@@ -7,7 +7,8 @@ module two_cubes_m
   use vectors_m, only: rotation_matrix, quaternion_exp, quaternion_product
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use surface_features_m, only: surface_t, surface_init
+  use surface_features_m, only: surface_init
+  use surface_search_m, only: surface_t
   use meeting_m, only: poses_t, meeting_t, know_views
   implicit none
   private
