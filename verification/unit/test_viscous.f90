@@ -42,6 +42,7 @@ program test_viscous
           - heights(n)))))
     end do
     call check('converged', viscous%converged)
+    call check('a direction where sweeps would be hundreds', viscous%iterations <= 10)   ! 8
     call check('linear profile above a wall inside a cell', worst, 0.0_wp, 1.0e-7_wp)
     call check('shear force on the wall', viscous%force(1, 1), -mu*speed/(depth - heights(n)), &
                1.0e-7_wp*mu*speed)
