@@ -4,13 +4,13 @@
 !! The force on a body is the sum over its wall legs (`viscous_legs_m`), so the stage conserves
 !! momentum. Departure from the paper: its overlay gives a drag that depends on the time step.
 !!
-!! Solved by Jacobi sweeps as long as each leaves a tenth at most, as where a step moves momentum by
-!! much less than a cell; from there on by conjugate gradients.
+!! Solved by Chebyshev iteration, where a sweep is one pass over the grid without a scalar product,
+!! unless a step is so long that this takes too many: then by conjugate gradients.
 module viscous_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use viscous_system_m, only: viscous_t, wall_legs_t, wrench
   use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms, &
     terms_at_once
@@ -21,7 +21,8 @@ module viscous_m
   public :: apply_viscous, force_of_legs, velocity_scale, inertial_momentum   ! for C-ISMAC
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
-  real(wp), parameter :: quick = 0.1_wp             !! of what is left after a sweep
+  real(wp), parameter :: most_sweeps = 100.0_wp     !! of Chebyshev; CG may be quicker then
+  real(wp), parameter :: smallest_spread = 1.0e-6_wp
   integer, parameter :: max_iterations = 500
   integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
 
@@ -36,71 +37,120 @@ contains
     type(rigid_motion_t), intent(inout) :: bodies
     type(flow_t), intent(inout) :: flow
     type(viscous_t), intent(inout) :: self
-    real(wp), dimension(6, bodies%n) :: r_body, z_body, s_body, y_body, start
-    real(wp) :: rz, rz_before, alpha, beta, scale
-    real(wp) :: worst, worst_before   !! velocity change that one Jacobi sweep would make [m/s]
-    logical :: sweeps                 !! it does so well that there is no need of a direction
+    real(wp), dimension(6, bodies%n) :: r_body, y_body
+    real(wp) :: inverse(6, 6, bodies%n)   ! of the blocks of the bodies
+    real(wp) :: bound, worst   ! largest change by a Jacobi step that is allowed, and is left [m/s]
     integer :: b
 
-    start = bodies%motion
-    s_body = bodies%motion
-    call velocity_scale(grid, flow%u, bodies, scale)
+    call velocity_scale(grid, flow%u, bodies, bound)
+    bound = tolerance*bound
     call first_guess(grid, self%mass, flow%u, self%s, self%r)
-    call apply_viscous(grid, bodies, self, s_body, y_body)
+    call apply_viscous(grid, bodies, self, bodies%motion, y_body)
     call add_side_pull(self)
-    do b = 1, bodies%n
-      r_body(:, b) = inertial_momentum(bodies, b, self%dt, start(:, b))
-    end do
     call improve(grid, 1.0_wp, self%y, self%r, self%inverse, self%z, worst)
-    r_body = r_body - y_body
-    sweeps = .true.
-    worst_before = huge(worst)
-    rz = 0.0_wp
+    do b = 1, bodies%n
+      r_body(:, b) = inertial_momentum(bodies, b, self%dt, bodies%motion(:, b)) - y_body(:, b)
+      inverse(:, :, b) = 0.0_wp
+      if (bodies%free(b)) inverse(:, :, b) = inverse_of(bodies%apparent(:, :, b)/self%dt &
+                                                        + self%body_matrix(:, :, b))
+    end do
     self%iterations = 0
+    call chebyshev(grid, inverse, bound, worst, r_body, bodies, flow%u, self)
+    if (.not. self%converged) call conjugate_gradients(grid, inverse, bound, r_body, bodies, &
+                                                       flow%u, self)
+    call force_of_legs(bodies, flow, self)
+  end subroutine solve_viscous
+
+  !> Chebyshev iteration on the system over its diagonal, whose eigenvalues lie between 1 - s and
+  !! 1 + s with s the largest sum of the legs to other cells over the diagonal. It is left to
+  !! conjugate gradients what that makes too slow.
+  !!
+  !! Source: Saad (2003), Iterative methods for sparse linear systems, algorithm 12.1. The lower
+  !! bound takes bodies for held; if they are not, it converges too, perhaps more slowly.
+  subroutine chebyshev(grid, inverse, bound, worst, r_body, bodies, u, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: inverse(:, :, :)   !! (6, 6, bodies) of their blocks
+    real(wp), intent(in) :: bound              !! of the largest change by a Jacobi step [m/s]
+    real(wp), intent(inout) :: worst           !! that change; it stands in `self%z` [m/s]
+    real(wp), intent(inout) :: r_body(:, :)    !! (6, bodies) residual
+    type(rigid_motion_t), intent(inout) :: bodies
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(viscous_t), intent(inout) :: self
+    real(wp), dimension(6, bodies%n) :: change, z_body, y_body
+    real(wp) :: s, rate, weight, next, before, fresh
+    integer :: sweeps
+
+    s = max(self%spread, smallest_spread)
+    rate = s/(1.0_wp + sqrt(1.0_wp - min(s, 1.0_wp)**2))
+    weight = s
+    before = 0.0_wp
+    fresh = 1.0_wp
+    sweeps = 0
+    change = 0.0_wp
     do
-      call precondition_bodies()
+      z_body = of_blocks(inverse, r_body)
       worst = max(worst, maxval([0.0_wp, abs(z_body(1:3, :))]))
-      self%converged = worst <= tolerance*scale
-      if (self%converged .or. self%iterations == max_iterations) exit
-      sweeps = sweeps .and. worst < quick*worst_before
-      if (sweeps) then
-        worst_before = worst
-        s_body = z_body
-        alpha = 1.0_wp
-        call sweep(grid, bodies, s_body, flow%u, self, y_body, worst)
-      else
-        rz_before = rz
-        rz = dot(self%r, self%z) + sum_bodies(r_body, z_body)
-        beta = 0.0_wp
-        if (rz_before > 0.0_wp) beta = rz/rz_before
-        call new_direction(grid, beta, self%z, self%s)
-        s_body = z_body + beta*s_body
-        call apply_viscous(grid, bodies, self, s_body, y_body)
-        alpha = rz/(dot(self%s, self%y) + sum_bodies(s_body, y_body))
-        call improve(grid, -alpha, self%s, flow%u)
-        call improve(grid, alpha, self%y, self%r, self%inverse, self%z, worst)
-      end if
+      self%converged = worst <= bound
+      if (self%converged) exit
+      if (self%iterations == 0) sweeps = sweeps_to(bound/worst)
+      if (self%iterations >= sweeps) exit
+      change = before*change + fresh*z_body
+      next = 1.0_wp/(2.0_wp/s - weight)
+      before = next*weight
+      fresh = 2.0_wp*next/s
+      weight = next
+      call sweep(grid, change, before, fresh, u, self, worst)
+      call apply_to_bodies(bodies, self, change, y_body)
+      bodies%motion = bodies%motion + change
+      r_body = r_body - y_body
+      self%iterations = self%iterations + 1
+    end do
+  contains
+    !> Sweeps that should reach a share of the error, and some more; none if they are too many.
+    pure integer function sweeps_to(share)
+      real(wp), intent(in) :: share
+      real(wp) :: n
+
+      n = most_sweeps + 1.0_wp
+      if (rate < 1.0_wp) n = min(n, log(0.5_wp*share)/log(rate))
+      sweeps_to = merge(0, ceiling(1.25_wp*n) + 3, n > most_sweeps)
+    end function sweeps_to
+  end subroutine chebyshev
+
+  !> Conjugate gradients on the system over its diagonal, from where it is.
+  subroutine conjugate_gradients(grid, inverse, bound, r_body, bodies, u, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: inverse(:, :, :)   !! (6, 6, bodies) of their blocks
+    real(wp), intent(in) :: bound              !! of the largest change by a Jacobi step [m/s]
+    real(wp), intent(inout) :: r_body(:, :)    !! (6, bodies) residual
+    type(rigid_motion_t), intent(inout) :: bodies
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(viscous_t), intent(inout) :: self
+    real(wp), dimension(6, bodies%n) :: s_body, z_body, y_body
+    real(wp) :: rz, rz_before, alpha, beta, worst
+
+    call improve(grid, 0.0_wp, self%y, self%r, self%inverse, self%z, worst)
+    s_body = 0.0_wp
+    rz = 0.0_wp
+    do
+      z_body = of_blocks(inverse, r_body)
+      self%converged = max(worst, maxval([0.0_wp, abs(z_body(1:3, :))])) <= bound
+      if (self%converged .or. self%iterations >= max_iterations) exit
+      rz_before = rz
+      rz = dot(self%r, self%z) + sum(r_body*z_body)
+      beta = 0.0_wp
+      if (rz_before > 0.0_wp) beta = rz/rz_before
+      call new_direction(grid, beta, self%z, self%s)
+      s_body = z_body + beta*s_body
+      call apply_viscous(grid, bodies, self, s_body, y_body)
+      alpha = rz/(dot(self%s, self%y) + sum(s_body*y_body))
+      call improve(grid, -alpha, self%s, u)
+      call improve(grid, alpha, self%y, self%r, self%inverse, self%z, worst)
       bodies%motion = bodies%motion + alpha*s_body
       r_body = r_body - alpha*y_body
       self%iterations = self%iterations + 1
     end do
-    call force_of_legs(bodies, flow, self)
   contains
-    !> Residual of the bodies over their translational or rotational inertia.
-    subroutine precondition_bodies()
-      integer :: b, c
-
-      z_body = 0.0_wp
-      do b = 1, bodies%n
-        if (.not. bodies%free(b)) cycle
-        associate (m => self%body_matrix(:, :, b))
-          do c = 1, 6
-            z_body(c, b) = r_body(c, b)/(bodies%apparent(c, c, b)/self%dt + m(c, c))
-          end do
-        end associate
-      end do
-    end subroutine precondition_bodies
-
     !> Scalar product over the cells of all processes.
     function dot(a, b) result(total)
       real(wp), intent(in), contiguous :: a(:, :, :, :), b(:, :, :, :)
@@ -112,19 +162,18 @@ contains
         total = total + exact_dot(a(:, :, :, c), b(:, :, :, c), n_halo)
       end do
     end function dot
+  end subroutine conjugate_gradients
 
-    !> Scalar product over the free bodies.
-    pure function sum_bodies(a, b) result(total)
-      real(wp), intent(in) :: a(:, :), b(:, :)
-      real(wp) :: total
-      integer :: n
+  !> Residual of the bodies over their blocks; none of held ones.
+  pure function of_blocks(inverse, r_body) result(z_body)
+    real(wp), intent(in) :: inverse(:, :, :), r_body(:, :)
+    real(wp) :: z_body(size(r_body, 1), size(r_body, 2))
+    integer :: b
 
-      total = 0.0_wp
-      do n = 1, size(a, 2)
-        if (bodies%free(n)) total = total + dot_product(a(:, n), b(:, n))
-      end do
-    end function sum_bodies
-  end subroutine solve_viscous
+    do b = 1, size(r_body, 2)
+      z_body(:, b) = matmul(inverse(:, :, b), r_body(:, b))
+    end do
+  end function of_blocks
 
   !> The velocity at hand as the guess s, with its momentum over dt, r; none where the velocity is
   !! the wall's (`impose_rigid_velocity` sets it).
@@ -249,39 +298,41 @@ contains
     end do
   end subroutine new_direction
 
-  !> A Jacobi sweep: the velocity gets the change z, and the residual r follows, with its z.
-  subroutine sweep(grid, bodies, change, u, self, y_body, largest)
+  !> The velocity gets the change z, and the residual r follows; the next change z is the one just
+  !! made and that of a Jacobi step, each with its factor.
+  subroutine sweep(grid, of_bodies, before, fresh, u, self, largest)
     type(grid_t), intent(in) :: grid
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: change(:, :)    !! (6, bodies) of their motion
+    real(wp), intent(in) :: of_bodies(:, :)   !! (6, bodies) change of their motion
+    real(wp), intent(in) :: before, fresh     !! factors of the next change
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    type(viscous_t), intent(inout) :: self
-    real(wp), intent(out) :: y_body(:, :)   !! what the residual of the bodies loses
-    real(wp), intent(out) :: largest        !! |z| [m/s]
-    integer :: j, k, c
-    real(wp) :: row(grid%lo(1):grid%hi(1)), most(1)
+    type(viscous_t), intent(inout) :: self    !! the change just made stands in s on return
+    real(wp), intent(out) :: largest          !! that a Jacobi step would change [m/s]
+    integer :: i, j, k, c
+    real(wp) :: row(grid%lo(1):grid%hi(1)), step, most, of_all(1)
 
     call swap(self%z, self%s)
     call halo_exchange(self%s, n_halo, layers=1)
-    call add_walls(self%walls, change, 1.0_wp, lbound(self%r), self%r)
+    call add_walls(self%walls, of_bodies, 1.0_wp, lbound(self%r), self%r)
     most = 0.0_wp
-    associate (a => grid%lo(1), z => grid%hi(1))
-      !$omp parallel do collapse(2) private(j, row) reduction(max: most) schedule(static)
+    !$omp parallel do private(i, j, c, row, step) reduction(max: most) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
       do c = 1, 3
-        do k = grid%lo(3), grid%hi(3)
-          do j = grid%lo(2), grid%hi(2)
-            call apply_row(grid, self%diagonal, self%leg, self%s, j, k, c, row)
-            u(a:z, j, k, c) = u(a:z, j, k, c) + self%s(a:z, j, k, c)
-            self%r(a:z, j, k, c) = self%r(a:z, j, k, c) - row
-            self%z(a:z, j, k, c) = self%r(a:z, j, k, c)*self%inverse(a:z, j, k, c)
-            most(1) = max(most(1), maxval(abs(self%z(a:z, j, k, c))))
+        do j = grid%lo(2), grid%hi(2)
+          call apply_row(grid, self%diagonal, self%leg, self%s, j, k, c, row)
+          !$omp simd private(step) reduction(max: most)
+          do i = grid%lo(1), grid%hi(1)
+            u(i, j, k, c) = u(i, j, k, c) + self%s(i, j, k, c)
+            self%r(i, j, k, c) = self%r(i, j, k, c) - row(i)
+            step = self%r(i, j, k, c)*self%inverse(i, j, k, c)
+            self%z(i, j, k, c) = before*self%s(i, j, k, c) + fresh*step
+            most = max(most, abs(step))
           end do
         end do
       end do
-    end associate
-    call global_max(most)
-    largest = most(1)
-    call apply_to_bodies(bodies, self, change, y_body)
+    end do
+    of_all = most
+    call global_max(of_all)
+    largest = of_all(1)
   contains
     !> Exchange two arrays without copying.
     pure subroutine swap(a, b)

@@ -16,6 +16,7 @@ module viscous_legs_m
   use film_legs_m, only: film_legs
   use linked_cells_m, only: linked_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
+  use parallel_m, only: global_max
   implicit none
   private
   public :: build_viscous
@@ -55,33 +56,39 @@ contains
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
-    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%inverse)
+    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%inverse, self%spread)
   end subroutine build_viscous
 
   !> The ordinary legs and the masses into the diagonal, and its inverse; zero where there is no
-  !! unknown.
-  subroutine finish_diagonal(grid, leg, mass, diagonal, inverse)
+  !! unknown. `spread` is the largest share of the legs.
+  subroutine finish_diagonal(grid, leg, mass, diagonal, inverse, spread)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: diagonal, inverse
+    real(wp), intent(out) :: spread
     integer :: i, j, k, c
+    real(wp) :: legs, most(1)
 
-    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    most = 0.0_wp
+    !$omp parallel do collapse(2) private(i, j, legs) reduction(max: most) schedule(static)
     do c = 1, 3
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k) &
-              + leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
-              + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
+            legs = leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
+                   + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
+            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k) + legs
             inverse(i, j, k, c) = merge(1.0_wp/max(diagonal(i, j, k, c), tiny(1.0_wp)), 0.0_wp, &
                                         mass(i, j, k) > 0.0_wp)
+            most(1) = max(most(1), legs*inverse(i, j, k, c))
           end do
         end do
       end do
     end do
+    call global_max(most)
+    spread = most(1)
   end subroutine finish_diagonal
 
   !> Mass over dt of each cell with its centre in the fluid; none of the others.
@@ -148,7 +155,7 @@ contains
   end subroutine masses_of_groups
 
   !> Ordinary legs in direction d, between neighbours with their centres in the fluid and nothing
-  !! between them.
+  !! between them; none where a cell would be its own neighbour.
   subroutine ordinary_legs(grid, solid, mu, d, leg)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -162,6 +169,7 @@ contains
     e = unit_step(:, d)
     upper = grid%hi + e
     conductance = grid%area(d)/grid%h(d)
+    if (grid%n(d) == 1) conductance = 0.0_wp
     !$omp parallel do private(i, j, ordinary) schedule(static)
     do k = grid%lo(3), upper(3)
       do j = grid%lo(2), upper(2)

@@ -47,6 +47,8 @@ module viscous_system_m
       !! conductance of the leg across the lower face [kg/s]
     real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
     real(wp), allocatable :: inverse(:, :, :, :)    !! of the diagonal, 0: not an unknown [s/kg]
+    real(wp) :: spread = 1.0_wp
+      !! largest share of the diagonal that legs to other cells have, of all processes [-]
     type(wall_legs_t) :: walls
     type(side_legs_t) :: sides
     type(film_walls_t) :: films

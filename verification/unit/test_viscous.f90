@@ -61,6 +61,21 @@ program test_viscous
   call check('the body slows by the force it feels', wall%mass(1)*(wall%motion(1, 1) - speed), &
              5.0_wp*viscous%force(1, 1), 1.0e-7_wp*momentum(1))
 
+  ! A step that moves momentum by a cell or so: as few sweeps as the bound of Chebyshev promises.
+  call make_wall(heights(2))
+  wall%free = .true.
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 1.0e4_wp, viscous)
+  call solve_viscous(grid, wall, flow, viscous)
+  call check('legs to other cells beside the rest', viscous%spread > 0.5_wp &
+             .and. viscous%spread < 0.95_wp)
+  call check('sweeps as the bound promises', viscous%iterations > 10 .and. viscous%iterations &
+             <= log(0.5e-9_wp)/log(viscous%spread/(1.0_wp + sqrt(1.0_wp - viscous%spread**2))))
+  call make_wall(heights(2))
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 1.0e7_wp, viscous)
+  call solve_viscous(grid, wall, flow, viscous)
+  call check('a thousand sweeps are left to conjugate gradients', viscous%spread < 1.0_wp &
+             .and. viscous%iterations <= 10)
+
   ! Fluid at rest around a body that moves and turns.
   wall%x(:, 1) = [0.3_wp, 0.6_wp, -0.2_wp]
   wall%motion(:, 1) = [0.3_wp, -0.2_wp, 0.5_wp, 0.7_wp, -0.4_wp, 0.6_wp]
