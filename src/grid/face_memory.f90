@@ -32,13 +32,22 @@ contains
     real(wp), intent(inout), contiguous :: &
       deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
-    real(wp) :: keep
+    real(wp) :: keep, jump
 
     do d = 1, 3
       e = unit_step(:, d)
-      !$omp parallel do private(i, j, keep) schedule(static)
+      !$omp parallel do private(i, j, keep, jump) schedule(static)
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
+          jump = 0.0_wp
+          !$omp simd reduction(max: jump)
+          do i = grid%lo(1), grid%hi(1) + e(1)
+            jump = max(jump, abs(rho(i, j, k) - rho(i - e(1), j - e(2), k - e(3))))
+          end do
+          if (jump <= 0.0_wp) then
+            deviation(grid%lo(1):grid%hi(1) + e(1), j, k, d) = 0.0_wp
+            cycle
+          end if
           do i = grid%lo(1), grid%hi(1) + e(1)
             associate (il => i - e(1), jl => j - e(2), kl => k - e(3))
               keep = abs(rho(i, j, k) - rho(il, jl, kl))/(rho(i, j, k) + rho(il, jl, kl))

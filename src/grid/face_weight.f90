@@ -33,32 +33,34 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: force(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [N/m3]
-    integer :: i, j, k, d, e(3), f(3)
+    integer :: i, j, k, d, e(3), low(3), high(3)
+    integer :: at   ! from the number of a cell to its place in a line
     real(wp) :: weight
 
+    at = 1 - grid%first(1)
     do d = 1, 3
       weight = 0.5_wp*(fluid%liquid_density - fluid%gas_density)*fluid%gravity(d)
       if (.not. abs(weight) > 0.0_wp) cycle
       e = unit_step(:, d)
-      !$omp parallel do private(i, j, f) schedule(static)
-      do k = grid%lo(3), grid%hi(3) + e(3)
-        do j = grid%lo(2), grid%hi(2) + e(2)
-          do i = grid%lo(1), grid%hi(1) + e(1)
-            f = [i, j, k]
-            if (grid%side_of_face(f(d), d) /= no_side) cycle
-            force(i, j, k, d) = weight*(uneven(f) - uneven(f - e))
-          end do
+      low = grid%lo
+      high = grid%hi + e
+      if (grid%side_of_face(low(d), d) /= no_side) low = low + e
+      if (grid%side_of_face(high(d), d) /= no_side) high = high - e
+      !$omp parallel do private(i, j) schedule(static)
+      do k = low(3), high(3)
+        do j = low(2), high(2)
+          associate (below_2 => c(:, j - 2*e(2), k - 2*e(3)), below => c(:, j - e(2), k - e(3)), &
+                     here => c(:, j, k), above => c(:, j + e(2), k + e(3)))
+            !$omp simd
+            do i = low(1), high(1)
+              force(i, j, k, d) = weight*( &
+                uneven_share(here(at + i), below(at + i - e(1)), above(at + i + e(1))) &
+                - uneven_share(below(at + i - e(1)), below_2(at + i - 2*e(1)), here(at + i)))
+            end do
+          end associate
         end do
       end do
     end do
-  contains
-    !> The same of a cell, along d.
-    pure real(wp) function uneven(at)
-      integer, intent(in) :: at(3)
-
-      uneven = uneven_share(c(at(1), at(2), at(3)), c(at(1) - e(1), at(2) - e(2), at(3) - e(3)), &
-                            c(at(1) + e(1), at(2) + e(2), at(3) + e(3)))
-    end function uneven
   end subroutine weight_at_faces
 
 end module face_weight_m

@@ -30,19 +30,28 @@ contains
       !! [m/s], halo filled
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, n, s, e(3), f(3), c(3)
-    real(wp) :: change, other, total(3)
+    real(wp) :: change, other, total(3), most
+    real(wp) :: excess(grid%lo(1):grid%hi(1))   ! of the change to a neighbour above what counts
 
-    !$omp parallel do private(i, j, d, n, s, e, f, c, change, other, total) schedule(static)
+    !$omp parallel do private(i, j, d, n, s, e, f, c, change, other, total, most, excess) &
+    !$omp schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
+        most = 0.0_wp
+        !$omp simd reduction(max: most)
         do i = grid%lo(1), grid%hi(1)
+          excess(i) = max(abs(mu(i - 1, j, k) - mu(i, j, k)), abs(mu(i + 1, j, k) - mu(i, j, k)), &
+                          abs(mu(i, j - 1, k) - mu(i, j, k)), abs(mu(i, j + 1, k) - mu(i, j, k)), &
+                          abs(mu(i, j, k - 1) - mu(i, j, k)), abs(mu(i, j, k + 1) - mu(i, j, k))) &
+                      - pure_share*mu(i, j, k)
+          most = max(most, excess(i))
+        end do
+        a(grid%lo(1):grid%hi(1), j, k, :) = 0.0_wp
+        if (most <= 0.0_wp) cycle
+        do i = grid%lo(1), grid%hi(1)
+          if (excess(i) <= 0.0_wp) cycle
           c = [i, j, k]
           total = 0.0_wp
-          a(i, j, k, :) = 0.0_wp
-          change = max(abs(mu(i - 1, j, k) - mu(i, j, k)), abs(mu(i + 1, j, k) - mu(i, j, k)), &
-                       abs(mu(i, j - 1, k) - mu(i, j, k)), abs(mu(i, j + 1, k) - mu(i, j, k)), &
-                       abs(mu(i, j, k - 1) - mu(i, j, k)), abs(mu(i, j, k + 1) - mu(i, j, k)))
-          if (change <= pure_share*mu(i, j, k)) cycle
           if (any(alpha(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) > 0.0_wp)) cycle
           do d = 1, 3
             e = unit_step(:, d)

@@ -341,13 +341,18 @@ contains
       contiguous :: rho, mu, deviation
     real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
-    real(wp) :: nu, reach
+    real(wp) :: nu, reach, most
 
     reach = sum(1.0_wp/grid%h**2)
-    !$omp parallel do private(i, j, nu) schedule(static)
+    !$omp parallel do private(i, j, nu, most) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
-        if (.not. any(abs(deviation(grid%lo(1):grid%hi(1) + e(1), j, k)) > 0.0_wp)) cycle
+        most = 0.0_wp
+        !$omp simd reduction(max: most)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          most = max(most, abs(deviation(i, j, k)))
+        end do
+        if (most <= 0.0_wp) cycle
         !$omp simd private(nu)
         do i = grid%lo(1), grid%hi(1) + e(1)
           nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &

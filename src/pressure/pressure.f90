@@ -79,9 +79,11 @@ contains
 
     self%report = pressure_report_t()
     call start_from_none(self%phi_total)
-    do d = 1, 3
-      call start_from_none(flow%solid_flux(:, :, :, d))
-    end do
+    if (bodies%n > 0) then
+      do d = 1, 3
+        call start_from_none(flow%solid_flux(:, :, :, d))
+      end do
+    end if
     call set_bodies(grid, bodies, self%system)
     allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
     tolerance = 0.5_wp*allowed*grid%volume/dt
