@@ -34,10 +34,8 @@ contains
     real(wp), intent(inout), contiguous :: force(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [N/m3]
     integer :: i, j, k, d, e(3), low(3), high(3)
-    integer :: at   ! from the number of a cell to its place in a line
     real(wp) :: weight
 
-    at = 1 - grid%first(1)
     do d = 1, 3
       weight = 0.5_wp*(fluid%liquid_density - fluid%gas_density)*fluid%gravity(d)
       if (.not. abs(weight) > 0.0_wp) cycle
@@ -49,15 +47,14 @@ contains
       !$omp parallel do private(i, j) schedule(static)
       do k = low(3), high(3)
         do j = low(2), high(2)
-          associate (below_2 => c(:, j - 2*e(2), k - 2*e(3)), below => c(:, j - e(2), k - e(3)), &
-                     here => c(:, j, k), above => c(:, j + e(2), k + e(3)))
-            !$omp simd
-            do i = low(1), high(1)
+          !$omp simd
+          do i = low(1), high(1)
+            associate (il => i - e(1), jl => j - e(2), kl => k - e(3))
               force(i, j, k, d) = weight*( &
-                uneven_share(here(at + i), below(at + i - e(1)), above(at + i + e(1))) &
-                - uneven_share(below(at + i - e(1)), below_2(at + i - 2*e(1)), here(at + i)))
-            end do
-          end associate
+                uneven_share(c(i, j, k), c(il, jl, kl), c(i + e(1), j + e(2), k + e(3))) &
+                - uneven_share(c(il, jl, kl), c(il - e(1), jl - e(2), kl - e(3)), c(i, j, k)))
+            end associate
+          end do
         end do
       end do
     end do

@@ -6,6 +6,7 @@
 module liquid_sweep_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
+  use swap_m, only: swap
   use growing_m, only: ensure_room
   use case_types_m, only: absent, is_given
   use grid_m, only: grid_t, n_halo, unit_step
@@ -311,16 +312,6 @@ contains
       share = min(max(share/grid%h(axis), 0.0_wp), 1.0_wp)
     end if
   end function incoming_share
-
-  !> Exchange two arrays without copying.
-  pure subroutine swap(a, b)
-    real(wp), allocatable, intent(inout) :: a(:, :, :), b(:, :, :)
-    real(wp), allocatable :: c(:, :, :)
-
-    call move_alloc(a, c)
-    call move_alloc(b, a)
-    call move_alloc(c, b)
-  end subroutine swap
 
   !> Liquid volumes of the faces, and the new running values; W and Vt go through the same
   !! operations.

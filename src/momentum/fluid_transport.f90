@@ -1,6 +1,7 @@
 !> Liquid and momentum through the faces that the moving bodies leave open, in one step.
 module fluid_transport_m
   use kinds_m, only: wp
+  use swap_m, only: swap
   use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
@@ -67,15 +68,6 @@ contains
       call swap(viscous%s, self%liquid%volumes%g)
       call swap(viscous%y, self%momentum%momentum)
     end if
-  contains
-    pure subroutine swap(a, b)
-      real(wp), allocatable, intent(inout) :: a(:, :, :, :), b(:, :, :, :)
-      real(wp), allocatable :: c(:, :, :, :)
-
-      call move_alloc(a, c)
-      call move_alloc(b, a)
-      call move_alloc(c, b)
-    end subroutine swap
   end subroutine borrow
 
   !> Carry liquid and momentum, direction by direction; new density and viscosity. With C-ISMAC

@@ -8,6 +8,7 @@
 !! unless a step is so long that this takes too many: then by conjugate gradients.
 module viscous_m
   use kinds_m, only: wp, i8
+  use swap_m, only: swap
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
@@ -333,16 +334,6 @@ contains
     of_all = most
     call global_max(of_all)
     largest = of_all(1)
-  contains
-    !> Exchange two arrays without copying.
-    pure subroutine swap(a, b)
-      real(wp), allocatable, intent(inout) :: a(:, :, :, :), b(:, :, :, :)
-      real(wp), allocatable :: c(:, :, :, :)
-
-      call move_alloc(a, c)
-      call move_alloc(b, a)
-      call move_alloc(c, b)
-    end subroutine swap
   end subroutine sweep
 
   !> y := the system applied to velocities s and body motions x_body.
