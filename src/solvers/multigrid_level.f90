@@ -41,7 +41,7 @@ module multigrid_level_m
     real(sp), allocatable :: b(:, :, :, :)    !! scaled right side
     real(sp), allocatable :: s(:, :, :, :)    !! D**(-1/2), zero in closed cells
     real(sp), allocatable :: t(:, :, :, :)    !! D**(1/2), zero in closed cells
-    real(sp), allocatable :: edge(:, :, :, :) !! ends of the lines, for `fill_halo`
+    real(sp), allocatable :: edge(:, :, :)    !! cells at the ends of the lines, for `fill_ends`
   end type level_t
 
 contains
@@ -64,7 +64,7 @@ contains
       allocate (self%s, source=self%x)
       allocate (self%t, source=self%x)
       allocate (self%c(a(1):z(1), 2, a(2):z(2), a(3):z(3), 3), source=0.0_sp)
-      if (self%talks(1)) allocate (self%edge(4, 2, a(2):z(2), a(3):z(3)), source=0.0_sp)
+      if (self%talks(1)) allocate (self%edge(4, a(2):z(2), a(3):z(3)), source=0.0_sp)
     end associate
   end subroutine level_init
 
@@ -461,7 +461,7 @@ contains
     end subroutine exchange
   end subroutine fill_halo
 
-  !> Fill the pairs before and after the lines. With an odd number of cells the cell after the last
+  !> Fill the cells before and after the lines. With an odd number of cells the cell after the last
   !! stands in the last pair.
   subroutine fill_ends(self, x)
     type(level_t), intent(inout) :: self
@@ -471,25 +471,18 @@ contains
     first = self%a(1) + 1
     last = (self%hi(1) + 1)/2
     if (self%in_parts) then
-      self%edge(2, :, :, :) = x(first, :, :, :)
-      self%edge(3, :, :, :) = x(last, :, :, :)
-      call exchange(self%edge, [4, 2*(self%z(2) - self%a(2) + 1), self%z(3) - self%a(3) + 1])
-      x(first - 1, :, :, :) = self%edge(1, :, :, :)
-      x(last + 1, :, :, :) = self%edge(4, :, :, :)
+      self%edge(2, :, :) = x(first, 1, :, :)
+      self%edge(3, :, :) = x(last, 2, :, :)
+      call halo_exchange(self%edge, 1, 1)
+      x(first - 1, 2, :, :) = self%edge(1, :, :)
+      x(last + 1, 1, :, :) = self%edge(4, :, :)
     else if (modulo(self%n(1), 2) == 0) then
-      x(first - 1, :, :, :) = x(last, :, :, :)
-      x(last + 1, :, :, :) = x(first, :, :, :)
+      x(first - 1, 2, :, :) = x(last, 2, :, :)
+      x(last + 1, 1, :, :) = x(first, 1, :, :)
     else
       x(first - 1, 2, :, :) = x(last, 1, :, :)
       x(last, 2, :, :) = x(first, 1, :, :)
     end if
-  contains
-    subroutine exchange(view, extent)
-      integer, intent(in) :: extent(3)
-      real(sp), intent(inout) :: view(extent(1), extent(2), extent(3))
-
-      call halo_exchange(view, 1, 1)
-    end subroutine exchange
   end subroutine fill_ends
 
 end module multigrid_level_m

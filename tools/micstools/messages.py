@@ -289,10 +289,11 @@ def _gathers(size: Ints, cell_bytes: int, calls: int) -> Iterator[Pass]:
 
 
 def _fills(block: Blocks, calls: int) -> Iterator[Pass]:
-    """Layers of a level, direction by direction: pairs of single precision, filled up."""
+    """Layers of a level, direction by direction: ends of lines, or whole lines of pairs, filled
+    up; in single precision."""
     size = block.size + 2
     pairs = (block.last[:, 0] + 1) // 2 - (block.first[:, 0] + 1) // 2 + 1
     line = 2 * (VECTOR * ((pairs + VECTOR - 1) // VECTOR) + 2)
-    lengths = (8 * size[:, 1] * size[:, 2], 4 * line * size[:, 2], 4 * line * size[:, 1])
+    lengths = (4 * size[:, 1] * size[:, 2], 4 * line * size[:, 2], 4 * line * size[:, 1])
     for d, length in enumerate(lengths):
         yield Pass("halo", calls, block.neighbours[:, d], length)
