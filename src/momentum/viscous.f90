@@ -4,11 +4,10 @@
 !! The force on a body is the sum over its wall legs (`viscous_legs_m`), so the stage conserves
 !! momentum. Departure from the paper: its overlay gives a drag that depends on the time step.
 !!
-!! Solved by Chebyshev iteration, where a sweep is one pass over the grid without a scalar product,
-!! unless a step is so long that this takes too many: then by conjugate gradients.
+!! Solved by overrelaxation of two colours of cells, without scalar products, unless a step is so
+!! long that this takes too many sweeps: then by conjugate gradients.
 module viscous_m
   use kinds_m, only: wp, i8
-  use swap_m, only: swap
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
@@ -22,8 +21,8 @@ module viscous_m
   public :: apply_viscous, force_of_legs, velocity_scale, inertial_momentum   ! for C-ISMAC
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
-  real(wp), parameter :: most_sweeps = 100.0_wp     !! of Chebyshev; CG may be quicker then
-  real(wp), parameter :: smallest_spread = 1.0e-6_wp
+  real(wp), parameter :: most_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
+  real(wp), parameter :: smallest_rate = 1.0e-3_wp  !! at which a sweep is taken to converge
   integer, parameter :: max_iterations = 500
   integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
 
@@ -38,99 +37,139 @@ contains
     type(rigid_motion_t), intent(inout) :: bodies
     type(flow_t), intent(inout) :: flow
     type(viscous_t), intent(inout) :: self
-    real(wp), dimension(6, bodies%n) :: r_body, y_body
+    real(wp) :: momentum(6, bodies%n)     ! of the bodies, over dt, before the stage
     real(wp) :: inverse(6, 6, bodies%n)   ! of the blocks of the bodies
-    real(wp) :: bound, worst   ! largest change by a Jacobi step that is allowed, and is left [m/s]
+    real(wp) :: bound   ! of the largest change by a Jacobi step [m/s]
     integer :: b
 
     call velocity_scale(grid, flow%u, bodies, bound)
     bound = tolerance*bound
-    call first_guess(grid, self%mass, flow%u, self%s, self%r)
-    call apply_viscous(grid, bodies, self, bodies%motion, y_body)
+    call right_side(grid, self%mass, flow%u, self%r)
     call add_side_pull(self)
-    call improve(grid, 1.0_wp, self%y, self%r, self%inverse, self%z, worst)
     do b = 1, bodies%n
-      r_body(:, b) = inertial_momentum(bodies, b, self%dt, bodies%motion(:, b)) - y_body(:, b)
+      momentum(:, b) = inertial_momentum(bodies, b, self%dt, bodies%motion(:, b))
       inverse(:, :, b) = 0.0_wp
       if (bodies%free(b)) inverse(:, :, b) = inverse_of(bodies%apparent(:, :, b)/self%dt &
                                                         + self%body_matrix(:, :, b))
     end do
-    self%iterations = 0
-    call chebyshev(grid, inverse, bound, worst, r_body, bodies, flow%u, self)
-    if (.not. self%converged) call conjugate_gradients(grid, inverse, bound, r_body, bodies, &
+    call relaxation(grid, momentum, inverse, bound, bodies, flow%u, self)
+    if (.not. self%converged) call conjugate_gradients(grid, momentum, inverse, bound, bodies, &
                                                        flow%u, self)
     call force_of_legs(bodies, flow, self)
   end subroutine solve_viscous
 
-  !> Chebyshev iteration on the system over its diagonal, whose eigenvalues lie between 1 - s and
-  !! 1 + s with s the largest sum of the legs to other cells over the diagonal. It is left to
-  !! conjugate gradients what that makes too slow.
+  !> Successive overrelaxation: cells whose numbers have an even sum, those of an odd one, bodies.
+  !! The weight goes from one to the best one as those of Chebyshev do. It is left to conjugate
+  !! gradients what that makes too slow.
   !!
-  !! Source: Saad (2003), Iterative methods for sparse linear systems, algorithm 12.1. The lower
-  !! bound takes bodies for held; if they are not, it converges too, perhaps more slowly.
-  subroutine chebyshev(grid, inverse, bound, worst, r_body, bodies, u, self)
+  !! Source: Young (1971), Iterative solution of large linear systems, chapters 6 and 10. The bodies
+  !! are a third colour, which the best weight leaves out of account; any weight below 2 converges.
+  subroutine relaxation(grid, momentum, inverse, bound, bodies, u, self)
     type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: momentum(:, :)     !! (6, bodies) over dt, before the stage
     real(wp), intent(in) :: inverse(:, :, :)   !! (6, 6, bodies) of their blocks
     real(wp), intent(in) :: bound              !! of the largest change by a Jacobi step [m/s]
-    real(wp), intent(inout) :: worst           !! that change; it stands in `self%z` [m/s]
-    real(wp), intent(inout) :: r_body(:, :)    !! (6, bodies) residual
     type(rigid_motion_t), intent(inout) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(inout) :: self
-    real(wp), dimension(6, bodies%n) :: change, z_body, y_body
-    real(wp) :: s, rate, weight, next, before, fresh
-    integer :: sweeps
+    real(wp) :: change(6, bodies%n)
+    real(wp) :: weight, worst
+    integer :: most, colour
 
-    s = max(self%spread, smallest_spread)
-    rate = s/(1.0_wp + sqrt(1.0_wp - min(s, 1.0_wp)**2))
-    weight = s
-    before = 0.0_wp
-    fresh = 1.0_wp
-    sweeps = 0
-    change = 0.0_wp
-    do
-      z_body = of_blocks(inverse, r_body)
-      worst = max(worst, maxval([0.0_wp, abs(z_body(1:3, :))]))
-      self%converged = worst <= bound
-      if (self%converged) exit
-      if (self%iterations == 0) sweeps = sweeps_to(bound/worst)
-      if (self%iterations >= sweeps) exit
-      change = before*change + fresh*z_body
-      next = 1.0_wp/(2.0_wp/s - weight)
-      before = next*weight
-      fresh = 2.0_wp*next/s
-      weight = next
-      call sweep(grid, change, before, fresh, u, self, worst)
-      call apply_to_bodies(bodies, self, change, y_body)
+    self%iterations = 0
+    self%converged = .false.
+    most = sweeps_allowed(grid, self%spread)
+    if (most == 0) return
+    call add_walls(self%walls, bodies%motion, 1.0_wp, lbound(self%r), self%r)
+    weight = 1.0_wp
+    do while (self%iterations < most .and. .not. self%converged)
+      worst = 0.0_wp
+      do colour = 0, 1
+        call relax(grid, colour, weight, u, self, worst)
+        if (self%iterations == 0 .and. colour == 0) weight = 2.0_wp
+        weight = 1.0_wp/(1.0_wp - 0.25_wp*weight*self%spread**2)
+      end do
+      change = of_blocks(inverse, momentum - rows_of_bodies(bodies, self, u, bodies%motion))
+      worst = max(worst, maxval([0.0_wp, abs(change(1:3, :))]))
+      change = weight*change
       bodies%motion = bodies%motion + change
-      r_body = r_body - y_body
+      call add_walls(self%walls, change, 1.0_wp, lbound(self%r), self%r)
       self%iterations = self%iterations + 1
+      self%converged = worst <= bound
     end do
-  contains
-    !> Sweeps that should reach a share of the error, and some more; none if they are too many.
-    pure integer function sweeps_to(share)
-      real(wp), intent(in) :: share
-      real(wp) :: n
+    if (.not. self%converged) call add_walls(self%walls, bodies%motion, -1.0_wp, lbound(self%r), &
+                                             self%r)
+  end subroutine relaxation
 
-      n = most_sweeps + 1.0_wp
-      if (rate < 1.0_wp) n = min(n, log(0.5_wp*share)/log(rate))
-      sweeps_to = merge(0, ceiling(1.25_wp*n) + 3, n > most_sweeps)
-    end function sweeps_to
-  end subroutine chebyshev
+  !> Twice the sweeps that should reach the tolerance; none if they are too many, or if the weight
+  !! would be too large for the first and the last cell of a period of an odd number of cells. These
+  !! are of one colour: a weight w converges as long as 2/w - 1 exceeds the share that their leg has
+  !! in the diagonal, at most the spread s, and the best w = 2/(1 + sqrt(1 - s^2)).
+  pure integer function sweeps_allowed(grid, s)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: s   !! largest share of the legs to other cells in the diagonal
+    real(wp) :: rate
+
+    sweeps_allowed = 0
+    if (s >= 1.0_wp) return
+    if (any(grid%periodic .and. grid%n > 1 .and. modulo(grid%n, 2) == 1) .and. s**2 > 0.5_wp) return
+    rate = max((s/(1.0_wp + sqrt(1.0_wp - s**2)))**2, smallest_rate)
+    if (log(tolerance)/log(rate) > most_sweeps) return
+    sweeps_allowed = 2*ceiling(log(tolerance)/log(rate)) + 3
+  end function sweeps_allowed
+
+  !> Relax the cells of one colour by a weight.
+  subroutine relax(grid, colour, weight, u, self, worst)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: colour
+    real(wp), intent(in) :: weight
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(viscous_t), intent(in) :: self
+    real(wp), intent(inout) :: worst   !! largest change by a weight of one, so far [m/s]
+    integer :: i, j, k, c
+    real(wp) :: change, most, of_all(1)
+
+    call halo_exchange(u, n_halo, layers=1)
+    most = 0.0_wp
+    !$omp parallel do private(i, j, c, change) reduction(max: most) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        do c = 1, 3
+          do i = grid%lo(1) + modulo(grid%lo(1) + j + k + colour, 2), grid%hi(1), 2
+            associate (l => self%leg)
+              change = (self%r(i, j, k, c) &
+                        + l(i, j, k, 1)*u(i - 1, j, k, c) + l(i + 1, j, k, 1)*u(i + 1, j, k, c) &
+                        + l(i, j, k, 2)*u(i, j - 1, k, c) + l(i, j + 1, k, 2)*u(i, j + 1, k, c) &
+                        + l(i, j, k, 3)*u(i, j, k - 1, c) + l(i, j, k + 1, 3)*u(i, j, k + 1, c)) &
+                       *self%inverse(i, j, k, c) - u(i, j, k, c)
+            end associate
+            u(i, j, k, c) = u(i, j, k, c) + weight*change
+            most = max(most, abs(change))
+          end do
+        end do
+      end do
+    end do
+    of_all = most
+    call global_max(of_all)
+    worst = max(worst, of_all(1))
+  end subroutine relax
 
   !> Conjugate gradients on the system over its diagonal, from where it is.
-  subroutine conjugate_gradients(grid, inverse, bound, r_body, bodies, u, self)
+  subroutine conjugate_gradients(grid, momentum, inverse, bound, bodies, u, self)
     type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: momentum(:, :)     !! (6, bodies) over dt, before the stage
     real(wp), intent(in) :: inverse(:, :, :)   !! (6, 6, bodies) of their blocks
     real(wp), intent(in) :: bound              !! of the largest change by a Jacobi step [m/s]
-    real(wp), intent(inout) :: r_body(:, :)    !! (6, bodies) residual
     type(rigid_motion_t), intent(inout) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(inout) :: self
-    real(wp), dimension(6, bodies%n) :: s_body, z_body, y_body
+    real(wp), dimension(6, bodies%n) :: r_body, s_body, z_body, y_body
     real(wp) :: rz, rz_before, alpha, beta, worst
 
-    call improve(grid, 0.0_wp, self%y, self%r, self%inverse, self%z, worst)
+    call new_direction(grid, 0.0_wp, u, self%s)
+    call apply_viscous(grid, bodies, self, bodies%motion, y_body)
+    r_body = momentum - y_body
+    call improve(grid, 1.0_wp, self%y, self%r, self%inverse, self%z, worst)
     s_body = 0.0_wp
     rz = 0.0_wp
     do
@@ -176,13 +215,13 @@ contains
     end do
   end function of_blocks
 
-  !> The velocity at hand as the guess s, with its momentum over dt, r; none where the velocity is
-  !! the wall's (`impose_rigid_velocity` sets it).
-  subroutine first_guess(grid, mass, u, s, r)
+  !> Momentum over dt of the velocity at hand, which is none where it is the wall's
+  !! (`impose_rigid_velocity` sets it).
+  subroutine right_side(grid, mass, u, r)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: u, s, r
+      contiguous :: u, r
     integer :: i, j, k, c
 
     !$omp parallel do collapse(2) private(i, j) schedule(static)
@@ -191,13 +230,12 @@ contains
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
             u(i, j, k, c) = merge(u(i, j, k, c), 0.0_wp, mass(i, j, k) > 0.0_wp)
-            s(i, j, k, c) = u(i, j, k, c)
             r(i, j, k, c) = mass(i, j, k)*u(i, j, k, c)
           end do
         end do
       end do
     end do
-  end subroutine first_guess
+  end subroutine right_side
 
   !> What the moving sides pull goes to the right side.
   pure subroutine add_side_pull(self)
@@ -299,43 +337,6 @@ contains
     end do
   end subroutine new_direction
 
-  !> The velocity gets the change z, and the residual r follows; the next change z is the one just
-  !! made and that of a Jacobi step, each with its factor.
-  subroutine sweep(grid, of_bodies, before, fresh, u, self, largest)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: of_bodies(:, :)   !! (6, bodies) change of their motion
-    real(wp), intent(in) :: before, fresh     !! factors of the next change
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    type(viscous_t), intent(inout) :: self    !! the change just made stands in s on return
-    real(wp), intent(out) :: largest          !! that a Jacobi step would change [m/s]
-    integer :: i, j, k, c
-    real(wp) :: row(grid%lo(1):grid%hi(1)), step, most, of_all(1)
-
-    call swap(self%z, self%s)
-    call halo_exchange(self%s, n_halo, layers=1)
-    call add_walls(self%walls, of_bodies, 1.0_wp, lbound(self%r), self%r)
-    most = 0.0_wp
-    !$omp parallel do private(i, j, c, row, step) reduction(max: most) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do c = 1, 3
-        do j = grid%lo(2), grid%hi(2)
-          call apply_row(grid, self%diagonal, self%leg, self%s, j, k, c, row)
-          !$omp simd private(step) reduction(max: most)
-          do i = grid%lo(1), grid%hi(1)
-            u(i, j, k, c) = u(i, j, k, c) + self%s(i, j, k, c)
-            self%r(i, j, k, c) = self%r(i, j, k, c) - row(i)
-            step = self%r(i, j, k, c)*self%inverse(i, j, k, c)
-            self%z(i, j, k, c) = before*self%s(i, j, k, c) + fresh*step
-            most = max(most, abs(step))
-          end do
-        end do
-      end do
-    end do
-    of_all = most
-    call global_max(of_all)
-    largest = of_all(1)
-  end subroutine sweep
-
   !> y := the system applied to velocities s and body motions x_body.
   subroutine apply_viscous(grid, bodies, self, x_body, y_body)
     type(grid_t), intent(in) :: grid
@@ -356,7 +357,7 @@ contains
       end do
     end do
     call add_walls(self%walls, x_body, -1.0_wp, lbound(self%y), self%y)
-    call apply_to_bodies(bodies, self, x_body, y_body)
+    y_body = rows_of_bodies(bodies, self, self%s, x_body)
   end subroutine apply_viscous
 
   !> One line of the system, the legs to bodies left out, applied to component c of s.
@@ -396,22 +397,24 @@ contains
     end do
   end subroutine add_walls
 
-  !> The rows of the bodies, applied to velocities s and motions x_body.
-  subroutine apply_to_bodies(bodies, self, x_body, y_body)
+  !> The rows of the bodies, applied to velocities of the cells and motions of the bodies.
+  function rows_of_bodies(bodies, self, u, motion) result(y)
     type(rigid_motion_t), intent(in) :: bodies
     type(viscous_t), intent(in) :: self
-    real(wp), intent(in) :: x_body(:, :)
-    real(wp), intent(out) :: y_body(:, :)
+    real(wp), intent(in), contiguous :: &
+      u(lbound(self%mass, 1):, lbound(self%mass, 2):, lbound(self%mass, 3):, :)   !! [m/s]
+    real(wp), intent(in) :: motion(:, :)   !! (6, bodies)
+    real(wp) :: y(6, bodies%n)
     real(wp) :: pull(6, bodies%n)
     integer :: b
 
-    call pull_of_legs(self, self%s, x_body, pull)
+    call pull_of_legs(self, u, motion, pull)
     do b = 1, bodies%n
-      y_body(:, b) = 0.0_wp
+      y(:, b) = 0.0_wp
       if (.not. bodies%free(b)) cycle
-      y_body(:, b) = inertial_momentum(bodies, b, self%dt, x_body(:, b)) - pull(:, b)
+      y(:, b) = inertial_momentum(bodies, b, self%dt, motion(:, b)) - pull(:, b)
     end do
-  end subroutine apply_to_bodies
+  end function rows_of_bodies
 
   !> Viscous force and torque on each body, from its wall legs [N, N m].
   subroutine force_of_legs(bodies, flow, self)
