@@ -67,7 +67,7 @@ help:
 	@echo 'make bench    time jobs, growth and the pressure system; writes build/bench.json'
 	@echo '               PEERS=1: other programs too; FULL=1: whole jobs; AGAINST=old.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
-	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; 40 minutes.'
+	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; 20 minutes.'
 	@echo '               RUNS=50; MOVES=20: besides, what moves the shares, 20 coarse runs of each'
 	@echo 'make reference  write docs/reference.md and docs/mics-case.schema.json anew'
 	@echo 'make docs     pages to browse, build/docs/site/index.html; every link is followed'
