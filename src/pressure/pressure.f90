@@ -79,7 +79,7 @@ contains
 
     self%report = pressure_report_t()
     call start_from_none(self%phi_total)
-    if (bodies%n > 0) then
+    if (size(self%system%operator%push, 2) > 0) then   ! bodies of the run, not only of this solve
       do d = 1, 3
         call start_from_none(flow%solid_flux(:, :, :, d))
       end do

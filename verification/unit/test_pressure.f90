@@ -12,7 +12,7 @@ program test_pressure
   use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
   use pressure_extension_m, only: extend_pressure
   use carried_pressure_m, only: carry_pressure
-  use rigid_motion_m, only: wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -37,6 +37,7 @@ program test_pressure
   call held_box('jacobi', tank, 'cg', 'jacobi')
   call held_box('bicgstab', tank, 'bicgstab', 'multigrid')
   call rough_and_fine()
+  call without_its_body()
   call free_box()
   call pressed_box()
   call still_water()
@@ -173,6 +174,21 @@ contains
     call solve()
     call check('rough is less work', rough < pressure%report%iterations)
   end subroutine rough_and_fine
+
+  !> A solve that leaves the body of the run aside knows nothing of the flux that it had before.
+  subroutine without_its_body()
+    type(rigid_motion_t) :: none
+
+    call build(tank, .false.)
+    call solve()
+    call check('the box had a flux', any(abs(box%flow%solid_flux) > 0.0_wp))
+    call stir()
+    none%n = 0
+    allocate (none%free(0))
+    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, none, pressure)
+    call check('without it: none', all(abs(box%flow%solid_flux) <= 0.0_wp))
+    call check('without it: divergence', largest_divergence() < 1.0e-8_wp)
+  end subroutine without_its_body
 
   !> A free box: velocity and motion together lose their divergence, and what the one gains in
   !! momentum along the period the other loses.
