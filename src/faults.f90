@@ -41,6 +41,7 @@ contains
     type(step_report_t), intent(in) :: report
     type(fault_t), intent(inout) :: fault
 
+    if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
     if (.not. report%contacts_solved) call set(sim, 'blocks move too fast for any body step', fault)
     if (.not. report%viscous_converged) call set(sim, 'the viscous stage did not converge', fault)
     if (.not. report%pressure_converged) then

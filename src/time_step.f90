@@ -51,6 +51,7 @@ module time_step_m
     type(walls_t) :: walls
     type(overlap_t) :: overlap
     logical :: wet = .true.                !! there is a fluid
+    logical :: start_converged = .true.    !! velocity and pressure at t = 0
     logical, allocatable :: felt(:)        !! blocks that have felt the fluid
     logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
@@ -109,7 +110,7 @@ contains
     call outflow_init(sim%grid, case%fluid, sim%flow%sides)
     call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)
     call copy_motion(sim%blocks, sim%stage%bodies)
-    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage)
+    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%stage, sim%start_converged)
     call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
 

@@ -9,7 +9,7 @@ module messages_m
   implicit none
   private
   public :: count_from_here, stop_counting, note_sent, note_asked, begin_search, end_search
-  public :: sent_kinds, sent_so_far, asked_what, asked_detail, asked_calls, what_length, traffic_t
+  public :: sent_kinds, sent_so_far, asked_what, asked_detail, asked_calls, traffic_t
 
   !> Kinds of messages sent: layers of the neighbours; blocks put together on all processes; sums,
   !! largest and smallest values of all; values of the root process; all that serves to find which

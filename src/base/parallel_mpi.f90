@@ -15,7 +15,7 @@ submodule (parallel_m) parallel_mpi_m
   use decomposition_m, only: best_pieces, last_cell, least_cells
   use exact_bins_m, only: bin_size, merge_bins
   use messages_m, only: note_sent, gather, reduction, broadcasts
-  use patience_m, only: choose_yield
+  use patience_m, only: choose_messages
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
   implicit none
@@ -37,7 +37,7 @@ contains
   module procedure parallel_init
     integer :: provided
 
-    call choose_yield()
+    call choose_messages()
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)

@@ -23,9 +23,11 @@ module patience_m
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
-  public :: choose_spin, choose_yield, share_cores, fair_threads, threads_used
+  public :: choose_spin, choose_messages, share_cores, fair_threads, threads_used
 
   character(*), parameter :: spin_count = '20000'   !! about a millisecond
+  character(*), parameter :: largest_layer = '65536'
+    !! that is sent at once [bytes]; larger ones wait until the receiver asks for them
   real(wp), parameter :: look_interval = 1.0_wp     !! between two looks at the machine [s]
 
   integer :: wanted = 0               !! threads that work when nobody else does; 0: not yet known
@@ -90,14 +92,23 @@ contains
     if (c_execv('/proc/self/exe'//c_null_char, arguments) /= 0) return   ! it goes on as it is
   end subroutine choose_spin
 
-  !> Let a process that waits for another one give its core away, unless the user has chosen (the
-  !! name is Open MPI's; other libraries have no such choice). Call it before MPI begins.
-  subroutine choose_yield()
-    character(*), parameter :: name = 'OMPI_MCA_mpi_yield_when_idle'
+  !> Let a process that waits for another one give its core away, and let layers go without asking
+  !! the other process first, unless the environment says otherwise. Call it before MPI begins. The
+  !! names are Open MPI's; other libraries have no such choice. Where it cannot be set MPI does as
+  !! it does.
+  subroutine choose_messages()
+    character(*), parameter :: yield = 'OMPI_MCA_mpi_yield_when_idle', &
+      eager(2) = [character(31) :: 'OMPI_MCA_btl_vader_eager_limit', 'OMPI_MCA_btl_sm_eager_limit']
+      ! of Open MPI 4 and 5, where either means the same
+    integer(c_int) :: status
+    integer :: i
 
-    if (is_set(name)) return
-    if (c_setenv(name//c_null_char, '1'//c_null_char, 1_c_int) /= 0) return   ! it waits busily
-  end subroutine choose_yield
+    if (.not. is_set(yield)) status = c_setenv(yield//c_null_char, '1'//c_null_char, 1_c_int)
+    if (is_set(trim(eager(1))) .or. is_set(trim(eager(2)))) return
+    do i = 1, size(eager)
+      status = c_setenv(trim(eager(i))//c_null_char, largest_layer//c_null_char, 1_c_int)
+    end do
+  end subroutine choose_messages
 
   !> Let fewer threads work while other programs run on their cores, and all of them afterwards.
   !! Call it now and then, outside parallel regions: once a second it looks at the machine.

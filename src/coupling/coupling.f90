@@ -61,6 +61,7 @@ contains
     call move_alloc(stage%links_before, keep)
     call move_alloc(stage%links, stage%links_before)
     call move_alloc(keep, stage%links)
+    call move_alloc(stage%links_before%slip, stage%links%slip)   ! nothing reads it at the start
     if (.not. stage%linked) call link_cells(grid, solid, stage%links_before)
     stage%linked = .false.
   end subroutine find_links_before

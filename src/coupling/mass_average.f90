@@ -71,7 +71,8 @@ contains
         call project_mixture(grid, dt, flow, stage)
         report%pressure%passes = report%pressure%passes + stage%pressure%report%passes
         report%pressure%iterations = report%pressure%iterations + stage%pressure%report%iterations
-        report%pressure%converged = stage%pressure%report%converged
+        report%pressure%converged = stage%pressure%report%converged &
+                                    .and. (pass == 1 .or. report%pressure%converged)
         call momentum_gained(grid, solid, dt, flow%u, stage)
         call push_bodies(dt, stage%from_pressure, bodies)
         stage%total = stage%total + stage%from_pressure

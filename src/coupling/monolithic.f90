@@ -343,12 +343,13 @@ contains
 
   !> Face velocity of the start made free of divergence, and the pressure of the fluid under gravity
   !! around bodies held in place, so that the first step starts from a balance.
-  subroutine start_flow(case, grid, solid, flow, stage)
+  subroutine start_flow(case, grid, solid, flow, stage, converged)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(flow_t), intent(inout) :: flow
     type(stage_t), intent(inout) :: stage
+    logical, intent(out) :: converged
     type(rigid_motion_t) :: held
     real(wp), allocatable :: uf(:, :, :, :)
 
@@ -359,6 +360,7 @@ contains
       call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, held, system%active, system%operator%flux)
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
+      converged = p%report%converged
       allocate (uf, source=flow%uf)
       held%motion = 0.0_wp
       flow%p = 0.0_wp
@@ -368,6 +370,7 @@ contains
       call add_tension(grid, flow%rho, stage%tension, a%face)
       flow%uf = dt*a%face
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
+      converged = converged .and. p%report%converged
       call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
                            p%known, flow%p)
       flow%uf = uf

@@ -95,6 +95,7 @@ contains
       allocate (stage%links_before, stage%links)
       call linked_cells_init(grid, stage%links_before)
       call linked_cells_init(grid, stage%links)
+      deallocate (stage%links_before%slip)   ! that of `links` serves both
       call mid_step_init(grid, stage%mid_step)
       call wall_balance_init(stage%balance)
       allocate (stage%from_mid_step, stage%late, stage%counted, stage%trend, source=stage%total)

@@ -1,6 +1,7 @@
 !> Wall legs of film cells without a master: their centre lies inside a body, their faces are open.
 module film_legs_m
   use kinds_m, only: wp
+  use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: side_no_slip
   use solid_geometry_m, only: solid_geometry_t
@@ -24,38 +25,31 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
-    integer :: b, m, n, c(3)
+    integer :: b, m, n
     real(wp) :: least   !! smallest sum of the areas that counts [m2]
 
     if (.not. self%lone_films) return
     if (size(self%films%sum, 2) < solid%n_cut) then
-      deallocate (self%films%sum)
-      allocate (self%films%sum(7, 2*solid%n_cut))
-    end if
-    if (size(self%films%area, 2) < size(solid%cell, 2)) then
-      deallocate (self%films%area)
-      allocate (self%films%area(3, size(solid%cell, 2)))
+      deallocate (self%films%sum, self%films%body)
+      allocate (self%films%sum(7, 2*solid%n_cut), self%films%body(2*solid%n_cut))
     end if
     least = 1.0e-3_wp*minval(grid%area)
+    self%films%n = 0
     self%films%sum(:, 1:solid%n_cut) = 0.0_wp
+    self%films%body(1:solid%n_cut) = 0
     do b = 1, bodies%n
       call find_areas(b)
     end do
     do n = 1, solid%n_cut
       if (film_number(solid%cut_cell(:, n)) > 0) call hold_by_sides(solid%cut_cell(:, n), n)
     end do
-    do b = 1, bodies%n
-      do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        c = solid%cell(:, m)
-        n = film_number(c)
-        if (n == 0) cycle
-        if (solid%inside(c(1), c(2), c(3)) /= b .and. &
-            .not. any(abs(self%films%area(:, m)) > 0.0_wp)) cycle
-        call add_wall(self, c, b, film_conductance(c, n)*max(norm2(self%films%area(:, m)), &
-                                                            1.0e-3_wp*least), &
+    do m = 1, self%films%n
+      associate (c => solid%cut_cell(:, self%films%wall(1, m)), body => self%films%wall(2, m))
+        call add_wall(self, c, body, film_conductance(c, self%films%wall(1, m)) &
+                      *max(norm2(self%films%area(:, m)), 1.0e-3_wp*least), &
                       nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), &
-                                         grid%centre(c(3), 3)], bodies%x(:, b)))
-      end do
+                                         grid%centre(c(3), 3)], bodies%x(:, body)))
+      end associate
     end do
   contains
     !> Number of a cut cell if it is an own film cell whose velocity is an unknown, else 0.
@@ -70,29 +64,55 @@ contains
     end function film_number
 
     !> Area of body b in each film cell as a vector, what its shares of the faces lack to close, and
-    !! its part of the sums.
+    !! its part of the sums. The cells are found through the faces, since a flat wall in a plane of
+    !! the grid has no share of the cell before it; those whose centre is in the body count even
+    !! without an area.
     subroutine find_areas(b)
       integer, intent(in) :: b
-      integer :: m, d, n
+      integer :: m, d, side, n
       real(wp) :: area
 
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         d = solid%face(4, m)
         area = solid%face_beta(m)*grid%area(d)
-        n = film_number(solid%face(1:3, m))
-        if (n > 0) self%films%sum(d, n) = self%films%sum(d, n) + area
-        n = film_number(solid%face(1:3, m) - unit_step(:, d))
-        if (n > 0) self%films%sum(d, n) = self%films%sum(d, n) - area
+        do side = 0, 1
+          n = film_number(solid%face(1:3, m) - side*unit_step(:, d))
+          if (n > 0) self%films%sum(d, n) = self%films%sum(d, n) + merge(area, -area, side == 0)
+        end do
+      end do
+      do m = solid%body_face(b), solid%body_face(b + 1) - 1
+        do side = 0, 1
+          n = film_number(solid%face(1:3, m) - side*unit_step(:, solid%face(4, m)))
+          if (n == 0) cycle
+          if (any(abs(self%films%sum(1:3, n)) > 0.0_wp)) call note_wall(b, n)
+        end do
       end do
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
-        n = film_number(solid%cell(:, m))
+        associate (c => solid%cell(:, m))
+          if (solid%inside(c(1), c(2), c(3)) /= b) cycle
+          n = film_number(c)
+        end associate
         if (n == 0) cycle
-        self%films%area(:, m) = self%films%sum(1:3, n)
-        self%films%sum(4:6, n) = self%films%sum(4:6, n) + self%films%sum(1:3, n)
-        self%films%sum(7, n) = self%films%sum(7, n) + norm2(self%films%sum(1:3, n))
-        self%films%sum(1:3, n) = 0.0_wp
+        if (self%films%body(n) /= b) call note_wall(b, n)
       end do
     end subroutine find_areas
+
+    !> Note body b as a wall of film cell n, with its area.
+    subroutine note_wall(b, n)
+      integer, intent(in) :: b, n
+
+      associate (films => self%films)
+        films%n = films%n + 1
+        call ensure_room(films%n, films%wall)
+        call ensure_room(films%n, films%area)
+        films%wall(:, films%n) = [n, b]
+        films%area(:, films%n) = films%sum(1:3, n)
+        films%sum(4:6, n) = films%sum(4:6, n) + films%sum(1:3, n)
+        films%sum(7, n) = films%sum(7, n) + norm2(films%sum(1:3, n))
+        films%sum(1:3, n) = 0.0_wp
+        films%body(n) = b
+      end associate
+    end subroutine note_wall
 
     !> The open parts of no-slip sides are walls too, and hold the film as they hold the cells whose
     !! centre lies in the fluid.

@@ -23,7 +23,7 @@ module viscous_m
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
   real(wp), parameter :: most_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
   real(wp), parameter :: smallest_rate = 1.0e-3_wp  !! at which a sweep is taken to converge
-  integer, parameter :: max_iterations = 500
+  integer, parameter :: max_iterations = 500        !! sweeps included
   integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
 
 contains
@@ -39,7 +39,7 @@ contains
     type(viscous_t), intent(inout) :: self
     real(wp) :: momentum(6, bodies%n)     ! of the bodies, over dt, before the stage
     real(wp) :: inverse(6, 6, bodies%n)   ! of the blocks of the bodies
-    real(wp) :: bound   ! of the largest change by a Jacobi step [m/s]
+    real(wp) :: bound   ! of the largest change that is left [m/s]
     integer :: b
 
     call velocity_scale(grid, flow%u, bodies, bound)
@@ -59,8 +59,8 @@ contains
   end subroutine solve_viscous
 
   !> Successive overrelaxation: cells whose numbers have an even sum, those of an odd one, bodies.
-  !! The weight goes from one to the best one as those of Chebyshev do. It is left to conjugate
-  !! gradients what that makes too slow.
+  !! The weight goes from one to the best one as those of Chebyshev do. What would take too many
+  !! sweeps is left to conjugate gradients.
   !!
   !! Source: Young (1971), Iterative solution of large linear systems, chapters 6 and 10. The bodies
   !! are a third colour, which the best weight leaves out of account; any weight below 2 converges.
@@ -68,12 +68,12 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: momentum(:, :)     !! (6, bodies) over dt, before the stage
     real(wp), intent(in) :: inverse(:, :, :)   !! (6, 6, bodies) of their blocks
-    real(wp), intent(in) :: bound              !! of the largest change by a Jacobi step [m/s]
+    real(wp), intent(in) :: bound              !! of the largest change by a weight of one [m/s]
     type(rigid_motion_t), intent(inout) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(inout) :: self
     real(wp) :: change(6, bodies%n)
-    real(wp) :: weight, worst
+    real(wp) :: weight, worst(1)   !! of the change in both colours, and the largest one
     integer :: most, colour
 
     self%iterations = 0
@@ -85,17 +85,18 @@ contains
     do while (self%iterations < most .and. .not. self%converged)
       worst = 0.0_wp
       do colour = 0, 1
-        call relax(grid, colour, weight, u, self, worst)
+        call relax(grid, colour, weight, u, self, worst(1))
         if (self%iterations == 0 .and. colour == 0) weight = 2.0_wp
         weight = 1.0_wp/(1.0_wp - 0.25_wp*weight*self%spread**2)
       end do
       change = of_blocks(inverse, momentum - rows_of_bodies(bodies, self, u, bodies%motion))
+      call global_max(worst)
       worst = max(worst, maxval([0.0_wp, abs(change(1:3, :))]))
       change = weight*change
       bodies%motion = bodies%motion + change
       call add_walls(self%walls, change, 1.0_wp, lbound(self%r), self%r)
       self%iterations = self%iterations + 1
-      self%converged = worst <= bound
+      self%converged = worst(1) <= bound
     end do
     if (.not. self%converged) call add_walls(self%walls, bodies%motion, -1.0_wp, lbound(self%r), &
                                              self%r)
@@ -104,7 +105,7 @@ contains
   !> Twice the sweeps that should reach the tolerance; none if they are too many, or if the weight
   !! would be too large for the first and the last cell of a period of an odd number of cells. These
   !! are of one colour: a weight w converges as long as 2/w - 1 exceeds the share that their leg has
-  !! in the diagonal, at most the spread s, and the best w = 2/(1 + sqrt(1 - s^2)).
+  !! in the diagonal, at most the spread s, and w is in the end 2/(1 + sqrt(1 - s^2)).
   pure integer function sweeps_allowed(grid, s)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: s   !! largest share of the legs to other cells in the diagonal
@@ -125,9 +126,9 @@ contains
     real(wp), intent(in) :: weight
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(in) :: self
-    real(wp), intent(inout) :: worst   !! largest change by a weight of one, so far [m/s]
+    real(wp), intent(inout) :: worst   !! largest change by a weight of one here, so far [m/s]
     integer :: i, j, k, c
-    real(wp) :: change, most, of_all(1)
+    real(wp) :: change, most
 
     call halo_exchange(u, n_halo, layers=1)
     most = 0.0_wp
@@ -141,7 +142,7 @@ contains
                         + l(i, j, k, 1)*u(i - 1, j, k, c) + l(i + 1, j, k, 1)*u(i + 1, j, k, c) &
                         + l(i, j, k, 2)*u(i, j - 1, k, c) + l(i, j + 1, k, 2)*u(i, j + 1, k, c) &
                         + l(i, j, k, 3)*u(i, j, k - 1, c) + l(i, j, k + 1, 3)*u(i, j, k + 1, c)) &
-                       *self%inverse(i, j, k, c) - u(i, j, k, c)
+                       /self%diagonal(i, j, k, c) - u(i, j, k, c)
             end associate
             u(i, j, k, c) = u(i, j, k, c) + weight*change
             most = max(most, abs(change))
@@ -149,9 +150,7 @@ contains
         end do
       end do
     end do
-    of_all = most
-    call global_max(of_all)
-    worst = max(worst, of_all(1))
+    worst = max(worst, most)
   end subroutine relax
 
   !> Conjugate gradients on the system over its diagonal, from where it is.
@@ -166,10 +165,11 @@ contains
     real(wp), dimension(6, bodies%n) :: r_body, s_body, z_body, y_body
     real(wp) :: rz, rz_before, alpha, beta, worst
 
+    if (.not. allocated(self%z)) allocate (self%z, source=self%y)
     call new_direction(grid, 0.0_wp, u, self%s)
     call apply_viscous(grid, bodies, self, bodies%motion, y_body)
     r_body = momentum - y_body
-    call improve(grid, 1.0_wp, self%y, self%r, self%inverse, self%z, worst)
+    call improve(grid, 1.0_wp, self%y, self%r, self%diagonal, self%z, worst)
     s_body = 0.0_wp
     rz = 0.0_wp
     do
@@ -185,7 +185,7 @@ contains
       call apply_viscous(grid, bodies, self, s_body, y_body)
       alpha = rz/(dot(self%s, self%y) + sum(s_body*y_body))
       call improve(grid, -alpha, self%s, u)
-      call improve(grid, alpha, self%y, self%r, self%inverse, self%z, worst)
+      call improve(grid, alpha, self%y, self%r, self%diagonal, self%z, worst)
       bodies%motion = bodies%motion + alpha*s_body
       r_body = r_body - alpha*y_body
       self%iterations = self%iterations + 1
@@ -282,14 +282,14 @@ contains
     p = matmul(bodies%apparent(:, :, b), motion)/dt
   end function inertial_momentum
 
-  !> x := x - a y on the own cells; with `inverse` also z := x*inverse and the largest |z|.
-  subroutine improve(grid, a, y, x, inverse, z, largest)
+  !> x := x - a y on the own cells; with `diagonal` also z := x/diagonal and the largest |z|.
+  subroutine improve(grid, a, y, x, diagonal, z, largest)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: a
     real(wp), intent(in), contiguous :: y(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous :: x(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous, optional :: &
-      inverse(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      diagonal(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous, optional :: &
       z(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out), optional :: largest
@@ -304,9 +304,9 @@ contains
           do i = grid%lo(1), grid%hi(1)
             x(i, j, k, c) = x(i, j, k, c) - a*y(i, j, k, c)
           end do
-          if (.not. present(inverse)) cycle
+          if (.not. present(diagonal)) cycle
           do i = grid%lo(1), grid%hi(1)
-            z(i, j, k, c) = x(i, j, k, c)*inverse(i, j, k, c)
+            z(i, j, k, c) = x(i, j, k, c)/diagonal(i, j, k, c)
             most(1) = max(most(1), abs(z(i, j, k, c)))
           end do
         end do
@@ -408,9 +408,10 @@ contains
     real(wp) :: pull(6, bodies%n)
     integer :: b
 
+    y = 0.0_wp
+    if (.not. any(bodies%free)) return
     call pull_of_legs(self, u, motion, pull)
     do b = 1, bodies%n
-      y(:, b) = 0.0_wp
       if (.not. bodies%free(b)) cycle
       y(:, b) = inertial_momentum(bodies, b, self%dt, motion(:, b)) - pull(:, b)
     end do

@@ -56,17 +56,17 @@ contains
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
-    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%inverse, self%spread)
+    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%spread)
   end subroutine build_viscous
 
-  !> The ordinary legs and the masses into the diagonal, and its inverse; zero where there is no
-  !! unknown. `spread` is the largest share of the legs.
-  subroutine finish_diagonal(grid, leg, mass, diagonal, inverse, spread)
+  !> The ordinary legs and the masses into the diagonal, which is 1 where there is no unknown.
+  !! `spread` is the largest share of the legs.
+  subroutine finish_diagonal(grid, leg, mass, diagonal, spread)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: diagonal, inverse
+    real(wp), intent(inout), contiguous :: &
+      diagonal(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out) :: spread
     integer :: i, j, k, c
     real(wp) :: legs, most(1)
@@ -79,10 +79,9 @@ contains
           do i = grid%lo(1), grid%hi(1)
             legs = leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
                    + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
-            diagonal(i, j, k, c) = diagonal(i, j, k, c) + mass(i, j, k) + legs
-            inverse(i, j, k, c) = merge(1.0_wp/max(diagonal(i, j, k, c), tiny(1.0_wp)), 0.0_wp, &
-                                        mass(i, j, k) > 0.0_wp)
-            most(1) = max(most(1), legs*inverse(i, j, k, c))
+            diagonal(i, j, k, c) = merge(diagonal(i, j, k, c) + mass(i, j, k) + legs, 1.0_wp, &
+                                         mass(i, j, k) > 0.0_wp)
+            if (mass(i, j, k) > 0.0_wp) most(1) = max(most(1), legs/diagonal(i, j, k, c))
           end do
         end do
       end do

@@ -34,8 +34,10 @@ module viscous_system_m
   type :: film_walls_t
     real(wp), allocatable :: sum(:, :)
       !! (7, cut cells) wall of one body, sum over the walls, as vectors; sum of their sizes [m2]
-    real(wp), allocatable :: area(:, :)
-      !! (3, cells of the bodies) wall of the body in each film cell as a vector [m2]
+    integer, allocatable :: body(:)       !! (cut cells) last body that is a wall of the cell
+    integer :: n = 0                      !! walls
+    integer, allocatable :: wall(:, :)    !! (2, *) number of the cut cell, body
+    real(wp), allocatable :: area(:, :)   !! (3, *) of each wall as a vector [m2]
   end type film_walls_t
 
   !> The system, what solves it, and what came out.
@@ -45,8 +47,7 @@ module viscous_system_m
       !! rho m V/dt, 0: the velocity is not an unknown [kg/s]
     real(wp), allocatable :: leg(:, :, :, :)
       !! conductance of the leg across the lower face [kg/s]
-    real(wp), allocatable :: diagonal(:, :, :, :)   !! [kg/s]
-    real(wp), allocatable :: inverse(:, :, :, :)    !! of the diagonal, 0: not an unknown [s/kg]
+    real(wp), allocatable :: diagonal(:, :, :, :)   !! 1 where the velocity is not an unknown [kg/s]
     real(wp) :: spread = 1.0_wp
       !! largest share of the diagonal that legs to other cells have, of all processes [-]
     type(wall_legs_t) :: walls
@@ -57,9 +58,9 @@ module viscous_system_m
       !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
     real(wp), allocatable :: spin_drag(:)
       !! 2 mu V of the body: torque per angular velocity [N m s]
-    real(wp), allocatable :: r(:, :, :, :), z(:, :, :, :)
-      !! residual, and the same over the diagonal
+    real(wp), allocatable :: r(:, :, :, :)   !! right side; of conjugate gradients the residual
     real(wp), allocatable :: s(:, :, :, :), y(:, :, :, :)   !! direction, the system applied to it
+    real(wp), allocatable :: z(:, :, :, :)   !! residual over the diagonal, if ever needed
     real(wp), allocatable :: force(:, :)   !! (6, n) of the fluid on each body [N, N m]
     integer :: iterations = 0              !! of the last solve
     logical :: converged = .true.
@@ -82,11 +83,12 @@ contains
     allocate (self%sides%cell(3, n), self%sides%pull(3, n))
     allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%leg(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%diagonal, self%inverse, self%r, self%z, self%s, self%y, source=self%leg)
+    allocate (self%diagonal, self%r, self%s, self%y, source=self%leg)
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%force(6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
-    allocate (self%films%sum(7, 0), self%films%area(3, 0))
+    allocate (self%films%sum(7, 0), self%films%body(0))
+    allocate (self%films%wall(2, 0), self%films%area(3, 0))
     associate (walls => self%walls)
       allocate (walls%first(n_bodies + 1), source=1)
       allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0))

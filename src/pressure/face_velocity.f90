@@ -15,7 +15,7 @@ module face_velocity_m
   private
   public :: acceleration_t, acceleration_init, face_acceleration, push_faces, cell_mean_of_faces
   public :: hold_in_cells
-  public :: predict_face_velocity, face_velocity_at_walls, shorten_at_walls, compact_time
+  public :: predict_face_velocity, face_velocity_at_walls, shorten_at_walls
 
   real(wp), parameter :: compact_courant = 0.125_wp   !! Courant number of the longest compact_time
 

@@ -15,7 +15,7 @@ module memory_plan_m
   private
   public :: planned_memory, require_memory, require_memory_to_start, size_text
 
-  integer(i8), parameter :: bytes_per_cell = 980       !! all arrays: fields, solids, solvers [B]
+  integer(i8), parameter :: bytes_per_cell = 930       !! all arrays: fields, solids, solvers [B]
   integer(i8), parameter :: bytes_of_c_ismac = 460     !! more for each cell [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
   integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]

@@ -143,7 +143,8 @@ contains
     type(solve_report_t), intent(out) :: report
     type(krylov_work_t), intent(inout) :: work
     real(wp), parameter :: orthogonal = 1.0e-14_wp      !! cosine of vectors at a right angle
-    real(wp) :: bound, alpha, omega, rho, rho_before, norms(2), sums(2), p_max
+    real(wp) :: bound, alpha, omega, rho, rho_before, shadows, sums(2), p_max
+      ! `shadows`: square of the length of the shadow
     logical :: fresh   !! the iteration starts at the residual at hand
 
     if (.not. allocated(work%shadow)) then
@@ -161,12 +162,12 @@ contains
       report%info = broken_down
       ! rho = shadow . r, against the norms of both
       sums = exact_dots(work%shadow, work%r, work%r, work%r, 1, work%line)
-      if (.not. fresh) fresh = abs(sums(1)) <= orthogonal*sqrt(norms(1)*sums(2))
+      if (.not. fresh) fresh = abs(sums(1)) <= orthogonal*sqrt(shadows*sums(2))
       if (fresh) then
         call copy(work%line, work%r, work%shadow)
         call copy(work%line, work%r, work%p)
         rho = sums(2)
-        norms(1) = sums(2)
+        shadows = sums(2)
         p_max = report%residual
       else
         rho = sums(1)
@@ -177,7 +178,7 @@ contains
       call prec%apply(work%p, p_max, work%y)
       call op%apply(work%y, work%q)
       sums = exact_dots(work%shadow, work%q, work%q, work%q, 1, work%line)
-      if (.not. abs(sums(1)) > orthogonal*sqrt(norms(1)*sums(2))) then
+      if (.not. abs(sums(1)) > orthogonal*sqrt(shadows*sums(2))) then
         if (fresh) exit
         fresh = .true.
         cycle

@@ -58,12 +58,15 @@ contains
   end subroutine build
 
   subroutine ready()
+    logical :: converged
+
     call place(block)
     block%flow%room = (1.0_wp - block%solid%alpha)*block%grid%volume
     block%flow%liquid = block%flow%room
     call stage_init(block%grid, 1, block%case%numerics, stage)
     call copy_motion(block%blocks, stage%bodies)
-    call start_flow(block%case, block%grid, block%solid, block%flow, stage)
+    call start_flow(block%case, block%grid, block%solid, block%flow, stage, converged)
+    call check('the start converged', converged)
     call fill_velocity_halo(block%grid, block%flow%u)
   end subroutine ready
 

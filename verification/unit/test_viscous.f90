@@ -139,6 +139,15 @@ program test_viscous
              1.0e-7_wp*film**2/mu)
   call check('each wall takes half of the force', viscous%force(1, :), &
              0.5_wp*film*[1.0_wp, 1.0_wp], 1.0e-7_wp*film)
+  call make_gap(3.0_wp*grid%h(3), 3.3_wp*grid%h(3), 2)   ! the lower wall in a plane of the grid
+  flow%u(:, :, :, 1) = long_time/rho
+  call link_cells(grid, solid, links)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, links)
+  call solve_viscous(grid, wall, flow, viscous)
+  call check('film on a wall in a plane of the grid', flow%u(2, 2, 4, 1), film**2/(12.0_wp*mu), &
+             1.0e-7_wp*film**2/mu)
+  call check('that wall, too, takes half of the force', viscous%force(1, :), &
+             0.5_wp*film*[1.0_wp, 1.0_wp], 1.0e-7_wp*film)
   call make_gap(0.0_wp, 0.3_wp*grid%h(3), 1)
   wall%motion(1, 1) = speed
   call link_cells(grid, solid, links)
