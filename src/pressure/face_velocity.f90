@@ -72,7 +72,7 @@ contains
           end do
         end do
       end do
-      if (.not. grid%periodic(d)) call sides_of_direction()
+      call sides_of_direction()
     end do
   contains
     subroutine sides_of_direction()
@@ -80,11 +80,7 @@ contains
       real(wp) :: outward, outside, length
 
       do s = 1, 2
-        if (.not. grid%at_side(s, d)) cycle
-        lower = grid%lo
-        upper = grid%hi
-        lower(d) = merge(1, grid%n(d) + 1, s == 1)
-        upper(d) = lower(d)
+        call grid%side_faces(s, d, lower, upper)
         outward = merge(-1.0_wp, 1.0_wp, s == 1)
         do k = lower(3), upper(3)
           do j = lower(2), upper(2)
@@ -144,11 +140,8 @@ contains
       real(wp) :: outward
 
       do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. .not. gives_pressure(grid%side(s, d))) cycle
-        lower = grid%lo
-        upper = grid%hi
-        lower(d) = merge(1, grid%n(d) + 1, s == 1)
-        upper(d) = lower(d)
+        if (.not. gives_pressure(grid%side(s, d))) cycle
+        call grid%side_faces(s, d, lower, upper)
         outward = merge(-1.0_wp, 1.0_wp, s == 1)
         do k = lower(3), upper(3)
           do j = lower(2), upper(2)
@@ -250,7 +243,7 @@ contains
                        a%cell(:, :, :, d), flow%uf(:, :, :, d))
       if (present(deviation)) call add_deviation(grid, dt, e, rho, flow%mu, &
                                                  deviation(:, :, :, d), flow%uf(:, :, :, d))
-      if (.not. grid%periodic(d)) call sides_of_direction()
+      call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
     do d = 1, 3
@@ -262,11 +255,8 @@ contains
       integer :: s, lower(3), upper(3), f(3)
 
       do s = 1, 2
-        if (.not. (grid%at_side(s, d) .and. flow%sides(s, d)%active)) cycle
-        lower = grid%lo
-        upper = grid%hi
-        lower(d) = merge(1, grid%n(d), s == 1)
-        upper(d) = lower(d)
+        if (.not. flow%sides(s, d)%active) cycle
+        call grid%side_cells(s, d, lower, upper)
         do k = lower(3), upper(3)
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)
@@ -285,11 +275,8 @@ contains
       real(wp) :: share, mean
 
       do s = 1, 2
-        if (.not. (grid%at_side(s, d) .and. gives_pressure(grid%side(s, d)))) cycle
-        lower = grid%lo
-        upper = grid%hi
-        lower(d) = merge(1, grid%n(d) + 1, s == 1)
-        upper(d) = lower(d)
+        if (.not. gives_pressure(grid%side(s, d))) cycle
+        call grid%side_faces(s, d, lower, upper)
         do k = lower(3), upper(3)
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)

@@ -93,7 +93,7 @@ contains
       !! [kg/m3]
     type(pressure_system_t), intent(inout) :: self
     type(outflow_t), intent(in), optional :: sides(2, 3)
-    integer :: i, j, k, d, s, e(3), face
+    integer :: i, j, k, d, e(3)
     real(wp) :: area_over_h
 
     do d = 1, 3
@@ -108,11 +108,7 @@ contains
           end do
         end do
       end do
-      do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
-        face = merge(1, grid%n(d) + 1, s == 1)
-        call side_coefficients(face, merge(face, face - 1, s == 1))
-      end do
+      call side_coefficients()
     end do
     call mark_active(grid, self%operator%cf, self%active)
     call take_all_cells(self%solver%work)
@@ -123,25 +119,23 @@ contains
     case default   ! 'none' needs nothing
     end select
   contains
-    !> A side of the domain: the velocity is given, or the pressure half a cell away.
-    subroutine side_coefficients(face, cell)
-      integer, intent(in) :: face, cell
-      integer :: a(3), b(3), c(3)
+    !> Sides of the domain: the velocity is given, or the pressure half a cell away.
+    subroutine side_coefficients()
+      integer :: s, a(3), b(3), c(3)
 
-      a = grid%lo
-      b = grid%hi
-      a(d) = face
-      b(d) = face
-      if (.not. gives_pressure(grid%side(s, d))) then
-        self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
-        return
-      end if
-      do k = a(3), b(3)
-        do j = a(2), b(2)
-          do i = a(1), b(1)
-            c = [i, j, k] + (cell - face)*e
-            self%operator%cf(i, j, k, d) = open(i, j, k, d)*grid%area(d) &
-              /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
+      do s = 1, 2
+        call grid%side_faces(s, d, a, b)
+        if (.not. gives_pressure(grid%side(s, d))) then
+          self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+          cycle
+        end if
+        do k = a(3), b(3)
+          do j = a(2), b(2)
+            do i = a(1), b(1)
+              c = [i, j, k] - merge(0, 1, s == 1)*e
+              self%operator%cf(i, j, k, d) = open(i, j, k, d)*grid%area(d) &
+                /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
+            end do
           end do
         end do
       end do
