@@ -104,7 +104,9 @@ contains
     integer :: i
 
     if (.not. is_set(yield)) status = c_setenv(yield//c_null_char, '1'//c_null_char, 1_c_int)
-    if (is_set(trim(eager(1))) .or. is_set(trim(eager(2)))) return
+    do i = 1, size(eager)
+      if (is_set(trim(eager(i)))) return
+    end do
     do i = 1, size(eager)
       status = c_setenv(trim(eager(i))//c_null_char, largest_layer//c_null_char, 1_c_int)
     end do
