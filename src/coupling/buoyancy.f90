@@ -204,7 +204,7 @@ contains
     !$omp parallel private(b, d, m, n, row, term)
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = flux%first_face(b), flux%first_face(b + 1) - 1, terms_at_once
         do d = 1, 3
           n = 0

@@ -35,20 +35,24 @@ contains
     integer, intent(in) :: n_blocks   !! bodies of `solid` without the bed, which comes last
     type(solid_geometry_t), intent(inout) :: solid
     real(wp) :: more(3, solid%n_cut)   ! m - 1 of the cut cells
+    integer :: owner(solid%n_cut)      ! the body that cuts them, or `several`
     integer :: k, m
 
+    call find_owners(solid, owner)
     !$omp parallel
     !$omp do schedule(static)
     do k = grid%first(3), grid%last(3)
       solid%free(:, :, k, :) = solid%open(:, :, k, :)
     end do
     !$omp end do nowait
-    !$omp do schedule(static)
+    !$omp do schedule(dynamic, 64)
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m))
         more(:, m) = 0.0_wp
         if (all(c < grid%last)) more(:, m) = more_inertia(openings(grid, solid%open, c), &
           solid%behind_plane(:, m), solid%alpha(c(1), c(2), c(3)))
+        if (maxval(more(:, m)) < least) cycle
+        if (others_around(grid, solid, owner, owner(m), c)) more(:, m) = 0.0_wp
       end associate
     end do
     !$omp end parallel
@@ -77,17 +81,14 @@ contains
     more = min(r**power - 1.0_wp, normal**2/(1.5_wp*max(depth, thinnest)))
   end function more_inertia
 
-  !> Make the faces of cut cells narrower, and list them by blocks; not where another body is in a
-  !! cell around: in gaps the water beyond the edge is not open.
+  !> Make the faces of cut cells narrower, and list them by blocks.
   subroutine narrow_faces(grid, n_blocks, more, solid)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_blocks
     real(wp), intent(in) :: more(:, :)   !! (3, cut cells)
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: owner(solid%n_cut)        ! the body that cuts a cell, `several` bodies
     integer :: b, d, m, n, s, next
 
-    call find_owners(solid, owner)
     n = size(solid%body_cell)
     if (size(solid%first_held) /= n) then
       deallocate (solid%first_held)
@@ -101,8 +102,6 @@ contains
         associate (c => solid%cell(:, m))
           associate (cut => solid%cut(c(1), c(2), c(3)))
             if (cut == 0) cycle
-            if (maxval(more(:, cut)) < least) cycle
-            if (others_around(grid, solid, owner, b, c)) cycle
             do d = 1, 3
               if (more(d, cut) < least) cycle
               do s = 0, 1
@@ -150,7 +149,8 @@ contains
     end do
   end subroutine find_owners
 
-  !> Is another body than b in cell c or one of the 26 around?
+  !> Is another body than b, the owner of cell c, in this cell or one of the 26 around? There the
+  !! water beyond an edge is in a gap, not open.
   pure function others_around(grid, solid, owner, b, c) result(yes)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -159,7 +159,7 @@ contains
     logical :: yes
     integer :: i, j, k, found
 
-    yes = .false.
+    yes = b == several
     do k = max(c(3) - 1, grid%first(3)), min(c(3) + 1, grid%last(3))
       do j = max(c(2) - 1, grid%first(2)), min(c(2) + 1, grid%last(2))
         do i = max(c(1) - 1, grid%first(1)), min(c(1) + 1, grid%last(1))

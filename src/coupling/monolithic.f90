@@ -68,7 +68,8 @@ contains
     call predict_faces(grid, solid, dt, flow, stage)
     call find_pressure(grid, solid, dt, flow, stage, report)
     call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
-                         stage%pressure%system%active, stage%pressure%known, flow%p)
+                         stage%pressure%system%active, stage%pressure%known, &
+                         stage%pressure%closed, flow%p)
     call sum_forces(dt, stage)
     report%viscous_converged = stage%viscous%converged
   end subroutine monolithic_stage
@@ -175,8 +176,7 @@ contains
 
     associate (bodies => stage%bodies, flux => stage%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
-      call force_from_tension(grid, bodies, flux, stage%tension, stage%terms, &
-                              stage%from_pressure)
+      call force_from_tension(grid, bodies, flux, stage%tension, stage%from_pressure)
       stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
       stage%from_level = stage%from_level + stage%from_mid_step + stage%late
@@ -372,7 +372,7 @@ contains
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       converged = converged .and. p%report%converged
       call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
-                           p%known, flow%p)
+                           p%known, p%closed, flow%p)
       flow%uf = uf
       call all_fluid_of_faces(grid, solid, stage%bodies, system%operator%flux, flow%uf, &
                               flow%solid_flux)

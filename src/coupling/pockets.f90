@@ -108,7 +108,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(pockets_t), intent(inout) :: self
     type(solid_geometry_t), intent(in) :: solid
-    integer :: m, n_stack, d, s, i(3), n(3), f(3)
+    integer :: m, n, n_stack, d, s
 
     !$omp parallel do schedule(static)
     do m = 1, solid%n_cut
@@ -116,30 +116,54 @@ contains
                         touches_free_cell(self, grid, solid, solid%cut_cell(:, m))
     end do
     n_stack = 0
-    do m = 1, solid%n_cut
-      if (.not. self%reached(m)) cycle
-      n_stack = n_stack + 1
-      self%stack(n_stack) = m
+    do n = 1, solid%n_cut   ! the few that touch one that is reached
+      if (self%reached(n)) cycle
+      do d = 1, 3
+        do s = 1, 2
+          m = cut_neighbour(self, solid, n, s, d)
+          if (m == 0) cycle
+          if (self%reached(m)) self%reached(n) = .true.
+        end do
+      end do
+      if (self%reached(n)) call push(n)
     end do
     do while (n_stack > 0)
-      i = solid%cut_cell(:, self%stack(n_stack))
+      n = self%stack(n_stack)
       n_stack = n_stack - 1
       do d = 1, 3
         do s = 1, 2
-          n = i + (2*s - 3)*unit_step(:, d)
-          if (any(n < self%low) .or. any(n > self%high)) cycle
-          f = merge(i, n, s == 1)
-          if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
-          m = solid%cut(n(1), n(2), n(3))
+          m = cut_neighbour(self, solid, n, s, d)
           if (m == 0) cycle
           if (self%reached(m)) cycle
           self%reached(m) = .true.
-          n_stack = n_stack + 1
-          self%stack(n_stack) = m
+          call push(m)
         end do
       end do
     end do
+  contains
+    subroutine push(m)
+      integer, intent(in) :: m
+
+      n_stack = n_stack + 1
+      self%stack(n_stack) = m
+    end subroutine push
   end subroutine spread_reach
+
+  !> Number of the cut cell on side s of cut cell m in direction d, if the face between is open and
+  !! the cell is kept here, else 0.
+  pure integer function cut_neighbour(self, solid, m, s, d) result(number)
+    type(pockets_t), intent(in) :: self
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: m, s, d
+    integer :: i(3), n(3), f(3)
+
+    number = 0
+    i = solid%cut_cell(:, m)
+    n = i + (2*s - 3)*unit_step(:, d)
+    if (any(n < self%low) .or. any(n > self%high)) return
+    f = merge(i, n, s == 1)
+    if (solid%open(f(1), f(2), f(3), d) > 0.0_wp) number = solid%cut(n(1), n(2), n(3))
+  end function cut_neighbour
 
   !> Does a cell share an open face with a cell without solid, or with an open side of the domain?
   pure logical function touches_free_cell(self, grid, solid, i)

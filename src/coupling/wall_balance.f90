@@ -128,7 +128,7 @@ contains
     bins = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, e, n, term) if (links%n > worth_threads)
     do b = 1, bodies%n
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = links%first_of_body(b), links%first_of_body(b + 1) - 1, terms_at_once
         n = 0
         do e = from, min(from + terms_at_once, links%first_of_body(b + 1)) - 1
@@ -197,7 +197,7 @@ contains
       integer :: e, n, from, c(3)
 
       if (list%n == 0) return
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = list%first_of_body(b), list%first_of_body(b + 1) - 1, terms_at_once
         n = 0
         do e = from, min(from + terms_at_once, list%first_of_body(b + 1)) - 1

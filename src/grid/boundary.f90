@@ -35,17 +35,17 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, m, n_filled
+    integer :: d, s, l, n_filled
 
     n_filled = n_halo
     if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(a, n_halo, d, layers)
-      do s = 1, 2
-        if (.not. grid%at_side(s, d) .or. grid%periodic(d)) cycle
-        do m = 1, n_filled
-          call mirror_plane(a, d, ghost_layer(grid, s, d, m), mirror_layer(grid, s, d, 1), &
-                            1.0_wp, 0.0_wp)
+      if (grid%periodic(d)) cycle
+      !$omp parallel do private(s) schedule(static)
+      do l = 1, size(a, shared_by(d))
+        do s = 1, 2
+          if (grid%at_side(s, d)) call mirror(grid, s, d, n_filled, .false., 1.0_wp, 0.0_wp, l, a)
         end do
       end do
     end do
@@ -59,29 +59,37 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, c, n_filled
+    integer :: d, s, c, l, n_filled
 
     n_filled = n_halo
     if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(u, n_halo, d, layers)
       if (grid%periodic(d)) cycle
-      !$omp parallel do collapse(2) schedule(static)
-      do c = 1, 3
-        do s = 1, 2
-          if (grid%at_side(s, d)) call fill_component(grid, s, d, c, n_filled, u(:, :, :, c))
+      !$omp parallel do private(s, c) schedule(static)
+      do l = 1, size(u, shared_by(d))
+        do c = 1, 3
+          do s = 1, 2
+            if (grid%at_side(s, d)) call fill_component(grid, s, d, c, n_filled, l, u(:, :, :, c))
+          end do
         end do
       end do
     end do
   end subroutine fill_velocity_halo
 
-  !> Halo of component c of the velocity outside side s of direction d, so many layers.
-  pure subroutine fill_component(grid, s, d, c, layers, u)
+  !> Direction whose planes the threads share while they fill the halo of direction d.
+  pure integer function shared_by(d)
+    integer, intent(in) :: d
+
+    shared_by = merge(2, 3, d == 3)
+  end function shared_by
+
+  !> Halo of component c of the velocity in plane l outside side s of direction d, so many layers.
+  pure subroutine fill_component(grid, s, d, c, layers, l, u)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: s, d, c, layers
+    integer, intent(in) :: s, d, c, layers, l
     real(wp), intent(inout), contiguous :: u(:, :, :)
     real(wp) :: factor, shift
-    integer :: m
 
     factor = 1.0_wp
     shift = 0.0_wp
@@ -92,12 +100,42 @@ contains
       factor = 0.0_wp
       shift = grid%side_velocity(c, s, d)
     end if
-    do m = 1, layers
-      call mirror_plane(u, d, ghost_layer(grid, s, d, m), &
-                        mirror_layer(grid, s, d, merge(m, 1, is_wall(grid%side(s, d)))), &
-                        factor, shift)
-    end do
+    call mirror(grid, s, d, layers, is_wall(grid%side(s, d)), factor, shift, l, u)
   end subroutine fill_component
+
+  !> Layers outside side s of direction d in plane l: a(outside) = factor*a(inside) + shift, inside
+  !! the cell as deep, or the last cell.
+  pure subroutine mirror(grid, s, d, layers, as_deep, factor, shift, l, a)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: s, d, layers
+    logical, intent(in) :: as_deep
+    real(wp), intent(in) :: factor, shift
+    integer, intent(in) :: l
+      !! place of the plane in the local array with its halo, in direction `shared_by(d)`
+    real(wp), intent(inout), contiguous :: a(:, :, :)
+    integer :: to(layers), from(layers), j, m
+
+    do m = 1, layers
+      to(m) = ghost_layer(grid, s, d, m)
+      from(m) = mirror_layer(grid, s, d, merge(m, 1, as_deep))
+    end do
+    select case (d)
+    case (1)
+      do j = 1, size(a, 2)
+        do m = 1, layers
+          a(to(m), j, l) = factor*a(from(m), j, l) + shift
+        end do
+      end do
+    case (2)
+      do m = 1, layers
+        a(:, to(m), l) = factor*a(:, from(m), l) + shift
+      end do
+    case default
+      do m = 1, layers
+        a(:, l, to(m)) = factor*a(:, l, from(m)) + shift
+      end do
+    end select
+  end subroutine mirror
 
   !> Position of halo layer m outside side s, counted in the local array with its halo (first = 1).
   pure function ghost_layer(grid, s, d, m) result(layer)
@@ -118,21 +156,5 @@ contains
     inner = min(m, cells)
     layer = merge(n_halo + inner, n_halo + cells + 1 - inner, s == 1)
   end function mirror_layer
-
-  !> One layer normal to d from another: a(to) = factor*a(from) + shift.
-  pure subroutine mirror_plane(a, d, to, from, factor, shift)
-    real(wp), intent(inout), contiguous :: a(:, :, :)
-    integer, intent(in) :: d, to, from
-    real(wp), intent(in) :: factor, shift
-
-    select case (d)
-    case (1)
-      a(to, :, :) = factor*a(from, :, :) + shift
-    case (2)
-      a(:, to, :) = factor*a(:, from, :) + shift
-    case default
-      a(:, :, to) = factor*a(:, :, from) + shift
-    end select
-  end subroutine mirror_plane
 
 end module boundary_m

@@ -299,7 +299,7 @@ contains
     bins = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, m, n, f, e, term) if (self%first_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = self%first_face(b), self%first_face(b + 1) - 1, terms_at_once
         n = 0
         do m = from, min(from + terms_at_once, self%first_face(b + 1)) - 1
@@ -349,7 +349,7 @@ contains
     !$omp parallel private(b, e, n, term, pressure) if (self%first(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = self%first(b), self%first(b + 1) - 1, terms_at_once
         n = min(terms_at_once, self%first(b + 1) - from)
         do e = 1, n

@@ -197,7 +197,7 @@ contains
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, kept, at(3)
 
-    !$omp parallel do schedule(static) if (left > worth_threads)
+    !$omp parallel do schedule(dynamic, 64) if (left > worth_threads)
     do l = 1, left
       self%value(self%open_list(l)) = mean_of_neighbours(self%cell(:, self%open_list(l)))
     end do

@@ -45,7 +45,7 @@ contains
     real(wp) :: n(3), y, middle, r, slip
     integer :: m
 
-    !$omp parallel do private(n, y, middle, r, slip) schedule(static)
+    !$omp parallel do private(n, y, middle, r, slip) schedule(dynamic, 64)
     do m = links%n_films + 1, links%n
       associate (c => links%cell(:, m))
         links%centre(m) = 1.0_wp

@@ -34,7 +34,7 @@ contains
     real(wp) :: excess(grid%lo(1):grid%hi(1))   ! of the change to a neighbour above what counts
 
     !$omp parallel do private(i, j, d, n, s, e, f, c, change, other, total, most, excess) &
-    !$omp schedule(static)
+    !$omp schedule(dynamic)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         most = 0.0_wp

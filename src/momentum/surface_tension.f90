@@ -11,7 +11,6 @@
 !! domain: the surface meets walls and upright sides of bodies at 90 degrees.
 module surface_tension_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_rows
   use case_types_m, only: fluid_t
   use boundary_kinds_m, only: no_side
   use grid_m, only: grid_t, unit_step
@@ -22,10 +21,12 @@ module surface_tension_m
   use face_weight_m, only: weight_at_faces
   use surface_curvature_m, only: surface_curvature_t, surface_curvature_init, find_curvature, &
                                  no_surface
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
   public :: surface_tension_t, find_tension, add_tension, force_from_tension
+
+  integer, parameter :: worth_threads = 1000   !! fewer faces of bodies are the work of one thread
 
   type :: surface_tension_t
     logical :: acts = .false.
@@ -131,32 +132,35 @@ contains
   !> Add force and torque of the surface on each body to those of the pressure: the tension of the
   !! surface as continued through the body acts on the solid part of the faces, as the pressure
   !! does. With an angle of 90 degrees that is the pull along the line of contact.
-  subroutine force_from_tension(grid, bodies, flux, self, work, force)
+  subroutine force_from_tension(grid, bodies, flux, self, force)
     type(grid_t), intent(in) :: grid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     type(surface_tension_t), intent(in) :: self
-    real(wp), allocatable, intent(inout) :: work(:, :)   !! (*, 6) grows when needed
     real(wp), intent(inout) :: force(:, :)   !! (6, bodies) about the centre of mass [N, N m]
     integer(i8) :: bins(bin_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n)
-    integer :: b, m, t, n
+    real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
+    integer :: b, m, n, from
 
     if (.not. self%acts) return
     bins = spread(no_terms, 2, 6*bodies%n)
+    !$omp parallel private(b, m, n, term) if (flux%first_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
-      n = flux%first_face(b + 1) - flux%first_face(b)
-      call ensure_rows(n, work)
-      t = 0
-      do m = flux%first_face(b), flux%first_face(b + 1) - 1
-        if (.not. flux%mine(m)) cycle
-        t = t + 1
-        associate (f => flux%face(:, m))
-          work(t, :) = flux%s(:, m)*grid%h(f(4))*self%force(f(1), f(2), f(3), f(4))
-        end associate
+      !$omp do schedule(dynamic)
+      do from = flux%first_face(b), flux%first_face(b + 1) - 1, terms_at_once
+        n = 0
+        do m = from, min(from + terms_at_once, flux%first_face(b + 1)) - 1
+          if (.not. flux%mine(m)) cycle
+          n = n + 1
+          associate (f => flux%face(:, m))
+            term(n, :) = flux%s(:, m)*grid%h(f(4))*self%force(f(1), f(2), f(3), f(4))
+          end associate
+        end do
+        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
-      call exact_add_columns(work(1:t, :), bins(:, 6*b - 5:6*b))
+      !$omp end do nowait
     end do
+    !$omp end parallel
     call exact_totals(bins, total)
     force(:, :bodies%n) = force(:, :bodies%n) + reshape(total, [6, bodies%n])
   end subroutine force_from_tension

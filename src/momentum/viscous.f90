@@ -442,7 +442,7 @@ contains
     associate (walls => self%walls)
       !$omp parallel private(b, m, n, term, slip) if (walls%n > worth_threads)
       do b = 1, size(pull, 2)
-        !$omp do schedule(static)
+        !$omp do schedule(dynamic)
         do from = walls%first(b), walls%first(b + 1) - 1, terms_at_once
           n = 0
           do m = from, min(from + terms_at_once, walls%first(b + 1)) - 1

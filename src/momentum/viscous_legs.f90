@@ -239,6 +239,9 @@ contains
     do s = 1, 2
       call grid%side_faces(s, d, a, b)
       self%leg(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+      ! Only a side that moves goes into a list.
+      !$omp parallel do collapse(2) private(i, c, value) schedule(static) &
+      !$omp if (all(abs(grid%side_velocity(:, s, d)) <= 0.0_wp))
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
@@ -333,7 +336,7 @@ contains
       real(wp) :: term(terms_at_once, 1)
       integer :: m, n, from, i(3)
 
-      !$omp do schedule(static)
+      !$omp do schedule(dynamic)
       do from = solid%body_cell(body), solid%body_cell(body + 1) - 1, terms_at_once
         n = 0
         do m = from, min(from + terms_at_once, solid%body_cell(body + 1)) - 1
@@ -357,7 +360,7 @@ contains
     real(wp) :: term(terms_at_once, 10)
     integer :: from, m, n
 
-    !$omp do schedule(static)
+    !$omp do schedule(dynamic)
     do from = walls%first(body), walls%first(body + 1) - 1, terms_at_once
       n = min(terms_at_once, walls%first(body + 1) - from)
       do m = 1, n

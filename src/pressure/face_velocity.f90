@@ -391,7 +391,7 @@ contains
     type(flow_t), intent(inout) :: flow
     integer :: m, d, c(3)
 
-    !$omp parallel do private(d, c) schedule(static)
+    !$omp parallel do private(d, c) schedule(dynamic, 64)
     do m = 1, size(wall_cell, 2)
       do d = 1, 3
         call shorten(wall_cell(:, m), d, body(m))

@@ -36,7 +36,7 @@ module pressure_m
     logical :: rough = .false.             !! the next solve may leave `rough_factor` times that
     integer :: max_passes = 0
     real(wp), allocatable :: phi_total(:, :, :)                      !! full halo [Pa]
-    integer, allocatable :: known(:, :, :)        !! work of `extend_pressure`
+    integer, allocatable :: known(:, :, :), closed(:, :)   !! work of `extend_pressure`
     type(pressure_report_t) :: report             !! of the last solve
   end type pressure_t
 

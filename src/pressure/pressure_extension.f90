@@ -2,6 +2,7 @@
 module pressure_extension_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo, unit_step
+  use cell_list_m, only: list_marked
   use boundary_m, only: fill_scalar_halo
   use mixture_m, only: face_mean
   use parallel_m, only: global_sum, halo_exchange
@@ -18,7 +19,7 @@ contains
   !! Cells that are nearly full of solid do not lend theirs while others can: what water is left
   !! between two faces that lie on one another may have any pressure, and it would push the blocks
   !! apart wherever they touch.
-  subroutine extend_pressure(grid, gravity, rho, alpha, active, known, p)
+  subroutine extend_pressure(grid, gravity, rho, alpha, active, known, cell, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -27,13 +28,19 @@ contains
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(inout), contiguous :: known(grid%first(1):, grid%first(2):, grid%first(3):)
                                                   !! work: pass in which p was found, 0 unknown
+    integer, allocatable, intent(inout) :: cell(:, :)   !! work: those without open faces, grows
     real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [Pa]
     real(wp), parameter :: least_fluid = 0.1_wp   ! share of a cell that lends its pressure
-    integer :: i, j, k, pass, n_found, round
+    integer :: k, l, n, pass, n_found, round
     integer(i8) :: left(1)
     logical :: sideways
 
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      known(:, :, k) = merge(0, 1, active(:, :, k))
+    end do
+    call list_marked(grid, lbound(known), known, cell, n)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - least_fluid)
@@ -46,12 +53,8 @@ contains
       call halo_exchange(known, n_halo, layers=1)
       pass = pass + 1
       n_found = 0
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            if (known(i, j, k) == 0 .and. .not. active(i, j, k)) call from_neighbours([i, j, k])
-          end do
-        end do
+      do l = 1, n
+        if (known(cell(1, l), cell(2, l), cell(3, l)) == 0) call from_neighbours(cell(:, l))
       end do
       left = n_found
       call global_sum(left)
@@ -66,7 +69,7 @@ contains
     !> Mean over the neighbours known before this pass.
     subroutine from_neighbours(c)
       integer, intent(in) :: c(3)
-      integer :: d, s, n(3), count
+      integer :: d, s, o(3), count
       real(wp) :: total
 
       count = 0
@@ -74,12 +77,12 @@ contains
       do d = 1, 3
         if (sideways .and. abs(gravity(d)) > 0.0_wp) cycle
         do s = -1, 1, 2
-          n = c + s*unit_step(:, d)
-          if (any((n < 1 .or. n > grid%n) .and. .not. grid%periodic)) cycle
-          if (known(n(1), n(2), n(3)) == 0 .or. known(n(1), n(2), n(3)) == pass) cycle
+          o = c + s*unit_step(:, d)
+          if (any((o < 1 .or. o > grid%n) .and. .not. grid%periodic)) cycle
+          if (known(o(1), o(2), o(3)) == 0 .or. known(o(1), o(2), o(3)) == pass) cycle
           count = count + 1
-          total = total + p(n(1), n(2), n(3)) - real(s, wp)*gravity(d)*grid%h(d) &
-                  *face_mean(rho(n(1), n(2), n(3)), rho(c(1), c(2), c(3)))
+          total = total + p(o(1), o(2), o(3)) - real(s, wp)*gravity(d)*grid%h(d) &
+                  *face_mean(rho(o(1), o(2), o(3)), rho(c(1), c(2), c(3)))
         end do
       end do
       if (count == 0) return

@@ -326,7 +326,7 @@ contains
     type(one_body_t) :: block
     type(surface_tension_t) :: tension
     type(rigid_flux_t) :: flux
-    real(wp), allocatable :: work(:, :), p(:, :, :)
+    real(wp), allocatable :: p(:, :, :)
     logical, allocatable :: active(:, :, :)
     character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
       'slip', 'slip', 'periodic', 'periodic', 'slip', 'slip'], [2, 3])
@@ -367,9 +367,8 @@ contains
       call build_rigid_flux(g, block%solid, block%bodies, active, flux)
       call force_from_faces(g, block%bodies, flux, p, force)
       size_of_force = norm2(force(1:3, 1))
-      allocate (work(0, 6))
       pull = 0.0_wp
-      call force_from_tension(g, block%bodies, flux, tension, work, pull)
+      call force_from_tension(g, block%bodies, flux, tension, pull)
       call check('the pressure pushes the body', size_of_force > 1.0e-5_wp)
       call check('the surface pulls it back', maxval(abs(force + pull)), 0.0_wp, &
                  1.0e-12_wp*size_of_force)
