@@ -43,6 +43,9 @@ contains
 
     if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
     if (.not. report%contacts_solved) call set(sim, 'blocks move too fast for any body step', fault)
+    if (.not. report%transport_converged) then
+      call set(sim, 'what small cells of the transport give did not converge', fault)
+    end if
     if (.not. report%viscous_converged) call set(sim, 'the viscous stage did not converge', fault)
     if (.not. report%pressure_converged) then
       call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
@@ -85,7 +88,7 @@ contains
     real(wp) :: courant
 
     rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
-    courant = sim%case%run%dt*rate%carried
+    courant = sim%case%run%dt*max(rate%given, rate%followed)
     if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
       //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
       //' keeps it', fault)

@@ -7,7 +7,7 @@ module carried_volumes_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: carried_volumes_t, carried_volumes_init
+  public :: carried_volumes_t, carried_volumes_init, share_of
 
   type :: carried_volumes_t
     !> Volumes through the lower faces in a part of the step, all and liquid, positive along the
@@ -35,5 +35,13 @@ contains
     allocate (self%w(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (self%v, self%w_before, self%v_before, self%c, source=self%w)
   end subroutine carried_volumes_init
+
+  !> Liquid share of a volume, within 0 and 1.
+  elemental function share_of(w, v) result(share)
+    real(wp), intent(in) :: w, v
+    real(wp) :: share
+
+    share = min(max(w/merge(v, 1.0_wp, v > 0.0_wp), 0.0_wp), 1.0_wp)
+  end function share_of
 
 end module carried_volumes_m

@@ -17,7 +17,7 @@ module liquid_sweep_m
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_constant, open_slab_below
   use surface_normal_m, only: vertical_t, vertical_of, surface_normal
   use extended_fraction_m, only: nearly_pure
-  use carried_volumes_m, only: carried_volumes_t
+  use carried_volumes_m, only: carried_volumes_t, share_of
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -359,13 +359,5 @@ contains
     left = ((volume - max(-low, 0.0_wp)) - max(high, 0.0_wp)) &
            + (max(low, 0.0_wp) + max(-high, 0.0_wp))
   end function after_exchange
-
-  !> Liquid share of a volume, within 0 and 1.
-  elemental function share_of(w, v) result(share)
-    real(wp), intent(in) :: w, v
-    real(wp) :: share
-
-    share = min(max(w/merge(v, 1.0_wp, v > 0.0_wp), 0.0_wp), 1.0_wp)
-  end function share_of
 
 end module liquid_sweep_m

@@ -19,7 +19,7 @@ module liquid_transport_m
   use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
-                           count_small_cells
+                           renew_shares, count_small_cells
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use exact_sum_m, only: exact_sum
   implicit none
@@ -102,14 +102,15 @@ contains
       self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :)/real(self%parts, wp)
     end do
     self%sweeps%clamped = 0.0_wp
+    self%small%converged = .true.
     self%inflow = 0.0_wp
   end subroutine begin_transport
 
   !> The order of the directions and the small cells of an equal part of the step.
   !!
-  !! Where the fluid moves further than the sweeps can follow, the same volumes go in several parts.
-  !! The open volume of a cell then runs in equal parts too, so the last part ends at that
-  !! of the new geometry whatever their number.
+  !! Where the liquid moves further than the sweeps can follow, the same volumes go in several
+  !! parts. The open volume of a cell then runs in equal parts too, so the last part ends at that of
+  !! the new geometry whatever their number.
   subroutine begin_part(grid, old, part, step, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old
@@ -118,6 +119,7 @@ contains
     type(liquid_transport_t), intent(inout) :: self
 
     self%order = orders(:, 1 + modulo(step + part - 1, size(orders, 2)))
+    if (part > 1) call renew_shares(grid, old, self%small, self%volumes)
     call find_small_cells(grid, old, self%volumes, self%small)
   end subroutine begin_part
 

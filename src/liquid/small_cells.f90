@@ -11,13 +11,13 @@ module small_cells_m
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
-  use carried_volumes_m, only: carried_volumes_t
+  use carried_volumes_m, only: carried_volumes_t, share_of
   use exact_sum_m, only: exact_sum
   use parallel_m, only: halo_exchange, global_max, global_sum
   implicit none
   private
   public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells, count_small_cells
-  public :: late_values, move_late
+  public :: renew_shares, late_values, move_late
 
   real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
   real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
@@ -32,12 +32,14 @@ module small_cells_m
     integer :: n_late = 0
     integer, allocatable :: face(:, :)        !! (4, *) cell and direction of the lower face
     integer, allocatable :: donor(:, :), receiver(:, :)   !! (3, *)
+    integer, allocatable :: late_in_row(:, :)   !! work: those of a direction in the row (:, j, k)
     real(wp), allocatable :: q_late(:), g_late(:)
       !! (*) volume and liquid through these faces, positive along the axis [m3]
     ! Statistics of the last step, all processes.
     integer :: count = 0                      !! small cells that gave something
-    integer :: count_open = 0                 !! of them without solid: the time step is long
+    integer :: count_open = 0                 !! of them without solid: fast gas, or a long step
     integer :: iterations = 0                 !! of the last donor values
+    logical :: converged = .true.             !! all donor values of the step
     real(wp) :: held = 0.0_wp                 !! liquid in closed cells until they open [m3]
     ! Work of the donor values, a number for each small cell.
     real(wp), allocatable :: amount(:), mass(:), ratio(:)
@@ -55,6 +57,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
+    allocate (self%late_in_row(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1))
     allocate (self%cell(3, first_size))
     allocate (self%face(4, first_size), self%donor(3, first_size), self%receiver(3, first_size))
   end subroutine small_cells_init
@@ -110,12 +113,10 @@ contains
     n = 0
     do d = 1, 3
       e = unit_step(:, d)
+      call count_late_faces(grid, d, volumes%q(:, :, :, d), self%number, self%late_in_row)
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
-          associate (a => grid%lo(1), b => grid%hi(1))
-            if (maxval(self%number(a - e(1):b + e(1), j, k)) == 0 .and. &
-                maxval(self%number(a:b, j - e(2), k - e(3))) == 0) cycle
-          end associate
+          if (self%late_in_row(j, k) == 0) cycle
           do i = grid%lo(1), grid%hi(1) + e(1)
             if (.not. abs(volumes%q(i, j, k, d)) > 0.0_wp) cycle
             up = [i, j, k]
@@ -140,6 +141,31 @@ contains
     call ensure_room(n, self%q_late)
     call ensure_room(n, self%g_late)
   end subroutine find_late_faces
+
+  !> How many faces of direction d have a small donor, in each row.
+  subroutine count_late_faces(grid, d, q, number, in_row)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: d
+    real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! volume through the lower faces [m3]
+    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer, intent(inout), contiguous :: in_row(grid%lo(2):, grid%lo(3):)
+    integer :: i, j, k, n, e(3)
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j, n) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        n = 0
+        !$omp simd reduction(+: n)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          n = n + merge(1, 0, (q(i, j, k) > 0.0_wp .and. number(i - e(1), j - e(2), k - e(3)) > 0) &
+                        .or. (q(i, j, k) < 0.0_wp .and. number(i, j, k) > 0))
+        end do
+        in_row(j, k) = n
+      end do
+    end do
+  end subroutine count_late_faces
 
   !> The small cells give what they hold once all has come in: w, v, q and g are complete.
   subroutine give_small_cells(grid, volumes, self, share)
@@ -166,6 +192,31 @@ contains
       end associate
     end do
   end subroutine give_small_cells
+
+  !> C^ of what gave and got late in the part before, for the next one; that of cells with solid
+  !! stays that of the begin, as in the sweeps.
+  subroutine renew_shares(grid, old, self, volumes)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old
+    type(small_cells_t), intent(in) :: self
+    type(carried_volumes_t), intent(inout) :: volumes
+    integer :: l
+
+    do l = 1, self%n_late
+      call renew(self%donor(:, l))
+      call renew(self%receiver(:, l))
+    end do
+    call fill_scalar_halo(grid, volumes%c)
+  contains
+    subroutine renew(at)
+      integer, intent(in) :: at(3)
+
+      if (.not. grid%owns(at)) return
+      if (old%alpha(at(1), at(2), at(3)) > 0.0_wp) return
+      volumes%c(at(1), at(2), at(3)) = share_of(volumes%w(at(1), at(2), at(3)), &
+                                                volumes%v(at(1), at(2), at(3)))
+    end subroutine renew
+  end subroutine renew_shares
 
   !> What small cells hold per mass of a carried quantity once all has come in:
   !! $$ x_S = (a_S + \sum_{in} w\, x_{S'}) / (m_S + \sum_{in} w) $$
@@ -196,6 +247,7 @@ contains
       self%iterations = it
       if (change(1) <= 4.0_wp*epsilon(1.0_wp)*change(2)) exit
     end do
+    if (it > max_late_iterations) self%converged = .false.
     call halo_exchange(value, n_halo, layers=1)
   contains
     !> What they hold after the sweeps, and their mass with all that comes in.

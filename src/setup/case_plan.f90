@@ -231,10 +231,6 @@ contains
       else
         call entry(unit, 'Courant limit', 'none, dt is kept')
       end if
-      if (.not. case%fluid%single_phase) then
-        call entry(unit, 'liquid transport', brief(0.5_wp*h/speed)//' s at '//brief(speed) &
-                   //' m/s, half a cell a step')
-      end if
       if (gravity_step(case%fluid, h) < huge(h)) then
         call entry(unit, 'shortest waves', brief(gravity_step(case%fluid, h))//' s')
       end if
