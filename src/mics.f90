@@ -9,7 +9,7 @@ program mics
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, nproc, &
     set_threads
-  use patience_m, only: choose_spin, share_cores
+  use patience_m, only: choose_spin_and_pages, share_cores
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
@@ -44,7 +44,7 @@ program mics
   integer :: code, signal = 0
   real(wp) :: began   !! wall clock at the start [s]
 
-  call choose_spin()
+  call choose_spin_and_pages()
   call parallel_init()
   began = wall_clock()
   call read_options()

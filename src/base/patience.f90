@@ -1,5 +1,5 @@
-!> How threads and processes wait for one another, and how many threads work while other programs
-!! want the cores.
+!> How threads and processes wait for one another, how many threads work while other programs want
+!! the cores, and in which pages memory comes.
 !!
 !! A step is some hundreds of short loops. A thread that sleeps at the end of one must be woken for
 !! the next (measured, two threads on two idle cores: 105 ms a step, 57 with a spin of a
@@ -8,8 +8,12 @@
 !! waiting threads spin for about a millisecond, and go on as fewer while there are more running
 !! threads on the machine than cores. The number of threads never changes a result.
 !!
-!! The OpenMP library of gfortran reads the length of the spin before the program begins, so the
-!! only way to choose it is to begin again.
+!! A step runs through some hundred arrays. In pages of 4 kB the processor forgets where they lie;
+!! in large ones (2 MB) a step of the main job takes 7 % less CPU. The system gives large pages to
+!! those that ask, and glibc asks when it is told to.
+!!
+!! The libraries of gfortran and of C read both choices before the program begins, so the only way
+!! to make them is to begin again.
 !!
 !! Processes wait in MPI, which asks again and again without giving the core away unless it was told
 !! that there are too few cores; what it is told is often wrong, and it knows nothing of other
@@ -18,14 +22,18 @@
 module patience_m
   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_long, c_null_char, c_null_ptr, &
     c_ptr
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
+  use machine_memory_m, only: may_allocate
   use timers_m, only: wall_clock
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   implicit none
   private
-  public :: choose_spin, choose_messages, share_cores, fair_threads, threads_used
+  public :: choose_spin_and_pages, choose_messages, share_cores, fair_threads, threads_used
 
   character(*), parameter :: spin_count = '20000'   !! about a millisecond
+  character(*), parameter :: large_pages = 'glibc.malloc.hugetlb=1'
+  integer(i8), parameter :: room_for_pages = 100000000_i8
+    !! a process that may not have so much gets no large pages: their edges alone would fill it [B]
   character(*), parameter :: largest_layer = '65536'
     !! that is sent at once [bytes]; larger ones wait until the receiver asks for them
   real(wp), parameter :: look_interval = 1.0_wp     !! between two looks at the machine [s]
@@ -59,19 +67,34 @@ module patience_m
 
 contains
 
-  !> Start the program again with the spin of above, unless the user has chosen how threads wait.
+  !> Start the program again with the spin and the pages of above, unless the user has chosen how
+  !! threads wait and tuned glibc.
   !!
-  !! Call it before anything else. It returns when the choice is made, or when the system cannot
-  !! start the program again (no /proc): then threads wait as the library does.
-  subroutine choose_spin()
+  !! Call it before anything else. It returns when the choices are made, or when the system cannot
+  !! start the program again (no /proc): then the libraries do as they do.
+  subroutine choose_spin_and_pages()
+    character(*), parameter :: began_again = 'MICS_BEGAN_AGAIN'   ! never twice, whatever is kept
     character(kind=c_char), allocatable, target :: text(:, :)
     type(c_ptr), allocatable :: arguments(:)
     character(:), allocatable :: word
+    logical :: waits, tuned   ! the user's own, or better left alone
+    integer(c_int) :: status
     integer :: i, j, n, length, longest
 
-    if (is_set('OMP_WAIT_POLICY')) return
-    if (is_set('GOMP_SPINCOUNT')) return
-    if (c_setenv('GOMP_SPINCOUNT'//c_null_char, spin_count//c_null_char, 1_c_int) /= 0) return
+    if (is_set(began_again)) return
+    waits = is_set('OMP_WAIT_POLICY')
+    if (.not. waits) waits = is_set('GOMP_SPINCOUNT')
+    tuned = is_set('GLIBC_TUNABLES')
+    if (.not. tuned) tuned = .not. may_allocate(room_for_pages)
+    if (waits .and. tuned) return
+    status = c_setenv(began_again//c_null_char, '1'//c_null_char, 1_c_int)
+    if (status /= 0) return
+    if (.not. waits) then
+      status = c_setenv('GOMP_SPINCOUNT'//c_null_char, spin_count//c_null_char, 1_c_int)
+    end if
+    if (.not. tuned) then
+      status = c_setenv('GLIBC_TUNABLES'//c_null_char, large_pages//c_null_char, 1_c_int)
+    end if
     n = command_argument_count()
     longest = 0
     do i = 0, n
@@ -90,7 +113,7 @@ contains
     end do
     arguments(n + 1) = c_null_ptr
     if (c_execv('/proc/self/exe'//c_null_char, arguments) /= 0) return   ! it goes on as it is
-  end subroutine choose_spin
+  end subroutine choose_spin_and_pages
 
   !> Let a process that waits for another one give its core away, and let layers go without asking
   !! the other process first, unless the environment says otherwise. Call it before MPI begins. The

@@ -1,21 +1,30 @@
-!> The program begins again with its own spin and the same arguments, unless the user has chosen how
-!! threads wait, and leaves its cores to others. It calls itself: with arguments it is the program
-!! that begins again.
+!> The program begins again with its own spin and pages and the same arguments, unless the user has
+!! chosen how threads wait and tuned glibc, and leaves its cores to others. It calls itself: with
+!! arguments it is the program that begins again.
 program test_patience
   use kinds_m, only: wp
   use omp_lib, only: omp_get_max_threads
   use check_m, only: check, finish_checks
-  use patience_m, only: choose_spin, share_cores, fair_threads, threads_used
+  use patience_m, only: choose_spin_and_pages, share_cores, fair_threads, threads_used
   implicit none
+  character(*), parameter :: pages = '-u GLIBC_TUNABLES '
 
   if (command_argument_count() > 0) then
     call begin_again()
   else
     call check_shares()
-    call check('a short spin', status_of('-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT', 'short'), 0)
+    call check('a short spin', &
+      status_of(pages//'-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT', 'short'), 0)
     call check('the user''s policy', &
-      status_of('-u GOMP_SPINCOUNT OMP_WAIT_POLICY=active', 'none'), 0)
-    call check('the user''s count', status_of('-u OMP_WAIT_POLICY GOMP_SPINCOUNT=7', 'count'), 0)
+      status_of(pages//'-u GOMP_SPINCOUNT OMP_WAIT_POLICY=active', 'none'), 0)
+    call check('the user''s count', &
+      status_of(pages//'-u OMP_WAIT_POLICY GOMP_SPINCOUNT=7', 'count'), 0)
+    call check('the user''s glibc', &
+      status_of('-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT GLIBC_TUNABLES=mine', 'tuned'), 0)
+    call check('all of the user', &
+      status_of('OMP_WAIT_POLICY=active GOMP_SPINCOUNT=7 GLIBC_TUNABLES=mine', 'all'), 0)
+    call check('never twice', status_of(pages//'-u OMP_WAIT_POLICY -u GOMP_SPINCOUNT ' &
+                                        //'MICS_BEGAN_AGAIN=1', 'again'), 0)
   end if
   call finish_checks()
 
@@ -48,27 +57,37 @@ contains
     character(4096) :: program
 
     call get_command_argument(0, program)
-    call execute_command_line('env '//settings//' "'//trim(program)//'" '//wanted &
-      //' "two words" "" > /dev/null', exitstat=status)
+    call execute_command_line('env -u MICS_BEGAN_AGAIN '//settings//' "'//trim(program)//'" ' &
+      //wanted//' "two words" "" > /dev/null', exitstat=status)
   end function status_of
 
-  !> What a program finds once it has called choose_spin: a spin that is set only where the user
-  !! has said nothing, far below the 300000 of the library, and its arguments.
+  !> What a program finds once it has called choose_spin_and_pages: a spin and pages that are set
+  !! only where the user has said nothing, the spin far below the 300000 of the library, and its
+  !! arguments.
   subroutine begin_again()
-    character(20) :: wanted, count
+    character(30) :: wanted, count, tuned
     integer :: length, info, spins
 
-    call choose_spin()
+    call choose_spin_and_pages()
     call get_command_argument(1, wanted)
     call get_environment_variable('GOMP_SPINCOUNT', count, status=info)
+    call get_environment_variable('GLIBC_TUNABLES', tuned)
     select case (wanted)
-    case ('short')
+    case ('short', 'none', 'count')
+      call check('large pages', index(tuned, 'hugetlb=1') > 0)
+    case ('again')
+      call check('no pages', len_trim(tuned), 0)
+    case default
+      call check('tuned as it was', tuned == 'mine')
+    end select
+    select case (wanted)
+    case ('short', 'tuned')
       call check('is set', info, 0)
       read (count, *) spins
       call check('is short', spins > 0 .and. spins <= 30000)
-    case ('none')
+    case ('none', 'again')
       call check('is not set', info, 1)
-    case ('count')
+    case ('count', 'all')
       call check('stays', info == 0 .and. count == '7')
     case default
       call check('called as it should be', .false.)
