@@ -85,6 +85,7 @@ contains
     waits = is_set('OMP_WAIT_POLICY')
     if (.not. waits) waits = is_set('GOMP_SPINCOUNT')
     tuned = is_set('GLIBC_TUNABLES')
+    if (.not. tuned) tuned = is_set('OMPI_COMM_WORLD_SIZE')   ! many small processes fill them badly
     if (.not. tuned) tuned = .not. may_allocate(room_for_pages)
     if (waits .and. tuned) return
     status = c_setenv(began_again//c_null_char, '1'//c_null_char, 1_c_int)
