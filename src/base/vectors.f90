@@ -3,7 +3,7 @@ module vectors_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: cross, norm, normalised
+  public :: cross, norm, distance, normalised
   public :: quaternion_product, quaternion_from_axis, quaternion_exp, rotation_matrix, rotate
   public :: inverse3, solve6
 
@@ -26,6 +26,14 @@ contains
 
     length = sqrt(dot_product(a, a))
   end function norm
+
+  !> Distance of two points.
+  pure function distance(a, b) result(length)
+    real(wp), intent(in) :: a(3), b(3)
+    real(wp) :: length
+
+    length = norm(a - b)
+  end function distance
 
   !> The vector (or quaternion) divided by its length; a zero vector stays zero.
   pure function normalised(q) result(r)

@@ -12,7 +12,7 @@
 module contact_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
-  use vectors_m, only: norm, rotation_matrix
+  use vectors_m, only: distance, norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place
@@ -140,7 +140,7 @@ contains
     do b = 1, blocks%n
       if (blocks%present(b) .neqv. self%present(b)) return
       if (.not. blocks%present(b)) cycle
-      if (norm(blocks%x(:, b) - self%x(:, b)) > 0.5_wp*(self%wide_skin - self%clear)) return
+      if (distance(blocks%x(:, b), self%x(:, b)) > 0.5_wp*(self%wide_skin - self%clear)) return
     end do
     yes = .false.
   end function pairs_may_be_missing
@@ -317,7 +317,7 @@ contains
     now%turn_a = self%turn(:, :, a)
     now%turn_b = self%turn(:, :, b)
     now%to_b = now%poses%x_b + self%pairs(slot)%shift - now%poses%x_a
-    now%speed = norm(blocks%v(:, a) - blocks%v(:, b)) &
+    now%speed = distance(blocks%v(:, a), blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*self%reach(a) + norm(blocks%omega(:, b))*self%reach(b)
     now%gap = ahead*now%speed
     associate (surface_a => self%surface(blocks%shape(a)), &
@@ -370,12 +370,12 @@ contains
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
     type(touches_t), intent(inout) :: touches
-    real(wp) :: distance, depth, normal(3), arm(3)
+    real(wp) :: apart, depth, normal(3), arm(3)
 
-    distance = norm(now%to_b)
-    depth = surface_a%ball + surface_b%ball - distance
+    apart = norm(now%to_b)
+    depth = surface_a%ball + surface_b%ball - apart
     if (depth <= -now%gap) return
-    normal = now%to_b/max(distance, tiny(1.0_wp))
+    normal = now%to_b/max(apart, tiny(1.0_wp))
     arm = (surface_a%ball - 0.5_wp*depth)*normal
     call add_touch(touch_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
       min(surface_a%length, surface_b%length)), touches)
@@ -390,7 +390,7 @@ contains
     type(touches_t), intent(inout) :: touches
     type(view_t) :: view                      ! of the guest, host axes
     type(touch_t) :: touch
-    real(wp) :: turn_host(3, 3), place(3), distance, outward(3), arm(3)
+    real(wp) :: turn_host(3, 3), place(3), apart, outward(3), arm(3)
     integer :: c, m, n, i, edges, next
 
     touch%a = pair%a
@@ -416,9 +416,9 @@ contains
         place = view%x + view%turn(:, 1)*guest%probe(1, i) + view%turn(:, 2)*guest%probe(2, i) &
           + view%turn(:, 3)*guest%probe(3, i)
         call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
-          distance, outward)
+          apart, outward)
       end associate
-      touch%depth = guest%ball - distance
+      touch%depth = guest%ball - apart
       if (touch%depth <= -now%gap) cycle
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*touch%depth)*outward)
       outward = matmul(turn_host, outward)

@@ -10,7 +10,7 @@
 !! sleeper is never held by more than that share of its load.
 module sleep_m
   use kinds_m, only: wp
-  use vectors_m, only: norm
+  use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
   use springs_m, only: springs_t, reserve_springs
   implicit none
@@ -108,7 +108,7 @@ contains
     integer :: b
 
     do b = 1, blocks%n
-      way = norm(blocks%x(:, b) - sleep%x(:, b)) &
+      way = distance(blocks%x(:, b), sleep%x(:, b)) &
         + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%reach(b)
       if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
           way <= slow*sqrt(norm(gravity)*sleep%reach(b))*dt) then

@@ -2,7 +2,7 @@
 module substep_limits_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use vectors_m, only: norm
+  use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near
@@ -102,7 +102,7 @@ contains
     fastest = 0.0_wp
     do p = 1, near%n
       associate (a => near%a(p), b => near%b(p))
-        speed = norm(blocks%v(:, a) - blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
+        speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
           + norm(blocks%omega(:, b))*reach(b)
       end associate
       if (.not. speed <= fastest) fastest = speed

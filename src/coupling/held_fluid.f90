@@ -87,7 +87,7 @@ contains
     integer, intent(in) :: n_blocks
     real(wp), intent(in) :: more(:, :)   !! (3, cut cells)
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b, d, m, n, s, next
+    integer :: b, d, m, n, s, next, f(4)
 
     n = size(solid%body_cell)
     if (size(solid%first_held) /= n) then
@@ -105,7 +105,9 @@ contains
             do d = 1, 3
               if (more(d, cut) < least) cycle
               do s = 0, 1
-                call narrow([c + s*unit_step(:, d), d], 0.5_wp*more(d, cut))
+                f(1:3) = c + s*unit_step(:, d)
+                f(4) = d
+                call narrow(f, 0.5_wp*more(d, cut))
               end do
             end do
           end associate
@@ -143,7 +145,7 @@ contains
     do b = 1, size(solid%body_cell) - 1
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (cut => solid%cut(solid%cell(1, m), solid%cell(2, m), solid%cell(3, m)))
-          if (cut > 0) owner(cut) = merge(b, several, any(owner(cut) == [0, b]))
+          if (cut > 0) owner(cut) = merge(b, several, owner(cut) == 0 .or. owner(cut) == b)
         end associate
       end do
     end do

@@ -12,7 +12,7 @@ module monolithic_m
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
-  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, nearest_arm
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
   use viscous_legs_m, only: build_viscous
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
@@ -396,8 +396,7 @@ contains
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
           if (b == 0 .or. links%number(i, j, k) > 0) cycle
-          arm = nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, 3)], &
-                            bodies%x(:, b))
+          arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
           u(i, j, k, :) = wall_velocity(bodies%motion(:, b), arm)
         end do
       end do

@@ -18,7 +18,7 @@ module wall_balance_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm
+  use rigid_flux_m, only: arm_to_cell
   use linked_cells_m, only: linked_cells_t, open_shares
   use mid_step_m, only: mid_step_t
   use viscous_system_m, only: wrench
@@ -122,11 +122,13 @@ contains
     type(wall_balance_t), intent(in) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
     integer(i8) :: bins(bin_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
+    real(wp) :: total(6*bodies%n), term(terms_at_once, 6), load(6)
+    real(wp) :: faster(6, bodies%n)   ! than at the start
     integer :: b, e, n, from
 
+    faster = bodies%motion(:, :bodies%n) - at_start%motion(:, :bodies%n)
     bins = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b, e, n, term) if (links%n > worth_threads)
+    !$omp parallel private(b, e, n, term, load) if (links%n > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
       do from = links%first_of_body(b), links%first_of_body(b + 1) - 1, terms_at_once
@@ -134,7 +136,8 @@ contains
         do e = from, min(from + terms_at_once, links%first_of_body(b + 1)) - 1
           if (.not. grid%owns(links%cell(:, links%by_body(e)))) cycle
           n = n + 1
-          term(n, :) = of_cell(links%by_body(e), b)
+          load = of_cell(links%by_body(e), b)
+          term(n, :) = load
         end do
         call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
@@ -151,8 +154,8 @@ contains
       real(wp) :: arm(3), wall(3), moved(3)
 
       associate (c => links%cell(:, m))
-        arm = arm_of(grid, c, bodies%x(:, b))
-        wall = wall_velocity(bodies%motion(:, b) - at_start%motion(:, b), arm)
+        arm = arm_to_cell(grid, c, bodies%x(:, b))
+        wall = wall_velocity(faster(:, b), arm)
         moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
         owed = wrench((moved*(self%pushed(:, m) - wall) &
                        - self%mass(m)*(self%gained(:, m) - wall) + self%to_wall(:, m))/dt, arm)
@@ -193,7 +196,7 @@ contains
       type(linked_cells_t), intent(in) :: list
       logical, intent(in) :: at_start
       integer, intent(in) :: b
-      real(wp) :: term(terms_at_once, 6)
+      real(wp) :: term(terms_at_once, 6), load(6)
       integer :: e, n, from, c(3)
 
       if (list%n == 0) return
@@ -205,7 +208,8 @@ contains
           if (.not. grid%owns(c)) cycle
           if (at_start .and. links%number(c(1), c(2), c(3)) > 0) cycle
           n = n + 1
-          term(n, :) = of_cell(c, b)
+          load = of_cell(c, b)
+          term(n, :) = load
         end do
         call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
       end do
@@ -223,18 +227,8 @@ contains
         mass = mass_through(fluid, flow%room(c(1), c(2), c(3)), flow%liquid(c(1), c(2), c(3)))
         f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
       end if
-      owed = wrench(f/dt, arm_of(grid, c, bodies%x(:, b)))
+      owed = wrench(f/dt, arm_to_cell(grid, c, bodies%x(:, b)))
     end function of_cell
   end subroutine force_of_mid_step
-
-  !> From the centre of mass of a body to the centre of a cell [m].
-  pure function arm_of(grid, c, x) result(arm)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: c(3)
-    real(wp), intent(in) :: x(3)
-    real(wp) :: arm(3)
-
-    arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], x)
-  end function arm_of
 
 end module wall_balance_m

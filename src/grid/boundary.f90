@@ -113,7 +113,7 @@ contains
     integer, intent(in) :: l
       !! place of the plane in the local array with its halo, in direction `shared_by(d)`
     real(wp), intent(inout), contiguous :: a(:, :, :)
-    integer :: to(layers), from(layers), j, m
+    integer :: to(n_halo), from(n_halo), j, m
 
     do m = 1, layers
       to(m) = ghost_layer(grid, s, d, m)

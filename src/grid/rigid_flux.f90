@@ -17,7 +17,8 @@ module rigid_flux_m
   implicit none
   private
   public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, all_fluid_of_faces
-  public :: force_from_faces, force_from_cells, add_cell_flux, nearest_arm, closed_side
+  public :: force_from_faces, force_from_cells, add_cell_flux, closed_side
+  public :: nearest_arm, arm_to_cell
   public :: middle_of_face
 
   integer, parameter :: worth_threads = 1000   !! fewer faces or cells are looked at by one thread
@@ -65,6 +66,17 @@ contains
     where (grid%periodic) arm = arm - grid%length*anint(arm/grid%length)
   end function nearest_arm
 
+  !> The same to the centre of cell c.
+  pure function arm_to_cell(grid, c, centre) result(arm)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: centre(3)   !! of mass [m]
+    real(wp) :: arm(3)
+
+    arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], &
+                      centre)
+  end function arm_to_cell
+
   !> Unit fluxes through the faces, and those of free bodies net for the cells that hold fluid.
   subroutine build_rigid_flux(grid, solid, bodies, active, self)
     type(grid_t), intent(in) :: grid
@@ -74,6 +86,7 @@ contains
       !! cell has an open face
     type(rigid_flux_t), intent(inout) :: self
     integer :: b, m, n_face, n_entry, entry_of_body, high(3)
+    real(wp) :: s(6)
 
     n_face = solid%body_face(bodies%n + 1) + solid%first_held(bodies%n + 1) - 2
     call make_room(self, n_face)
@@ -94,8 +107,9 @@ contains
       do m = self%first_face(b), self%first_face(b + 1) - 1
         high = self%face(1:3, m)
         if (closed_side(grid, high(self%face(4, m)), self%face(4, m))) cycle
-        call add_to_cell(high - unit_step(:, self%face(4, m)), self%s(:, m))
-        call add_to_cell(high, -self%s(:, m))
+        s = self%s(:, m)
+        call add_to_cell(high - unit_step(:, self%face(4, m)), s)
+        call add_to_cell(high, -s)
       end do
       do entry_of_body = self%first(b), n_entry
         associate (c => self%cell(:, entry_of_body))

@@ -54,12 +54,14 @@ contains
       !! C^, halo filled
     integer, intent(in) :: i, j, k
     real(wp) :: m(3)
+    real(wp) :: shares(3, 3, 3)
 
     if (any(solid%alpha(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1) > 0.0_wp)) then
-      m = unit_normal(seen_shares(grid, solid, vertical%axis, c, [i, j, k]))
+      shares = seen_shares(grid, solid, vertical%axis, c, [i, j, k])
     else
-      m = unit_normal(c(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1))
+      shares = c(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1)
     end if
+    m = unit_normal(shares)
     if (.not. any(abs(m) > 0.0_wp)) m = vertical%up
   end function surface_normal
 

@@ -6,7 +6,7 @@ module film_legs_m
   use boundary_kinds_m, only: side_no_slip
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use rigid_flux_m, only: nearest_arm
+  use rigid_flux_m, only: arm_to_cell
   use viscous_system_m, only: viscous_t, add_wall, add_side
   implicit none
   private
@@ -47,8 +47,7 @@ contains
       associate (c => solid%cut_cell(:, self%films%wall(1, m)), body => self%films%wall(2, m))
         call add_wall(self, c, body, film_conductance(c, self%films%wall(1, m)) &
                       *max(norm2(self%films%area(:, m)), 1.0e-3_wp*least), &
-                      nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), &
-                                         grid%centre(c(3), 3)], bodies%x(:, body)))
+                      arm_to_cell(grid, c, bodies%x(:, body)))
       end associate
     end do
   contains

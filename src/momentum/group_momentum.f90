@@ -86,8 +86,8 @@ contains
         if (self%master(n, m) == 0) cycle
         call profile(grid, self, [m, n], bodies, t, wall)
         associate (c => self%cell(:, self%master(n, m)))
-          given = excess(:, m) &
-                  - matmul(t, u(c(1), c(2), c(3), :) - before(:, self%master(n, m)))
+          given = u(c(1), c(2), c(3), :) - before(:, self%master(n, m))
+          given = excess(:, m) - matmul(t, given)
         end associate
         to_wall(:, m) = to_wall(:, m) &
                         + self%share(n, m)*mass(m)*(given - to_master(self, [m, n], given))

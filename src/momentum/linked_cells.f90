@@ -11,7 +11,7 @@ module linked_cells_m
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm
+  use rigid_flux_m, only: arm_to_cell
   use plic_m, only: unit_constant
   use wall_profile_m, only: slip_at
   implicit none
@@ -489,8 +489,7 @@ contains
     real(wp) :: v(3)
 
     associate (b => self%body(film), c => self%cell(:, film))
-      v = wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(c(1), 1), &
-        grid%centre(c(2), 2), grid%centre(c(3), 3)], bodies%x(:, b)))
+      v = wall_velocity(bodies%motion(:, b), arm_to_cell(grid, c, bodies%x(:, b)))
     end associate
   end function velocity_at_wall
 

@@ -180,6 +180,7 @@ contains
       !! [m/s]
     logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)   !! [kg m/s]
+    real(wp), dimension(grid%lo(1):grid%hi(1) + 1) :: mass, keep   ! of a line
     integer :: j, m, e(3)
 
     e = unit_step(:, d)
@@ -189,13 +190,14 @@ contains
           call face_row(grid, scheme, e, j, k, q, u(:, :, :, m), &
                         carried(:grid%hi(1) + e(1), j, m))
         end do
-        call carry_slabs(grid, fluid, e, j, k, q, g, volumes%v_before, u, near, carried)
+        call carry_slabs(grid, fluid, e, j, k, q, g, volumes%v_before, u, near, mass, keep, &
+                         carried)
       end do
     end associate
   end subroutine carry_plane
 
   !> The same of one line of faces, from the values on them.
-  subroutine carry_slabs(grid, fluid, e, j, k, q, g, v, u, near, carried)
+  subroutine carry_slabs(grid, fluid, e, j, k, q, g, v, u, near, mass, keep, carried)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     integer, intent(in) :: e(3), j, k
@@ -204,10 +206,10 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: mass(grid%lo(1):), keep(grid%lo(1):)
+      !! work: through the face [kg]; share of the value on it that lies beyond the donor's
     real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)
       !! value on the face [m/s], on return momentum through it [kg m/s]
-    real(wp), dimension(grid%lo(1):grid%hi(1) + e(1)) :: mass   ! through the face [kg]
-    real(wp), dimension(grid%lo(1):grid%hi(1) + e(1)) :: keep   ! of the value beyond the donor's
     real(wp) :: room, donor
     integer :: i, m
     logical :: forward, mixed

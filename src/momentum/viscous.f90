@@ -384,14 +384,15 @@ contains
     real(wp), intent(in) :: factor
     integer, intent(in) :: first(4)
     real(wp), intent(inout), contiguous :: y(first(1):, first(2):, first(3):, :)   !! [kg m/s2]
+    real(wp) :: wall(3)
     integer :: b, m
 
     do b = 1, size(motion, 2)
       if (all(abs(motion(:, b)) <= 0.0_wp)) cycle
       do m = walls%first(b), walls%first(b + 1) - 1
         associate (n => walls%cell(:, m))
-          y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) &
-            + factor*walls%k(m)*wall_velocity(motion(:, b), walls%arm(:, m))
+          wall = wall_velocity(motion(:, b), walls%arm(:, m))
+          y(n(1), n(2), n(3), :) = y(n(1), n(2), n(3), :) + factor*walls%k(m)*wall
         end associate
       end do
     end do

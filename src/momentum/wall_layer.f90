@@ -34,9 +34,9 @@ contains
       !! halo filled [m/s]
     type(linked_cells_t), intent(inout) :: links
     real(wp) :: slip, weight, weights
-    integer :: m, n
+    integer :: m, n, behind(3)
 
-    !$omp parallel do private(n, slip, weight, weights) schedule(static)
+    !$omp parallel do private(n, behind, slip, weight, weights) schedule(static)
     do m = 1, links%n_films
       associate (f => links%cell(:, m))
         if (.not. grid%owns(f)) cycle
@@ -44,7 +44,8 @@ contains
         weights = 0.0_wp
         do n = 1, size(links%master, 1)
           if (links%master(n, m) == 0) cycle
-          if (.not. is_fluid(2*links%cell(:, links%master(n, m)) - f)) cycle
+          behind = 2*links%cell(:, links%master(n, m)) - f
+          if (.not. is_fluid(behind)) cycle
           weight = links%share(n, m)*links%nearer(n, m)
           if (weight <= 0.0_wp) cycle
           slip = slip + weight*slip_beside(m, n)

@@ -13,7 +13,7 @@ module carried_pressure_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm
+  use rigid_flux_m, only: arm_to_cell
   use face_velocity_m, only: acceleration_t
   use boundary_m, only: fill_scalar_halo
   implicit none
@@ -77,8 +77,7 @@ contains
       if (k < a(3) .or. k > z(3)) cycle
       do j = a(2), z(2)
         do i = a(1), z(1)
-          arm = nearest_arm(grid, [grid%centre(i, 1), grid%centre(j, 2), grid%centre(k, 3)], &
-                            bodies%x(:, b))
+          arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
           share = min(1.0_wp, (far - norm2(arm)/bodies%radius(b))/(far - 1.0_wp))
           if (share <= 0.0_wp) cycle
           near(i, j, k) = near(i, j, k) + share

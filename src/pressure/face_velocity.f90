@@ -8,7 +8,7 @@ module face_velocity_m
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
   use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm, middle_of_face
+  use rigid_flux_m, only: nearest_arm, arm_to_cell, middle_of_face
   use mixture_m, only: face_mean
   use wall_profile_m, only: slip_at
   implicit none
@@ -415,8 +415,7 @@ contains
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
-          - wall_velocity(bodies%motion(:, b), nearest_arm(grid, [grid%centre(i, 1), &
-            grid%centre(j, 2), grid%centre(k, 3)], bodies%x(:, b)))
+          - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
         time = compact_time(dt, dt*sum(abs(past)/grid%h))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
           - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
