@@ -218,7 +218,6 @@ contains
     if (.not. released .or. .not. sim%wet) return
     call swap_solids(sim)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
-    sim%stage%linked = .false.
     call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
   end subroutine release

@@ -51,7 +51,8 @@ contains
     end if
   end subroutine note_start
 
-  !> The links of the start of the step: those of the end of the last one, unless blocks have come.
+  !> The links of the start of the step: those of the end of the last one, or new ones if blocks
+  !! have come.
   subroutine find_links_before(grid, solid, stage)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid   !! at the start
@@ -62,8 +63,7 @@ contains
     call move_alloc(stage%links, stage%links_before)
     call move_alloc(keep, stage%links)
     call move_alloc(stage%links_before%slip, stage%links%slip)   ! nothing reads it at the start
-    if (.not. stage%linked) call link_cells(grid, solid, stage%links_before)
-    stage%linked = .false.
+    call link_cells(grid, solid, stage%links_before)
   end subroutine find_links_before
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like

@@ -50,7 +50,6 @@ contains
 
     stage%dry_motion = stage%bodies%motion
     call link_cells(grid, solid, stage%links)
-    stage%linked = .true.
     call begin_balance(case%fluid, stage%links, flow, stage%balance)
     call find_inertia(grid, stage%links, stage%balance%mass, flow, stage%rho)
     call match_densities(grid, stage%rho, stage%links)

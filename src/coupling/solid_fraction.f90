@@ -2,7 +2,8 @@
 !!
 !! Every process fills its own cells and halo, images in other periods included, from the poses of
 !! the bodies alone; nothing is exchanged but the flags of pockets, where there are any. The bed is
-!! one more fixed body, the last; its shares are found once.
+!! one more fixed body, the last; its shares are found once. Where nothing has moved nothing is
+!! filled.
 module solid_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
@@ -27,8 +28,6 @@ module solid_fraction_m
   private
   public :: solid_fraction_t, solid_fraction_init, update_solid
 
-  integer, parameter :: geometries = 2   !! that are filled in turn
-
   !> Work arrays of one thread.
   type :: share_work_t
     type(share_row_t) :: row
@@ -45,7 +44,9 @@ module solid_fraction_m
     type(share_work_t), allocatable :: work(:)    !! (threads)
     type(painting_t) :: painting
     type(pockets_t) :: pockets
-    integer :: empty = 0                          !! last fillings in a row without a body
+    integer :: poses = 0                          !! how often a body has moved, come or gone
+    real(wp), allocatable :: x(:, :), q(:, :)     !! (3, n), (4, n) the poses of now
+    logical, allocatable :: present(:)
   end type solid_fraction_t
 
 contains
@@ -63,6 +64,7 @@ contains
     if (present(bed)) self%has_bed = bed%there
     if (self%has_bed) call make_bed_solid(grid, bed, self%bed_centre, self%bed)
     n = blocks%n
+    allocate (self%x(3, n), self%q(4, n), self%present(n))
     if (self%has_bed) n = n + 1
     allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
     call painting_init(grid, n, self%painting)
@@ -76,8 +78,9 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(solid_geometry_t), intent(inout) :: solid
 
-    self%empty = merge(0, self%empty + 1, self%has_bed .or. any(blocks%present))
-    if (self%empty > geometries) return   ! nothing to paint, and nothing left to clear
+    call number_poses(blocks, self)
+    if (solid%poses == self%poses) return
+    solid%poses = self%poses
     call find_shares(grid, blocks, self)
     call ensure_lists(self%body, self%painting, solid)
     call place_bodies(grid, self%body, self%painting, solid)
@@ -102,6 +105,29 @@ contains
     call find_edges(grid, solid)
     call hold_fluid(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
   end subroutine update_solid
+
+  !> Give the poses of the bodies another number if they are others than at the last call.
+  pure subroutine number_poses(blocks, self)
+    type(blocks_t), intent(in) :: blocks
+    type(solid_fraction_t), intent(inout) :: self
+
+    logical :: same
+    integer :: b
+
+    same = self%poses > 0
+    do b = 1, blocks%n
+      same = same .and. (blocks%present(b) .eqv. self%present(b)) &
+             .and. all(abs(blocks%x(:, b) - self%x(:, b)) <= 0.0_wp) &
+             .and. all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)
+    end do
+    if (same) return
+    self%poses = self%poses + 1
+    do b = 1, blocks%n
+      self%present(b) = blocks%present(b)
+      self%x(:, b) = blocks%x(:, b)
+      self%q(:, b) = blocks%q(:, b)
+    end do
+  end subroutine number_poses
 
   !> Shares of every body that is near the cells of this process and has moved.
   subroutine find_shares(grid, blocks, self)

@@ -49,7 +49,6 @@ module velocity_stage_m
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(linked_cells_t), allocatable :: links_before, links
       !! of the surface at the start and at the end of the step
-    logical :: linked = .false.                    !! `links` fit the surface as it is
     type(mid_step_t) :: mid_step
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]

@@ -24,6 +24,7 @@ module solid_geometry_m
   end type solid_tets_t
 
   type :: solid_geometry_t
+    integer :: poses = 0   !! number of the poses of all bodies that it was filled for, 0: of none
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
     !> Share of the lower face through which pressure moves fluid; what it lacks of `open` moves

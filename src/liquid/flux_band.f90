@@ -25,7 +25,6 @@ module flux_band_m
     integer, allocatable :: part(:)          !! of a cell: number of its part
     integer, allocatable :: order(:)         !! the cells by part
     integer, allocatable :: spare(:)
-    real(wp), allocatable :: moved(:)
     integer, allocatable :: moved_cell(:, :)
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
     integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
@@ -40,6 +39,11 @@ module flux_band_m
     integer, allocatable :: number(:, :, :)  !! place in the list as found, 0: not in it
     integer, allocatable :: label(:, :, :)   !! smallest global cell number of the connected part
     real(wp), allocatable :: k(:, :, :, :)   !! conductance of the lower faces, largest face = 1 [-]
+
+    !> Poses of the bodies before and after the step (`solid%poses`) for which it was found, and
+    !! whether all of its parts are still there.
+    integer :: poses(2) = 0
+    logical :: whole = .false.
 
     !> The cells, sorted by part: those of part c are `first(c):first(c+1)-1`.
     integer :: n = 0
@@ -100,7 +104,6 @@ contains
       call ensure_room(n, f%part)
       call ensure_room(n, f%order)
       call ensure_room(n, f%spare)
-      call ensure_room(n, f%moved)
       call ensure_room(n, f%moved_cell)
     end associate
   end subroutine make_room
@@ -357,7 +360,7 @@ contains
     end do
   end function position
 
-  !> Stable sort of the lists by part; `first` marks where each begins.
+  !> Stable sort of the cells by part; `first` marks where each begins.
   subroutine sort_by_part(self)
     type(flux_band_t), intent(inout) :: self
     integer :: l, c
@@ -383,22 +386,7 @@ contains
       self%finder%moved_cell(:, l) = self%cell(:, self%finder%order(l))
     end do
     self%cell(:, 1:self%n) = self%finder%moved_cell(:, 1:self%n)
-    call reorder(self%finder%order(1:self%n), self%finder%moved, self%r)
-    call reorder(self%finder%order(1:self%n), self%finder%moved, self%open)
   end subroutine sort_by_part
-
-  !> Put a list in a new order.
-  pure subroutine reorder(order, moved, list)
-    integer, intent(in) :: order(:)       !! where the entries stand so far
-    real(wp), intent(inout) :: moved(:)   !! work
-    real(wp), intent(inout) :: list(:)
-    integer :: l
-
-    do l = 1, size(order)
-      moved(l) = list(order(l))
-    end do
-    list(1:size(order)) = moved(1:size(order))
-  end subroutine reorder
 
   !> Cells at an open side, sum of r and sum of the open volume of each part, over all processes.
   subroutine sum_by_part(grid, self)
@@ -446,6 +434,7 @@ contains
     type(flux_band_t), intent(inout) :: self
     integer :: l, d, at(3), f(3)
 
+    self%whole = .false.
     do l = self%first(c), self%first(c + 1) - 1
       self%r(l) = 0.0_wp
       at = self%cell(:, l)

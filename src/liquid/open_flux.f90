@@ -59,25 +59,50 @@ contains
     type(open_flux_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m3]
-    real(wp) :: cells(1)
-    logical :: solids
+    logical :: balanced
 
     self%iterations = 0
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
-    call mark_solids(grid, old, new, self%band%marked, solids)
-    if (solids) call mark_band(self%band)
-    call flux_of_velocity(grid, old, new, flow%uf, dt, solids, self%band, q)
-    if (.not. solids) return
-    call list_band(grid, new, flow%room, q, self%band)
-    cells = real(self%band%n, wp)
-    call global_max(cells)
-    if (cells(1) < 0.5_wp) return
-    call find_parts(grid, self%band)
-    call balance_parts(grid, self)
+    call flux_of_velocity(grid, old, new%open, flow%uf, dt, q)
+    if (.not. is_known(self%band, old, new)) call find_band(grid, old, new, self%band)
+    if (self%band%parts == 0) return
+    call find_balances(grid, new, flow%room, q, self%band)
+    call balance_parts(grid, self, balanced)
+    if (balanced) return
     call solve_potential(self)
     call correct_flux(grid, self%band, self%solver%x, q)
   end subroutine find_open_flux
+
+  !> Has the band been found for these bodies, and is all of it there?
+  pure logical function is_known(band, old, new)
+    type(flux_band_t), intent(in) :: band
+    type(solid_geometry_t), intent(in) :: old, new
+
+    is_known = band%whole .and. all([old%poses, new%poses] > 0) &
+      .and. all(band%poses == [old%poses, new%poses])
+  end function is_known
+
+  !> The band and its parts; no parts without solids.
+  subroutine find_band(grid, old, new, band)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old, new
+    type(flux_band_t), intent(inout) :: band
+    real(wp) :: cells(1)
+    logical :: solids
+
+    band%poses = [old%poses, new%poses]
+    band%whole = .true.
+    band%parts = 0
+    call mark_solids(grid, old, new, band%marked, solids)
+    if (.not. solids) return
+    call mark_band(band)
+    call find_conductances(grid, old%open, new%open, band)
+    call list_band(grid, band)
+    cells = real(band%n, wp)
+    call global_max(cells)
+    if (cells(1) > 0.5_wp) call find_parts(grid, band)
+  end subroutine find_band
 
   !> Mark the own cells with solid at the begin or the end of the step.
   subroutine mark_solids(grid, old, new, mark, there)
@@ -139,16 +164,44 @@ contains
     end do
   end subroutine widen
 
-  !> Volumes of the velocity through the faces as they are at the begin of the step, and the
-  !! conductances of the band, if there are solids.
-  subroutine flux_of_velocity(grid, old, new, uf, dt, solids, band, q)
+  !> Volumes of the velocity through the faces as they are at the begin of the step.
+  subroutine flux_of_velocity(grid, old, new_open, uf, dt, q)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old, new
-    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(solid_geometry_t), intent(in) :: old
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: new_open, uf
     real(wp), intent(in) :: dt
-    logical, intent(in) :: solids
-    type(flux_band_t), intent(inout) :: band
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: d, s, i, j, k, a(3), b(3)
+    real(wp) :: open_area
+
+    do d = 1, 3
+      open_area = dt*grid%area(d)
+      a = grid%lo
+      b = grid%hi + unit_step(:, d)
+      !$omp parallel do private(i, j) schedule(static)
+      do k = a(3), b(3)
+        do j = a(2), b(2)
+          do i = a(1), b(1)
+            q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
+              0.5_wp*(old%open(i, j, k, d) + new_open(i, j, k, d)) >= least_open)
+          end do
+        end do
+      end do
+      do s = 1, 2
+        if (.not. is_wall(grid%side(s, d))) cycle
+        call grid%side_faces(s, d, a, b)
+        q(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+      end do
+    end do
+  end subroutine flux_of_velocity
+
+  !> Conductances of the faces in the band: their open share in the mean of the step.
+  subroutine find_conductances(grid, old_open, new_open, band)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
+      contiguous :: old_open, new_open
+    type(flux_band_t), intent(inout) :: band
     integer :: d, s, a(3), b(3)
 
     do d = 1, 3
@@ -156,7 +209,6 @@ contains
       do s = 1, 2
         call grid%side_faces(s, d, a, b)
         if (is_wall(grid%side(s, d))) then
-          q(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
           band%k(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
         else if (gives_pressure(grid%side(s, d))) then
           call faces_between(1, a, b)
@@ -168,39 +220,28 @@ contains
     subroutine faces_between(cells, a, b)
       integer, intent(in) :: cells, a(3), b(3)
       integer :: i, j, k, e(3)
-      real(wp) :: w, open_area, size_of_face
+      real(wp) :: w, size_of_face
 
       e = unit_step(:, d)
-      open_area = dt*grid%area(d)
       size_of_face = grid%area(d)/maxval(grid%area)
       !$omp parallel do private(i, j, w) schedule(static)
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
-            w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
-            q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
-                                  w >= least_open)
-          end do
-          if (.not. solids) cycle
-          do i = a(1), b(1)
-            w = 0.5_wp*(old%open(i, j, k, d) + new%open(i, j, k, d))
+            w = 0.5_wp*(old_open(i, j, k, d) + new_open(i, j, k, d))
             band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, w >= least_open .and. &
               band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == cells)
           end do
         end do
       end do
     end subroutine faces_between
-  end subroutine flux_of_velocity
+  end subroutine find_conductances
 
-  !> Cells of the band with a way out, in the order of the grid, and their volume balance r.
-  subroutine list_band(grid, new, room, q, band)
+  !> Cells of the band with a way out, in the order of the grid.
+  subroutine list_band(grid, band)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: new
-    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flux_band_t), intent(inout) :: band
-    integer :: i, j, k, l
-    real(wp) :: outflow, room_left
+    integer :: i, j, k
 
     !$omp parallel do private(i, j) schedule(static)
     do k = lbound(band%number, 3), ubound(band%number, 3)
@@ -217,6 +258,18 @@ contains
     end do
     call list_marked(grid, lbound(band%number), band%number, band%cell, band%n)
     call make_room(band)
+  end subroutine list_band
+
+  !> Volume balance r of the cells of the band.
+  subroutine find_balances(grid, new, room, q, band)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: new
+    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(flux_band_t), intent(inout) :: band
+    integer :: i, j, k, l
+    real(wp) :: outflow, room_left
+
     !$omp parallel do private(i, j, k, outflow, room_left) schedule(static)
     do l = 1, band%n
       i = band%cell(1, l)
@@ -228,14 +281,15 @@ contains
       band%r(l) = (room_left - outflow)/grid%volume
       band%open(l) = 1.0_wp - new%alpha(i, j, k)
     end do
-  end subroutine list_band
+  end subroutine find_balances
 
   !> What the balances of a part without an open side sum up to is taken out of its cells in
   !! proportion to their open volume, so that closing cells still empty. Parts that balance then
-  !! need no solution.
-  subroutine balance_parts(grid, self)
+  !! need no solution; all of them do if `balanced`.
+  subroutine balance_parts(grid, self, balanced)
     type(grid_t), intent(in) :: grid
     type(open_flux_t), intent(inout) :: self
+    logical, intent(out) :: balanced
     integer :: c, l
     real(wp) :: share
 
@@ -254,6 +308,8 @@ contains
         end do
       end do
       call global_max(band%largest(1:band%parts))
+      balanced = all(band%largest(1:band%parts) <= self%control%tolerance)
+      if (balanced) return
       do c = 1, band%parts
         if (band%largest(c) <= self%control%tolerance) call drop_part(c, band)
       end do

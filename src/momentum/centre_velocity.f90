@@ -16,10 +16,9 @@
 module centre_velocity_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, leg_to_wall
+  use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, velocity_at_wall, wall_normal, distance_to_fluid, &
-                            distance_to_centre
+  use linked_cells_m, only: linked_cells_t, velocity_at_wall
   use wall_layer_m, only: slip_by_two
   use wall_profile_m, only: slip_at
   implicit none
@@ -41,47 +40,19 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
     type(linked_cells_t), intent(inout) :: links
-    integer, parameter :: here(3) = 0
-    real(wp) :: n(3), y, middle, r, slip
+    real(wp) :: slip
     integer :: m
 
-    !$omp parallel do private(n, y, middle, r, slip) schedule(dynamic, 64)
+    !$omp parallel do private(slip) schedule(dynamic, 64)
     do m = links%n_films + 1, links%n
-      associate (c => links%cell(:, m))
-        links%centre(m) = 1.0_wp
-        if (.not. grid%owns(c) .or. solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) cycle
-        n = wall_normal(grid, solid, c)
-        if (all(abs(n) <= 0.0_wp)) cycle
-        middle = distance_to_fluid(grid, solid, c, here, n)
-        y = distance_by_legs(c, n)
-        if (y <= 0.0_wp) y = max(0.0_wp, distance_to_centre(grid, solid, c, n))
-        if (middle <= y) cycle
-        r = y/middle
-        slip = slip_at(min(most_slip, slip_beside(m, n, middle)), r)
+      links%centre(m) = 1.0_wp
+      if (links%middle(m) <= 0.0_wp) cycle
+      associate (r => links%ratio(m))
+        slip = slip_at(min(most_slip, slip_beside(m, links%normal(:, m), links%middle(m))), r)
         links%centre(m) = max(r + (1.0_wp - r)*slip, least_share)
       end associate
     end do
   contains
-    !> Distance of the centre of cell c from a plane wall of normal n that pulls as its wall legs do
-    !! together; 0 if it has none [m].
-    pure function distance_by_legs(c, n) result(y)
-      integer, intent(in) :: c(3)
-      real(wp), intent(in) :: n(3)
-      real(wp) :: y
-      real(wp) :: length, seen, pull   !! cells; area of the wall along the legs, area over length
-      integer :: d
-
-      seen = 0.0_wp
-      pull = 0.0_wp
-      do d = 1, 3
-        length = leg_to_wall(solid, c, d, -nint(sign(1.0_wp, n(d))))
-        if (length <= 0.0_wp) cycle
-        seen = seen + grid%area(d)*abs(n(d))
-        pull = pull + grid%area(d)/(length*grid%h(d))
-      end do
-      y = seen/max(pull, tiny(pull))
-    end function distance_by_legs
-
     !> Slip of the layer as the cells across the open faces away from the wall tell it, by what
     !! of these faces lies along the wall.
     pure function slip_beside(m, n, middle) result(slip)

@@ -12,19 +12,20 @@ module linked_cells_m
   use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use plic_m, only: unit_constant
+  use wall_distance_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_legs
   use wall_profile_m, only: slip_at
   implicit none
   private
   public :: linked_cells_t, linked_cells_init, link_cells, order_by_body
   public :: masters_at_most, is_alone, along_share, match_densities, open_shares
-  public :: velocity_at_wall, wall_normal, distance_to_fluid, distance_to_centre
+  public :: velocity_at_wall
 
   integer, parameter :: reach = 2            !! layers of the halo with films that are needed
   integer, parameter :: masters_at_most = 3  !! of a film
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a master.
   type :: linked_cells_t
+    integer :: poses = 0                         !! of the bodies (`solid%poses`), 0: of none
     integer :: n = 0                             !! wall cells, films first
     integer :: n_films = 0
     integer, allocatable :: cell(:, :)           !! (3, *)
@@ -32,13 +33,17 @@ module linked_cells_m
     integer, allocatable :: number(:, :, :)      !! number of a wall cell, else 0
     !> Wall cells of body b: `by_body(first_of_body(b):first_of_body(b+1)-1)`.
     integer, allocatable :: by_body(:), first_of_body(:)
-    real(wp), allocatable :: normal(:, :)        !! (3, films) of the wall, into the fluid
+    real(wp), allocatable :: normal(:, :)        !! (3, *) of the wall, into the fluid
     integer, allocatable :: step(:, :)           !! (3*masters_at_most, films) to their masters
     integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
-    real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
+    real(wp), allocatable :: by_wall(:, :)       !! likewise: 1 - r
+    real(wp), allocatable :: nearer(:, :)        !! likewise, less under heavy films
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the film in a cell, 0 to 1
+    !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
+    !! [m], and that of its centre over it; no distance where the centre is no nearer.
+    real(wp), allocatable :: middle(:), ratio(:)
     !> Of a wall cell: share of its velocity, seen from the wall, that its centre has.
     real(wp), allocatable :: centre(:)
     integer :: n_groups = 0                      !! with a master beside an own cell
@@ -59,22 +64,26 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
-    allocate (self%normal(3, 0), self%leader(0), self%part(2, 0), self%centre(0))
+    allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
+    allocate (self%middle(0), self%ratio(0), self%centre(0))
     allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
-    allocate (self%share(masters_at_most, 0), self%nearer(masters_at_most, 0))
-    allocate (self%distance(masters_at_most, 0))
+    allocate (self%share(masters_at_most, 0), self%by_wall(masters_at_most, 0))
+    allocate (self%nearer(masters_at_most, 0), self%distance(masters_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine linked_cells_init
 
-  !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to.
+  !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to;
+  !! nothing is done where they are known already.
   subroutine link_cells(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(linked_cells_t), intent(inout) :: self
     integer :: m, c(3)
 
+    if (solid%poses > 0 .and. self%poses == solid%poses) return
+    self%poses = solid%poses
     do m = 1, self%n
       c = self%cell(:, m)
       self%number(c(1), c(2), c(3)) = 0
@@ -87,6 +96,7 @@ contains
     self%n_films = self%n
     call add_cut_cells(grid, solid, self)
     call find_masters(grid, solid, self)
+    call find_middles(grid, solid, self)
     call order_by_body(size(solid%body_cell) - 1, self)
     call group_films(grid, self)
     call ensure_room(self%n, self%centre)
@@ -214,12 +224,14 @@ contains
     call ensure_room(self%n_films, self%step)
     call ensure_room(self%n_films, self%master)
     call ensure_room(self%n_films, self%share)
+    call ensure_room(self%n_films, self%by_wall)
     call ensure_room(self%n_films, self%nearer)
     call ensure_room(self%n_films, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_films
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
-                     self%share(:, m), self%nearer(:, m), self%distance(:, m))
+                     self%share(:, m), self%by_wall(:, m), self%distance(:, m))
+      self%nearer(:, m) = self%by_wall(:, m)
     end do
     do m = 1, self%n_films
       body = self%body(m)
@@ -260,6 +272,36 @@ contains
       nearer(n) = (1.0_wp - edge_in(solid, c))*nearer(n)
     end do
   end subroutine find_wall
+
+  !> Of the own cut cells with their centre in the fluid the normal of the wall, and how far from it
+  !! their fluid and their centre are.
+  subroutine find_middles(grid, solid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(linked_cells_t), intent(inout) :: self
+    integer, parameter :: here(3) = 0
+    real(wp) :: middle, y
+    integer :: m
+
+    call ensure_room(self%n, self%normal)
+    call ensure_room(self%n, self%middle)
+    call ensure_room(self%n, self%ratio)
+    !$omp parallel do private(middle, y) schedule(dynamic, 64)
+    do m = self%n_films + 1, self%n
+      associate (c => self%cell(:, m), n => self%normal(:, m))
+        self%middle(m) = 0.0_wp
+        if (.not. grid%owns(c) .or. solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) cycle
+        n = wall_normal(grid, solid, c)
+        if (all(abs(n) <= 0.0_wp)) cycle
+        middle = distance_to_fluid(grid, solid, c, here, n)
+        y = distance_by_legs(grid, solid, c, n)
+        if (y <= 0.0_wp) y = max(0.0_wp, distance_to_centre(grid, solid, c, n))
+        if (middle <= y) cycle
+        self%middle(m) = middle
+        self%ratio(m) = y/middle
+      end associate
+    end do
+  end subroutine find_middles
 
   !> Steps from film c to its masters, and their shares of it, zero where there is none: cells
   !! across its open faces whose centre lies in the fluid, by open area along the normal; without
@@ -306,63 +348,6 @@ contains
       if (is_fluid) is_fluid = solid%inside(o(1), o(2), o(3)) == 0
     end function is_fluid
   end subroutine to_masters
-
-  !> Normal of the wall in a cell, into the fluid, from what its open faces lack to close; zero
-  !! where the walls cancel.
-  pure function wall_normal(grid, solid, c) result(n)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    real(wp) :: n(3)
-    real(wp), parameter :: least_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
-    integer :: d, f(3)
-
-    do d = 1, 3
-      f = c + unit_step(:, d)
-      n(d) = grid%area(d)*(solid%open(f(1), f(2), f(3), d) - solid%open(c(1), c(2), c(3), d))
-    end do
-    if (norm2(n) > least_wall*minval(grid%area)) then
-      n = n/norm2(n)
-    else
-      n = 0.0_wp
-    end if
-  end function wall_normal
-
-  !> Distance of the middle of the fluid of a cell from the wall in a cut cell c, taken as a plane
-  !! [m].
-  pure function distance_to_fluid(grid, solid, c, step, n) result(distance)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3), step(3)   !! from the cut cell to the cell of the fluid
-    real(wp), intent(in) :: n(3)           !! of the wall
-    real(wp) :: distance
-    integer :: o(3)
-
-    o = c + step
-    distance = distance_to_centre(grid, solid, c, n) + dot_product(n, real(step, wp)*grid%h) &
-               + level_of(grid, n, 0.5_wp*(1.0_wp + solid%alpha(o(1), o(2), o(3))))
-  end function distance_to_fluid
-
-  !> Distance of the centre of a cut cell c from its wall, taken as a plane; below zero in a film
-  !! [m].
-  pure function distance_to_centre(grid, solid, c, n) result(distance)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    real(wp), intent(in) :: n(3)           !! of the wall
-    real(wp) :: distance
-
-    distance = -level_of(grid, n, solid%alpha(c(1), c(2), c(3)))
-  end function distance_to_centre
-
-  !> Place along the normal of the plane below which a share of a cell lies, from its centre [m].
-  pure function level_of(grid, n, share) result(level)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: n(3), share
-    real(wp) :: level
-
-    level = unit_constant(n*grid%h, share) - 0.5_wp*sum(n*grid%h)
-  end function level_of
 
   !> The parts of films of each master beside an own cell, in the order of their places around it,
   !! so that sums over a group do not depend on the process.
@@ -470,10 +455,11 @@ contains
 
     !$omp parallel do private(n) schedule(static)
     do m = 1, self%n_films
+      self%nearer(:, m) = self%by_wall(:, m)
       do n = 1, masters_at_most
         if (self%master(n, m) == 0) cycle
         associate (c => self%cell(:, m), p => self%cell(:, self%master(n, m)))
-          self%nearer(n, m) = self%nearer(n, m) &
+          self%nearer(n, m) = self%by_wall(n, m) &
                               *min(1.0_wp, rho(p(1), p(2), p(3))/rho(c(1), c(2), c(3)))
         end associate
       end do

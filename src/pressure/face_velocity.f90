@@ -389,8 +389,10 @@ contains
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
+    real(wp) :: reach
     integer :: m, d, c(3)
 
+    reach = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(d, c) schedule(dynamic, 64)
     do m = 1, size(wall_cell, 2)
       do d = 1, 3
@@ -405,18 +407,18 @@ contains
     subroutine shorten(f, d, b)
       integer, intent(in) :: f(3), d, b
       integer :: low(3)
-      real(wp) :: nu, reach, past(3), time
+      real(wp) :: nu, past(3), time
 
       if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
       if (grid%side_of_face(f(d), d) /= no_side) return
       low = f - unit_step(:, d)
       if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
-      reach = sum(1.0_wp/grid%h**2)
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
-        nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
           - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
         time = compact_time(dt, dt*sum(abs(past)/grid%h))
+        if (time >= dt) return   ! as everywhere
+        nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
           - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
               - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))

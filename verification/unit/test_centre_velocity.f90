@@ -62,9 +62,12 @@ contains
 
     associate (leg => box%solid%leg_number(4, 5, top, 3))
       box%solid%leg_length(2, leg) = near
+      box%solid%poses = 0   ! another geometry
+      call link_cells(box%grid, box%solid, links)
       call find_centres(box%grid, box%solid, box%bodies, u, links)
       call check('a short leg', centre(), layer(near, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
       box%solid%leg_length(2, leg) = 0.0_wp
+      call link_cells(box%grid, box%solid, links)
       call find_centres(box%grid, box%solid, box%bodies, u, links)
       call check('the shortest', centre(), layer(1.0e-3_wp, 1.0_wp)/layer(of_fluid, 1.0_wp), &
                  1.0e-12_wp)

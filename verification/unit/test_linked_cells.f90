@@ -210,6 +210,7 @@ contains
   subroutine closing_face()
     associate (film => links%number(4, 6, top))
       box%solid%open(4, 7, top, 2) = 0.5_wp
+      box%solid%poses = 0   ! another geometry
       call link_cells(box%grid, box%solid, links)
       call check('shares close with the face', links%share(:, film), &
                  [0.0_wp, 0.5_wp*0.2_wp, 0.8_wp]/0.9_wp, 1.0e-12_wp)

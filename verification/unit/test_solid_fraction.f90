@@ -38,6 +38,7 @@ program test_solid_fraction
   call periods()
   call any_part_of_the_grid()
   call clean_after_moving()
+  call filled_if_moved()
   call finish_checks()
 
 contains
@@ -802,5 +803,44 @@ contains
     end do
     call check('moving: as if filled afresh', same)
   end subroutine clean_after_moving
+
+  !> Two geometries in turn; a body only turns, only moves, only comes or goes, or nothing does.
+  subroutine filled_if_moved()
+    real(wp), parameter :: mark = 0.25_wp
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid(2), fresh
+    type(solid_fraction_t) :: fraction
+    integer :: s, turn
+    logical :: same
+
+    grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
+    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], &
+                     spread([0.05_wp, 0.04_wp, 0.05_wp], 2, 1), spread(identity, 2, 1), blocks)
+    call solid_fraction_init(grid, blocks, fraction)
+    call solid_geometry_init(grid, solid(1), 1)
+    call solid_geometry_init(grid, solid(2), 1)
+    same = .true.
+    turn = 1
+    do s = 1, 16
+      select case (mod(s/2, 4))   ! the second of two is as the first
+      case (1)
+        if (mod(s, 2) == 0) blocks%q(:, 1) = draw_attitude()
+      case (2)
+        if (mod(s, 2) == 0) blocks%x(:, 1) = blocks%x(:, 1) + [0.003_wp, 0.0_wp, -0.002_wp]
+      case default
+        if (mod(s, 2) == 0) blocks%present(1) = .not. blocks%present(1)
+      end select
+      turn = 3 - turn
+      call update_solid(fraction, grid, blocks, solid(turn))
+      call fill(grid, blocks, fresh)
+      same = same .and. same_bits(solid(turn), fresh)
+    end do
+    call check('one thing at a time: as if filled afresh', same)
+    call update_solid(fraction, grid, blocks, solid(1))
+    solid(1)%alpha(1, 1, 1) = mark
+    call update_solid(fraction, grid, blocks, solid(1))
+    call check('nothing moved: nothing filled', solid(1)%alpha(1, 1, 1), mark, 0.0_wp)
+  end subroutine filled_if_moved
 
 end program test_solid_fraction
