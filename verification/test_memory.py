@@ -47,7 +47,7 @@ def planned(plan: str) -> tuple[float, str]:
 
 
 @pytest.mark.parametrize(
-    ("cells", "least"), [("2147483647, 1, 1", 9e13), ("1290, 1290, 1290", 2.0e12)]
+    ("cells", "least"), [("2147483647, 1, 1", 8e13), ("1290, 1290, 1290", 1.7e12)]
 )
 def test_more_than_any_machine_has(cells: str, least: float, tmp_path: Path) -> None:
     """The plan counts beyond 32 bits and says that it is too much; a run ends at once."""
@@ -66,7 +66,7 @@ def test_more_than_any_machine_has(cells: str, least: float, tmp_path: Path) -> 
     assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
 
 
-@pytest.mark.parametrize("limit", [15e6, 25e6, 50e6, 200e6, 340e6, 355e6])
+@pytest.mark.parametrize("limit", [15e6, 25e6, 50e6, 200e6, 300e6, 314e6])
 def test_limit_of_the_process(limit: float, tmp_path: Path) -> None:
     """`ulimit -v`, as queues set it: code 4 with what was asked, nothing written."""
     done = mics(tmp_path, "64, 64, 64", limit=limit)
@@ -80,5 +80,5 @@ def test_limit_of_the_process(limit: float, tmp_path: Path) -> None:
 def test_what_is_planned_is_enough(cells: str, momentum: str, tmp_path: Path) -> None:
     """A run that may have what the plan says, and a little for the program's code, has enough."""
     plan, _ = planned(mics(tmp_path, cells, "--check", momentum=momentum).stdout)
-    done = mics(tmp_path, cells, "--quiet", limit=1.05 * plan + 10e6, momentum=momentum)
+    done = mics(tmp_path, cells, "--quiet", limit=1.05 * plan + 11e6, momentum=momentum)
     assert (done.returncode, done.stderr) == (0, "")

@@ -1,18 +1,19 @@
 !> Fluid and bodies move each other: one velocity stage for both, by the chosen coupling.
 module coupling_m
   use kinds_m, only: wp
+  use swap_m, only: swap
   use case_types_m, only: case_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use surface_tension_m, only: find_tension
   use face_memory_m, only: note_deviation
   use linked_cells_m, only: linked_cells_t, link_cells
   use mid_step_m, only: to_mid_step
   use rigid_flux_m, only: all_fluid_of_faces
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
-  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion, keep_acceleration
+  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion, keep_acceleration, &
+    find_surface_force, return_surface_force
   use rigid_body_m, only: blocks_t, set_velocity_after_fluid
   implicit none
   private
@@ -36,12 +37,14 @@ contains
       call find_links_before(grid, solid, stage)
     end if
     if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
+      call swap(flow%solid_flux, stage%deviation)          ! lent until the pressure and
+      call swap(stage%viscous%leg, stage%mid_step%given)   ! the viscosity need them
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
       call to_mid_step(grid, case%fluid, solid, stage%links_before, stage%bodies, stage%trend, dt, &
                        flow, stage%acceleration, stage%mid_step)
     end if
     if (.not. stage%implicit_momentum) return
-    call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
+    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
     if (case%numerics%coupling == 'mics') then
       call density_of_mixture(grid, solid, stage%bodies, flow%rho, stage%rho_mixture)
       call keep_acceleration(grid, case%fluid%gravity, stage%whole%open, stage%rho_mixture, flow, &
@@ -49,6 +52,7 @@ contains
     else
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
     end if
+    call return_surface_force(stage)
   end subroutine note_start
 
   !> The links of the start of the step: those of the end of the last one, or new ones if blocks
@@ -102,7 +106,7 @@ contains
     type(stage_report_t), intent(out) :: report
 
     stage%total = 0.0_wp
-    call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
+    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
     call set_velocity()
     call motion_at_start(blocks, stage)
     if (case%numerics%coupling == 'mics') then

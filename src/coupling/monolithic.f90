@@ -7,6 +7,7 @@
 !! 2 % of theory at steps of 0.25 to 4 ms (docs/decisions/coupling.md).
 module monolithic_m
   use kinds_m, only: wp
+  use swap_m, only: swap
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t, add_product
@@ -27,9 +28,9 @@ module monolithic_m
   use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
     force_of_mid_step
   use surface_stress_m, only: surface_stress
-  use surface_tension_m, only: find_tension, add_tension, force_from_tension
+  use surface_tension_m, only: add_tension, force_from_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
-    predict_velocity, renew_acceleration
+    predict_velocity, renew_acceleration, find_surface_force, return_surface_force
   use boundary_m, only: fill_velocity_halo
   use parallel_m, only: halo_exchange
   implicit none
@@ -122,6 +123,7 @@ contains
       call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
       call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
                              flow, a%cell, stage%mid_step, stage%from_mid_step)
+      call swap(stage%viscous%leg, stage%mid_step%given)
     end associate
   end subroutine accelerate_fluid
 
@@ -176,6 +178,7 @@ contains
     associate (bodies => stage%bodies, flux => stage%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, stage%tension, stage%from_pressure)
+      call return_surface_force(stage)
       stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
       stage%from_level = stage%from_level + stage%from_mid_step + stage%late
@@ -224,6 +227,7 @@ contains
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
     call predict_face_velocity(grid, dt, stage%rho, stage%acceleration, flow, stage%deviation)
+    if (allocated(stage%deviation)) call swap(flow%solid_flux, stage%deviation)
     call shorten_at_walls(grid, dt, stage%bodies, stage%links%cell(:, :stage%links%n), &
                           stage%links%body, stage%links%number, stage%mid_step%takes_part, &
                           stage%rho, stage%acceleration, flow)
@@ -365,8 +369,9 @@ contains
       flow%p = 0.0_wp
       call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, a%face, &
                              flow%sides)
-      call find_tension(grid, case%fluid, solid, flow%c, stage%tension)
+      call find_surface_force(case%fluid, grid, solid, flow%c, stage)
       call add_tension(grid, flow%rho, stage%tension, a%face)
+      call return_surface_force(stage)
       flow%uf = dt*a%face
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       converged = converged .and. p%report%converged

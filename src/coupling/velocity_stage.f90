@@ -1,10 +1,11 @@
 !> What both couplings share: the bodies as the flow sees them, the solvers, the parts of the force.
 module velocity_stage_m
   use kinds_m, only: wp
+  use swap_m, only: swap
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
-  use case_types_m, only: numerics_t
+  use case_types_m, only: numerics_t, fluid_t
   use fields_m, only: flow_t, add_product
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
@@ -15,12 +16,13 @@ module velocity_stage_m
   use linked_cells_m, only: linked_cells_t, linked_cells_init
   use mid_step_m, only: mid_step_t, mid_step_init
   use wall_balance_m, only: wall_balance_t, wall_balance_init
-  use surface_tension_m, only: surface_tension_t, add_tension
+  use surface_tension_m, only: surface_tension_t, find_tension, add_tension
   use rigid_body_m, only: blocks_t, space_tensor
   implicit none
   private
   public :: stage_t, stage_report_t, stage_init, copy_motion, push_bodies
   public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
+  public :: find_surface_force, return_surface_force
 
   type :: stage_report_t
     type(pressure_report_t) :: pressure
@@ -55,7 +57,8 @@ module velocity_stage_m
     real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
-    real(wp), allocatable :: deviation(:, :, :, :) !! of the faces at the start (`face_memory_m`)
+    real(wp), allocatable :: deviation(:, :, :, :)
+      !! of the faces at the start (`face_memory_m`); borrowed
     ! Of the mixture.
     type(solid_geometry_t) :: whole                !! the domain without solids
     real(wp), allocatable :: rho_mixture(:, :, :)  !! fluid and solid [kg/m3]
@@ -96,12 +99,38 @@ contains
       call linked_cells_init(grid, stage%links)
       deallocate (stage%links_before%slip)   ! that of `links` serves both
       call mid_step_init(grid, stage%mid_step)
+      deallocate (stage%mid_step%given)      ! borrowed when there is something to tell
       call wall_balance_init(stage%balance)
       allocate (stage%from_mid_step, stage%late, stage%counted, stage%trend, source=stage%total)
-      allocate (stage%deviation(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
       allocate (stage%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if
   end subroutine stage_init
+
+  !> Force of the surface, in arrays that the viscous stage lends until then.
+  subroutine find_surface_force(fluid, grid, solid, c, stage)
+    type(fluid_t), intent(in) :: fluid
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    type(stage_t), intent(inout) :: stage
+
+    associate (viscous => stage%viscous, tension => stage%tension)
+      call swap(viscous%r, tension%force)
+      call swap(viscous%s, tension%surface%place)
+      call swap(viscous%mass, tension%surface%curvature)
+      call find_tension(grid, fluid, solid, c, tension)
+      call swap(viscous%s, tension%surface%place)
+      call swap(viscous%mass, tension%surface%curvature)
+    end associate
+  end subroutine find_surface_force
+
+  !> The force of the surface has been counted: the viscous stage has its array back.
+  subroutine return_surface_force(stage)
+    type(stage_t), intent(inout) :: stage
+
+    call swap(stage%viscous%r, stage%tension%force)
+  end subroutine return_surface_force
 
   !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
   !! solids change; `stage%tension` is that of the start.

@@ -40,10 +40,8 @@ module flux_band_m
     integer, allocatable :: label(:, :, :)   !! smallest global cell number of the connected part
     real(wp), allocatable :: k(:, :, :, :)   !! conductance of the lower faces, largest face = 1 [-]
 
-    !> Poses of the bodies before and after the step (`solid%poses`) for which it was found, and
-    !! whether all of its parts are still there.
+    !> Poses of the bodies before and after the step (`solid%poses`) for which it was found.
     integer :: poses(2) = 0
-    logical :: whole = .false.
 
     !> The cells, sorted by part: those of part c are `first(c):first(c+1)-1`.
     integer :: n = 0
@@ -434,7 +432,6 @@ contains
     type(flux_band_t), intent(inout) :: self
     integer :: l, d, at(3), f(3)
 
-    self%whole = .false.
     do l = self%first(c), self%first(c + 1) - 1
       self%r(l) = 0.0_wp
       at = self%cell(:, l)

@@ -11,6 +11,7 @@
 !! volume.
 module liquid_transport_m
   use kinds_m, only: wp
+  use swap_m, only: swap
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
@@ -55,6 +56,7 @@ contains
 
     call open_flux_init(grid, self%flux)
     call carried_volumes_init(grid, self%volumes)
+    deallocate (self%volumes%w, self%volumes%v, self%volumes%c)   ! those of the flow
     call liquid_sweep_init(grid, gravity, self%sweeps)
     call small_cells_init(grid, self%small)
     call extended_fraction_init(gravity, self%extension)
@@ -89,22 +91,32 @@ contains
     type(solid_geometry_t), intent(in) :: old, new
     real(wp), intent(in) :: dt
     type(liquid_transport_t), intent(inout) :: self
-    type(flow_t), intent(in) :: flow   !! liquid, room, c (halo filled) and uf of the begin
+    type(flow_t), intent(inout) :: flow   !! liquid, room, c (halo filled) and uf of the begin;
+                                          !! the first three are taken until the transport is over
     integer :: k
 
     call find_open_flux(grid, old, new, dt, flow, self%flux, self%volumes%q)
-    !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      self%volumes%w(:, :, k) = flow%liquid(:, :, k)
-      self%volumes%v(:, :, k) = flow%room(:, :, k)
-      self%volumes%c(:, :, k) = flow%c(:, :, k)
-      if (self%parts == 1) cycle
-      self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :)/real(self%parts, wp)
-    end do
+    call swap_fields(flow, self%volumes)
+    if (self%parts > 1) then
+      !$omp parallel do schedule(static)
+      do k = grid%first(3), grid%last(3)
+        self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :)/real(self%parts, wp)
+      end do
+    end if
     self%sweeps%clamped = 0.0_wp
     self%small%converged = .true.
     self%inflow = 0.0_wp
   end subroutine begin_transport
+
+  !> Liquid, open volume and C^ of the flow run in its own arrays; called once more, they are back.
+  subroutine swap_fields(flow, volumes)
+    type(flow_t), intent(inout) :: flow
+    type(carried_volumes_t), intent(inout) :: volumes
+
+    call swap(flow%liquid, volumes%w)
+    call swap(flow%room, volumes%v)
+    call swap(flow%c, volumes%c)
+  end subroutine swap_fields
 
   !> The order of the directions and the small cells of an equal part of the step.
   !!
@@ -174,18 +186,13 @@ contains
     type(solid_geometry_t), intent(in) :: new   !! bodies at the end of the step
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
-    integer :: k
 
-    !$omp parallel do schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      flow%liquid(:, :, k) = self%volumes%w(:, :, k)
-      flow%room(:, :, k) = self%volumes%v(:, :, k)
-    end do
+    call swap_fields(flow, self%volumes)
     call fill_scalar_halo(grid, flow%liquid)
     call fill_scalar_halo(grid, flow%room)
     call extend_fraction(grid, new, self%extension, flow)
     flow%liquid_inflow = flow%liquid_inflow + self%inflow
-    call count_small_cells(grid, new, self%volumes%w, self%small)
+    call count_small_cells(grid, new, flow%liquid, self%small)
   end subroutine finish_transport
 
 end module liquid_transport_m

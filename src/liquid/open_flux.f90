@@ -65,7 +65,7 @@ contains
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
     call flux_of_velocity(grid, old, new%open, flow%uf, dt, q)
-    if (.not. is_known(self%band, old, new)) call find_band(grid, old, new, self%band)
+    call find_band(grid, old, new, self%band)
     if (self%band%parts == 0) return
     call find_balances(grid, new, flow%room, q, self%band)
     call balance_parts(grid, self, balanced)
@@ -74,16 +74,8 @@ contains
     call correct_flux(grid, self%band, self%solver%x, q)
   end subroutine find_open_flux
 
-  !> Has the band been found for these bodies, and is all of it there?
-  pure logical function is_known(band, old, new)
-    type(flux_band_t), intent(in) :: band
-    type(solid_geometry_t), intent(in) :: old, new
-
-    is_known = band%whole .and. all([old%poses, new%poses] > 0) &
-      .and. all(band%poses == [old%poses, new%poses])
-  end function is_known
-
-  !> The band and its parts; no parts without solids.
+  !> The band, its conductances and parts; no parts without solids. Only the conductances are not
+  !! known still if the bodies are where they were in the last step.
   subroutine find_band(grid, old, new, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
@@ -91,8 +83,11 @@ contains
     real(wp) :: cells(1)
     logical :: solids
 
+    if (all([old%poses, new%poses] > 0) .and. all(band%poses == [old%poses, new%poses])) then
+      if (band%parts > 0) call find_conductances(grid, old%open, new%open, band)
+      return
+    end if
     band%poses = [old%poses, new%poses]
-    band%whole = .true.
     band%parts = 0
     call mark_solids(grid, old, new, band%marked, solids)
     if (.not. solids) return

@@ -13,6 +13,7 @@ module fluid_transport_m
                                      momentum_late
   use viscous_system_m, only: viscous_t
   use elliptic_solver_m, only: elliptic_solver_t
+  use pressure_system_m, only: pressure_system_t
   implicit none
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
@@ -46,23 +47,24 @@ contains
     else
       self%liquid%sweeps%level = case%fluid%water_level
     end if
-    deallocate (self%liquid%flux%solver)
+    deallocate (self%liquid%flux%solver, self%liquid%flux%band%k)
     if (case%numerics%momentum == 'c_ismac') return
     call momentum_init(grid, self%momentum, case%numerics%advection)
     deallocate (self%liquid%volumes%q, self%liquid%volumes%g, self%momentum%momentum)
   end subroutine fluid_transport_init
 
-  !> Borrow the solver of the pressure and arrays of the viscous stage, which need them later in the
-  !! step and keep nothing there; called once more, give them back. Nothing is copied.
-  subroutine borrow(viscous, solver, self)
+  !> Borrow solver and coefficients of the pressure and arrays of the viscous stage, which need them
+  !! later in the step and keep nothing there; called once more, give them back. Nothing is copied.
+  subroutine borrow(viscous, pressure, self)
     type(viscous_t), intent(inout) :: viscous
-    type(elliptic_solver_t), allocatable, intent(inout) :: solver
+    type(pressure_system_t), intent(inout) :: pressure
     type(fluid_transport_t), intent(inout) :: self
     type(elliptic_solver_t), allocatable :: other
 
-    call move_alloc(solver, other)
-    call move_alloc(self%liquid%flux%solver, solver)
+    call move_alloc(pressure%solver, other)
+    call move_alloc(self%liquid%flux%solver, pressure%solver)
     call move_alloc(other, self%liquid%flux%solver)
+    call swap(pressure%operator%cf, self%liquid%flux%band%k)
     if (allocated(self%momentum%mixed_near)) then
       call swap(viscous%r, self%liquid%volumes%q)
       call swap(viscous%s, self%liquid%volumes%g)
@@ -72,24 +74,24 @@ contains
 
   !> Carry liquid and momentum, direction by direction; new density and viscosity. With C-ISMAC
   !! momentum waits for the predictor, which uses the volumes of the same parts.
-  subroutine carry_fluid(case, grid, before, after, span, flow, viscous, solver, self)
+  subroutine carry_fluid(case, grid, before, after, span, flow, viscous, pressure, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
     type(span_t), intent(in) :: span
     type(flow_t), intent(inout) :: flow   !! halos filled on entry and return
-    type(viscous_t), intent(inout) :: viscous   !! lends arrays
-    type(elliptic_solver_t), allocatable, intent(inout) :: solver   !! of the pressure, lent too
+    type(viscous_t), intent(inout) :: viscous            !! lends arrays
+    type(pressure_system_t), intent(inout) :: pressure   !! lends its solver and an array
     type(fluid_transport_t), intent(inout) :: self
 
     self%liquid%parts = parts_of_step(span%courant)
-    call borrow(viscous, solver, self)
+    call borrow(viscous, pressure, self)
     if (case%numerics%momentum == 'c_ismac') then
       call transport_liquid(grid, before, after, span%dt, span%number, self%liquid, flow)
     else
       call carry_all(case%fluid, grid, before, after, span, flow, self%liquid, self%momentum)
     end if
-    call borrow(viscous, solver, self)
+    call borrow(viscous, pressure, self)
     call mix_fluid(case%fluid, flow)
   end subroutine carry_fluid
 

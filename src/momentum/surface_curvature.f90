@@ -10,7 +10,7 @@ module surface_curvature_m
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use plic_m, only: unit_normal
-  use surface_heights_m, only: column_t, find_places, nine_heights, is_full, is_empty, no_height
+  use surface_heights_m, only: column_t, find_places, nine_heights, is_full, is_empty
   use parallel_m, only: halo_exchange, global_sum
   implicit none
   private
@@ -32,18 +32,21 @@ module surface_curvature_m
 
 contains
 
-  !> Room for the fields, at the start of a run.
+  !> Room for the fields that are neither there nor lent.
   subroutine surface_curvature_init(grid, self)
     type(grid_t), intent(in) :: grid
-    type(surface_curvature_t), intent(out) :: self
+    type(surface_curvature_t), intent(inout) :: self
     integer, parameter :: first_size = 1024
     integer :: a(3), b(3)
 
     a = grid%first
     b = grid%last
-    allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    if (.not. allocated(self%curvature)) then
+      allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    end if
+    if (.not. allocated(self%place)) allocate (self%place(a(1):b(1), a(2):b(2), a(3):b(3), 3))
+    if (allocated(self%state)) return
     allocate (self%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
-    allocate (self%place(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=no_height)
     allocate (self%cell(3, first_size), self%value(first_size))
   end subroutine surface_curvature_init
 

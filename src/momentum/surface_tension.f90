@@ -48,7 +48,7 @@ contains
 
     self%acts = .not. fluid%single_phase
     if (.not. self%acts) return
-    if (.not. allocated(self%force)) call allocate_tension(grid, fluid%surface_tension, self)
+    call allocate_tension(grid, fluid%surface_tension, self)
     !$omp parallel do schedule(static)
     do k = lbound(self%force, 3), ubound(self%force, 3)
       self%force(:, :, k, :) = 0.0_wp
@@ -59,7 +59,7 @@ contains
     call force_at_faces(grid, fluid%surface_tension, c, self)
   end subroutine find_tension
 
-  !> Room for the fields, at the start of a run.
+  !> Room for the fields that are neither there nor lent.
   subroutine allocate_tension(grid, sigma, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: sigma   !! [N/m]
@@ -68,7 +68,7 @@ contains
 
     a = grid%first
     b = grid%last
-    allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    if (.not. allocated(self%force)) allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3))
     if (sigma > 0.0_wp) call surface_curvature_init(grid, self%surface)
   end subroutine allocate_tension
 

@@ -79,11 +79,9 @@ contains
 
     self%report = pressure_report_t()
     call start_from_none(self%phi_total)
-    if (size(self%system%operator%push, 2) > 0) then   ! bodies of the run, not only of this solve
-      do d = 1, 3
-        call start_from_none(flow%solid_flux(:, :, :, d))
-      end do
-    end if
+    do d = 1, 3
+      call start_from_none(flow%solid_flux(:, :, :, d))
+    end do
     call set_bodies(grid, bodies, self%system)
     allowed = merge(rough_factor, 1.0_wp, self%rough)*self%tolerance
     tolerance = 0.5_wp*allowed*grid%volume/dt

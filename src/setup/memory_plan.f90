@@ -1,7 +1,7 @@
 !> How much memory a run will take, and whether it can have that.
 !!
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
-!! and both couplings (gfortran 12): 500 to 885 B for a cell, those of the halo counted, 1311 B
+!! and both couplings (gfortran 12): 470 to 751 B for a cell, those of the halo counted, 1218 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -15,8 +15,8 @@ module memory_plan_m
   private
   public :: planned_memory, require_memory, require_memory_to_start, size_text
 
-  integer(i8), parameter :: bytes_per_cell = 930       !! all arrays: fields, solids, solvers [B]
-  integer(i8), parameter :: bytes_of_c_ismac = 460     !! more for each cell [B]
+  integer(i8), parameter :: bytes_per_cell = 810       !! all arrays: fields, solids, solvers [B]
+  integer(i8), parameter :: bytes_of_c_ismac = 470     !! more for each cell [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
   integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]
   integer(i8), parameter :: bytes_at_rest = 30000000   !! program and libraries [B]
