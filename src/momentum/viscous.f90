@@ -7,6 +7,7 @@
 !! Solved by overrelaxation of two colours of cells, without scalar products, unless a step is so
 !! long that this takes too many sweeps: then by conjugate gradients.
 module viscous_m
+  use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
@@ -14,7 +15,7 @@ module viscous_m
   use viscous_system_m, only: viscous_t, wall_legs_t, wrench
   use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms, &
     terms_at_once
-  use parallel_m, only: halo_exchange, global_max
+  use parallel_m, only: halo_exchange, global_max, nproc
   implicit none
   private
   public :: solve_viscous
@@ -73,28 +74,25 @@ contains
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(inout) :: self
     real(wp) :: change(6, bodies%n)
-    real(wp) :: weight, worst(1)   !! of the change in both colours, and the largest one
-    integer :: most, colour
+    real(wp) :: weight(2), worst(1)   !! of the change in either colour, and the largest one
+    integer :: most
 
     self%iterations = 0
     self%converged = .false.
     most = sweeps_allowed(grid, self%spread)
     if (most == 0) return
     call add_walls(self%walls, bodies%motion, 1.0_wp, lbound(self%r), self%r)
-    weight = 1.0_wp
+    weight = [1.0_wp, 1.0_wp/(1.0_wp - 0.5_wp*self%spread**2)]
     do while (self%iterations < most .and. .not. self%converged)
-      worst = 0.0_wp
-      do colour = 0, 1
-        call relax(grid, colour, weight, u, self, worst(1))
-        if (self%iterations == 0 .and. colour == 0) weight = 2.0_wp
-        weight = 1.0_wp/(1.0_wp - 0.25_wp*weight*self%spread**2)
-      end do
+      call relax(grid, weight, u, self, worst(1))
       change = of_blocks(inverse, momentum - rows_of_bodies(bodies, self, u, bodies%motion))
       call global_max(worst)
       worst = max(worst, maxval([0.0_wp, abs(change(1:3, :))]))
-      change = weight*change
+      weight(1) = 1.0_wp/(1.0_wp - 0.25_wp*weight(2)*self%spread**2)
+      change = weight(1)*change
       bodies%motion = bodies%motion + change
       call add_walls(self%walls, change, 1.0_wp, lbound(self%r), self%r)
+      weight(2) = 1.0_wp/(1.0_wp - 0.25_wp*weight(1)*self%spread**2)
       self%iterations = self%iterations + 1
       self%converged = worst(1) <= bound
     end do
@@ -119,39 +117,86 @@ contains
     sweeps_allowed = 2*ceiling(log(tolerance)/log(rate)) + 3
   end function sweeps_allowed
 
-  !> Relax the cells of one colour by a weight.
-  subroutine relax(grid, colour, weight, u, self, worst)
+  !> Relax the cells of one colour, then those of the other, each by its weight.
+  !!
+  !! Where nothing has to be exchanged between the colours the second follows the first one plane
+  !! behind, so that a plane comes from memory once for both. Each thread then has some planes next
+  !! to each other, of which the first colour of the outer two comes first.
+  subroutine relax(grid, weight, u, self, worst)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: colour
+    real(wp), intent(in) :: weight(2)
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(viscous_t), intent(in) :: self
+    real(wp), intent(out) :: worst   !! largest change by a weight of one here [m/s]
+    integer :: colour, k, low, high
+
+    worst = 0.0_wp
+    if (nproc() > 1 .or. any(grid%periodic)) then
+      do colour = 1, 2
+        call halo_exchange(u, n_halo, layers=1)
+        !$omp parallel do reduction(max: worst) schedule(static)
+        do k = grid%lo(3), grid%hi(3)
+          call relax_plane(grid, colour, k, weight(colour), u, self, worst)
+        end do
+      end do
+      return
+    end if
+    !$omp parallel private(k, low, high) reduction(max: worst)
+    call planes_of_thread(grid, low, high)
+    do k = low, high, max(1, high - low)
+      call relax_plane(grid, 1, k, weight(1), u, self, worst)
+    end do
+    !$omp barrier
+    do k = low + 1, high - 1
+      call relax_plane(grid, 1, k, weight(1), u, self, worst)
+      call relax_plane(grid, 2, k - 1, weight(2), u, self, worst)
+    end do
+    do k = max(low, high - 1), high
+      call relax_plane(grid, 2, k, weight(2), u, self, worst)
+    end do
+    !$omp end parallel
+  end subroutine relax
+
+  !> Planes low..high of the thread that asks, none if high < low.
+  subroutine planes_of_thread(grid, low, high)
+    type(grid_t), intent(in) :: grid
+    integer, intent(out) :: low, high
+    integer :: planes, me, n
+
+    planes = grid%hi(3) - grid%lo(3) + 1
+    me = omp_get_thread_num()
+    n = omp_get_num_threads()
+    low = grid%lo(3) + planes*me/n
+    high = grid%lo(3) + planes*(me + 1)/n - 1
+  end subroutine planes_of_thread
+
+  !> Relax the cells of one colour in plane k by a weight; colour 1 has even sums of its numbers.
+  subroutine relax_plane(grid, colour, k, weight, u, self, worst)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: colour, k
     real(wp), intent(in) :: weight
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(viscous_t), intent(in) :: self
-    real(wp), intent(inout) :: worst   !! largest change by a weight of one here, so far [m/s]
-    integer :: i, j, k, c
-    real(wp) :: change, most
+    real(wp), intent(inout) :: worst   !! largest change by a weight of one so far [m/s]
+    integer :: i, j, c
+    real(wp) :: change
 
-    call halo_exchange(u, n_halo, layers=1)
-    most = 0.0_wp
-    !$omp parallel do private(i, j, c, change) reduction(max: most) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do j = grid%lo(2), grid%hi(2)
-        do c = 1, 3
-          do i = grid%lo(1) + modulo(grid%lo(1) + j + k + colour, 2), grid%hi(1), 2
-            associate (l => self%leg)
-              change = (self%r(i, j, k, c) &
-                        + l(i, j, k, 1)*u(i - 1, j, k, c) + l(i + 1, j, k, 1)*u(i + 1, j, k, c) &
-                        + l(i, j, k, 2)*u(i, j - 1, k, c) + l(i, j + 1, k, 2)*u(i, j + 1, k, c) &
-                        + l(i, j, k, 3)*u(i, j, k - 1, c) + l(i, j, k + 1, 3)*u(i, j, k + 1, c)) &
-                       /self%diagonal(i, j, k, c) - u(i, j, k, c)
-            end associate
-            u(i, j, k, c) = u(i, j, k, c) + weight*change
-            most = max(most, abs(change))
-          end do
+    do j = grid%lo(2), grid%hi(2)
+      do c = 1, 3
+        do i = grid%lo(1) + modulo(grid%lo(1) + j + k + colour - 1, 2), grid%hi(1), 2
+          associate (l => self%leg)
+            change = (self%r(i, j, k, c) &
+                      + l(i, j, k, 1)*u(i - 1, j, k, c) + l(i + 1, j, k, 1)*u(i + 1, j, k, c) &
+                      + l(i, j, k, 2)*u(i, j - 1, k, c) + l(i, j + 1, k, 2)*u(i, j + 1, k, c) &
+                      + l(i, j, k, 3)*u(i, j, k - 1, c) + l(i, j, k + 1, 3)*u(i, j, k + 1, c)) &
+                     /self%diagonal(i, j, k, c) - u(i, j, k, c)
+          end associate
+          u(i, j, k, c) = u(i, j, k, c) + weight*change
+          worst = max(worst, abs(change))
         end do
       end do
     end do
-    worst = max(worst, most)
-  end subroutine relax
+  end subroutine relax_plane
 
   !> Conjugate gradients on the system over its diagonal, from where it is.
   subroutine conjugate_gradients(grid, momentum, inverse, bound, bodies, u, self)

@@ -1,5 +1,6 @@
 !> Implicit viscosity: exact shear past a wall inside the cells, film cells, momentum of the stage.
 program test_viscous
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use case_types_m, only: grid_input_t, boundary_input_t
@@ -158,9 +159,55 @@ program test_viscous
   call check('odd box: by sweeps', viscous%iterations > 10 .and. viscous%iterations <= 25)   ! 21
   call waves_in_odd_box(5.0_wp)
   call check('odd box, longer step: left to conjugate gradients', viscous%iterations, 2)
+  call waves_in_closed_box()
   call finish_checks()
   call parallel_final()
 contains
+  !> A wave in a box with slip walls, on threads that have many planes of cells, two, one or none.
+  subroutine waves_in_closed_box()
+    integer, parameter :: n(3) = [6, 5, 9], mode(3) = [2, 1, 5], threads(5) = [1, 2, 4, 9, 12]
+    real(wp), parameter :: pi = acos(-1.0_wp), number = 1.5_wp   !! nu dt/h^2
+    type(grid_input_t) :: input
+    type(boundary_input_t) :: boundary
+    type(grid_t) :: box
+    real(wp) :: wave(n(1), n(2), n(3)), first(n(1), n(2), n(3)), slows, x(3)
+    integer :: i, j, k, m, most
+
+    input%cells = n
+    input%length = 0.1_wp*real(n, wp)
+    boundary%kind = 'slip'
+    call grid_init(input, boundary, box)
+    call solid_geometry_init(box, solid, 0)
+    call rigid_motion_init(0, wall)
+    call viscous_init(box, 0, viscous)
+    slows = 1.0_wp + 4.0_wp*number*sum(sin(0.5_wp*pi*real(mode, wp)/real(n, wp))**2)
+    do k = 1, n(3)
+      do j = 1, n(2)
+        do i = 1, n(1)
+          x = pi*real(mode, wp)*(real([i, j, k], wp) - 0.5_wp)/real(n, wp)
+          wave(i, j, k) = sin(x(1))*cos(x(2))*cos(x(3))   ! none into the walls
+        end do
+      end do
+    end do
+    most = omp_get_max_threads()
+    do m = 1, size(threads)
+      call omp_set_num_threads(threads(m))
+      call flow_init(box, flow)
+      flow%rho = rho
+      flow%mu = mu
+      flow%u(1:n(1), 1:n(2), 1:n(3), 1) = wave
+      call build_viscous(box, solid, wall, flow%rho, flow%mu, number*0.1_wp**2*rho/mu, viscous)
+      call solve_viscous(box, wall, flow, viscous)
+      if (m == 1) first = flow%u(1:n(1), 1:n(2), 1:n(3), 1)
+      call check('closed box: by sweeps', viscous%converged .and. viscous%iterations > 1)
+      call check('closed box: the wave decays', maxval(abs(flow%u(1:n(1), 1:n(2), 1:n(3), 1) &
+                                                           - wave/slows)), 0.0_wp, 1.0e-8_wp)
+      call check('closed box: the same bits on any threads', &
+                 all(abs(flow%u(1:n(1), 1:n(2), 1:n(3), 1) - first) <= 0.0_wp))
+    end do
+    call omp_set_num_threads(most)
+  end subroutine waves_in_closed_box
+
   !> Waves in a periodic box of odd numbers of cells, where first and last cell are of one colour:
   !! each decays by its own factor.
   subroutine waves_in_odd_box(number)
