@@ -201,7 +201,6 @@ contains
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
     report%transport_parts = sim%transport%liquid%parts
-    report%small_cells = sim%transport%liquid%small%count
     report%transport_converged = sim%transport%liquid%small%converged
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%stage%tension%surface%fallback

@@ -110,7 +110,6 @@ contains
   pure subroutine number_poses(blocks, self)
     type(blocks_t), intent(in) :: blocks
     type(solid_fraction_t), intent(inout) :: self
-
     logical :: same
     integer :: b
 

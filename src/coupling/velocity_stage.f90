@@ -106,7 +106,8 @@ contains
     end if
   end subroutine stage_init
 
-  !> Force of the surface, in arrays that the viscous stage lends until then.
+  !> Force of the surface, in arrays of the viscous stage, which has all of them back but that of
+  !! the force itself (`return_surface_force`).
   subroutine find_surface_force(fluid, grid, solid, c, stage)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid

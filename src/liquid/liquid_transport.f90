@@ -20,7 +20,7 @@ module liquid_transport_m
   use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
-                           renew_shares, count_small_cells
+                           renew_shares
   use extended_fraction_m, only: extended_fraction_t, extended_fraction_init, extend_fraction
   use exact_sum_m, only: exact_sum
   implicit none
@@ -192,7 +192,6 @@ contains
     call fill_scalar_halo(grid, flow%room)
     call extend_fraction(grid, new, self%extension, flow)
     flow%liquid_inflow = flow%liquid_inflow + self%inflow
-    call count_small_cells(grid, new, flow%liquid, self%small)
   end subroutine finish_transport
 
 end module liquid_transport_m

@@ -74,8 +74,8 @@ contains
     call correct_flux(grid, self%band, self%solver%x, q)
   end subroutine find_open_flux
 
-  !> The band, its conductances and parts; no parts without solids. Only the conductances are not
-  !! known still if the bodies are where they were in the last step.
+  !> The band, its conductances and parts; no parts without solids. If the bodies are where they
+  !! were in the last step only the conductances are found again, whose array is borrowed.
   subroutine find_band(grid, old, new, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new

@@ -12,16 +12,14 @@ module small_cells_m
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
   use carried_volumes_m, only: carried_volumes_t, share_of
-  use exact_sum_m, only: exact_sum
   use parallel_m, only: halo_exchange, global_max, global_sum
   implicit none
   private
-  public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells, count_small_cells
+  public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells
   public :: renew_shares, late_values, move_late
 
   real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
   real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
-  real(wp), parameter :: closed_volume = 1.0e-12_wp !! open volume of a closed cell [V]
   integer, parameter :: max_late_iterations = 1000
 
   type :: small_cells_t
@@ -35,12 +33,8 @@ module small_cells_m
     integer, allocatable :: late_in_row(:, :)   !! work: those of a direction in the row (:, j, k)
     real(wp), allocatable :: q_late(:), g_late(:)
       !! (*) volume and liquid through these faces, positive along the axis [m3]
-    ! Statistics of the last step, all processes.
-    integer :: count = 0                      !! small cells that gave something
-    integer :: count_open = 0                 !! of them without solid: fast gas, or a long step
     integer :: iterations = 0                 !! of the last donor values
     logical :: converged = .true.             !! all donor values of the step
-    real(wp) :: held = 0.0_wp                 !! liquid in closed cells until they open [m3]
     ! Work of the donor values, a number for each small cell.
     real(wp), allocatable :: amount(:), mass(:), ratio(:)
   end type small_cells_t
@@ -321,39 +315,5 @@ contains
       end if
     end do
   end subroutine move_late
-
-  !> Small cells that gave something, and the liquid of closed cells.
-  subroutine count_small_cells(grid, new, liquid, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: new   !! bodies at the end of the step
-    real(wp), intent(in), contiguous :: liquid(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! W at the end of the step [m3]
-    type(small_cells_t), intent(inout) :: self
-    integer(i8) :: count(2)
-    integer :: s, l, n, at(3)
-
-    self%ratio(1:self%n) = 0.0_wp
-    do l = 1, self%n_late
-      at = self%donor(:, l)
-      if (.not. grid%owns(at)) cycle
-      self%ratio(self%number(at(1), at(2), at(3))) = 1.0_wp
-    end do
-    count = 0_i8
-    n = 0
-    do s = 1, self%n
-      at = self%cell(:, s)
-      if (self%ratio(s) > 0.0_wp) then
-        count(1) = count(1) + 1_i8
-        if (new%alpha(at(1), at(2), at(3)) <= 0.0_wp) count(2) = count(2) + 1_i8
-      end if
-      if (1.0_wp - new%alpha(at(1), at(2), at(3)) > closed_volume) cycle
-      n = n + 1
-      self%amount(n) = liquid(at(1), at(2), at(3))
-    end do
-    call global_sum(count)
-    self%count = int(count(1))
-    self%count_open = int(count(2))
-    self%held = exact_sum(self%amount(1:n))
-  end subroutine count_small_cells
 
 end module small_cells_m

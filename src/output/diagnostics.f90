@@ -24,7 +24,6 @@ module diagnostics_m
     real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m]
     real(wp) :: contact_courant_max = 0.0_wp  !! C_s of eq. (6) [-]
     integer :: substeps = 0
-    integer :: small_cells = 0                !! cells that the transport treated as small
     integer :: sealed_cells = 0               !! cells without any open face that held fluid
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
     integer :: warnings = 0                   !! printed in this step

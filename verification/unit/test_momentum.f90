@@ -138,7 +138,7 @@ contains
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
     call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
                > 50)
-    call check('parts keep cells from being small', transport%small%count_open, 0)
+    call check('parts keep cells from being small', transport%small%n_late, 0)
   end subroutine uniform_through_an_interface
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.
@@ -221,7 +221,7 @@ contains
       do d = 1, 3   ! the velocity stage gives closed cells the velocity of the body
         where (new%alpha >= 1.0_wp) flow%u(:, :, :, d) = stream(d)
       end do
-      small = max(small, transport%small%count)
+      small = max(small, transport%small%n_late)
     end do
     call check('uniform velocity around a moving box', worst, 0.0_wp, 1.0e-9_wp)
     call check('cells opened and closed', small > 0)

@@ -5,7 +5,7 @@ program test_small_cells
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
-                           count_small_cells, renew_shares
+                           renew_shares
   use box_solid_m, only: simple_grid
   use check_m, only: check, finish_checks
   implicit none
@@ -76,11 +76,6 @@ contains
     call check('new share of who got', volumes%c(5, 2, 2), through*c_4/(1.0_wp + through), &
                1.0e-12_wp)
     call check('no other', volumes%c(6, 2, 2), -1.0_wp, 0.0_wp)
-    solid%alpha(4, 2, 2) = 1.0_wp
-    call count_small_cells(grid, solid, volumes%w, small)
-    call check('small cells that gave', small%count, 3)
-    call check('of them without solid', small%count_open, 2)
-    call check('held in a closed cell', small%held, volumes%w(4, 2, 2), 0.0_wp)
   end subroutine row_of_small_cells
 
   !> Round a ring of four cells flows a million times what they hold: after a thousand passes the
