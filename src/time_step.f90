@@ -160,7 +160,7 @@ contains
         call tic(sim%timer_transport)
         call carry_fluid(case, grid, sim%before, sim%solid, &
                          span_t(dt, report%cfl_carried, sim%clock%step), flow, &
-                         sim%stage%viscous, sim%stage%pressure%system, sim%transport)
+                         sim%stage%viscous, sim%stage%pressure, sim%transport)
         if (sim%stage%implicit_momentum) sim%stage%c_ismac%q = sim%transport%liquid%parts &
                                                                *sim%transport%liquid%volumes%q
         call toc(sim%timer_transport)

@@ -37,8 +37,10 @@ contains
       call find_links_before(grid, solid, stage)
     end if
     if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
-      call swap(flow%solid_flux, stage%deviation)          ! lent until the pressure and
-      call swap(stage%viscous%leg, stage%mid_step%given)   ! the viscosity need them
+      if (.not. allocated(stage%deviation)) then
+        call swap(flow%solid_flux, stage%deviation)          ! lent until the pressure and
+        call swap(stage%viscous%leg, stage%mid_step%given)   ! the viscosity need them
+      end if
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
       call to_mid_step(grid, case%fluid, solid, stage%links_before, stage%bodies, stage%trend, dt, &
                        flow, stage%acceleration, stage%mid_step)
@@ -106,7 +108,6 @@ contains
     type(stage_report_t), intent(out) :: report
 
     stage%total = 0.0_wp
-    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
     call set_velocity()
     call motion_at_start(blocks, stage)
     if (case%numerics%coupling == 'mics') then

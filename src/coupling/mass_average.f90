@@ -25,7 +25,7 @@ module mass_average_m
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
   use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
-    predict_velocity, renew_acceleration, return_surface_force
+    predict_velocity, renew_acceleration, find_surface_force, return_surface_force
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
@@ -152,6 +152,7 @@ contains
     ! `y` is free until the viscous stage.
     associate (a => stage%acceleration, rho => stage%rho_mixture, by_stress => stage%viscous%y)
       call face_acceleration(grid, case%fluid%gravity, flow%rho, rho, flow%p, a%face, flow%sides)
+      call find_surface_force(case%fluid, grid, solid, flow%c, stage)
       call add_tension(grid, rho, stage%tension, a%face)
       call return_surface_force(stage)
       call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)

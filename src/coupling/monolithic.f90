@@ -62,8 +62,10 @@ contains
       call set_pressure_system(grid, solid%free, stage%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
     end associate
+    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
     call accelerate_fluid(case, grid, solid, dt, flow, stage)
     call push_by_known_forces(case, grid, solid, dt, flow, stage)
+    call return_surface_force(stage)
     call add_viscosity(grid, solid, dt, flow, stage)
     call predict_faces(grid, solid, dt, flow, stage)
     call find_pressure(grid, solid, dt, flow, stage, report)
@@ -119,7 +121,7 @@ contains
       call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
       call accelerate_cells(grid, dt, flow, stage)
       call add_product(grid, dt, by_stress, flow%u)
-      if (stage%implicit_momentum) return
+      if (.not. allocated(stage%mid_step%given)) return   ! nothing has been given before
       call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
       call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
                              flow, a%cell, stage%mid_step, stage%from_mid_step)
@@ -178,7 +180,6 @@ contains
     associate (bodies => stage%bodies, flux => stage%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, stage%tension, stage%from_pressure)
-      call return_surface_force(stage)
       stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, stage)
       stage%from_level = stage%from_level + stage%from_mid_step + stage%late

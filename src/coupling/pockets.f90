@@ -13,21 +13,19 @@ module pockets_m
     integer :: low(3) = 1, high(3) = 0            !! first and last cell where the solids are kept
     logical, allocatable :: reached(:)            !! (cut cells) fluid gets there from uncut cells
     integer, allocatable :: stack(:)
-    integer, allocatable :: flag(:, :, :)         !! the same on the grid, for the exchange
+    integer, allocatable :: flag(:, :, :)
+      !! the same on the grid, for the exchange; not before the first pocket
   end type pockets_t
 
 contains
 
-  subroutine pockets_init(grid, low, high, self)
-    type(grid_t), intent(in) :: grid
+  subroutine pockets_init(low, high, self)
     integer, intent(in) :: low(3), high(3)   !! first and last cell where the solids are kept
     type(pockets_t), intent(out) :: self
 
     self%low = low
     self%high = high
     allocate (self%reached(0), self%stack(0))
-    allocate (self%flag(grid%first(1):grid%last(1), grid%first(2):grid%last(2), &
-                        grid%first(3):grid%last(3)), source=0)
   end subroutine pockets_init
 
   !> Close the faces of cut cells from which no open faces lead to a cell without solid.
@@ -49,7 +47,7 @@ contains
     left(1) = own_unreached(grid, self, solid)
     call global_sum(left)
     do while (left(1) > 0)
-      call exchange_reach(self, solid)
+      call exchange_reach(grid, self, solid)
       call spread_reach(grid, self, solid)
       changed(1) = left(1)
       left(1) = own_unreached(grid, self, solid)
@@ -58,7 +56,7 @@ contains
     end do
     solid%n_sealed = int(left(1))
     if (left(1) == 0) return
-    call exchange_reach(self, solid)
+    call exchange_reach(grid, self, solid)
     do m = 1, solid%n_cut
       if (self%reached(m)) cycle
       solid%n_closed = solid%n_closed + 1
@@ -84,11 +82,16 @@ contains
   end function own_unreached
 
   !> Learn from the owners which cut cells of the halo are reached.
-  subroutine exchange_reach(self, solid)
+  subroutine exchange_reach(grid, self, solid)
+    type(grid_t), intent(in) :: grid
     type(pockets_t), intent(inout) :: self
     type(solid_geometry_t), intent(in) :: solid
     integer :: m
 
+    if (.not. allocated(self%flag)) then
+      allocate (self%flag(grid%first(1):grid%last(1), grid%first(2):grid%last(2), &
+                          grid%first(3):grid%last(3)))
+    end if
     self%flag = 0
     do m = 1, solid%n_cut
       associate (i => solid%cut_cell(:, m))

@@ -68,7 +68,7 @@ contains
     if (self%has_bed) n = n + 1
     allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
     call painting_init(grid, n, self%painting)
-    call pockets_init(grid, self%painting%low, self%painting%high, self%pockets)
+    call pockets_init(self%painting%low, self%painting%high, self%pockets)
   end subroutine solid_fraction_init
 
   !> Fill the solid geometry for the poses of the bodies present.

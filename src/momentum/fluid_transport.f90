@@ -13,7 +13,7 @@ module fluid_transport_m
                                      momentum_late
   use viscous_system_m, only: viscous_t
   use elliptic_solver_m, only: elliptic_solver_t
-  use pressure_system_m, only: pressure_system_t
+  use pressure_m, only: pressure_t
   implicit none
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
@@ -48,6 +48,7 @@ contains
       self%liquid%sweeps%level = case%fluid%water_level
     end if
     deallocate (self%liquid%flux%solver, self%liquid%flux%band%k)
+    deallocate (self%liquid%volumes%w_before, self%liquid%volumes%v_before)
     if (case%numerics%momentum == 'c_ismac') return
     call momentum_init(grid, self%momentum, case%numerics%advection)
     deallocate (self%liquid%volumes%q, self%liquid%volumes%g, self%momentum%momentum)
@@ -57,14 +58,18 @@ contains
   !! later in the step and keep nothing there; called once more, give them back. Nothing is copied.
   subroutine borrow(viscous, pressure, self)
     type(viscous_t), intent(inout) :: viscous
-    type(pressure_system_t), intent(inout) :: pressure
+    type(pressure_t), intent(inout) :: pressure
     type(fluid_transport_t), intent(inout) :: self
     type(elliptic_solver_t), allocatable :: other
 
-    call move_alloc(pressure%solver, other)
-    call move_alloc(self%liquid%flux%solver, pressure%solver)
-    call move_alloc(other, self%liquid%flux%solver)
-    call swap(pressure%operator%cf, self%liquid%flux%band%k)
+    associate (system => pressure%system, flux => self%liquid%flux, volumes => self%liquid%volumes)
+      call move_alloc(system%solver, other)
+      call move_alloc(flux%solver, system%solver)
+      call move_alloc(other, flux%solver)
+      call swap(system%operator%cf, flux%band%k)
+      call swap(pressure%phi_total, volumes%w_before)
+      call swap(viscous%mass, volumes%v_before)
+    end associate
     if (allocated(self%momentum%mixed_near)) then
       call swap(viscous%r, self%liquid%volumes%q)
       call swap(viscous%s, self%liquid%volumes%g)
@@ -81,7 +86,7 @@ contains
     type(span_t), intent(in) :: span
     type(flow_t), intent(inout) :: flow   !! halos filled on entry and return
     type(viscous_t), intent(inout) :: viscous            !! lends arrays
-    type(pressure_system_t), intent(inout) :: pressure   !! lends its solver and an array
+    type(pressure_t), intent(inout) :: pressure          !! lends its solver and arrays
     type(fluid_transport_t), intent(inout) :: self
 
     self%liquid%parts = parts_of_step(span%courant)

@@ -129,18 +129,20 @@ contains
     type(viscous_t), intent(in) :: self
     real(wp), intent(out) :: worst   !! largest change by a weight of one here [m/s]
     integer :: colour, k, low, high
+    logical :: alone   ! with nothing to exchange
 
     worst = 0.0_wp
-    if (nproc() > 1 .or. any(grid%periodic)) then
-      do colour = 1, 2
-        call halo_exchange(u, n_halo, layers=1)
+    alone = nproc() == 1 .and. .not. any(grid%periodic)
+    do colour = 1, 2   ! asked for alone, too: a run in one process foretells the messages of many
+      call halo_exchange(u, n_halo, layers=1)
+      if (.not. alone) then
         !$omp parallel do reduction(max: worst) schedule(static)
         do k = grid%lo(3), grid%hi(3)
           call relax_plane(grid, colour, k, weight(colour), u, self, worst)
         end do
-      end do
-      return
-    end if
+      end if
+    end do
+    if (.not. alone) return
     !$omp parallel private(k, low, high) reduction(max: worst)
     call planes_of_thread(grid, low, high)
     do k = low, high, max(1, high - low)

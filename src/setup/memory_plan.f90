@@ -1,7 +1,7 @@
 !> How much memory a run will take, and whether it can have that.
 !!
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
-!! and both couplings (gfortran 12): 470 to 751 B for a cell, those of the halo counted, 1218 B
+!! and both couplings (gfortran 12): 460 to 734 B for a cell, those of the halo counted, 1200 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit

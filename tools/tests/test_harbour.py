@@ -23,8 +23,8 @@ def write(path: Path, *words: str) -> None:
 @pytest.mark.parametrize(
     ("words", "cells", "blocks", "memory"),
     [
-        ([], 25_600_000, 2000, 28.0),
-        (["--spacing", "0.5", "--blocks", "333", "--kind", "dolos"], 3_200_000, 333, 3.8),
+        ([], 25_600_000, 2000, 23.0),
+        (["--spacing", "0.5", "--blocks", "333", "--kind", "dolos"], 3_200_000, 333, 3.16),
     ],
 )
 def test_the_program_plans_memory_and_time(

@@ -13,7 +13,7 @@ program test_pockets
   type(pockets_t) :: pockets
 
   call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
-  call pockets_init(grid, [1, 1, 1], grid%n, pockets)
+  call pockets_init([1, 1, 1], grid%n, pockets)
 
   call two_cells([3, 3, 2])
   call close_pockets(grid, pockets, solid)
