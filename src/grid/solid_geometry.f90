@@ -7,7 +7,7 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces, openings, edge_in
+  public :: solid_geometry_t, solid_geometry_init, set_faces, openings, wall_area, edge_in
   public :: leg_to_wall, bounded_leg
   public :: clear_cells, clear_faces, clear_legs, hand_over_faces
 
@@ -118,6 +118,18 @@ contains
       w(d, 2) = open(f(1), f(2), f(3), d)
     end do
   end function openings
+
+  !> Area of the wall in cell c as a vector into the fluid: what its open faces lack to close [m2].
+  pure function wall_area(grid, solid, c) result(area)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: area(3)
+    real(wp) :: w(3, 2)
+
+    w = openings(grid, solid%open, c)
+    area = grid%area*(w(:, 2) - w(:, 1))
+  end function wall_area
 
   !> How much of an edge cell c has, 0 if it is not cut.
   pure function edge_in(solid, c) result(edge)

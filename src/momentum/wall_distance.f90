@@ -1,8 +1,8 @@
 !> How far the fluid and the centre of a cell are from the wall in a cut cell, taken as a plane.
 module wall_distance_m
   use kinds_m, only: wp
-  use grid_m, only: grid_t, unit_step
-  use solid_geometry_m, only: solid_geometry_t, leg_to_wall
+  use grid_m, only: grid_t
+  use solid_geometry_m, only: solid_geometry_t, wall_area, leg_to_wall
   use plic_m, only: unit_constant
   implicit none
   private
@@ -18,12 +18,8 @@ contains
     integer, intent(in) :: c(3)
     real(wp) :: n(3)
     real(wp), parameter :: least_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
-    integer :: d, f(3)
 
-    do d = 1, 3
-      f = c + unit_step(:, d)
-      n(d) = grid%area(d)*(solid%open(f(1), f(2), f(3), d) - solid%open(c(1), c(2), c(3), d))
-    end do
+    n = wall_area(grid, solid, c)
     if (norm2(n) > least_wall*minval(grid%area)) then
       n = n/norm2(n)
     else

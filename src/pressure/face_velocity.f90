@@ -6,7 +6,7 @@ module face_velocity_m
   use boundary_kinds_m, only: gives_pressure, no_side
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
-  use solid_geometry_m, only: solid_geometry_t, openings, edge_in
+  use solid_geometry_m, only: solid_geometry_t, openings, wall_area, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm, arm_to_cell, middle_of_face
   use mixture_m, only: face_mean
@@ -507,7 +507,7 @@ contains
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))
-      n = wall_normal(f - unit_step(:, d)) + wall_normal(f)
+      n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
       n = n/max(norm2(n), tiny(1.0_wp))
       associate (u => flow%u(c(1), c(2), c(3), :))
         time = dt
@@ -544,19 +544,6 @@ contains
       if (open >= 1.0_wp) face = (theta - 0.5_wp)*abs(n_d)
       b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
     end function near_wall
-
-    !> Wall area of a cell as a vector into the fluid: what its open faces lack to close [m2].
-    pure function wall_normal(c) result(area)
-      integer, intent(in) :: c(3)
-      real(wp) :: area(3)
-      integer :: d, e(3)
-
-      do d = 1, 3
-        e = unit_step(:, d)
-        area(d) = grid%area(d)*(solid%open(c(1) + e(1), c(2) + e(2), c(3) + e(3), d) &
-                                - solid%open(c(1), c(2), c(3), d))
-      end do
-    end function wall_normal
   end subroutine face_velocity_at_walls
 
 end module face_velocity_m
