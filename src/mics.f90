@@ -63,7 +63,7 @@ program mics
   call count_from_here()
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
-    call share_cores()   ! a step after the last line was printed: who reads it sleeps again
+    call share_cores()
     call find_fault(sim, report, fault)
     signal = stop_asked(stop_requests)
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit

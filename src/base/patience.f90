@@ -37,11 +37,15 @@ module patience_m
   character(*), parameter :: largest_layer = '65536'
     !! that is sent at once [bytes]; larger ones wait until the receiver asks for them
   real(wp), parameter :: look_interval = 1.0_wp     !! between two looks at the machine [s]
+  integer, parameter :: glances = 3                 !! of which a look is the least, a step apart
 
   integer :: wanted = 0               !! threads that work when nobody else does; 0: not yet known
-  real(wp) :: last_look = 0.0_wp      !! wall clock [s]
-  real(wp) :: began = 0.0_wp          !! wall clock at the first look [s]
-  real(wp) :: thread_time = 0.0_wp    !! threads at work times wall time, up to the last look [s]
+  real(wp) :: last_look = 0.0_wp      !! wall clock at its first glance [s]
+  integer :: glances_taken = 0        !! of the look at hand
+  integer :: least_running = 0        !! threads of all programs seen by these
+  real(wp) :: began = 0.0_wp          !! wall clock at the first call [s]
+  real(wp) :: last_call = 0.0_wp      !! likewise [s]
+  real(wp) :: thread_time = 0.0_wp    !! threads at work times wall time, up to the last call [s]
 
   interface
     integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
@@ -137,10 +141,11 @@ contains
   end subroutine choose_messages
 
   !> Let fewer threads work while other programs run on their cores, and all of them afterwards.
-  !! Call it now and then, outside parallel regions: once a second it looks at the machine.
+  !! Call it every step, outside parallel regions: once a second it looks at the machine. A program
+  !! that runs only for a moment, as one that reads the line just printed, counts for nothing.
   subroutine share_cores()
     integer, parameter :: sc_nprocessors_onln = 84   !! of sysconf, on Linux
-    integer :: n, cores, running
+    integer :: n, cores
     real(wp) :: now
 
     n = omp_get_max_threads()
@@ -148,17 +153,23 @@ contains
     if (wanted == 0) then
       wanted = n
       began = now
-    else if (now - last_look < look_interval) then
-      return
-    else
-      thread_time = thread_time + n*(now - last_look)
+      last_call = now
+      last_look = now - look_interval
     end if
-    last_look = now
+    thread_time = thread_time + n*(now - last_call)
+    last_call = now
     if (wanted == 1) return
+    if (glances_taken == 0) then
+      if (now - last_look < look_interval) return
+      last_look = now
+      least_running = huge(least_running)
+    end if
+    glances_taken = modulo(glances_taken + 1, glances)
+    least_running = min(least_running, running_threads())
+    if (glances_taken > 0) return
     cores = int(c_sysconf(sc_nprocessors_onln))
-    running = running_threads()
-    if (cores == 0 .or. running == 0) return
-    call omp_set_num_threads(fair_threads(n, wanted, running, cores))
+    if (cores == 0 .or. least_running == 0) return
+    call omp_set_num_threads(fair_threads(n, wanted, least_running, cores))
   end subroutine share_cores
 
   !> Threads that leave each other running thread a core: n of those now running are ours.
@@ -193,14 +204,14 @@ contains
     if (info /= 0) running = 0
   end function running_threads
 
-  !> How many threads worked since the first look, weighted by wall time, and how many were to.
+  !> How many threads worked since the first call, weighted by wall time, and how many were to.
   subroutine threads_used(mean, most)
     real(wp), intent(out) :: mean
     integer, intent(out) :: most
 
     most = merge(wanted, omp_get_max_threads(), wanted > 0)
     mean = most
-    if (last_look > began) mean = thread_time/(last_look - began)
+    if (last_call > began) mean = thread_time/(last_call - began)
   end subroutine threads_used
 
   !> Is there an environment variable of this name?

@@ -3,7 +3,7 @@
 !! arguments it is the program that begins again.
 program test_patience
   use kinds_m, only: wp
-  use omp_lib, only: omp_get_max_threads
+  use omp_lib, only: omp_get_max_threads, omp_get_num_procs
   use check_m, only: check, finish_checks
   use patience_m, only: choose_spin_and_pages, share_cores, fair_threads, threads_used
   implicit none
@@ -44,11 +44,27 @@ contains
     call check('never more than wanted', fair_threads(3, 4, 3, 64), 4)
     call threads_used(mean, most)
     call check('before the first look', mean, real(most, wp), 1.0e-12_wp)
+    call keep_busy(omp_get_num_procs())
     call share_cores()
+    call share_cores()
+    call check('a moment of others counts for nothing', omp_get_max_threads(), all_of_us)
+    call share_cores()
+    call check('others that stay get cores', omp_get_max_threads(), 1)
     call threads_used(mean, most)
     call check('all were wanted', most, all_of_us)
-    call check('at least one is left', omp_get_max_threads() >= 1)
+    call check('all worked so far', mean, real(all_of_us, wp), 1.0e-12_wp)
   end subroutine check_shares
+
+  !> Start n programs that do nothing but compute for two seconds.
+  subroutine keep_busy(n)
+    integer, intent(in) :: n
+    integer :: i
+
+    do i = 1, n
+      call execute_command_line('timeout 2 sh -c "while :; do :; done" &')
+    end do
+    call execute_command_line('sleep 0.2')   ! they are starting
+  end subroutine keep_busy
 
   !> Exit code of this program with arguments, among them one with blanks and one without letters.
   function status_of(settings, wanted) result(status)
