@@ -39,8 +39,7 @@ module messages_m
     real(wp) :: bytes_most(5) = 0.0_wp     !! likewise [B]
   end type traffic_t
 
-  integer, parameter :: most_asked = 512
-  type(asked_t) :: asked(most_asked)
+  type(asked_t), allocatable :: asked(:)
   integer :: entries = 0
   integer(i8) :: messages(5) = 0_i8, bytes(5) = 0_i8
   logical :: counting = .false., searching = .false.
@@ -50,6 +49,7 @@ contains
   !> Begin to count.
   subroutine count_from_here()
     entries = 0
+    if (.not. allocated(asked)) allocate (asked(64))
     messages = 0_i8
     bytes = 0_i8
     counting = .true.
@@ -94,13 +94,23 @@ contains
     do e = 1, entries
       if (asked(e)%what == wanted%what .and. all(asked(e)%detail == wanted%detail)) exit
     end do
-    if (e > most_asked) error stop 'note_asked: more kinds of messages than most_asked'
     if (e > entries) then
+      if (e > size(asked)) call double_room()
       entries = e
       asked(e) = wanted
     end if
     asked(e)%calls = asked(e)%calls + 1_i8
   end subroutine note_asked
+
+  !> Room for twice as many entries: sums over parts of the fluid have as many lengths as there were
+  !! numbers of parts.
+  subroutine double_room()
+    type(asked_t), allocatable :: more(:)
+
+    allocate (more(2*size(asked)))
+    more(:entries) = asked(:entries)
+    call move_alloc(more, asked)
+  end subroutine double_room
 
   !> Messages of this process so far and their bytes, by kind.
   function sent_so_far() result(sent)
@@ -113,8 +123,11 @@ contains
   !> What was asked, one of each sort.
   function asked_what() result(name)
     character(what_length) :: name(entries)
+    integer :: e
 
-    name = name_of(asked(:entries)%what)
+    do e = 1, entries
+      name(e) = name_of(asked(e)%what)
+    end do
   end function asked_what
 
   !> The details of each, see `asked_t`.
@@ -130,8 +143,11 @@ contains
   !> How often each was asked.
   function asked_calls() result(calls)
     real(wp) :: calls(entries)
+    integer :: e
 
-    calls = real(asked(:entries)%calls, wp)
+    do e = 1, entries
+      calls(e) = real(asked(e)%calls, wp)
+    end do
   end function asked_calls
 
 end module messages_m
