@@ -1,10 +1,10 @@
 !> How fast the flow crosses the cells: what the length of a step follows, and what the transport
 !! carries in it.
 !!
-!! The step follows liquid and blocks, and so do the parts of its transport (`fluid_transport_m`).
-!! Gas that a closing hole presses out, or that a jet drags along, is ten times as fast and has a
-!! thousandth of the mass: it does not shorten the step unless it is faster still, and its cells
-!! give implicitly (`small_cells_m`). Measured choice: docs/decisions/time_step.md.
+!! The step follows liquid and blocks. Gas that a closing hole presses out, or that a jet drags
+!! along, is ten times as fast and has a thousandth of the mass: it does not shorten the step, its
+!! transport takes more parts (`fluid_transport_m`), unless it is faster still. Measured choice:
+!! docs/decisions/time_step.md.
 module courant_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
@@ -18,7 +18,6 @@ module courant_m
 
   real(wp), parameter :: least_open = 0.5_wp     !! share of a face whose velocity counts
   real(wp), parameter :: least_liquid = 0.5_wp   !! of a cell that the step follows
-  real(wp), parameter :: least_carried = 0.1_wp  !! of one that the parts of the transport follow
   real(wp), parameter :: gas_lead = 8.0_wp
     !! gas faster than so many times what is followed shortens the step all the same
   real(wp), parameter :: past_wall = 1.5_wp
@@ -28,11 +27,9 @@ module courant_m
   type :: courant_rate_t
     real(wp) :: followed = 0.0_wp
       !! largest |u_d|/h_d of the cells that are at least half liquid, and of the flow past the
-      !! blocks; at least an eighth of `given`
+      !! blocks; at least an eighth of `carried`
     real(wp) :: carried = 0.0_wp
-      !! largest share of itself that a cell gives through its faces, of those at least a tenth
-      !! liquid; of all where there is none half liquid
-    real(wp) :: given = 0.0_wp   !! the same of all cells
+      !! largest share of itself that a cell gives through its faces
     logical :: has_surface = .false.   !! are there cells of liquid and cells of gas?
   end type courant_rate_t
 
@@ -45,47 +42,45 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(blocks_t), intent(in) :: blocks
     type(courant_rate_t) :: rate
-    real(wp) :: fluid(5)
+    real(wp) :: fluid(4)
     integer :: b
 
     fluid = fluid_rates(grid, flow%uf, solid%open, flow%c)
     call global_max(fluid)
     rate%followed = fluid(1)
-    rate%given = fluid(3)
-    rate%carried = merge(fluid(2), rate%given, fluid(4) >= least_liquid)
-    rate%has_surface = all(fluid(4:) >= least_liquid)
+    rate%carried = fluid(2)
+    rate%has_surface = all(fluid(3:) >= least_liquid)
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
       rate%followed = max(rate%followed, past_wall/minval(grid%h)*( &
                       norm2(blocks%v(:, b)) &
                       + norm2(blocks%omega(:, b))*blocks%shapes(blocks%shape(b))%radius))
     end do
-    rate%followed = max(rate%followed, rate%given/gas_lead)
+    rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate
 
-  !> Followed, carried and given, the most liquid and the most gas in a cell, of this process.
+  !> Followed and carried, the most liquid and the most gas in a cell, of this process.
   function fluid_rates(grid, uf, open, c) result(rates)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):, :) &
       :: uf, open   !! velocity [m/s] and open share of the lower faces
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share
-    real(wp) :: rates(5)
+    real(wp) :: rates(4)
     real(wp) :: west, east, front, back, below, above   !! velocities at the faces [cells/s]
-    real(wp) :: gives, followed, carried, given, liquid, gas
+    real(wp) :: followed, carried, liquid, gas
     integer :: i, j, k
 
     followed = 0.0_wp
     carried = 0.0_wp
-    given = 0.0_wp
     liquid = 0.0_wp
     gas = 0.0_wp
-    !$omp parallel do private(i, j, west, east, front, back, below, above, gives) &
-    !$omp reduction(max: followed, carried, given, liquid, gas) schedule(static)
+    !$omp parallel do private(i, j, west, east, front, back, below, above) schedule(static) &
+    !$omp reduction(max: followed, carried, liquid, gas)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        !$omp simd private(west, east, front, back, below, above, gives) &
-        !$omp reduction(max: followed, carried, given, liquid, gas)
+        !$omp simd private(west, east, front, back, below, above) &
+        !$omp reduction(max: followed, carried, liquid, gas)
         do i = grid%lo(1), grid%hi(1)
           west = through(uf(i, j, k, 1), open(i, j, k, 1))/grid%h(1)
           east = through(uf(i + 1, j, k, 1), open(i + 1, j, k, 1))/grid%h(1)
@@ -93,11 +88,9 @@ contains
           back = through(uf(i, j + 1, k, 2), open(i, j + 1, k, 2))/grid%h(2)
           below = through(uf(i, j, k, 3), open(i, j, k, 3))/grid%h(3)
           above = through(uf(i, j, k + 1, 3), open(i, j, k + 1, 3))/grid%h(3)
-          gives = (max(0.0_wp, east) - min(0.0_wp, west)) &
-                  + (max(0.0_wp, back) - min(0.0_wp, front)) &
-                  + (max(0.0_wp, above) - min(0.0_wp, below))
-          given = max(given, gives)
-          carried = max(carried, merge(gives, 0.0_wp, c(i, j, k) >= least_carried))
+          carried = max(carried, (max(0.0_wp, east) - min(0.0_wp, west)) &
+                        + (max(0.0_wp, back) - min(0.0_wp, front)) &
+                        + (max(0.0_wp, above) - min(0.0_wp, below)))
           liquid = max(liquid, c(i, j, k))
           gas = max(gas, 1.0_wp - c(i, j, k))
           followed = max(followed, merge(max(abs(west), abs(east), abs(front), abs(back), &
@@ -106,7 +99,7 @@ contains
         end do
       end do
     end do
-    rates = [followed, carried, given, liquid, gas]
+    rates = [followed, carried, liquid, gas]
   end function fluid_rates
 
   !> Velocity through a face, none where it is mostly closed.

@@ -88,7 +88,7 @@ contains
     real(wp) :: courant
 
     rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
-    courant = sim%case%run%dt*max(rate%given, rate%followed)
+    courant = sim%case%run%dt*max(rate%carried, rate%followed)
     if (.not. courant <= highest_courant) call set(sim, 'Courant number '//brief(courant) &
       //', above '//brief(highest_courant)//': &run dt is too long for this flow, and cfl_max = 0' &
       //' keeps it', fault)
@@ -105,7 +105,7 @@ contains
       associate (x => sim%blocks%x(:, b))
         if (.not. all(ieee_is_finite(x)) .or. .not. all(ieee_is_finite(sim%blocks%v(:, b)))) then
           call set(sim, 'body '//to_text(b)//': its place or speed is not a number', fault)
-        else if (has_left(sim%grid, sim%case%fluid%gravity, x)) then
+        else if (has_left(sim%grid, sim%case%fluid%gravity, x, sim%blocks%v(:, b))) then
           call set(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x(1))//', ' &
                    //to_text(x(2))//', '//to_text(x(3))//') m', fault)
         end if
@@ -114,10 +114,11 @@ contains
   end subroutine look_at_blocks
 
   !> Is a centre of mass outside? Not so in periodic directions, nor above an open top, from where a
-  !! block falls back, up to the height of the tank.
-  pure function has_left(grid, gravity, x) result(left)
+  !! block falls back, unless it rises by more than the height of the tank.
+  pure function has_left(grid, gravity, x, v) result(left)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3), x(3)
+    real(wp), intent(in) :: v(3)   !! [m/s]
     logical :: left
     real(wp) :: beyond
     integer :: d, s
@@ -129,6 +130,7 @@ contains
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
         if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0) then
           beyond = beyond - grid%length(d)
+          if (merge(-v(d), v(d), s == 1) <= 0.0_wp) beyond = 0.0_wp
         end if
         left = left .or. beyond > 0.0_wp
       end do

@@ -38,7 +38,7 @@ contains
       //'step of the history', example='0.005')
     call v%real('cfl_max', run%cfl_max, not_negative('-', zero='0 keeps dt fixed'), &
       'the time step is made shorter to keep the Courant number of liquid and blocks below ' &
-      //'this; gas may be eight times as fast', example='0.25')
+      //'this; gas up to eight times as fast moves in parts of the step', example='0.25')
     call v%text('output', run%output, 'folder of the result files; an older result is renamed ' &
       //'first', example='''my-run''')
     call v%real('field_interval', run%field_interval, not_negative('s', zero='0 means never'), &

@@ -120,7 +120,7 @@ contains
 
   !> The order of the directions and the small cells of an equal part of the step.
   !!
-  !! Where the liquid moves further than the sweeps can follow, the same volumes go in several
+  !! Where the fluid moves further than the sweeps can follow, the same volumes go in several
   !! parts. The open volume of a cell then runs in equal parts too, so the last part ends at that of
   !! the new geometry whatever their number.
   subroutine begin_part(grid, old, part, step, self)

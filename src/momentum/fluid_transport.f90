@@ -18,7 +18,7 @@ module fluid_transport_m
   private
   public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
 
-  real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: liquid gives less than it has
+  real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: a cell gives less than it has
   integer, parameter :: max_parts = 100        !! of one step
 
   type :: fluid_transport_t
@@ -29,7 +29,7 @@ module fluid_transport_m
   !> The step at hand.
   type :: span_t
     real(wp) :: dt = 0.0_wp        !! [s]
-    real(wp) :: courant = 0.0_wp   !! largest share of itself that a cell of liquid gives [-]
+    real(wp) :: courant = 0.0_wp   !! largest share of itself that a cell gives [-]
     integer :: number = 0          !! of the step, which decides the order of the sweeps
   end type span_t
 
@@ -124,8 +124,8 @@ contains
     call finish_transport(grid, after, liquid, flow)
   end subroutine carry_all
 
-  !> Number of equal parts in which the volumes of a step move, so that the sweeps can follow the
-  !! liquid. Gas that moves further gives as small cells do.
+  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
+  !! number that the sweeps can follow.
   pure function parts_of_step(courant) result(parts)
     real(wp), intent(in) :: courant   !! of the whole step [-]
     integer :: parts

@@ -15,7 +15,7 @@ module diagnostics_m
   !> What one fluid step, with its body substeps, tells about itself.
   type :: step_report_t
     real(wp) :: cfl = 0.0_wp                  !! Courant number of liquid and blocks [-]
-    real(wp) :: cfl_carried = 0.0_wp          !! largest share of itself that liquid gives [-]
+    real(wp) :: cfl_carried = 0.0_wp          !! largest share of itself that a cell gives [-]
     integer :: transport_parts = 0            !! in which the volumes of the step moved
     real(wp) :: divergence_max = 0.0_wp       !! of the face velocity that the next step uses [1/s]
     integer :: pressure_passes = 0
