@@ -7,8 +7,7 @@ program mics
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
-  use parallel_m, only: parallel_init, parallel_final, parallel_abort, is_root, nproc, &
-    set_threads
+  use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use patience_m, only: choose_spin_and_pages, share_cores
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
@@ -26,7 +25,7 @@ program mics
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
-  use output_m, only: output_t, open_output, write_due_output, close_output
+  use output_m, only: output_t, check_output, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
   use time_step_m, only: simulation_t, simulation_init, resume, take_step
@@ -125,14 +124,19 @@ contains
   subroutine read_and_check()
     type(problems_t) :: problems, oddities
     character(:), allocatable :: text
+    integer :: n
 
-    call read_text(options%case_file, text, problems)
-    if (problems%n > 0) call refuse(problems)
+    if (is_root()) call read_text(options%case_file, text, problems)   ! mpirun gives it the input
+    n = problems%n
+    call broadcast(n)
+    if (n > 0) call refuse(problems)
+    call broadcast(text)
     call read_case(text, case, problems)
     call make_shapes(case, shapes, problems)
     call make_bed(case, bed, problems)
     call check_case(case, shapes, bed, problems)
     call check_initial_state(case, problems)
+    call check_output(case, options, problems)
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) return
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
@@ -155,8 +159,8 @@ contains
   subroutine refuse(problems)
     type(problems_t), intent(in) :: problems
 
-    if (is_root()) call problems%report(error_unit)
-    call parallel_abort(exit_input)
+    call problems%report(error_unit)
+    call fatal(exit_input, '')
   end subroutine refuse
 
   !> End in good order before a run began.

@@ -182,6 +182,7 @@ contains
     type(stage_report_t), intent(in) :: stage
     type(step_report_t), intent(inout) :: report
     real(wp) :: speed
+    logical :: any_free
     integer :: b
 
     report%contact_energy = contact%energy
@@ -189,11 +190,14 @@ contains
     report%substeps = contact%substeps
     report%contacts_solved = contact%info == 0
     speed = 0.0_wp
+    any_free = .false.
     do b = 1, sim%blocks%n
       if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
-      speed = max(speed, norm2(sim%blocks%v(:, b)))
+      any_free = .true.
+      speed = max(speed, norm2(sim%blocks%v(:, b)) + norm2(sim%blocks%omega(:, b)) &
+                         *sim%blocks%shapes(sim%blocks%shape(b))%radius)
     end do
-    call sim%clock%note_speed(speed, none_to_come(sim%clock%t, sim%blocks))
+    call sim%clock%note_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes

@@ -23,9 +23,9 @@ DAM = """&run t_end = {t_end}  dt = {dt}  cfl_max = {cfl_max} /
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 
-def mics(work: Path, groups: str) -> tuple[int, str]:
+def mics(work: Path, groups: str, tank: str = TANK) -> tuple[int, str]:
     """Exit code and messages of a run."""
-    (work / "case.nml").write_text(TANK + groups)
+    (work / "case.nml").write_text(tank + groups)
     done = subprocess.run(
         [str(MICS), "--threads", "1", "--quiet", "case.nml"],
         cwd=work,
@@ -71,3 +71,23 @@ def test_fixed_step_too_long(dt: float, t_end: float, tmp_path: Path) -> None:
 def test_steps_that_follow_the_flow(dt: float, cfl_max: float, tmp_path: Path) -> None:
     """A fixed step that is short enough, and one that may shrink, end as they should."""
     assert mics(tmp_path, DAM.format(dt=dt, t_end=1.0, cfl_max=cfl_max)) == (0, "")
+
+
+@pytest.mark.parametrize(("height", "up", "code"), [(9.0, -1.0, 0), (9.0, 1.0, 3), (1.9, 1.0, 0)])
+def test_high_above_an_open_top(height: float, up: float, code: int, tmp_path: Path) -> None:
+    """A body may be let go at any height; one that rises further than the tank is high has left."""
+    body = LIGHT.format(density=2300, height=f"{height}  velocity = 0, 0, {up}")
+    found, said = mics(tmp_path, body)
+    assert found == code, said
+    assert (code == 3) == ("body 1 left the tank" in said)
+
+
+def test_wind_over_a_periodic_tank(tmp_path: Path) -> None:
+    """Round a tank without ends gas moves by many cells a step."""
+    case = """&run t_end = 0.1  dt = 0.01  cfl_max = 1.0 /
+    &boundary x_min = 'periodic'  x_max = 'periodic'  y_min = 'slip'  y_max = 'slip'
+      z_min = 'no_slip'  z_max = 'no_slip'  z_max_velocity = 45.0, 0, 0 /
+    &fluid water_level = 0.02  gas_viscosity = 0.2  liquid_viscosity = 1.0 /
+    """
+    tank = "&grid cells = 24, 1, 12  length = 0.24, 0.01, 0.12 /\n"
+    assert mics(tmp_path, case, tank) == (0, "")

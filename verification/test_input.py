@@ -272,3 +272,15 @@ def test_every_rank_stops_and_one_speaks(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.count(BAD["unknown variable"][1]) == 1
     assert list(tmp_path.iterdir()) == [case]
+
+
+@pytest.mark.xdist_group("ranks")
+def test_ranks_read_standard_input(tmp_path: Path) -> None:
+    """mpirun gives it to one process, which hands it on, or speaks for all."""
+    machine = Machine(ROOT / "mics_mpi", ranks=2)
+    done = mics(["--check"], tmp_path, TANK, machine=machine)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = mics([], tmp_path, BAD["unknown variable"][0], machine=machine)
+    assert done.returncode == 2
+    assert done.stderr.count(BAD["unknown variable"][1]) == 1
+    assert list(tmp_path.iterdir()) == []

@@ -335,6 +335,27 @@ def test_fluid_alone(fluid: Path) -> None:
         assert np.isfinite(h5["series/kinetic_energy_fluid"][:]).all()
 
 
+def test_fluid_leaves_blocks_out(tmp_path: Path) -> None:
+    """Those that a case of fluid alone names are not there, wherever they would be."""
+    case = tmp_path / "case.nml"
+    text = """&run t_end = 0.02  dt = 0.01  physics = 'fluid'  field_interval = 0.01 /
+    &grid cells = 6, 6, 6  length = 0.1, 0.1, 0.1 /
+    &fluid water_level = 0.05 /
+    &shape name = 'c'  kind = 'cube'  size = 0.03 /
+    """
+    case.write_text(text)
+    assert run(tmp_path / "none", case=case) == (0, "")
+    case.write_text(
+        text
+        + "&body shape = 'c'  position = 0.05, 0.05, 0.06 /\n"
+        + "&body shape = 'c'  position = 7, 0.05, 0.06 /\n"
+        + "&drop shape = 'c'  position = 0.05, 0.05, 0.08 /\n"
+    )
+    assert run(tmp_path / "some", case=case) == (0, "")
+    found = differences(tmp_path / "none", tmp_path / "some")
+    assert [line for line in found if "namelist" not in line] == []
+
+
 def but_restarts(found: list[str]) -> list[str]:
     """Differences apart from restart files of another time or name."""
     return [line for line in found if not line.startswith("restart-")]
@@ -494,12 +515,70 @@ def test_older_results_are_kept(wet: Path, tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.bak-1", "run.bak-2"]
 
 
-def test_other_folders_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("option", ["--quiet", "--check"])
+def test_other_folders_are_refused(option: str, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("important")
-    code, said = run(tmp_path)
+    code, said = run(tmp_path, option)
     assert code == 2
-    assert "not empty" in said
+    assert f"--output = '{tmp_path}': the folder is not empty" in said
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def short_case(path: Path, values: str, size: float = 0.1) -> Path:
+    """A dry case of some steps."""
+    path.write_text(f"""&run physics = 'dry'  dt = 0.01  {values} /
+    &grid cells = 4, 4, 4  length = 1, 1, 1 /
+    &shape name = 'a'  kind = 'cube'  size = {size} /
+    &body shape = 'a'  position = 0.5, 0.5, 0.5 /
+    """)
+    return path
+
+
+def test_blanks_at_the_end_of_a_name(tmp_path: Path) -> None:
+    case = short_case(tmp_path / "case.nml", "t_end = 0.02  output = 'a b  '")
+    assert run(None, case=case, cwd=tmp_path) == (0, "")
+    assert (tmp_path / "a b" / "run.h5").is_file()
+
+
+@pytest.mark.parametrize("interval", ["1e-20", "1e-13", "1e-11", "0.01"])
+def test_interval_shorter_than_a_step(interval: str, tmp_path: Path) -> None:
+    """A row for each step, however short the interval."""
+    values = f"t_end = 0.05  history_interval = {interval}  restart_interval = {interval}"
+    case = short_case(tmp_path / "case.nml", values)
+    process = start(tmp_path / "run", case=case)
+    try:
+        assert process.wait(timeout=20) == 0
+    finally:
+        process.kill()
+    with opened(tmp_path / "run" / "run.h5") as h5:
+        assert len(h5["series/time"]) == 6
+
+
+def test_same_folder_by_another_name(tmp_path: Path) -> None:
+    """A run goes on in its folder, whatever way leads there."""
+    case = short_case(tmp_path / "case.nml", "t_end = 0.02  output = 'run'")
+    assert run(None, case=case, cwd=tmp_path) == (0, "")
+    (tmp_path / "link").symlink_to("run")
+    for n, name in enumerate(["run", str(tmp_path / "run"), "./run/", "link"]):
+        short_case(case, f"t_end = {0.04 + 0.02 * n}  output = 'run'")
+        there = ["--restart", "./run/restart-a.h5", "--output", name]
+        assert run(None, *there, case=case, cwd=tmp_path) == (0, "")
+    with opened(tmp_path / "run" / "run.h5") as h5:
+        assert h5["series/time"][-1] == 0.1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["case.nml", "link", "run"]
+
+
+def test_every_change_of_a_case_is_told(tmp_path: Path) -> None:
+    case = short_case(tmp_path / "case.nml", "t_end = 0.02")
+    assert run(tmp_path / "run", case=case) == (0, "")
+    short_case(case, "t_end = 0.02  rest_time = 3", size=0.2)
+    code, said = run(None, "--restart", tmp_path / "run" / "restart-a.h5", case=case)
+    assert code == 2
+    assert "&run rest_time = 3, was rest_time = 0.5; &shape size = 0.2, was size = 0.1" in said
+    case.write_text(case.read_text() + "&body shape = 'a'  position = 0.2, 0.2, 0.2 /")
+    code, said = run(None, "--restart", tmp_path / "run" / "restart-a.h5", case=case)
+    assert code == 2
+    assert said.endswith("; &body, was nothing\n")
 
 
 def test_no_room_for_files(tmp_path: Path) -> None:

@@ -70,6 +70,24 @@ def test_a_settled_run_has_no_more_to_do(tmp_path: Path) -> None:
         assert float(h5["series/time"][-1]) == end
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "",
+        "&body shape = 'c'  position = 0.2, 0.2, 0.05  fixed = T /\n",
+        "&body shape = 's'  position = 0.2, 0.2, 0.2  angular_velocity = 0, 0, 50 /\n",
+    ],
+    ids=["no block", "a held one", "one that spins in its place"],
+)
+def test_what_never_settles(body: str, tmp_path: Path) -> None:
+    """Where no block comes to rest there is nothing to settle."""
+    text = CASE.format(stop="T", count=1).replace("t_end = 5", "t_end = 1")
+    text = text.split("&drop")[0] + "&shape name = 's'  kind = 'sphere'  size = 0.1 /\n"
+    text = text.replace("physics", "history_interval = 0.1  physics")
+    code, said, end = run(tmp_path, text + "&fluid gravity = 0, 0, 0 /\n" + body)
+    assert (code, said, end) == (0, "", 1.0)
+
+
 def test_goes_on_when_not_asked(tmp_path: Path) -> None:
     """Without `stop_when_settled` the run goes to its end and does not speak of rest."""
     code, said, end = run(tmp_path, CASE.format(stop="F", count=2))

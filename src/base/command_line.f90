@@ -290,14 +290,14 @@ contains
       '  --max-wall HH:MM', &
       '                  stop in good order before this much wall time has passed', &
       '  --quiet         no progress table', &
-      '  --version       version and how the program was built', &
+      '  --version       version and revision of the source', &
       '  --help [GROUP]  this text, or every variable of a group of the case', &
       '  --help=markdown --help=json', &
       '                  all groups as the page docs/reference.md, or as a JSON schema', &
       '', &
       'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
-      '            130 or 143 ended by a signal, a file named stop in the folder', &
-      '            of the results, or --max-wall; a restart file was written.', &
+      '            128 + N ended by signal N (130 or 143 also by a file named stop in the', &
+      '            folder of the results, or --max-wall); a restart file was written.', &
       '']
     integer :: i
 

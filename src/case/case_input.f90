@@ -52,7 +52,16 @@ contains
     call read_missing_groups(n, v, case)
     call check_together(list, case, v)
     problems = v%problems
+    if (case%run%physics == 'fluid') call leave_out_blocks(case)
   end subroutine read_case
+
+  !> Fluid alone: the blocks that the case names are not there.
+  subroutine leave_out_blocks(case)
+    type(case_t), intent(inout) :: case
+
+    deallocate (case%body, case%drop)
+    allocate (case%body(0), case%drop(0))
+  end subroutine leave_out_blocks
 
   !> Texts that the types of a case cannot give a default to.
   subroutine set_empty(case)

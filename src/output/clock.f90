@@ -50,14 +50,15 @@ contains
     clock%next_restart = next_multiple(clock%run%restart_interval, clock%t)
   end subroutine clock_resume
 
-  !> First multiple of an interval that lies after t.
+  !> First multiple of an interval that lies after t; t itself if they lie closer than times can be
+  !! told apart, so that each step is due.
   pure function next_multiple(interval, t) result(next)
     real(wp), intent(in) :: interval, t   !! [s]
     real(wp) :: next
     real(wp) :: n   ! a whole number, perhaps beyond integers
 
     next = t
-    if (interval <= 0.0_wp) return
+    if (interval <= max(same_time, epsilon(t)*t)) return
     n = aint(t/interval)
     do while (n*interval <= t + same_time)
       n = n + 1.0_wp
@@ -112,12 +113,13 @@ contains
   end function settled
 
   !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
-  pure subroutine note_speed(self, speed, none_to_come)
+  pure subroutine note_speed(self, speed, all_there)
     class(clock_t), intent(inout) :: self
-    real(wp), intent(in) :: speed          !! largest of all free blocks [m/s]
-    logical, intent(in) :: none_to_come    !! no block is still to be released, but for lack of room
+    real(wp), intent(in) :: speed       !! largest of all points of free blocks [m/s]
+    logical, intent(in) :: all_there
+      !! there are free blocks, and none is still to be released, but for lack of room
 
-    if (.not. none_to_come .or. speed >= self%run%rest_speed) then
+    if (.not. all_there .or. speed >= self%run%rest_speed) then
       self%rest_began = -1.0_wp
     else if (self%rest_began < 0.0_wp) then
       self%rest_began = self%t

@@ -4,7 +4,7 @@
 !! process at least; the caller then closes the output and ends with `fatal`.
 module output_m
   use kinds_m, only: wp, i8
-  use errors_m, only: exit_ok, exit_files
+  use errors_m, only: problems_t, exit_ok, exit_files
   use parallel_m, only: broadcast, is_root, total_traffic
   use messages_m, only: traffic_t
   use timers_m, only: timer, tic, toc, wall_clock
@@ -13,7 +13,7 @@ module output_m
   use bed_m, only: bed_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use output_folder_m, only: prepare_folder, continue_folder, folder_of
+  use output_folder_m, only: check_folder, prepare_folder, continue_folder, folder_of
   use folder_lock_m, only: folder_lock_t
   use plain_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, row_t, make_row
@@ -24,7 +24,7 @@ module output_m
   use progress_m, only: progress_t, progress_start, line_due, write_line, write_summary
   implicit none
   private
-  public :: output_t, open_output, write_due_output, close_output
+  public :: output_t, check_output, open_output, write_due_output, close_output
 
   character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', &
     block_name = '/blocks.vtkhdf'
@@ -61,6 +61,7 @@ contains
     type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
     type(output_t), intent(out) :: output
+    character(:), allocatable :: what
 
     output%message = ''
     output%restart_file = options%restart
@@ -77,9 +78,8 @@ contains
     if (len(options%restart) > 0) then
       call continue_files(options, state, output)
     else
-      output%folder = case%run%output
-      if (len(options%output) > 0) output%folder = options%output
-      call prepare_folder(output%folder, output%lock, output%code, output%message)
+      call name_folder(case, options, what, output%folder)
+      call prepare_folder(what, output%folder, output%lock, output%code, output%message)
       if (output%code == exit_ok) call create_files(state, bed, output)
     end if
     call look_for_trouble(output)
@@ -90,6 +90,35 @@ contains
     call progress_start(options%quiet, output%fluid, state%clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
+
+  !> Folder of a run that starts anew, and who asks for it.
+  subroutine name_folder(case, options, what, path)
+    type(case_t), intent(in) :: case
+    type(options_t), intent(in) :: options
+    character(:), allocatable, intent(out) :: what, path
+
+    if (len(options%output) > 0) then
+      what = '--output'
+      path = trim(options%output)
+    else
+      what = '&run output'
+      path = trim(case%run%output)
+    end if
+  end subroutine name_folder
+
+  !> Note what forbids the folder of a run that starts anew, nothing is changed. All processes call.
+  subroutine check_output(case, options, problems)
+    type(case_t), intent(in) :: case
+    type(options_t), intent(in) :: options
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: what, path, message
+    integer :: code
+
+    if (len(options%restart) > 0) return
+    call name_folder(case, options, what, path)
+    call check_folder(what, path, code, message)
+    if (code /= exit_ok) call problems%add_message(message)
+  end subroutine check_output
 
   subroutine create_files(state, bed, output)
     type(run_state_t), intent(in) :: state

@@ -48,6 +48,13 @@ module output_folder_m
       character(kind=c_char), intent(in) :: path(*)
     end function c_opendir
 
+    type(c_ptr) function c_realpath(path, found) bind(c, name='realpath')
+      import :: c_ptr, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+      character(kind=c_char), intent(out) :: found(4096)   !! PATH_MAX of Linux
+    end function c_realpath
+
     type(c_ptr) function c_readdir(folder) bind(c, name='readdir')
       import :: c_ptr
       implicit none
@@ -64,7 +71,8 @@ module output_folder_m
 contains
 
   !> Could `prepare_folder` use this folder? Nothing is changed. All processes call.
-  subroutine check_folder(path, code, message)
+  subroutine check_folder(what, path, code, message)
+    character(*), intent(in) :: what   !! who asks for it: '&run output' or '--output'
     character(*), intent(in) :: path
     integer, intent(out) :: code                           !! exit_ok or exit_input
     character(:), allocatable, intent(out) :: message
@@ -73,14 +81,14 @@ contains
     code = exit_ok
     if (is_root()) then
       if (len(path) > longest_path) then
-        message = '&run output = '''//path(:40)//'...'': has '//to_text(len(path)) &
+        message = what//' = '''//path(:40)//'...'': has '//to_text(len(path)) &
           //' characters, must have at most '//to_text(longest_path)
       else if (.not. exists(path)) then
         continue
       else if (.not. is_folder(path)) then
-        message = '&run output = '''//path//''': is a file, must be a folder'
+        message = what//' = '''//path//''': is a file, must be a folder'
       else if (.not. is_free(path)) then
-        message = '&run output = '''//path//''': the folder is not empty and holds no run.h5, ' &
+        message = what//' = '''//path//''': the folder is not empty and holds no run.h5, ' &
           //'must be new, empty, or that of an older run'
       end if
       if (len(message) > 0) code = exit_input
@@ -89,13 +97,14 @@ contains
   end subroutine check_folder
 
   !> Make an empty folder for a new run; the results of an older run are renamed away first.
-  subroutine prepare_folder(path, lock, code, message)
+  subroutine prepare_folder(what, path, lock, code, message)
+    character(*), intent(in) :: what                       !! '&run output' or '--output'
     character(*), intent(in) :: path
     type(folder_lock_t), intent(inout) :: lock             !! of the root process, if all went well
     integer, intent(out) :: code                           !! exit_ok, exit_input or exit_files
     character(:), allocatable, intent(out) :: message      !! of trouble
 
-    call check_folder(path, code, message)
+    call check_folder(what, path, code, message)
     if (code /= exit_ok) return
     if (is_root()) call take_folder(trimmed(path), lock, code, message)
     call tell_all(code, message)
@@ -189,12 +198,12 @@ contains
     from = folder_of(restart)
     path = from
     if (len(output) > 0) path = trimmed(output)
-    if (path == from) then
+    if (is_same(path, from)) then
       if (is_root()) call lock%take(path, code, message)
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
       call tell_all(code, message)
-      if (code == exit_ok) call prepare_folder(output, lock, code, message)
+      if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
       if (code == exit_ok .and. is_root()) call copy_results(from, path, lock, code, message)
     end if
     call tell_all(code, message)
@@ -238,13 +247,38 @@ contains
     if (index(file, '/') > 0) path = trimmed(file(:index(file, '/', back=.true.)))
   end function folder_of
 
-  !> A path without the slashes at its end.
+  !> A path without the slashes and blanks at its end.
   pure function trimmed(path) result(short)
     character(*), intent(in) :: path
     character(:), allocatable :: short
 
     short = path(:max(verify(path, '/ ', back=.true.), min(1, len(path))))
   end function trimmed
+
+  !> Do two paths lead to the same place?
+  function is_same(one, other) result(yes)
+    character(*), intent(in) :: one, other
+    logical :: yes
+
+    yes = one == other
+    if (.not. yes .and. exists(one)) yes = whole_path(one) == whole_path(other)
+  end function is_same
+
+  !> The path from the root without links and dots; the path as it is where there is nothing.
+  function whole_path(path) result(whole)
+    character(*), intent(in) :: path
+    character(:), allocatable :: whole
+    character(kind=c_char), target :: found(4096)
+    integer :: i
+
+    whole = path
+    if (.not. c_associated(c_realpath(path//c_null_char, found))) return
+    whole = ''
+    do i = 1, size(found)
+      if (found(i) == c_null_char) exit
+      whole = whole//found(i)
+    end do
+  end function whole_path
 
   function exists(path) result(yes)
     character(*), intent(in) :: path

@@ -207,32 +207,47 @@ contains
     else if (kind /= format_name .or. number /= format_version) then
       message = file%path//': not a restart file of this version'
     else
-      message = first_change(before, parameters)
+      message = changes(before, parameters)
       info = merge(0, 2, len(message) == 0)
     end if
   end subroutine check_kind
 
-  !> The first line in which two lists of all values differ, apart from those that may change.
-  function first_change(before, after) result(message)
+  !> All values in which two lists of them differ, apart from those that may change, as far as both
+  !! have the same groups.
+  function changes(before, after) result(message)
     character(*), intent(in) :: before, after
     character(:), allocatable :: message
-    character(:), allocatable :: old, new
+    character(:), allocatable :: old, new, group
     integer :: at_old, at_new
 
     message = ''
+    group = ''
     at_old = 1
     at_new = 1
     do
       call next_line(before, at_old, old)
       call next_line(after, at_new, new)
       if (old /= new) then
-        message = 'the case differs from that of the restart file: '//shown(new)//', was ' &
-          //shown(old)
-        return
+        if (len(message) > 0) message = message//'; '
+        if (starts_group(old) .or. starts_group(new)) group = ''
+        message = message//group//shown(new)//', was '//shown(old)
+        if (len(group) == 0) exit
+      else if (len(old) == 0) then
+        exit
+      else if (starts_group(old)) then
+        group = shown(old)//' '
       end if
-      if (len(old) == 0) return
     end do
-  end function first_change
+    if (len(message) > 0) message = 'the case differs from that of the restart file: '//message
+  end function changes
+
+  !> Does a line begin or end a group, or are there no more?
+  pure function starts_group(line) result(yes)
+    character(*), intent(in) :: line
+    logical :: yes
+
+    yes = len(line) == 0 .or. index(adjustl(line), '&') == 1 .or. adjustl(line) == '/'
+  end function starts_group
 
   pure function shown(line) result(text)
     character(*), intent(in) :: line

@@ -117,9 +117,10 @@ contains
                  //brief(height*case%grid%length(1)*case%grid%length(2)) &
                  //' m3 below it, bodies included')
     end if
-    if (size(case%water) > 0) then
-      call entry(unit, 'boxes of liquid', to_text(size(case%water)))
-    else if (.not. is_given(case%fluid%water_level)) then
+    if (size(case%water) > 0) call entry(unit, 'boxes of liquid', to_text(size(case%water)))
+    if (len(case%fluid%initial_state) > 0) then
+      call entry(unit, 'initial state', 'from '//case%fluid%initial_state)
+    else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
       call entry(unit, 'water level', 'none: no liquid at all')
     end if
   end subroutine print_liquid
