@@ -540,6 +540,13 @@ def test_blanks_at_the_end_of_a_name(tmp_path: Path) -> None:
     assert (tmp_path / "a b" / "run.h5").is_file()
 
 
+def test_run_shorter_than_a_step(tmp_path: Path) -> None:
+    case = short_case(tmp_path / "case.nml", "t_end = 0.004")
+    assert run(tmp_path / "run", case=case) == (0, "")
+    with opened(tmp_path / "run" / "run.h5") as h5:
+        assert h5["series/time"][:].tolist() == [0.0, 0.004]
+
+
 @pytest.mark.parametrize("interval", ["1e-20", "1e-13", "1e-11", "0.01"])
 def test_interval_shorter_than_a_step(interval: str, tmp_path: Path) -> None:
     """A row for each step, however short the interval."""

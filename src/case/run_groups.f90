@@ -58,7 +58,6 @@ contains
       'how long every block must be that slow', example='1')
 
     if (is_given(run%t_end) .and. v%good('dt')) then
-      call v%require('t_end', run%t_end >= run%dt, 'must be at least dt = '//to_text(run%dt)//' s')
       call v%require('t_end', run%t_end <= most_steps*run%dt, 'must be at most ' &
                      //to_text(most_steps)//' steps of dt = '//to_text(run%dt)//' s')
     end if

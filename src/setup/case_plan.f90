@@ -222,7 +222,7 @@ contains
 
     call heading(unit, 'Time steps')
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
-               //count_text(case%run%t_end/case%run%dt)//' steps')
+               //count_text(max(1.0_wp, case%run%t_end/case%run%dt))//' steps')
     call entry(unit, 'time of the run', 'about '//time_text(wet, case)//' or more on one core')
     h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
@@ -318,7 +318,8 @@ contains
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet, blocks
-    real(wp), parameter :: series_bytes = 16*8.0_wp   ! sixteen series
+    real(wp), parameter :: least_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
+    real(wp), parameter :: series_bytes = 19*8.0_wp   ! nineteen series
     real(wp), parameter :: body_bytes = 27*8.0_wp     ! pose, motion, forces, contacts
     real(wp), parameter :: cell_bytes = 6*4.0_wp      ! liquid, solid, pressure, velocity
     real(wp) :: frames, rows
@@ -327,11 +328,12 @@ contains
     n = size(case%body) + sum(case%drop%count)
     if (.not. blocks) n = 0
     frames = 0.0_wp
-    if (case%run%field_interval > 0.0_wp) frames = 1.0_wp + case%run%t_end/case%run%field_interval
-    rows = 1.0_wp + case%run%t_end/max(case%run%dt, case%run%history_interval)
+    if (case%run%field_interval > 0.0_wp) frames = written(case%run%field_interval)
+    rows = written(case%run%history_interval)
     call heading(unit, 'Files in '//case%run%output)
     call entry(unit, 'run.h5', 'history of '//to_text(n)//' bodies, '//count_text(rows) &
-               //' rows or more, '//size_text(rows*(series_bytes + body_bytes*real(n, wp))))
+               //' rows or more, '//size_text(least_bytes &
+               + rows*(series_bytes + body_bytes*real(n, wp))))
     if (frames > 0.0_wp .and. wet) then
       call entry(unit, 'fields.vtkhdf', count_text(frames)//' frames, at most ' &
                  //size_text(frames*cell_bytes*product(real(case%grid%cells, wp))))
@@ -345,6 +347,16 @@ contains
     else
       call entry(unit, 'restart-a.h5', 'at the end')
     end if
+  contains
+    !> How often something is written at the start, at an interval and at the end, in steps of dt.
+    pure real(wp) function written(interval)
+      real(wp), intent(in) :: interval   !! [s]
+      real(wp) :: times
+
+      times = case%run%t_end/max(case%run%dt, interval)
+      written = 1.0_wp + aint(times)
+      if (times - aint(times) > 1.0e-9_wp) written = written + 1.0_wp
+    end function written
   end subroutine print_files
 
   !> Volume of the shape of that name [m3].

@@ -46,7 +46,7 @@ def main(words: list[str] | None = None) -> None:
     """The entry point: call a command and exit with its code."""
     words = sys.argv[1:] if words is None else words
     if not words or words[0] in ("--help", "-h"):
-        print(usage(), file=sys.stdout if words else sys.stderr)
+        command.run_script(lambda: print(usage(), file=sys.stdout if words else sys.stderr))
         raise SystemExit(0 if words else 2)
     if words[0] not in COMMANDS:
         print(

@@ -1,5 +1,6 @@
 """What all scripts do alike: find the results asked for, say in one line what is wrong."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -45,9 +46,16 @@ def open_run(path: Path) -> Run:
 
 
 def run_script(main: Callable[[], None], name: str | None = None) -> None:
-    """Call a script; trouble with what the user gave it is one line and the exit code 2."""
+    """Call a script; trouble with what the user gave it is one line and the exit code 2. Who reads
+    its output may go at any time, as `head` does."""
     try:
-        main()
+        try:
+            main()
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is left to say
+        raise SystemExit(141) from None
     except KeyboardInterrupt:
         raise SystemExit(130) from None
     except (BadRun, OSError, subprocess.SubprocessError) as problem:

@@ -84,3 +84,18 @@ def test_other_scripts_refuse_in_one_line(tmp_path: Path, loose_pile: Run) -> No
     (tmp_path / "file").write_text("")
     said = one_line(call("plot_history", loose_pile.folder, "--out", tmp_path / "file" / "a.png"))
     assert str(tmp_path / "file") in said
+
+
+def test_the_reader_of_the_output_goes(tmp_path: Path) -> None:
+    """As with `| head`: no traceback, and the code of the signal."""
+    write_run(tmp_path / "run", Motion(t_end=0.1))
+    for words in (["--help"], ["pile", str(tmp_path / "run")]):
+        text = "import sys; from micstools.cli import main; main(sys.argv[1:])"
+        program = [sys.executable, "-c", text, *words]
+        with subprocess.Popen(
+            program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT / "tools", text=True
+        ) as running:
+            assert running.stdout and running.stderr
+            running.stdout.close()
+            assert running.stderr.read() == ""
+            assert running.wait() == 141
