@@ -296,8 +296,8 @@ contains
       '                  all groups as the page docs/reference.md, or as a JSON schema', &
       '', &
       'Exit codes: 0 done, 2 wrong usage or input, 3 numerical trouble, 4 files,', &
-      '            128 + N ended by signal N (130 or 143 also by a file named stop in the', &
-      '            folder of the results, or --max-wall); a restart file was written.', &
+      '            128 + N ended by signal N, 143 also by a file named stop in the', &
+      '            folder of the results or --max-wall; a restart file was written.', &
       '']
     integer :: i
 

@@ -261,7 +261,7 @@ contains
     logical :: yes
 
     yes = one == other
-    if (.not. yes .and. exists(one)) yes = whole_path(one) == whole_path(other)
+    if (.not. yes) yes = whole_path(one) == whole_path(other)
   end function is_same
 
   !> The path from the root without links and dots; the path as it is where there is nothing.
