@@ -55,13 +55,13 @@ contains
     call check('all worked so far', mean, real(all_of_us, wp), 1.0e-12_wp)
   end subroutine check_shares
 
-  !> Start n programs that do nothing but compute for two seconds.
+  !> Start n programs that do nothing but compute for half a second.
   subroutine keep_busy(n)
     integer, intent(in) :: n
     integer :: i
 
     do i = 1, n
-      call execute_command_line('timeout 2 sh -c "while :; do :; done" &')
+      call execute_command_line('timeout 0.5 sh -c "while :; do :; done" &')
     end do
     call execute_command_line('sleep 0.2')   ! they are starting
   end subroutine keep_busy
