@@ -3,6 +3,7 @@ module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
   use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
+  use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
@@ -66,8 +67,8 @@ module diagnostics_m
 contains
 
   !> The row of this moment. Without fluid its columns are NaN. All processes call.
-  subroutine make_row(gravity, wall_time, state, report, row)
-    real(wp), intent(in) :: gravity(3)            !! [m/s2]
+  subroutine make_row(fluid, wall_time, state, report, row)
+    type(fluid_t), intent(in) :: fluid            !! its properties
     real(wp), intent(in) :: wall_time             !! [s]
     type(run_state_t), intent(in) :: state
     type(step_report_t), intent(in) :: report
@@ -76,9 +77,9 @@ contains
     row%time = state%clock%t
     row%dt = state%clock%dt
     row%wall_time = wall_time
-    call add_fluid(state%grid, state%flow, state%solid, report, row)
+    call add_fluid(fluid, state%grid, state%flow, state%solid, report, row)
     row%kinetic_energy_bodies = kinetic_energy(state%blocks)
-    row%potential_energy_bodies = potential_energy(gravity, state%blocks)
+    row%potential_energy_bodies = potential_energy(fluid%gravity, state%blocks)
     row%contact_energy = report%contact_energy
     row%max_overlap = report%max_overlap
     row%contact_courant_max = report%contact_courant_max
@@ -87,7 +88,8 @@ contains
   end subroutine make_row
 
   !> The columns of the fluid.
-  subroutine add_fluid(grid, flow, solid, report, row)
+  subroutine add_fluid(fluid, grid, flow, solid, report, row)
+    type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(in) :: flow
     type(solid_geometry_t), intent(in) :: solid
@@ -112,14 +114,15 @@ contains
     row%solver_iterations = real(report%solver_iterations, wp)
     row%curvature_fallback = real(report%curvature_fallback, wp)
     row%transport_parts = real(report%transport_parts, wp)
-    call sum_fluid(grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
+    call sum_fluid(fluid, grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
     if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
       (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
   end subroutine add_fluid
 
-  !> Volume of liquid, and kinetic energy sum 1/2 rho V (1 - alpha) |u|^2 of the fluid, exact and
+  !> Volume of liquid, and kinetic energy sum 1/2 m |u|^2 of the fluid that a cell holds, exact and
   !! therefore the same on any number of threads and processes.
-  subroutine sum_fluid(grid, flow, solid, volume, energy)
+  subroutine sum_fluid(fluid, grid, flow, solid, volume, energy)
+    type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(in) :: flow
     type(solid_geometry_t), intent(in) :: solid
@@ -140,7 +143,7 @@ contains
     end do
     !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      call plane_terms(grid, k, flow%liquid, flow%rho, solid%alpha, flow%u, terms)
+      call plane_terms(fluid, grid, k, flow%liquid, solid%alpha, flow%u, terms)
       do m = 1, 2
         call exact_add(terms(:, m), mine(:, m))
       end do
@@ -157,15 +160,19 @@ contains
     energy = total(2)
   end subroutine sum_fluid
 
-  !> Volume of liquid and kinetic energy of the cells of plane k.
-  pure subroutine plane_terms(grid, k, liquid, rho, alpha, u, terms)
+  !> Volume of liquid and kinetic energy of the cells of plane k. The mass is that of the liquid and
+  !! the gas in the open part: `flow%rho` of a cut cell is that of its level, gas that leaves a cut
+  !! cell under water would have a thousand times its energy.
+  pure subroutine plane_terms(fluid, grid, k, liquid, alpha, u, terms)
+    type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: k
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, rho, alpha
+      liquid, alpha
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 2) [m3], [J]
     integer :: i, j, first, last, at
+    real(wp) :: mass
 
     first = grid%lo(1)
     last = grid%hi(1)
@@ -173,8 +180,9 @@ contains
       at = (j - grid%lo(2))*(last - first + 1) + 1 - first
       do i = first, last
         terms(at + i, 1) = liquid(i, j, k)
-        terms(at + i, 2) = 0.5_wp*grid%volume*rho(i, j, k)*(1.0_wp - alpha(i, j, k)) &
-          *(u(i, j, k, 1)**2 + u(i, j, k, 2)**2 + u(i, j, k, 3)**2)
+        mass = fluid%liquid_density*liquid(i, j, k) + fluid%gas_density &
+          *max(0.0_wp, grid%volume*(1.0_wp - alpha(i, j, k)) - liquid(i, j, k))
+        terms(at + i, 2) = 0.5_wp*mass*(u(i, j, k, 1)**2 + u(i, j, k, 2)**2 + u(i, j, k, 3)**2)
       end do
     end do
   end subroutine plane_terms

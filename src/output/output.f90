@@ -9,7 +9,7 @@ module output_m
   use messages_m, only: traffic_t
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, fluid_t
   use bed_m, only: bed_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
@@ -36,7 +36,7 @@ module output_m
     character(:), allocatable :: folder
     character(:), allocatable :: restart_file   !! the newest, empty: none yet
     character(:), allocatable, private :: text, parameters   !! of the case
-    real(wp), private :: gravity(3) = 0.0_wp                 !! [m/s2]
+    type(fluid_t), private :: properties     !! of the fluid
     logical, private :: quiet = .false.      !! no table
     logical, private :: fluid = .false.      !! there is one
     logical, private :: fields = .false., surfaces = .false. !! these files are written
@@ -70,7 +70,7 @@ contains
     call tic(output%phase)
     output%text = case%text
     output%parameters = parameters
-    output%gravity = case%fluid%gravity
+    output%properties = case%fluid
     output%quiet = options%quiet
     output%fluid = allocated(state%flow%u)
     output%fields = output%fluid .and. case%run%field_interval > 0.0_wp
@@ -246,7 +246,7 @@ contains
     line_wanted = line_wanted .or. frame_wanted
     if (.not. (row_wanted .or. frame_wanted)) call tell_all(output%quiet, line_wanted)
     if (row_wanted .or. line_wanted) then
-      call make_row(output%gravity, output%run_file%wall_time + wall_clock() &
+      call make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
     end if
     if (row_wanted) then
@@ -325,7 +325,7 @@ contains
 
     if (output%code == exit_ok) then
       call total_traffic(state%clock%step - output%progress%first_step, traffic)
-      call make_row(output%gravity, output%run_file%wall_time + wall_clock() &
+      call make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
       if (output%row_step /= state%clock%step) then
         call write_row(output%run_file, state%clock%n_rows, row, state%blocks)

@@ -1,0 +1,54 @@
+!> The sums over the fluid in a row of results: what a cell holds counts, not what its level would
+!! have it hold.
+program test_diagnostics
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use grid_m, only: grid_init
+  use fields_m, only: flow_init
+  use solid_geometry_m, only: solid_geometry_init
+  use run_state_m, only: run_state_t
+  use diagnostics_m, only: step_report_t, row_t, make_row
+  use check_m, only: check, finish_checks
+  implicit none
+  real(wp), parameter :: volume = 0.1_wp*0.2_wp*0.25_wp   !! of a cell [m3]
+  type(case_t) :: case
+  type(run_state_t) :: state
+  type(step_report_t) :: report
+  type(row_t) :: row
+  real(wp) :: mass
+
+  case%grid%cells = [4, 4, 4]
+  case%grid%length = [0.4_wp, 0.8_wp, 1.0_wp]
+  call grid_init(case%grid, case%boundary, state%grid)
+  call flow_init(state%grid, state%flow)
+  allocate (state%solid)
+  call solid_geometry_init(state%grid, state%solid, 0)
+  allocate (state%blocks%asleep(0))
+  state%solid%alpha = 0.0_wp
+  state%flow%u = 0.0_wp
+  state%flow%c = 1.0_wp      ! all of it under water,
+  state%flow%liquid = 0.0_wp   ! as far as the surface around tells
+  state%flow%rho = case%fluid%liquid_density
+  state%flow%liquid(1:4, 1:4, 1:2) = volume
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  call check('liquid', row%liquid_volume, 32*volume, 1.0e-15_wp)
+  call check('at rest', row%kinetic_energy_fluid, 0.0_wp, 0.0_wp)
+
+  state%flow%u(2, 2, 2, :) = [1.0_wp, -2.0_wp, 2.0_wp]   ! a cell of liquid
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  mass = case%fluid%liquid_density*volume
+  call check('liquid that moves', row%kinetic_energy_fluid, 0.5_wp*mass*9, 1.0e-12_wp*mass)
+
+  state%flow%u = 0.0_wp
+  state%solid%alpha(3, 2, 3) = 0.75_wp                   ! gas in a cut cell under water
+  state%flow%u(3, 2, 3, :) = [0.0_wp, 0.0_wp, 80.0_wp]
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  mass = case%fluid%gas_density*0.25_wp*volume
+  call check('gas in a cut cell', row%kinetic_energy_fluid, 0.5_wp*mass*6400, 1.0e-9_wp*mass)
+
+  state%flow%liquid(3, 2, 3) = 0.2_wp*volume             ! and with some liquid
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  mass = (case%fluid%gas_density*0.05_wp + case%fluid%liquid_density*0.2_wp)*volume
+  call check('both in a cut cell', row%kinetic_energy_fluid, 0.5_wp*mass*6400, 1.0e-9_wp*mass)
+  call finish_checks()
+end program test_diagnostics
