@@ -146,8 +146,8 @@ contains
     call check_restart()
   end subroutine test_whole_and_parts
 
-  !> Sum of 1/2 m |u|^2 by a plain loop, with the halo-free part of `fill_cells`: half of each cell is
-  !! water, a quarter air.
+  !> Sum of 1/2 m |u|^2 by a plain loop, with the halo-free part of `fill_cells`: half of each cell
+  !! is water, a quarter air.
   function energy_at(t) result(energy)
     real(wp), intent(in) :: t
     real(wp), parameter :: mass = 1.0e-6_wp*(0.5_wp*998.2_wp + 0.25_wp*1.204_wp)   !! [kg]
