@@ -41,7 +41,7 @@ contains
     if (blocks) call print_bodies(unit, case, shapes)
     call print_steps(unit, case, shapes, wet, blocks)
     call print_memory(unit, case, shapes)
-    call print_files(unit, case, wet, blocks)
+    call print_files(unit, case, wet)
   end subroutine print_plan
 
   subroutine print_run(unit, case)
@@ -314,10 +314,10 @@ contains
   end subroutine print_memory
 
   !> Files to come, with upper bounds of their size (fields and surfaces are compressed).
-  subroutine print_files(unit, case, wet, blocks)
+  subroutine print_files(unit, case, wet)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    logical, intent(in) :: wet, blocks
+    logical, intent(in) :: wet
     real(wp), parameter :: least_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
     real(wp), parameter :: series_bytes = 19*8.0_wp   ! nineteen series
     real(wp), parameter :: body_bytes = 27*8.0_wp     ! pose, motion, forces, contacts
@@ -326,7 +326,6 @@ contains
     integer :: n
 
     n = size(case%body) + sum(case%drop%count)
-    if (.not. blocks) n = 0
     frames = 0.0_wp
     if (case%run%field_interval > 0.0_wp) frames = written(case%run%field_interval)
     rows = written(case%run%history_interval)

@@ -78,8 +78,8 @@ contains
     call check('no other', volumes%c(6, 2, 2), -1.0_wp, 0.0_wp)
   end subroutine row_of_small_cells
 
-  !> Round a ring of four cells flows a million times what they hold: after a thousand passes the
-  !! values of the donors still change, which is told.
+  !> Round a ring of four cells flows a million times what they hold: after ten thousand passes
+  !! the values of the donors still change, which is told.
   subroutine ring_of_small_cells()
     solid%alpha = 0.0_wp
     volumes%v = 1.0_wp
