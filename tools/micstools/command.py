@@ -41,8 +41,11 @@ def results_of(path: Path) -> Path:
 
 
 def open_run(path: Path) -> Run:
-    """The run of a folder or of a case file."""
-    return Run(results_of(path))
+    """The run of a folder or of a case file, with one row at least."""
+    run = Run(results_of(path))
+    if not run.bodies.time.size:
+        raise BadRun(f"{run.folder} holds no row of results yet")
+    return run
 
 
 def run_script(main: Callable[[], None], name: str | None = None) -> None:

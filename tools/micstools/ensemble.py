@@ -1,7 +1,7 @@
 """An ensemble: which runs it has, a folder and a case each, and how each of them ended.
 
     DIR/ensemble.csv, ensemble.json     a row per run; settings, counts and shares
-    DIR/0001/case.nml                   what the program was given, seed included
+    DIR/0001/case.nml, files.json       what the program was given, seed included
     DIR/0001/result/                    its results
     DIR/0001/log.txt                    what it said
 
@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from micstools import settings
+from micstools import case_copy, settings
 from micstools.reader import BadRun
 from micstools.settings import Setting
 
@@ -117,14 +117,7 @@ def members(plan: Plan, fields: bool = False) -> Iterator[Member]:
 
 def write_case(member: Member) -> None:
     """Make the folder of a run; one that was made for another case is left alone."""
-    if member.case.exists():
-        if member.case.read_text() != member.text:
-            raise BadRun(
-                f"{member.case} is another case, seed or setting than asked for: give another --out"
-            )
-        return
-    member.folder.mkdir(parents=True, exist_ok=True)
-    member.case.write_text(member.text)
+    case_copy.keep(member.case, member.text)
 
 
 def state(member: Member) -> State:

@@ -16,6 +16,9 @@ from micstools import ensemble_queue, extras
 from micstools.ensemble import Member, State, state
 from micstools.ensemble_queue import Queue
 
+NO_WAY_ON = "cannot go on"
+"""What the program says of files from which, or in which, a run cannot go on."""
+
 _living: set[subprocess.Popen[bytes]] = set()
 _stopping = threading.Event()
 
@@ -36,8 +39,10 @@ def execute(member: Member, program: Path, here: Path) -> int | None:
     restarts = [p for p in member.result.glob("restart-[ab].h5") if p.is_file()]
     for path in sorted(restarts, key=lambda p: p.stat().st_mtime_ns, reverse=True):
         code = _call(member, [str(program), "--restart", str(path), str(member.case)], here)
-        if code not in (2, 4):  # a damaged restart file: try the other, then the beginning
+        said = member.log.read_text(errors="replace")
+        if code != 2 and not (code == 4 and NO_WAY_ON in said):
             return code
+        # A restart file that is no good: try the other one, then the beginning.
     return _call(member, [str(program), "--output", str(member.result), str(member.case)], here)
 
 

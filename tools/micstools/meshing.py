@@ -18,6 +18,8 @@ from micstools.shapes import Shape, from_tets
 
 LARGEST_CHANGE = 0.01
 """Change of volume by repairs or by meshing that is refused."""
+STEP_UNIT = 1.0e-3
+"""Gmsh turns lengths of a STEP file, which tells its unit, into mm [m]."""
 LONGEST = 20.0
 """Length of a block above which its file is taken to be in mm or cm [m]."""
 LONG = 1.0
@@ -36,6 +38,7 @@ class Surface:
     triangles: IntArray  # (m, 3) seen from outside
     volume: float
     warnings: list[str] = field(default_factory=list)
+    unit: float | None = None  # of the file [m], where it says so
 
     @property
     def length(self) -> float:
@@ -52,6 +55,7 @@ def load(path: Path, element: float = 0.0) -> Surface:
         points, triangles, volume, warnings = _step_surface(path, element)
         surface = closed(points, triangles, volume)
         surface.warnings[:0] = warnings
+        surface.unit = STEP_UNIT
         return surface
     import trimesh
 
@@ -133,6 +137,7 @@ def simplified(surface: Surface, faces: int) -> Surface:
         f"{found.volume / surface.volume - 1:+.2%} of the volume"
     )
     found.warnings[:0] = [*surface.warnings, said]
+    found.unit = surface.unit
     return found
 
 
@@ -152,12 +157,20 @@ def _parts(mesh: Any) -> list[tuple[Array, IntArray]]:
 
 
 def scale_of(surface: Surface, size: float | None, scale: float | None) -> float:
-    """Factor from the file's units to m: from the wanted length, as given, or 1 with a warning
-    where the block then is a large one."""
+    """Factor from the file's units to m: from the wanted length, as given, as the file says, or 1
+    with a warning where the block then is a large one. What a file says holds for its lengths in
+    mm; another scale than that is told."""
     if size is not None:
         return size / surface.length
     if scale is not None:
+        if surface.unit is not None and abs(scale / surface.unit - 1) > 1e-9:
+            surface.warnings.append(
+                f"by its own unit the block is {surface.unit * surface.length:g} m long; "
+                f"--scale {scale:g}, m for each mm of it, makes it {scale * surface.length:g} m"
+            )
         return scale
+    if surface.unit is not None:
+        return surface.unit
     said = (
         f"read as m the block is {surface.length:g} m long; if the file is in mm give "
         "--scale 0.001, in cm --scale 0.01, or give the length in m with --size"

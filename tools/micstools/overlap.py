@@ -1,10 +1,12 @@
 """How near the true shapes of blocks and walls come to one another, and how deep they overlap.
 
-The contact model of a run plays no part here: distances and depths are those of the tetrahedra
-and their surface triangles. All lengths in metres.
+Distances and depths are those of the tetrahedra and their surface triangles, whatever the contact
+model of a run; but blocks that collide by spheres, which reach beyond their surface, touch where
+these do. All lengths in metres.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -30,6 +32,10 @@ class Placed:
     position: Array  # (3) [m]
     quaternion: Array  # (4) w, x, y, z
 
+    def moved(self, way: Array) -> "Placed":
+        """The block moved by `way` (3) [m]."""
+        return replace(self, position=self.position + way)
+
     @property
     def points(self) -> Array:
         """Corners (n, 3) [m]."""
@@ -46,18 +52,47 @@ class Placed:
         return self.points[self.shape.triangles]
 
     @property
+    def sphere_centres(self) -> Array:
+        """Centres of the contact spheres (s, 3) [m]."""
+        return place(self.shape.sphere_centre, self.position, self.quaternion)
+
+    @property
     def samples(self) -> Array:
         """Many points of the surface (n, 3) [m]."""
         return place(self.shape.samples, self.position, self.quaternion)
 
 
 def present_bodies(run: Run, row: int) -> dict[int, Placed]:
-    """The released bodies of a run at a row, by their number."""
+    """The released bodies of a run at a row, by their number; with their centroids in the tank
+    where a direction is periodic."""
     b = run.bodies
+    place = run.into_tank(b.position[row])
     return {
-        int(k): Placed(run.shapes[b.shape[k]], b.position[row, k], b.quaternion[row, k])
+        int(k): Placed(run.shapes[b.shape[k]], place[k], b.quaternion[row, k])
         for k in np.flatnonzero(b.present(row))
     }
+
+
+def images(run: Run, bodies: Iterable[Placed]) -> list[Placed]:
+    """Bodies as the tank shows them: with the images of those that cross a periodic side."""
+    found = list(bodies)
+    for d in np.flatnonzero(run.period):
+        for body in list(found):
+            for side in (-1.0, 1.0):
+                moved = body.moved(side * run.period[d] * np.eye(3)[d])
+                reach = moved.position[d] + np.array([-1.0, 1.0]) * body.shape.radius
+                if reach[1] > run.grid.low[d] and reach[0] < run.grid.high[d]:
+                    found.append(moved)
+    return found
+
+
+def nearest(run: Run, body: Placed, to: Placed) -> Placed:
+    """The periodic image of a body that is nearest to another one."""
+    way = np.zeros(3)
+    for d in np.flatnonzero(run.period):
+        periods = np.round((body.position[d] - to.position[d]) / run.period[d])
+        way[d] = -periods * run.period[d]
+    return body.moved(way)
 
 
 def near(a: Placed, b: Placed, margin: float = 0.0) -> bool:
@@ -93,27 +128,40 @@ def depth(a: Placed, b: Placed) -> float:
     return deepest
 
 
-def wall_gaps(body: Placed, low: Array, high: Array, sides: dict[str, str]) -> dict[str, float]:
-    """Distance of a block to each side that is a contact wall [m]; negative: depth in the wall."""
-    points = body.points
+def sphere_gap(a: Placed, b: Placed) -> float:
+    """Least distance between the contact spheres of two blocks [m]; negative: depth."""
+    apart = np.linalg.norm(a.sphere_centres[:, None] - b.sphere_centres[None], axis=2)
+    return float((apart - a.shape.sphere_radius[:, None] - b.shape.sphere_radius).min())
+
+
+def wall_gaps(
+    body: Placed, low: Array, high: Array, sides: dict[str, str], spheres: bool = False
+) -> dict[str, float]:
+    """Distance of a block, or of its contact `spheres`, to each side that is a contact wall [m];
+    negative: depth in the wall."""
+    points = body.sphere_centres if spheres else body.points
+    radius: Array | float = body.shape.sphere_radius if spheres else 0.0
     gaps = {}
     for axis, name in enumerate("xyz"):
         if sides[f"{name}_min"] in WALL_KINDS:
-            gaps[f"{name}_min"] = float(points[:, axis].min() - low[axis])
+            gaps[f"{name}_min"] = float((points[:, axis] - radius).min() - low[axis])
         if sides[f"{name}_max"] in WALL_KINDS:
-            gaps[f"{name}_max"] = float(high[axis] - points[:, axis].max())
+            gaps[f"{name}_max"] = float(high[axis] - (points[:, axis] + radius).max())
     return gaps
 
 
-def bed_gap(body: Placed, facets: Array, reach: float) -> float:
-    """Least distance between the surfaces of a block and of a bed (n, 3, 3) [m]; infinite where no
-    facet comes within `reach` of the sphere around the block."""
-    margin = body.shape.radius + reach
+def bed_gap(body: Placed, facets: Array, reach: float, spheres: bool = False) -> float:
+    """Least distance between the surface of a block, or its contact `spheres`, and a bed (n, 3, 3)
+    [m]; infinite where no facet comes within `reach` of the sphere around the block."""
+    margin = body.shape.radius + reach + (body.shape.sphere_radius.max() if spheres else 0.0)
     low, high = body.position - margin, body.position + margin
     beside = (facets.min(axis=1) <= high) & (facets.max(axis=1) >= low)
     facets = facets[beside.all(axis=1)]
     if not len(facets):
         return float("inf")
+    if spheres:
+        distance = distance_to_triangles(body.sphere_centres, facets)
+        return float((distance - body.shape.sphere_radius).min())
     points = body.points
     edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
     return min(
@@ -149,18 +197,41 @@ def touches(run: Run, row: int, reach: float = 5e-4) -> Touches:
     bodies = present_bodies(run, row)
     blocks = {}
     for i, j in combinations(bodies, 2):
-        a, b = bodies[i], bodies[j]
-        if near(a, b, reach):
+        a = bodies[i]
+        b = nearest(run, bodies[j], a)
+        spheres = by_spheres(run, a) and by_spheres(run, b)
+        if near(a, b, reach + (_stick_out(a) + _stick_out(b) if spheres else 0.0)):
             distance = gap(a, b)
             if distance > reach and depth(a, b) > 0:
                 distance = 0.0
+            if distance > reach and spheres:
+                distance = sphere_gap(a, b)
             if distance <= reach:
                 blocks[i, j] = distance
     gaps = _all_wall_gaps(run, bodies)
-    walls = {key: g for key, g in gaps.items() if g <= reach}
     corners, facets = run.bed
     beds = {k: bed_gap(body, corners[facets], reach) for k, body in bodies.items()}
+    for k, body in bodies.items():
+        if by_spheres(run, body):
+            around = wall_gaps(body, run.grid.low, run.grid.high, run.sides, spheres=True)
+            gaps |= {(k, side): min(g, gaps[k, side]) for side, g in around.items()}
+            beds[k] = min(beds[k], bed_gap(body, corners[facets], reach, spheres=True))
+    walls = {key: g for key, g in gaps.items() if g <= reach}
     return Touches(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
+
+
+def _stick_out(body: Placed) -> float:
+    """How far contact spheres reach beyond the sphere around a block, at most [m]."""
+    reach = np.linalg.norm(body.shape.sphere_centre, axis=1) + body.shape.sphere_radius
+    return max(0.0, float(reach.max()) - body.shape.radius)
+
+
+def by_spheres(run: Run, body: Placed) -> bool:
+    """Does a block collide by spheres: by contact spheres, or as the ball that it is?"""
+    if str(run.value("contact", "model", "surface")).strip() == "spheres":
+        return True
+    kinds = {s.get("name"): s.get("kind") for s in run.parameters.get("shape", [])}
+    return str(kinds.get(body.shape.name)).strip() == "sphere"
 
 
 @dataclass(frozen=True)
@@ -181,8 +252,9 @@ def overlap(run: Run, row: int = -1) -> Overlap:
     bodies = present_bodies(run, row)
     blocks = {}
     for i, j in combinations(bodies, 2):
-        if near(bodies[i], bodies[j]):
-            found = depth(bodies[i], bodies[j])
+        other = nearest(run, bodies[j], bodies[i])
+        if near(bodies[i], other):
+            found = depth(bodies[i], other)
             if found > 0:
                 blocks[i, j] = found
     gaps = _all_wall_gaps(run, bodies)

@@ -40,6 +40,10 @@ class Level:
         """Relative error of the rise."""
         return (self.found - self.start) / (self.demanded - self.start) - 1
 
+    def shows(self, run: Run) -> bool:
+        """Is there a rise to speak of, a hundredth of a cell at least?"""
+        return bool(abs(self.demanded - self.start) >= 0.01 * run.grid.spacing[2])
+
 
 def findings(run: Run, paper: bool | None = None) -> list[Finding]:
     """Everything that can be said about the run so far; with what the `paper` says of its pile if
@@ -49,8 +53,8 @@ def findings(run: Run, paper: bool | None = None) -> list[Finding]:
     found = [at_rest(run), depth(run)]
     if is_papers_tank(run) if paper is None else paper:
         found = [turning(run), *first_block(run), walls(run), found[0], pattern(run), found[1]]
-    if has_level(run):
-        found.append(level(run))
+    if has_level(run) and (rise := water_level(run)).shows(run):
+        found.append(level(rise))
     return found
 
 
@@ -131,7 +135,7 @@ def first_block(run: Run) -> list[Finding]:
         return []
     first = int(b.dropped[0])
     rows = {"at the end": len(b.time) - 1}
-    if b.dropped.size > 1 and b.release_time[b.dropped[1]] <= b.time[-1]:
+    if b.dropped.size > 1 and b.time[0] < b.release_time[b.dropped[1]] <= b.time[-1]:
         before = int(np.flatnonzero(b.time < b.release_time[b.dropped[1]])[-1])
         rows = {"before the second is dropped": before, **rows}
     found = []
@@ -232,6 +236,18 @@ def demanded_level(run: Run, row: int) -> float:
     return level
 
 
+def still_level(run: Run) -> float | None:
+    """Level [m] of the water when it has come to rest around the blocks of the last row; that of
+    the start where it does not follow from the blocks."""
+    wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
+    level = run.value("fluid", "water_level", None)
+    if not wet or level is None or bool(run.value("fluid", "single_phase", False)):
+        return None
+    if not level_follows(run):
+        return float(level)
+    return demanded_level(run, len(run.bodies.time) - 1)
+
+
 def measured_level(run: Run, t: float, guess: float) -> float:
     """Mean height [m] of the surface at time `t` [s], over all columns of cells.
 
@@ -255,9 +271,8 @@ def water_level(run: Run) -> Level:
     return Level(start, measured_level(run, t, demanded), demanded)
 
 
-def level(run: Run) -> Finding:
+def level(found: Level) -> Finding:
     """Final level against the rise that the submerged volume demands."""
-    found = water_level(run)
     figures = (
         f"level {1e3 * found.found:.3f} mm, demanded {1e3 * found.demanded:.3f} mm, "
         f"rise off by {100 * found.error:.2f} %"

@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ from micstools import block_numbers, pile_numbers
 from micstools.block_numbers import BlockNumbers
 from micstools.ensemble import OUTCOMES
 from micstools.geometry import Array
-from micstools.overlap import present_bodies
+from micstools.overlap import images, present_bodies
+from micstools.pile import still_level
 from micstools.pile_numbers import PileNumbers
 from micstools.reader import BadRun, Run
 from micstools.shares import wilson
@@ -85,6 +86,20 @@ class Ensemble:
         """The piles of a choice."""
         return [p for p in self.piles if all(p.row[k] == v for k, v in choice.items())]
 
+    @property
+    def parts(self) -> list["Ensemble"]:
+        """An ensemble of each choice: the runs of different choices have the same drops, so they
+        are not independent, and numbers over all of them tell nothing."""
+        return [
+            replace(self, about=self.about | {"choices": [choice]}, piles=self.of(choice))
+            for choice in self.choices
+        ]
+
+    @property
+    def name(self) -> str:
+        """The choice of an ensemble that has one, in words; empty where nothing is varied."""
+        return ", ".join(f"{k} = {v}" for k, v in self.choices[0].items())
+
 
 @dataclass(frozen=True)
 class Maps:
@@ -115,8 +130,7 @@ def open_ensemble(
     if not done:
         raise BadRun(f"{folder} holds no run that came to its end")
     if step is None:
-        grid = Run(folder / str(done[0]["folder"]) / "result").grid
-        step = float((grid.high - grid.low)[:2].max()) / 300
+        step = pile_numbers.usual_step(Run(folder / str(done[0]["folder"]) / "result"))
     piles = [_pile(folder, row, step, box) for row in done]
     return Ensemble(folder, about, piles, step, left)
 
@@ -137,7 +151,7 @@ def _about(path: Path) -> dict[str, Any]:
 def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
     run = Run(folder / str(row["folder"]) / "result")
     found = pile_numbers.numbers(run, step, box=box)
-    bodies = list(present_bodies(run, -1).values())
+    bodies = images(run, present_bodies(run, -1).values())
     top = pile_numbers.height_map(bodies, run.grid.low, run.grid.high, step)
     return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top)
 
@@ -145,11 +159,10 @@ def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Arra
 def pattern(run: Run, found: PileNumbers) -> str:
     """The pattern of a pile by its contacts, see MEANING."""
     b = run.bodies
-    level = run.value("fluid", "water_level", None)
     if not b.present(-1).all():
         return "neither"
-    wet = str(run.value("run", "physics", "coupled")).strip() != "dry" and level is not None
-    if wet and (b.position[-1, b.dropped, 2] > float(level or 0.0)).any():
+    level = still_level(run)
+    if level is not None and (b.position[-1, b.dropped, 2] > level).any():
         return "neither"
     return "B" if found.on_floor else "A"
 
@@ -175,10 +188,9 @@ def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, floa
         yield total, count / total, *wilson(count, total)
 
 
-def maps(ensemble: Ensemble, choice: dict[str, Any] | None = None) -> Maps:
-    """The mean pile of the complete ones, its spread, and where blocks are likely; of one choice
-    of the varied variables, or of all runs."""
-    whole = [p for p in ensemble.of(choice or {}) if p.complete]
+def maps(ensemble: Ensemble) -> Maps:
+    """The mean pile of the complete ones, its spread, and where blocks are likely."""
+    whole = ensemble.whole
     if not whole:
         raise BadRun(f"{ensemble.folder} holds no pile with all its blocks")
     tops = np.array([p.top for p in whole])
@@ -220,11 +232,11 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """95 % interval of the median of what the values are drawn from, whatever its form, from their
     order; nan for fewer than six. Source: Conover, Practical nonparametric statistics, 3.2."""
     n, ordered = len(values), sorted(values)
-    below, rank, weight = 0.0, 0, 0.5**n
-    while below + weight <= 0.025:
+    below, rank, weight = 0, 0, 1  # times 0.5**n
+    while 40 * (below + weight) <= 2**n:  # 2.5 %
         below += weight
         rank += 1
-        weight *= (n - rank + 1) / rank
+        weight = weight * (n - rank + 1) // rank  # binomial coefficients
     if rank == 0:
         return float("nan"), float("nan")
     return ordered[rank - 1], ordered[n - rank]
@@ -250,12 +262,8 @@ def flat(found: PileNumbers) -> dict[str, float | str]:
 
 
 def summary(ensemble: Ensemble) -> dict[str, Any]:
-    """What `pile.json` holds of an ensemble; nan is left to the writer."""
-    found = [flat(p.numbers) for p in ensemble.whole]
-    spreads = {
-        name: spread_of([float(row[name]) for row in found if row[name] != ""])
-        for name in (found[0] if found else {})
-    }
+    """What `pile.json` holds of an ensemble, the estimates for each choice of the varied variables;
+    nan is left to the writer."""
     return {
         "format": "mics-ensemble-piles",
         "format_version": 1,
@@ -264,11 +272,34 @@ def summary(ensemble: Ensemble) -> dict[str, Any]:
         "left_out": {str(k): v for k, v in ensemble.left_out.items()},
         "step": ensemble.step,
         "patterns": [
-            {"choice": choice, "meaning": MEANING, "shares": pattern_shares(ensemble.of(choice))}
-            for choice in ensemble.choices
+            {
+                "choice": part.choices[0],
+                "meaning": MEANING,
+                "shares": pattern_shares(part.piles),
+                **_estimates(part),
+            }
+            for part in ensemble.parts
         ],
-        "convergence": {name: list(running(ensemble.piles, name)) for name in PATTERNS},
-        "numbers": {name: spread for name, spread in spreads.items() if spread},
-        "remarkable": {str(k): v for k, v in remarkable(ensemble).items()},
+        **(_estimates(ensemble) if len(ensemble.choices) == 1 else {}),
         "table": rows(ensemble),
     }
+
+
+def _estimates(part: Ensemble) -> dict[str, Any]:
+    """Of the runs of one choice: how the shares converge, the spread of the numbers of the complete
+    piles, and which runs are remarkable."""
+    return {
+        "convergence": {name: list(running(part.piles, name)) for name in PATTERNS},
+        "numbers": spreads(part),
+        "remarkable": {str(k): v for k, v in remarkable(part).items()},
+    }
+
+
+def spreads(part: Ensemble) -> dict[str, dict[str, float]]:
+    """The spread of each number of the complete piles that is known."""
+    found = [flat(p.numbers) for p in part.whole]
+    known = {
+        name: spread_of([float(row[name]) for row in found if row[name] != ""])
+        for name in (found[0] if found else {})
+    }
+    return {name: spread for name, spread in known.items() if spread}

@@ -7,7 +7,7 @@ import numpy as np
 
 from micstools import block_numbers, pile_form
 from micstools.geometry import Array
-from micstools.overlap import Placed, present_bodies, touches
+from micstools.overlap import Placed, images, present_bodies, touches
 from micstools.pile import REACH
 from micstools.reader import BadRun, Run
 
@@ -42,10 +42,12 @@ def numbers(
         raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
     row = row % len(b.time)
     bodies, seen = present_bodies(run, row), touches(run, row, REACH)
-    blocks = list(bodies.values())
+    if not bodies:
+        raise BadRun(f"{run.folder}: no block is let go at t = {b.time[row]:g} s: there is no pile")
+    blocks = images(run, bodies.values())
     top = height_map(blocks, run.grid.low, run.grid.high, step)
     here = list(bodies)
-    mass, place = b.mass[here], b.position[row, here]
+    mass, place = b.mass[here], np.array([body.position for body in bodies.values()])
     x, y, z = (float(v) for v in (mass[:, None] * place).sum(axis=0) / mass.sum())
     low, high = box or pile_form.around(blocks, run.grid.low, run.grid.high)
     known = box is not None or not len(run.bed[1])
@@ -77,6 +79,11 @@ def _randomness(run: Run, row: int) -> float:
     ((name, _),) = Counter(b.shape[k] for k in free).most_common(1)
     alike = [k for k in free if b.shape[k] == name]
     return pile_form.attitude_randomness(run.shapes[name], b.quaternion[row, alike])
+
+
+def usual_step(run: Run) -> float:
+    """Size of the squares of a map where none is asked for, a 300th of the tank [m]."""
+    return float((run.grid.high - run.grid.low)[:2].max()) / 300
 
 
 def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Array:

@@ -215,6 +215,21 @@ class Run:
         return {side: kind.strip() for side, kind in kinds.items()}
 
     @cached_property
+    def period(self) -> Array:
+        """Length of the tank in each periodic direction (3) [m], zero in the others."""
+        periodic = [self.sides[f"{axis}_min"] == "periodic" for axis in "xyz"]
+        return np.where(periodic, self.grid.high - self.grid.low, 0.0)
+
+    def into_tank(self, place: Array) -> Array:
+        """Places (..., 3) [m], which results hold unwrapped, moved by whole periods into the
+        tank."""
+        found = np.array(place, float)
+        for d in np.flatnonzero(self.period):
+            low = self.grid.low[d]
+            found[..., d] = low + (found[..., d] - low) % self.period[d]
+        return found
+
+    @cached_property
     def grid(self) -> Grid:
         """The cells."""
         return self._read("run.h5", lambda h5: Grid(*(h5[f"grid/{d}"][:] for d in "xyz")))
@@ -232,7 +247,8 @@ class Run:
     @cached_property
     def bodies(self) -> Bodies:
         """The bodies at every complete row."""
-        return self._read("run.h5", _read_bodies)
+        placed = len(self.parameters.get("body", []))
+        return self._read("run.h5", lambda h5: _read_bodies(h5, placed))
 
     @cached_property
     def series(self) -> Series:
@@ -389,7 +405,8 @@ def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
     return h5["bed/points"][:], h5["bed/triangles"][:].astype(int)
 
 
-def _read_bodies(h5: h5py.File) -> Bodies:
+def _read_bodies(h5: h5py.File, placed: int) -> Bodies:
+    """The bodies; the first `placed` of them are those of `&body`, the others drops."""
     group = h5["bodies"]
     per_body = ("shape", "mass", "fixed", "release_time")
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
@@ -399,18 +416,20 @@ def _read_bodies(h5: h5py.File) -> Bodies:
         shape=[_text(name) for name in group["shape"][:]],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
-        release_time=_true_release(group["release_time"][:], values),
+        release_time=_true_release(group["release_time"][:], values, placed),
         **values,
     )
 
 
-def _true_release(due: Array, rows: dict[str, Array]) -> Array:
-    """Release times (N) [s]; infinite for a block that is due but still waits for room, which shows
-    in that it has neither moved nor felt a force since."""
+def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:
+    """Release times (N) [s]; infinite for a block that is due but not let go yet, which shows in
+    that it has neither moved nor felt a force since. Those `placed` at the start do not wait."""
+    if not len(rows["time"]):
+        return due
     signs = [rows[name] for name in ("velocity", "fluid_force", "contact_force")]
     alive = np.any([(np.nan_to_num(sign) != 0).any(axis=(0, 2)) for sign in signs], axis=0)
-    waited = (due > 0) & (due < rows["time"][-1]) & ~alive
-    return np.where(waited, np.inf, due)
+    may_wait = (due > 0) | (np.arange(len(due)) >= placed)
+    return np.where(may_wait & (due <= rows["time"][-1]) & ~alive, np.inf, due)
 
 
 def _read_series(h5: h5py.File) -> Series:

@@ -57,6 +57,7 @@ class Motion:
     final_level: float = 0.1612
     wave: float = 0.004  # [m]
     turn_in_fall: float = 0.0  # degrees before the first touch
+    more: str = ""  # groups of the case
 
 
 def write_run(folder: Path, motion: Motion | None = None) -> Path:
@@ -100,7 +101,7 @@ def _paths(motion: Motion, time: Array) -> tuple[Array, Array, Array]:
 def _write_provenance(h5: h5py.File, motion: Motion) -> None:
     case = CASE.format(cells=motion.cells, level=motion.level, t_end=motion.t_end)
     case += "".join(BODY.format(x, 0.05, 0.0288675) for x in (0.09, 0.15, 0.21))
-    case += "".join(DROP.format(k) for k in range(len(motion.places)))
+    case += "".join(DROP.format(k) for k in range(len(motion.places))) + motion.more
     h5.create_group("provenance").attrs.update(
         {"namelist": case, "parameters": case, "version": "0.1.0", "threads": 1, "ranks": 1}
     )

@@ -148,3 +148,25 @@ def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
     assert code == 2 and "too many" in err
     code, _, err = call(capfd, *words, "--cells", "2,1")
     assert code == 2 and "must be positive and rise" in err
+
+
+def test_a_grid_that_broke_down_is_left_out(tmp_path: Path, capfd) -> None:
+    program, case = tmp_path / "mics", tmp_path / "case.nml"
+    tests = Path(__file__).parent
+    program.write_text(
+        PROGRAM.replace("{python}", sys.executable)
+        .replace("{tools!r}", repr(str(tests.parent)))
+        .replace("{tests!r}", repr(str(tests)))
+        .replace('attrs["exit_status"] = 0', 'attrs["exit_status"] = 3 if n == 15 else 0')
+        + "sys.exit(3 if n == 15 else 0)\n"
+    )
+    program.chmod(0o755)
+    case.write_text("&run t_end = 1.0 /\n&grid cells = 10, 10, 10 length = 1, 1, 1 /\n")
+    words = ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out"),
+             "--cells", "1,1.5,2"]  # fmt: skip
+    for runs in (3, 0):  # the second call makes none anew
+        code, out, err = call(capfd, *words)
+        assert code == 3 and out.count("\nran ") == runs
+        assert "1.5/result ended with code 3" in err
+    rows = json.loads((tmp_path / "out/study.json").read_text())
+    assert "cells x 1.5" not in rows[0] and "cells x 2" in rows[0]

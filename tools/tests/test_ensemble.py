@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from micstools import cli, ensemble, ensemble_fields, settings, shares, slurm
+from micstools import cli, ensemble, ensemble_engine, ensemble_fields, settings, shares, slurm
 from micstools.ensemble import Plan
 from micstools.program import find as find_program
 from micstools.reader import BadRun, Run
@@ -421,3 +421,46 @@ def test_an_ensemble_that_slept_goes_on(tmp_path: Path, program: Path) -> None:
     finally:
         running.kill()
     assert "6 of 6 done" in said
+
+
+def test_another_file_of_the_same_name_is_refused(tmp_path: Path, program: Path, capsys) -> None:
+    """Runs with an old and a new block must not be one ensemble."""
+    block = tmp_path / "block.txt"
+    block.write_text("mics-shape 1")
+    (tmp_path / "case.nml").write_text(CASE + f"&shape name = 'a' kind = 'file' file = '{block}' /")
+    words = ("--runs", "2", "--slurm", "--out", str(tmp_path / "a b"))
+    assert call(program, *words) == 0
+    assert call(program, *words) == 0
+    block.write_text("mics-shape 1 of another size")
+    assert call(program, *words) == 2
+    assert f"{block} has changed since" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "calls"),
+    [
+        ("restart-b.h5: damaged; a run cannot go on from it", 4, ["b", "a", "new"]),
+        ("run.h5: has lost rows, the run cannot go on in it", 4, ["b", "a", "new"]),
+        ("fields.vtkhdf: cannot write: No space left on device", 4, ["b"]),
+        ("the case differs from that of the restart file", 2, ["b", "a", "new"]),
+    ],
+)
+def test_only_a_bad_restart_file_throws_a_run_back(
+    said: str, code: int, calls: list[str], tmp_path: Path
+) -> None:
+    """A disk that is full after hours is no reason to begin anew."""
+    program = tmp_path / "mics"
+    program.write_text(
+        f"#!{sys.executable}\nimport sys\nwords = sys.argv[1:]\n"
+        f"open({str(tmp_path / 'calls')!r}, 'a').write("
+        "words[words.index('--restart') + 1][-4] + ' ' if '--restart' in words else 'new ')\n"
+        f"sys.exit({said!r} if False else (print({said!r}, file=sys.stderr) or {code}))\n"
+    )
+    program.chmod(0o755)
+    member = ensemble.Member(1, 1, (), CASE, tmp_path / "0001")
+    member.result.mkdir(parents=True)
+    for age, name in enumerate(("restart-b.h5", "restart-a.h5")):
+        (member.result / name).touch()
+        os.utime(member.result / name, (1000 - age, 1000 - age))
+    assert ensemble_engine.execute(member, program, tmp_path) == code
+    assert (tmp_path / "calls").read_text().split() == calls

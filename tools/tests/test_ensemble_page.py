@@ -100,12 +100,13 @@ def test_each_choice_has_its_own_maps(tmp_path: Path) -> None:
         row[name] = 0.4 if row["run"] == 1 else 0.6 if row["run"] < 5 else 0.8
     (folder / "ensemble.json").write_text(json.dumps(about))
     found = pile_ensemble.open_ensemble(folder, 0.002)
-    left, right = (pile_ensemble.maps(found, {name: value}) for value in (0.4, 0.6))
+    left, right = (pile_ensemble.maps(part) for part in found.parts[:2])
     more = left.cover - right.cover  # fixed blocks lie in all piles
     assert more[:, left.x < 0.15].max() == 1.0 and more[:, left.x > 0.15].min() == -1.0
     assert more[:, left.x < 0.15].min() == 0.0 and more[:, left.x > 0.15].max() == 0.0
     text = ensemble_page.page(found)
-    said = re.findall(r"<h3>(contact\.friction[^<]*)</h3>", text)
+    plan = text[text.index("Where blocks will lie") : text.index("How much piles differ")]
+    said = re.findall(r"<h3>(contact\.friction[^<]*)</h3>", plan)
     piles = {0.4: "one pile", 0.6: "three piles", 0.8: "one pile"}
     assert said == [f"{name} = {value}: {n}" for value, n in piles.items()]
     assert text.count('class="maps"') == 3

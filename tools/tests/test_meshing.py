@@ -313,3 +313,23 @@ def test_script_refuses_a_bad_file(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.startswith("make_shape: ")
     assert not (tmp_path / "block.txt").exists()
+
+
+@pytest.mark.parametrize(("unit", "metres"), [(".MILLI.", 0.06), ("$", 60.0)])
+def test_a_step_file_tells_its_unit(unit: str, metres: float, tmp_path: Path) -> None:
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addBox(0, 0, 0, 60, 20, 20)
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(tmp_path / "box.step"))
+    gmsh.finalize()
+    text = (tmp_path / "box.step").read_text()
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+    (tmp_path / "box.step").write_text(text.replace("(.MILLI.,.METRE.)", f"({unit},.METRE.)"))
+    surface = meshing.load(tmp_path / "box.step")
+    assert meshing.scale_of(surface, None, None) * surface.length == pytest.approx(metres)
+    assert meshing.scale_of(surface, None, 0.001) * surface.length == pytest.approx(metres)
+    assert surface.warnings == []
+    assert meshing.scale_of(surface, None, 1.0) == 1.0
+    assert "by its own unit the block is" in surface.warnings[0]

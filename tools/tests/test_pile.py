@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -93,7 +94,7 @@ def test_level_follows_the_submerged_volume(make_run) -> None:
     found = pile.water_level(run)
     assert found.demanded == pytest.approx(0.15 + rise, rel=1e-12)
     assert found.found == pytest.approx(0.15 + rise, abs=1e-8)
-    assert pile.level(run).seen
+    assert pile.level(pile.water_level(run)).seen
 
 
 def test_level_with_a_block_through_the_surface(make_run) -> None:
@@ -101,7 +102,7 @@ def test_level_with_a_block_through_the_surface(make_run) -> None:
     level = pile.demanded_level(run, -1)
     below = pile.submerged_volume(run, -1, level)
     assert level * 0.03 - below == pytest.approx(0.15 * 0.03 - 3 * 56e-6, rel=1e-12)
-    assert not pile.level(run).seen
+    assert not pile.level(pile.water_level(run)).seen
 
 
 def test_telling_times_are_written_times(loose_pile) -> None:
@@ -150,3 +151,19 @@ def test_report_says_yes_and_no(loose_pile) -> None:
     text = pile.report(pile.findings(loose_pile))
     assert "yes  attitude changes less than 5 degrees" in text
     assert "no   blocks of the final pile touch" in text
+
+
+def test_no_level_without_a_rise(make_run) -> None:
+    """Before the first splash there is no rise to compare with."""
+    high = [(np.array([0.15, 0.05, 0.16 + 0.03]), UPRIGHT)]
+    run = make_run(Motion(places=high, t_end=0.5, field_step=0.5, level=0.08))
+    assert pile.water_level(run).demanded == pytest.approx(0.08)
+    assert not any("level" in found.statement for found in pile.findings(run))
+
+
+def test_two_free_blocks_from_the_start_in_the_papers_words(make_run) -> None:
+    run = make_run(Motion())
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/release_time"][3:5] = 0.0
+    run.refresh()
+    assert any("first block" in found.statement for found in pile.findings(run, paper=True))

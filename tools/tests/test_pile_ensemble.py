@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli, pile_ensemble, shapes, shares
-from micstools.reader import BadRun
+from micstools import cli, pile_ensemble, pile_numbers, shapes, shares
+from micstools.reader import BadRun, Run
 from synthetic import UPRIGHT, Motion, write_run
 
 EDGE, HALF = 0.02, 0.01
@@ -24,17 +24,9 @@ def write_ensemble(folder: Path, ends: list[tuple[float, float, float]] = ENDS) 
     """An ensemble with a run for each end, and one more that failed."""
     table = []
     for number, end in enumerate(ends, start=1):
-        # Only what is due after the start can be seen to wait.
+        # One that waits does so behind another one.
         places = [(RIGHT, 0.05, HIGH), end] if end == WAITING else [end]
-        motion = Motion(
-            shape=shapes.cube(EDGE),
-            places=[(np.array(place), UPRIGHT) for place in places],
-            t_end=2.0,
-            history_step=0.05,
-            field_step=2.0,
-            cells=(12, 4, 8),
-        )
-        write_run(folder / f"{number:04d}" / "result", motion)
+        write_run(folder / f"{number:04d}" / "result", cube_run(places))
         table.append(row(number, "no room" if end == WAITING else "settled"))
     table.append(row(len(ends) + 1, "failed"))
     about = {"format": "mics-ensemble", "runs": len(table), "seed": 1, "spread": 0.005,
@@ -42,6 +34,19 @@ def write_ensemble(folder: Path, ends: list[tuple[float, float, float]] = ENDS) 
              "table": table}  # fmt: skip
     (folder / "ensemble.json").write_text(json.dumps(about))
     return folder
+
+
+def cube_run(places: list[tuple[float, float, float]], more: str = "") -> Motion:
+    """Cubes dropped one a second that end at some places."""
+    return Motion(
+        shape=shapes.cube(EDGE),
+        places=[(np.array(place), UPRIGHT) for place in places],
+        t_end=len(places) + 1.0,
+        history_step=0.05,
+        field_step=len(places) + 1.0,
+        cells=(12, 4, 8),
+        more=more,
+    )
 
 
 def row(number: int, outcome: str) -> dict:
@@ -135,3 +140,46 @@ def test_interval_of_a_median() -> None:
     assert pile_ensemble.median_interval([3, 1, 2, 6, 5, 4]) == (1, 6)
     assert np.isnan(pile_ensemble.median_interval([1, 2, 3, 4, 5])).all()
     assert pile_ensemble.spread_of([float("nan")]) is None
+    many = pile_ensemble.median_interval(list(range(1, 2001)))  # by the normal distribution
+    assert np.array(many) == pytest.approx(1000.5 + 0.98 * np.sqrt(2000) * np.array([-1, 1]), abs=1)
+
+
+def test_a_drop_of_the_very_start_can_wait(tmp_path: Path) -> None:
+    """It hangs at its place, due since t = 0: the pile is not complete, and no pattern."""
+    folder = write_ensemble(tmp_path, [WAITING])
+    run = Run(write_run(folder / "0001" / "result", cube_run([WAITING])))
+    assert list(run.bodies.present(-1)) == [True, True, True, False]
+    (pile,) = pile_ensemble.open_ensemble(folder, 0.002).piles
+    assert (pile.pattern, pile.complete, pile.numbers.blocks) == ("neither", False, 3)
+
+
+@pytest.mark.parametrize(("height", "dry"), [(0.1503, False), (0.152, True)])
+def test_under_water_is_judged_by_the_level_of_the_end(
+    height: float, dry: bool, tmp_path: Path
+) -> None:
+    """Cubes lift the water by some 0.67 mm, so a centroid 0.3 mm above its first level is wet."""
+    ends = [(LEFT, 0.05, HALF), (0.12, 0.05, 0.08), (RIGHT, 0.05, height)]
+    run = Run(write_run(tmp_path / "run", cube_run(ends)))
+    found = pile_numbers.numbers(run, 0.002)
+    assert (pile_ensemble.pattern(run, found) == "neither") == dry
+
+
+def test_each_choice_has_its_own_numbers(tmp_path: Path, capsys) -> None:
+    """Choices share their drops, so no interval is taken over all of them."""
+    folder, name = write_ensemble(tmp_path, ENDS[:4]), "contact.friction"
+    about = json.loads((folder / "ensemble.json").read_text())
+    about["choices"] = [{name: 0.4}, {name: 0.6}]
+    for line in about["table"]:
+        line[name] = 0.4 if line["run"] % 2 else 0.6
+    (folder / "ensemble.json").write_text(json.dumps(about))
+    with pytest.raises(SystemExit):
+        cli.main(["pile", str(folder), "--step", "0.002"])
+    said = capsys.readouterr().out
+    assert "contact.friction = 0.4: A 0 of 2" in said and "contact.friction = 0.6: A 1 of 2" in said
+    content = json.loads((folder / "pile.json").read_text())
+    tops = [part["numbers"]["top"] for part in content["patterns"]]
+    assert [top["known"] for top in tops] == [2, 2] and tops[0] != tops[1]
+    assert "numbers" not in content and "convergence" not in content
+    with h5py.File(folder / "pile_maps.h5") as h5:
+        assert sorted(h5) == ["contact.friction = 0.4", "contact.friction = 0.6"]
+        assert h5["contact.friction = 0.4/cover"].attrs["units"] == "-"

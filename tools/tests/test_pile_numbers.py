@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from micstools import cli, pile_numbers, shapes
-from micstools.reader import Run
+from micstools.overlap import Placed, present_bodies, sphere_gap, touches
+from micstools.reader import BadRun, Run
 from synthetic import UPRIGHT, Motion
 
 EDGE = 0.02
@@ -80,3 +81,80 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
         assert h5["top"].attrs["units"] == "m"
     assert top[np.abs(y - 0.03).argmin(), np.abs(x - 0.03).argmin()] == pytest.approx(0.06)
     assert np.isfinite(top).sum() * 1e-6 == pytest.approx(content["plan_area"])
+
+
+PERIODIC = "&boundary x_min = 'periodic' x_max = 'periodic' /\n"
+
+
+def test_blocks_touch_and_cover_through_a_periodic_side(make_run, capsys) -> None:
+    """Two cubes side by side, one at x_max, one a period on: the pile is that of a closed box moved
+    along."""
+    ends = [(np.array([x, 0.05, 0.01]), UPRIGHT) for x in (0.295, 0.615)]
+    run = make_run(Motion(shape=shapes.cube(0.02), places=ends, t_end=3.0, cells=(12, 4, 8),
+                          field_step=3.0, more=PERIODIC))  # fmt: skip
+    assert run.period.tolist() == pytest.approx([0.3, 0.0, 0.0])
+    seen = touches(run, -1)
+    assert (3, 4) in seen.blocks and set(seen.blocks) == {(3, 4)}
+    bodies = present_bodies(run, -1)
+    assert [float(bodies[k].position[0]) for k in (3, 4)] == pytest.approx([0.295, 0.015])
+    alone = make_run(Motion(shape=shapes.cube(0.02), places=[], t_end=3.0, cells=(12, 4, 8),
+                            field_step=3.0))  # fmt: skip
+    bare = pile_numbers.numbers(alone, 0.001)
+    found = pile_numbers.numbers(run, 0.001)
+    assert found.plan_area - bare.plan_area == pytest.approx(2 * 0.02**2, rel=0.06)
+    assert 0.0 < found.porosity < 1.0
+
+
+def test_contact_spheres_touch_where_they_are(make_run) -> None:
+    """A cube on contact spheres that stick out stands above the floor, and touches it."""
+    cube = shapes.cube(0.02)
+    lowest = float((cube.sphere_centre[:, 2] - cube.sphere_radius).min())
+    out = -lowest - 0.01
+    assert out > 6e-4  # more than counts as a touch
+    standing = Placed(cube, np.array([0.04, 0.05, -lowest]), UPRIGHT)
+    ways = np.arange(0.0195, 0.025, 1e-5)
+    gaps = [sphere_gap(standing, standing.moved(np.array([way, 0, 0]))) for way in ways]
+    way = float(ways[np.flatnonzero(np.array(gaps) >= 0.0)[0]])  # spheres just touch
+    assert way > 0.0206
+    ends = [(np.array([x, 0.05, -lowest]), UPRIGHT) for x in (0.04, 0.04 + way)]
+    spheres, surface = (
+        touches(
+            make_run(Motion(shape=cube, places=ends, t_end=3.0, cells=(12, 4, 8),
+                            field_step=3.0, more=f"&contact model = '{model}' /\n")), -1)
+        for model in ("spheres", "surface")
+    )  # fmt: skip
+    assert spheres.on_floor(3) and spheres.on_floor(4) and (3, 4) in spheres.blocks
+    assert not surface.on_floor(3) and (3, 4) not in surface.blocks
+
+
+def test_nothing_to_tell_before_the_first_block(make_run, capsys) -> None:
+    run = make_run(Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8)))
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/release_time"][:] = 5.0
+    run.refresh()
+    with pytest.raises(BadRun, match="no block is let go at t = 3 s"):
+        pile_numbers.numbers(run, 0.001)
+    for command in ("pile", "report"):
+        with pytest.raises(SystemExit) as end:
+            cli.main([command, str(run.folder)])
+        assert end.value.code == 2 and "no block is let go" in capsys.readouterr().err
+
+
+def test_results_without_a_row_are_one_line(make_run, capsys) -> None:
+    run = make_run(Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8)))
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        for group in ("bodies", "series"):
+            for name, data in list(h5[group].items()):
+                if data.shape[:1] == h5["bodies/time"].shape:
+                    values = data[:0]
+                    if name != "time" or group == "series":
+                        del h5[group][name]
+                        h5[group][name] = values
+        del h5["bodies/time"]
+        h5["bodies/time"] = np.empty(0)
+    run.refresh()
+    assert "rows    0, none yet" in str(run)
+    for command in ("pile", "report"):
+        with pytest.raises(SystemExit) as end:
+            cli.main([command, str(run.folder)])
+        assert end.value.code == 2 and "no row of results yet" in capsys.readouterr().err

@@ -13,7 +13,7 @@ import numpy as np
 from micstools import block_numbers, command, pile, pile_ensemble, pile_form, pile_numbers
 from micstools.commands.base import Command
 from micstools.geometry import Array
-from micstools.overlap import present_bodies
+from micstools.overlap import images, present_bodies
 from micstools.pile_ensemble import Ensemble
 from micstools.reader import BadRun
 from micstools.shares import in_words
@@ -36,8 +36,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
     add("--paper", action="store_true", help="what the paper says, in any tank")
-    add("--step", type=float, help="of plan area and maps [m], default 0.001, "
-        "of an ensemble a 300th of the tank")  # fmt: skip
+    add("--step", type=float, help="of plan area and maps [m], default a 300th of the tank")
     add("--box", type=float, nargs=6, metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
         help="of the porosity [m], default the box around the pile")  # fmt: skip
 
@@ -64,16 +63,17 @@ def _box(values: list[float] | None) -> tuple[Array, Array] | None:
 def _of_run(given: argparse.Namespace) -> int:
     """Print the findings and the numbers; these and the outline go into `pile.json`, the height map
     into `pile_maps.h5`."""
-    box, step = _box(given.box), given.step or 0.001
+    box = _box(given.box)
     findings(given)
     run = command.open_run(given.run)
+    step = given.step or pile_numbers.usual_step(run)
     found = asdict(pile_numbers.numbers(run, step, box=box))
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
         words = ["-" if v != v else f"{v:.5g}" for v in values]
         print(f"     {name:20}{', '.join(words)}")
     top = pile_numbers.height_map(
-        list(present_bodies(run, -1).values()), run.grid.low, run.grid.high, step
+        images(run, present_bodies(run, -1).values()), run.grid.low, run.grid.high, step
     )
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
@@ -84,19 +84,10 @@ def _of_run(given: argparse.Namespace) -> int:
 
 
 def _of_ensemble(ensemble: Ensemble) -> int:
-    """Print shares and spread of the numbers; they go into `pile.json`, a row for each run into
-    `pile.csv`, the maps into `pile_maps.h5`."""
-    total = len(ensemble.piles)
-    for choice in ensemble.choices:
-        name = ", ".join(f"{k} = {v}" for k, v in choice.items())
-        shares = pile_ensemble.pattern_shares(ensemble.of(choice))
-        said = [f"{k} {in_words(s['count'], len(ensemble.of(choice)))}" for k, s in shares.items()]
-        print((f"{name}: " if name else "") + ", ".join(said))
-    print(f"numbers of the {len(ensemble.whole)} complete piles of {total}: median (5 to 95 %)")
-    content = pile_ensemble.summary(ensemble)
-    for name, spread in content["numbers"].items():
-        low, high = spread["5 %"], spread["95 %"]
-        print(f"     {name:20}{spread['median']:.5g} ({low:.5g} to {high:.5g})")
+    """Print shares and spread of the numbers, for each choice; they go into `pile.json`, a row for
+    each run into `pile.csv`, the maps into `pile_maps.h5`."""
+    for part in ensemble.parts:
+        _tell(part)
     with (ensemble.folder / "pile.csv").open("w", newline="") as file:
         rows = pile_ensemble.rows(ensemble)
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
@@ -105,19 +96,37 @@ def _of_ensemble(ensemble: Ensemble) -> int:
     if ensemble.whole:
         _write_maps(ensemble)
     print(f"{ensemble.folder / 'pile.csv'}")
-    _write_json(ensemble.folder / "pile.json", content)
+    _write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
     return 0
 
 
+def _tell(part: Ensemble) -> None:
+    """Print what there is to say of the runs of one choice."""
+    total = len(part.piles)
+    shares = pile_ensemble.pattern_shares(part.piles)
+    said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
+    print((f"{part.name}: " if part.name else "") + ", ".join(said))
+    print(f"numbers of the {len(part.whole)} complete piles of {total}: median (5 to 95 %)")
+    for name, spread in pile_ensemble.spreads(part).items():
+        low, high = spread["5 %"], spread["95 %"]
+        print(f"     {name:20}{spread['median']:.5g} ({low:.5g} to {high:.5g})")
+
+
 def _write_maps(ensemble: Ensemble) -> None:
-    _write_h5(ensemble.folder / "pile_maps.h5", asdict(pile_ensemble.maps(ensemble)))
+    """The maps; where variables were varied in a group for each choice, named by it."""
+    found: dict[str, Array] = {}
+    for part in ensemble.parts:
+        if part.whole:
+            here = f"{part.name}/" if part.name else ""
+            found |= {here + k: v for k, v in asdict(pile_ensemble.maps(part)).items()}
+    _write_h5(ensemble.folder / "pile_maps.h5", found)
 
 
 def _write_h5(path: Path, found: dict[str, Array]) -> None:
     with h5py.File(path, "w") as h5:
         for name, values in found.items():
             h5[name] = values
-            h5[name].attrs["units"] = "-" if name == "cover" else "m"
+            h5[name].attrs["units"] = "-" if name.endswith("cover") else "m"
     print(path)
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from micstools import command, pile_ensemble
 from micstools.commands.base import Command
 from micstools.page import ensemble_page, run_page
-from micstools.reader import Run
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,8 +19,8 @@ def _report(given: argparse.Namespace) -> int:
         folder = given.run
         text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
     else:
-        folder = command.results_of(given.run)
-        text = run_page.page(Run(folder))
+        run = command.open_run(given.run)
+        folder, text = run.folder, run_page.page(run)
     path = given.out or folder / "report.html"
     path.write_text(text, encoding="utf-8")
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")

@@ -16,8 +16,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="closed surface: .stl, .obj, .step")
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--size", type=float, help="largest extent of the block [m]")
-    length.add_argument("--scale", type=float, help="metres per unit of the file, 0.001 for mm")
-    parser.add_argument("--element", type=float, default=0.0, help="longest edge [file's units]")
+    unit = "metres per unit of the file, 0.001 for mm; STEP tells its own"
+    length.add_argument("--scale", type=float, help=unit)
+    edge = "longest edge [file's units, of STEP mm]"
+    parser.add_argument("--element", type=float, default=0.0, help=edge)
     parser.add_argument(
         "--simplify",
         type=int,
@@ -82,7 +84,7 @@ SHAPE = Command(
     "tell its mass.",
     (
         "shape block.stl --size 0.06 --out block.txt",
-        "shape block.step --scale 0.001 --out block.txt",
+        "shape block.step --out block.txt",
         "shape scan.stl --scale 0.001 --simplify 500 --out block.txt",
     ),
     arguments,

@@ -4,15 +4,18 @@ import argparse
 import csv
 import json
 import subprocess
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from micstools import pile_ensemble, pile_numbers, program, settings
+from micstools import case_copy, pile_ensemble, pile_numbers, program, settings
 from micstools.commands.base import Command
 from micstools.convergence import Convergence, converge
 from micstools.reader import BadRun, Run
+
+_ENDED = (0, 3)  # codes of a run that would end in the same way again
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,20 +46,23 @@ def finer(text: str, factor: float) -> str:
 
 
 def _run(path: Path, text: str, folder: Path, threads: int | None) -> Run:
-    """Run a case in a folder, unless it is there already."""
+    """Run a case in a folder to its end, unless that is there already."""
     case, result = folder / "case.nml", folder / "result"
-    if case.exists() and case.read_text() != text:
-        raise BadRun(f"{case} is another case than asked for: give another --out")
-    done = case.exists() and (result / "run.h5").is_file()
-    if not done or int(Run(result).provenance.get("exit_status", -1)) != 0:
-        folder.mkdir(parents=True, exist_ok=True)
-        case.write_text(text)
+    case_copy.keep(case, text)
+    if _code(result) not in _ENDED:
         words: list[str | Path] = [path, "--output", result, "--quiet", case]
         words[1:1] = ["--threads", str(threads)] if threads is not None else []
         code = subprocess.run(words).returncode
-        if code not in (0, 3):
+        if code not in _ENDED:
             raise BadRun(f"{case}: the run ended with code {code}")
     return Run(result)
+
+
+def _code(result: Path) -> int:
+    """Exit code of a run, -1 while it has none."""
+    if not (result / "run.h5").is_file():
+        return -1
+    return int(Run(result).provenance.get("exit_status", -1))
 
 
 def _study(given: argparse.Namespace) -> int:
@@ -66,14 +72,19 @@ def _study(given: argparse.Namespace) -> int:
     cases = [finer(text, factor) for factor in factors]
     for each in cases:
         program.check(path, each)
-    found = []
+    whole, found = [], []
     for factor, each in zip(factors, cases, strict=True):
         print(f"cells x {factor:g}: {folder}/{factor:g}", flush=True)
         run = _run(path, each, folder / f"{factor:g}", given.threads)
-        step = float((run.grid.high - run.grid.low)[:2].max()) / 300
-        found.append(pile_ensemble.flat(pile_numbers.numbers(run, step)))
-    _tell(folder, factors, found)
-    return 0
+        if _code(run.folder) != 0:
+            print(f"mics-tools study: {run.folder} ended with code 3, a fault of the numerics or "
+                  "blocks without room: left out", file=sys.stderr)  # fmt: skip
+            continue
+        whole.append(factor)
+        found.append(pile_ensemble.flat(pile_numbers.numbers(run, pile_numbers.usual_step(run))))
+    if found:
+        _tell(folder, whole, found)
+    return 0 if len(whole) == len(factors) else 3
 
 
 def _tell(folder: Path, factors: list[float], found: list[dict[str, float | str]]) -> None:
@@ -108,7 +119,8 @@ STUDY = Command(
     "study",
     "Run a case on coarser and finer cells: each number of the pile, its observed order and an\n"
     "estimate of its error (study.csv, study.json). A second call runs what is missing. Piles are\n"
-    "chaotic: what does not converge says so.",
+    "chaotic: what does not converge says so. A grid on which the run ends with code 3 is left\n"
+    "out, and the exit code is 3.",
     (
         "study input/blocks_coarse.nml --cells 1,1.5,2",
         "study input/blocks.nml --cells 0.5,0.75,1 --set run.t_end=0.8 --set drop.count=1",

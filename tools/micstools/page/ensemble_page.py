@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from micstools import pile_ensemble
+from micstools import pile, pile_ensemble
 from micstools.energy import made_by_contact
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
@@ -39,7 +39,7 @@ document.querySelectorAll('[data-pile]').forEach(button => button.addEventListen
   const pile = piles.runs[button.dataset.pile];
   dialog.querySelector('h3').textContent = pile.title;
   dialog.querySelector('.about').textContent = pile.about;
-  if (pilePlayer) pilePlayer.load({ ...piles.tank, ...pile.scene });
+  if (pilePlayer) pilePlayer.load({ ...piles.tanks[pile.tank], ...pile.scene });
 }));
 dialog.querySelector('.close').addEventListener('click', () => dialog.close());
 """
@@ -76,7 +76,7 @@ def page(ensemble: Ensemble) -> str:
     return document(
         title,
         tag("h1", title),
-        tag("p", sentence(ensemble), class_="lead"),
+        *(tag("p", sentence(part), class_="lead") for part in ensemble.parts),
         tag("p", assumptions(ensemble)),
         _patterns(ensemble),
         *([_plan(ensemble), _histograms(ensemble)] if ensemble.whole else []),
@@ -91,9 +91,11 @@ def page(ensemble: Ensemble) -> str:
 
 
 def sentence(ensemble: Ensemble) -> str:
-    """Shares of the patterns and the height of the piles, each with its interval."""
+    """Shares of the patterns of one choice and the height of the piles, each with its interval."""
     total, shares = len(ensemble.piles), pile_ensemble.pattern_shares(ensemble.piles)
     said = [f"in {in_words(shares[name]['count'], total)} {words}" for name, words in _SAID.items()]
+    if ensemble.name:
+        said[0] = f"with {ensemble.name} {said[0]}"
     words = f"{run_words.capital(', '.join(said))} (in brackets: share and 95 % interval). "
     words += _heights([_top(p) for p in ensemble.whole])
     return words.replace(" %", "\u00a0%").replace(" mm", "\u00a0mm")
@@ -158,10 +160,9 @@ def _varied(ensemble: Ensemble, name: str) -> str:
 def _patterns(ensemble: Ensemble) -> Markup:
     """Bars of the shares, for each choice of the varied variables."""
     rows: list[list[object]] = []
-    for choice in ensemble.choices:
-        piles = ensemble.of(choice)
+    for part in ensemble.parts:
+        piles, name = part.piles, part.name or "all runs"
         shares = pile_ensemble.pattern_shares(piles)
-        name = _name(choice)
         for k, (pattern, share) in enumerate(shares.items()):
             low, high = (100 * v for v in share["interval_95"])
             seen = f"{share['count']} of {len(piles)}".replace(" ", "\u00a0")
@@ -178,10 +179,6 @@ def _patterns(ensemble: Ensemble) -> Markup:
     )
 
 
-def _name(choice: dict[str, Any]) -> str:
-    return ", ".join(f"{k} = {v}" for k, v in choice.items()) or "all runs"
-
-
 def _bar(share: float, low: float, high: float) -> Markup:
     """A share in percent as a bar, its interval as a line over it."""
     drawn = [
@@ -195,18 +192,17 @@ def _bar(share: float, low: float, high: float) -> Markup:
 
 def _plan(ensemble: Ensemble) -> Markup:
     """The mean pile from above, for each choice of the varied variables to one scale of height."""
-    choices = [c for c in ensemble.choices if any(p.complete for p in ensemble.of(c))]
-    found = [pile_ensemble.maps(ensemble, choice) for choice in choices]
+    whole = [part for part in ensemble.parts if part.whole]
+    found = [pile_ensemble.maps(part) for part in whole]
     top = 1e3 * max(float(maps.high.max()) for maps in found)
     size = ensemble.example.run.grid
     extent = " x ".join(millimetres(v) for v in (size.high - size.low)[:2])
     note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
     note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
     parts: list[Markup] = []
-    for choice, maps in zip(choices, found, strict=True):
-        if len(ensemble.choices) > 1:
-            piles = sum(p.complete for p in ensemble.of(choice))
-            parts.append(tag("h3", f"{_name(choice)}: {count(piles, 'pile')}"))
+    for part, maps in zip(whole, found, strict=True):
+        if part.name:
+            parts.append(tag("h3", f"{part.name}: {count(len(part.whole), 'pile')}"))
         parts.append(tag("div", *_maps(maps, top), class_="maps"))
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
 
@@ -222,6 +218,21 @@ def _maps(found: Maps, top: float) -> list[Markup]:
 
 
 def _histograms(ensemble: Ensemble) -> Markup:
+    note = "Bars count complete piles; thick line: the median; dashed: 5 and 95 % of the piles."
+    parts: list[Markup] = []
+    for part in ensemble.parts:
+        if part.whole:
+            parts += [*_heading(part), *_spreads(part)]
+    return section("numbers", "How much piles differ", *parts, tag("p", note, class_="note"))
+
+
+def _heading(part: Ensemble) -> list[Markup]:
+    """The name of a choice, where there are several."""
+    return [tag("h3", part.name)] if part.name else []
+
+
+def _spreads(ensemble: Ensemble) -> list[Markup]:
+    """Histograms and a table of the numbers of one choice."""
     drawn: list[Markup] = []
     rows: list[list[object]] = []
     for quantity in _QUANTITIES:
@@ -233,19 +244,16 @@ def _histograms(ensemble: Ensemble) -> Markup:
         known = np.array([v for v in values if v == v])
         drawn.append(charts.histogram(known, quantity.name, marks))
         rows.append([quantity.name, *(f"{value:.4g}" for value, _ in marks)])
-    note = "Bars count complete piles; thick line: the median; dashed: 5 and 95 % of the piles."
-    return section(
-        "numbers",
-        "How much piles differ",
+    return [
         tag("div", *drawn, class_="charts"),
-        tag("p", note, class_="note"),
         table(["of the complete piles", "5 %", "median", "95 %"], rows),
-    )
+    ]
 
 
 def _wall(ensemble: Ensemble) -> Markup:
     """A small picture of every pile, by pattern; a click shows it in three dimensions."""
-    marks = pile_ensemble.remarkable(ensemble)
+    marks = {k: words for part in ensemble.parts
+             for k, words in pile_ensemble.remarkable(part).items()}  # fmt: skip
     parts: list[Markup] = []
     for pattern in PATTERNS:
         piles = [p for p in ensemble.piles if p.pattern == pattern]
@@ -280,14 +288,22 @@ def _thumbnail(p: Pile, marks: list[str]) -> Markup:
 
 
 def _scenes(ensemble: Ensemble) -> dict[str, Any]:
-    """The last row of every run for the player; the tank and the shapes once."""
-    tank = motion.tank(ensemble.example.run)
-    return {"tank": tank, "runs": {p.number: _shown(p) for p in ensemble.piles}}
+    """The last row of every run for the player; the tank and the shapes once, or for each choice
+    where they are varied."""
+    varied = {name.split(".")[0] for choice in ensemble.choices for name in choice}
+    parts = ensemble.parts if varied & {"shape", "grid", "bed"} else [ensemble]
+    parts = [part for part in parts if part.piles]
+    return {
+        "tanks": [motion.tank(part.example.run) for part in parts],
+        "runs": {
+            p.number: _shown(p) | {"tank": n} for n, part in enumerate(parts) for p in part.piles
+        },
+    }
 
 
 def _shown(p: Pile) -> dict[str, Any]:
     scene = motion.blocks(p.run, np.array([len(p.run.bodies.time) - 1]))
-    level = motion.still_level(p.run)
+    level = pile.still_level(p.run)
     scene["water"] = None if level is None else {"level": level}
     n = p.numbers
     about = [f"seed {p.row['seed']}", f"ended: {p.row['outcome']}",
@@ -305,6 +321,15 @@ def _shown(p: Pile) -> dict[str, Any]:
 
 def _running(ensemble: Ensemble) -> Markup:
     """Estimates after each run, with their intervals: were the runs enough?"""
+    parts: list[Markup] = []
+    for part in ensemble.parts:
+        if part.piles:
+            parts += [*_heading(part), *_estimates(part)]
+    return section("running", "Were the runs enough?", *parts)
+
+
+def _estimates(ensemble: Ensemble) -> list[Markup]:
+    """How the share of the commonest pattern and the median of the top of one choice went."""
     shares = pile_ensemble.pattern_shares(ensemble.piles)
     name = max(("A", "B"), key=lambda k: shares[k]["count"])
     steps = np.array(list(pile_ensemble.running(ensemble.piles, name)))
@@ -324,8 +349,7 @@ def _running(ensemble: Ensemble) -> Markup:
         f"After {count(len(ensemble.piles), 'run')} the share of {name} is known to lie between "
         f"{low:.0f} and {high:.0f} %; four times as many runs would about halve that width."
     )
-    return section("running", "Were the runs enough?", tag("p", said),
-                   tag("div", *drawn, class_="charts"))  # fmt: skip
+    return [tag("p", said), tag("div", *drawn, class_="charts")]
 
 
 def _health(ensemble: Ensemble) -> Markup:

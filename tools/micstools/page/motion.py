@@ -41,7 +41,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
     b = run.bodies
     names = list(run.shapes)
     speed = np.linalg.norm(b.velocity[rows], axis=2)
-    fastest = float(speed.max(initial=0.0)) or 1.0
+    fastest = float(np.nanmax(speed, initial=0.0)) or 1.0
     colours = block_colours(b.dropped, b.n)
     return {
         "bodies": [
@@ -55,9 +55,9 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
             for k in range(b.n)
         ],
         "times": packed(b.time[rows], "f4"),
-        "place": packed(b.position[rows], "f4"),
+        "place": packed(run.into_tank(b.position[rows]), "f4"),
         "turn": packed(np.round(32767 * unit(b.quaternion[rows])), "i2"),
-        "speed": packed(np.round(255 * speed / fastest), "u1"),
+        "speed": packed(np.round(255 * np.nan_to_num(speed) / fastest), "u1"),
         "fastest": fastest,
         "contacts": packed(b.contacts[rows].clip(0, 255), "u1"),
     }
@@ -98,20 +98,8 @@ def water(run: Run) -> dict[str, Any] | None:
     where currents make it, a level; none in a dry run, a full one, or without a level."""
     if pile.has_level(run):
         return _surface(run)
-    level = still_level(run)
+    level = pile.still_level(run)
     return None if level is None else {"level": level}
-
-
-def still_level(run: Run) -> float | None:
-    """Level [m] of the water when it has come to rest around the blocks of the last row; that of
-    the start where it does not follow from the blocks."""
-    wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
-    level = run.value("fluid", "water_level", None)
-    if not wet or level is None or bool(run.value("fluid", "single_phase", False)):
-        return None
-    if not pile.level_follows(run):
-        return float(level)
-    return pile.demanded_level(run, len(run.bodies.time) - 1)
 
 
 def _surface(run: Run) -> dict[str, Any]:

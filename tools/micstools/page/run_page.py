@@ -51,7 +51,7 @@ def page(run: Run) -> str:
         )
         return document(title, tag("h1", title), tag("p", lead, class_="lead"), case,
                         _health(run), *last, script="")  # fmt: skip
-    step = float((run.grid.high - run.grid.low)[:2].max()) / 300
+    step = pile_numbers.usual_step(run)
     found = Found(pile_numbers.numbers(run, step), overlap(run), block_numbers.of_blocks(run), step)
     return document(
         title,
@@ -132,7 +132,7 @@ def _upper_corner(run: Run, bodies: dict[int, Placed], level: float | None) -> A
 
 def _last_level(run: Run) -> float | None:
     """The mean level of the water at the end; the one it should have where no field was written."""
-    return pile.water_level(run).found if pile.has_level(run) else motion.still_level(run)
+    return pile.water_level(run).found if pile.has_level(run) else pile.still_level(run)
 
 
 def _blocks(run: Run, found: Found) -> Markup:
