@@ -10,7 +10,7 @@ module courant_m
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, fastest_point
   use parallel_m, only: global_max
   implicit none
   private
@@ -42,7 +42,7 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(blocks_t), intent(in) :: blocks
     type(courant_rate_t) :: rate
-    real(wp) :: fluid(4)
+    real(wp) :: fluid(4), spacing
     integer :: b
 
     fluid = fluid_rates(grid, flow%uf, solid%open, flow%c)
@@ -50,11 +50,10 @@ contains
     rate%followed = fluid(1)
     rate%carried = fluid(2)
     rate%has_surface = all(fluid(3:) >= least_liquid)
+    spacing = minval(grid%h, grid%n > 1)   ! the thickness of a slice of one cell says nothing
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      rate%followed = max(rate%followed, past_wall/minval(grid%h)*( &
-                      norm2(blocks%v(:, b)) &
-                      + norm2(blocks%omega(:, b))*blocks%shapes(blocks%shape(b))%radius))
+      rate%followed = max(rate%followed, past_wall/spacing*fastest_point(blocks, b))
     end do
     rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate

@@ -42,7 +42,8 @@ contains
     type(fault_t), intent(inout) :: fault
 
     if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
-    if (.not. report%contacts_solved) call set(sim, 'blocks move too fast for any body step', fault)
+    if (.not. report%contacts_solved) call set(sim, 'a step would need more than a million body ' &
+      //'steps: blocks are too fast, or `contact_time` or `substep_ratio` too small', fault)
     if (.not. report%transport_converged) then
       call set(sim, 'what small cells of the transport give did not converge', fault)
     end if
@@ -128,7 +129,8 @@ contains
       do s = 1, 2
         if (grid%periodic(d)) cycle
         beyond = merge(grid%origin(d) - x(d), x(d) - grid%origin(d) - grid%length(d), s == 1)
-        if (.not. is_wall(grid%side(s, d)) .and. merge(gravity(d), -gravity(d), s == 1) > 0) then
+        if (.not. is_wall(grid%side(s, d)) .and. d == maxloc(abs(gravity), 1) &
+            .and. merge(gravity(d), -gravity(d), s == 1) > 0.0_wp) then
           beyond = beyond - grid%length(d)
           if (merge(-v(d), v(d), s == 1) <= 0.0_wp) beyond = 0.0_wp
         end if

@@ -14,6 +14,7 @@ program mics
   use timers_m, only: wall_clock
   use messages_m, only: count_from_here
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
+  use checksum_m, only: checksum_t
   use case_file_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case, parameters_text
@@ -56,7 +57,7 @@ program mics
 
   call open_output(case, parameters(), options, sim%run_state_t, bed, output)
   call stop_on_trouble()
-  call write_due_output(sim%run_state_t, report, output)
+  if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   call note_places(sim, fault)
   call count_from_here()
@@ -65,6 +66,7 @@ program mics
     call share_cores()
     call find_fault(sim, report, fault)
     signal = stop_asked(stop_requests)
+    if (sim%clock%finished()) signal = 0   ! there is nothing left to stop
     if (fault%code /= exit_ok .or. signal /= 0 .or. output%code /= exit_ok) exit
     call write_due_output(sim%run_state_t, report, output)
   end do
@@ -81,11 +83,21 @@ program mics
 
 contains
 
-  !> All values of the case as text, and what the file of the bed held.
+  !> All values of the case as text, and what the files of shapes and the bed held.
   function parameters() result(text)
     character(:), allocatable :: text
+    type(checksum_t) :: checksum, none
+    integer :: s
 
     text = parameters_text(case)
+    do s = 1, size(shapes)
+      if (shapes(s)%kind /= 'file') cycle
+      checksum = none
+      call checksum%add_reals(size(shapes(s)%point), shapes(s)%point)
+      call checksum%add_integers(size(shapes(s)%tet), shapes(s)%tet)
+      text = text//'! checksum of the shape '//trim(shapes(s)%name)//' '//checksum%text() &
+             //new_line('a')
+    end do
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
   end function parameters
 

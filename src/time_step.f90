@@ -16,10 +16,10 @@ module time_step_m
   use extended_fraction_m, only: extend_fraction
   use fluid_transport_m, only: fluid_transport_t, fluid_transport_init, carry_fluid, span_t
   use mixture_m, only: mix_fluid
-  use outflow_m, only: outflow_init, start_outflow, update_outflow
+  use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_init
+  use rigid_body_m, only: blocks_init, fastest_point
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use contacts_m, only: contacts_init, contact_report_t, move_blocks
@@ -114,7 +114,7 @@ contains
     call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
   end subroutine simulation_init
 
-  !> What follows from the state after it was read: solids in the grid, density, halos.
+  !> What follows from the state after it was read: solids in the grid, density, halos, outflows.
   subroutine resume(sim)
     type(simulation_t), intent(inout) :: sim
 
@@ -127,6 +127,8 @@ contains
     call fill_scalar_halo(sim%grid, sim%flow%room)
     call fill_scalar_halo(sim%grid, sim%flow%c)
     call mix_fluid(sim%case%fluid, sim%flow)
+    call resume_outflow(sim%grid, sim%case%fluid, sim%clock%dt, sim%flow%c, sim%flow%uf, &
+                        sim%flow%sides)
   end subroutine resume
 
   !> Advance by one step.
@@ -194,8 +196,7 @@ contains
     do b = 1, sim%blocks%n
       if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
       any_free = .true.
-      speed = max(speed, norm2(sim%blocks%v(:, b)) + norm2(sim%blocks%omega(:, b)) &
-                         *sim%blocks%shapes(sim%blocks%shape(b))%radius)
+      speed = max(speed, fastest_point(sim%blocks, b))
     end do
     call sim%clock%note_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return

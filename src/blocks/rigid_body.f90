@@ -17,7 +17,7 @@ module rigid_body_m
   private
   public :: blocks_t, blocks_init, release_body
   public :: begin_step, drift, kick, hold_sleepers, set_velocity_after_fluid
-  public :: space_tensor, kinetic_energy, potential_energy
+  public :: space_tensor, kinetic_energy, potential_energy, fastest_point
 
   !> Given rates: (3, n) velocity [m/s], and spin, space frame [rad/s].
   type :: given_t
@@ -313,5 +313,16 @@ contains
       energy = energy - blocks%mass(b)*dot_product(gravity, blocks%x(:, b))
     end do
   end function potential_energy
+
+  !> Bound of the speed of all points of body b: that of the centre, and by rotation that of the
+  !! point furthest from it [m/s].
+  pure function fastest_point(blocks, b) result(speed)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b
+    real(wp) :: speed
+
+    speed = norm2(blocks%v(:, b)) &
+            + norm2(blocks%omega(:, b))*blocks%shapes(blocks%shape(b))%radius
+  end function fastest_point
 
 end module rigid_body_m

@@ -5,7 +5,7 @@ module substep_limits_m
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_is_near
+  use bed_m, only: bed_is_near, bed_place
   use neighbours_m, only: pair_list_t
   use touching_m, only: touching_t
   use contact_response_m, only: impact_turn
@@ -69,9 +69,9 @@ contains
 
     limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(touching))
     if (touching%exact) then
-      near = fastest_near(blocks, limits%reach, touching%surface%near)
+      near = fastest_near(blocks, limits, touching%surface%near)
     else
-      near = fastest_near(blocks, limits%reach, touching%spheres%near)
+      near = fastest_near(blocks, limits, touching%spheres%near)
     end if
     fastest = 0.0_wp
     do b = 1, blocks%n
@@ -90,10 +90,11 @@ contains
     if (.not. speed*limit <= limits%clear) limit = limits%clear/speed
   end function substep_limit
 
-  !> Highest relative speed of any two points of listed pairs of bodies [m/s].
-  pure function fastest_near(blocks, reach, near) result(fastest)
+  !> Highest relative speed of any two points of pairs of bodies that are near now [m/s]. The list
+  !! holds more pairs, the more the longer it stands.
+  pure function fastest_near(blocks, limits, near) result(fastest)
     type(blocks_t), intent(in) :: blocks
-    real(wp), intent(in) :: reach(:)         !! (bodies) [m]
+    type(limits_t), intent(in) :: limits
     type(pair_list_t), intent(in) :: near
     real(wp) :: fastest
     real(wp) :: speed
@@ -101,7 +102,9 @@ contains
 
     fastest = 0.0_wp
     do p = 1, near%n
-      associate (a => near%a(p), b => near%b(p))
+      associate (a => near%a(p), b => near%b(p), reach => limits%reach)
+        if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
+            > reach(a) + reach(b) + limits%clear) cycle
         speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
           + norm(blocks%omega(:, b))*reach(b)
       end associate
@@ -114,6 +117,7 @@ contains
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: x(3), reach   !! [m]
     logical :: yes
+    real(wp) :: place(3)
     integer :: w
 
     yes = .true.
@@ -121,7 +125,9 @@ contains
       if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
     end do
     yes = walls%bed%there
-    if (yes) yes = bed_is_near(walls%bed, x - reach, x + reach)
+    if (.not. yes) return
+    place = bed_place(walls%bed, x)
+    yes = bed_is_near(walls%bed, place - reach, place + reach)
   end function near_wall
 
   !> Longest substep the present touches allow [s].

@@ -21,7 +21,7 @@ module outflow_m
   use parallel_m, only: global_max
   implicit none
   private
-  public :: outflow_t, outflow_init, start_outflow, update_outflow
+  public :: outflow_t, outflow_init, start_outflow, update_outflow, resume_outflow
   public :: reach, side_reach, pressure_outside, mean_velocity
 
   real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
@@ -125,12 +125,41 @@ contains
           if (side%memory > 0.0_wp) then
             side%mean = side%mean + dt/(side%memory + dt)*side%c*(side%velocity - side%mean)
           end if
-          side%impulse = dt*side%c*fluid%liquid_density*side%celerity
-          call set_pressure(grid, fluid, side)
+          call set_outside(grid, fluid, dt, side)
         end associate
       end do
     end do
   end subroutine update_outflow
+
+  !> What is outside the sides after a step of dt, from the state that it left.
+  subroutine resume_outflow(grid, fluid, dt, c, uf, sides)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(outflow_t), intent(inout) :: sides(2, 3)   !! with their mean velocities
+    integer :: s, d
+
+    do d = 1, 3
+      do s = 1, 2
+        if (.not. sides(s, d)%active) cycle
+        call gather(grid, s, d, c, uf, sides(s, d))
+        call set_outside(grid, fluid, dt, sides(s, d))
+      end do
+    end do
+  end subroutine resume_outflow
+
+  !> Pressure outside a side, and what a velocity beyond the mean adds to it in a step of dt.
+  pure subroutine set_outside(grid, fluid, dt, side)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: dt   !! [s]
+    type(outflow_t), intent(inout) :: side
+
+    side%impulse = dt*side%c*fluid%liquid_density*side%celerity
+    call set_pressure(grid, fluid, side)
+  end subroutine set_outside
 
   !> Liquid shares and outward velocities of a side, from the processes that touch it.
   subroutine gather(grid, s, d, c, uf, side)

@@ -13,13 +13,16 @@ module output_m
   use bed_m, only: bed_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use output_folder_m, only: check_folder, prepare_folder, continue_folder, folder_of
+  use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
   use plain_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, row_t, make_row
-  use write_run_m, only: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
-  use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, write_field_frame
-  use write_vtkhdf_m, only: block_file_t, create_block_file, reopen_block_file, write_block_frame
+  use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
+    write_row, close_run_file
+  use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, &
+    continue_field_file, write_field_frame
+  use write_vtkhdf_m, only: block_file_t, create_block_file, reopen_block_file, &
+    continue_block_file, write_block_frame
   use restart_m, only: write_restart
   use progress_m, only: progress_t, progress_start, line_due, write_line, write_summary
   implicit none
@@ -155,38 +158,47 @@ contains
     call output%block_file%file%close()
   end subroutine close_files
 
-  !> Open the files of the run that goes on.
+  !> Open the files of the run that goes on, and change them once all are found good.
   subroutine continue_files(options, state, output)
     type(options_t), intent(in) :: options
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
     integer :: up_to_date(2)
+    logical :: frames
 
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//run_name, output%text, output%parameters, state%clock, &
-                         state%blocks, output%run_file)
-    if (output%fluid) call continue_fields(state, output)
-    if (state%blocks%n > 0) call continue_surfaces(state, output)
+    frames = state%clock%n_frames > 0
+    call reopen_run_file(output%folder//run_name, state%clock, state%blocks, output%run_file)
+    if (frames .and. output%fluid) call reopen_field_file(output%folder//field_name, state%clock, &
+                                                          output%field_file)
+    if (frames .and. state%blocks%n > 0) call reopen_block_file(output%folder//block_name, &
+      state%blocks, state%clock, output%block_file)
+    call look_for_trouble(output)
+    if (output%code /= exit_ok) return
+    call continue_run_file(output%text, output%parameters, output%run_file)
+    if (output%fluid) call continue_fields(frames, state, output)
+    if (state%blocks%n > 0) call continue_surfaces(frames, state, output)
     up_to_date = 0
     if (output%run_file%up_to_date) up_to_date(1) = 1
     if (output%field_file%up_to_date .or. output%block_file%up_to_date) up_to_date(2) = 1
     call broadcast(up_to_date)   ! only the root process knows about its own files
     if (up_to_date(1) == 1) output%row_step = state%clock%step
     if (up_to_date(2) == 1) output%frame_step = state%clock%step
-    if (folder_of(options%restart)//restart_name(1) == options%restart) output%next_restart = 2
+    if (index('/'//options%restart, restart_name(1)) > 0) output%next_restart = 2
     output%restart_step = state%clock%step
   end subroutine continue_files
 
   !> Go on with the frames of the fluid; without any so far the file begins now, and where no more
   !! are wanted it only loses the later ones.
-  subroutine continue_fields(state, output)
+  subroutine continue_fields(frames, state, output)
+    logical, intent(in) :: frames   !! there are some
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (state%clock%n_frames > 0) then
-      call reopen_field_file(output%folder//field_name, state%grid, state%clock, output%field_file)
+    if (frames) then
+      call continue_field_file(state%grid, output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
       call create_field_file(output%folder//field_name, state%grid, output%field_file)
@@ -194,13 +206,13 @@ contains
   end subroutine continue_fields
 
   !> The same for the frames of the blocks.
-  subroutine continue_surfaces(state, output)
+  subroutine continue_surfaces(frames, state, output)
+    logical, intent(in) :: frames   !! there are some
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (state%clock%n_frames > 0) then
-      call reopen_block_file(output%folder//block_name, state%blocks, state%clock, &
-                             output%block_file)
+    if (frames) then
+      call continue_block_file(output%block_file)
       if (.not. output%surfaces) call output%block_file%file%close()
     else if (output%surfaces) then
       call create_block_file(output%folder//block_name, state%blocks, output%block_file)
@@ -322,19 +334,21 @@ contains
     type(row_t) :: row
     type(traffic_t) :: traffic
     integer :: code
+    logical :: row_wanted, frame_wanted
 
     if (output%code == exit_ok) then
       call total_traffic(state%clock%step - output%progress%first_step, traffic)
       call make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
-      if (output%row_step /= state%clock%step) then
-        call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
-        if (state%clock%row_due()) call state%clock%row_done()
-      end if
-      if (output%frame_step /= state%clock%step) then
-        call write_frames(state, output)
-        if (state%clock%frame_due()) call state%clock%frame_done()
-      end if
+      row_wanted = output%row_step /= state%clock%step
+      frame_wanted = output%frame_step /= state%clock%step
+      if (row_wanted) call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
+      if (frame_wanted) call write_frames(state, output)
+      call look_for_trouble(output)
+    end if
+    if (output%code == exit_ok) then   ! the state that is saved counts what is there
+      if (row_wanted .and. state%clock%row_due()) call state%clock%row_done()
+      if (frame_wanted .and. state%clock%frame_due()) call state%clock%frame_done()
       call write_line(output%progress, state%clock, row, state%blocks)
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
@@ -343,6 +357,7 @@ contains
     call close_files(output)
     call output%lock%release()
     call look_for_trouble(output)
+    if (output%code /= exit_ok) code = output%code
     call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
                        traffic, output%folder)
   end subroutine close_output

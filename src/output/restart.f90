@@ -129,7 +129,7 @@ contains
     end if
     call read_state(path, parameters, state, info, message)
     call move_alloc(solid, state%solid)
-    if (info == 1) message = message//other_file(path)
+    if (info == 1) message = message//'; a run cannot go on from it'//other_file(path)
     if (info /= 0) return
     if (state%clock%t_end < state%clock%t) then
       info = 2

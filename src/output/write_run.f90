@@ -19,7 +19,8 @@ module write_run_m
   use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
   implicit none
   private
-  public :: run_file_t, create_run_file, reopen_run_file, write_row, close_run_file
+  public :: run_file_t, create_run_file, reopen_run_file, continue_run_file, write_row, &
+    close_run_file
 
   integer, parameter :: n_vectors = 7       !! columns of three numbers per block
   character(*), parameter :: vector_name(n_vectors) = [character(16) :: 'position', 'velocity', &
@@ -199,10 +200,9 @@ contains
     call file%store('/bodies/release_time', 's', blocks%release_time)
   end subroutine write_bodies
 
-  !> Open the file of a run that goes on from `clock` and drop the rows later than that.
-  subroutine reopen_run_file(path, text, parameters, clock, blocks, self)
+  !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
+  subroutine reopen_run_file(path, clock, blocks, self)
     character(*), intent(in) :: path
-    character(*), intent(in) :: text, parameters   !! the case as it is now
     type(clock_t), intent(in) :: clock
     type(blocks_t), intent(in) :: blocks
     type(run_file_t), intent(out) :: self
@@ -223,15 +223,25 @@ contains
         call file%open_column('/series/'//trim(column_name(c)), file_real64, self%series(c))
       end do
       call file%count_rows(self%time, clock%n_rows, clock%t, self%rows, self%up_to_date)
-      call file%make_room(room_for_change + 2*(len(text) + len(parameters)))
-      call resize_all(self)
       wall_time = 0.0_wp
       q = 0.0_wp
-      call file%read_row(self%quaternion, self%rows, q)
+      call file%read_row(self%quaternion, clock%n_rows, q)   ! the last due one: the next is like it
       call file%read_row(self%series(n_columns), self%rows, wall_time)
       self%q = reshape(q, [4, blocks%n])
       self%wall_time = wall_time(1)
       self%release_time = blocks%release_time
+    end associate
+  end subroutine reopen_run_file
+
+  !> Drop the rows later than the start of a run that goes on, and say that it does.
+  subroutine continue_run_file(text, parameters, self)
+    character(*), intent(in) :: text, parameters   !! the case as it is now
+    type(run_file_t), intent(inout) :: self
+
+    if (.not. is_root()) return
+    associate (file => self%file)
+      call file%make_room(room_for_change + 2*(len(text) + len(parameters)))
+      call resize_all(self)
       call file%rewrite('/bodies/release_time', self%release_time)
       call file%attribute('/provenance', 'namelist', text)
       call file%attribute('/provenance', 'parameters', parameters)
@@ -239,7 +249,7 @@ contains
       call file%attribute('/provenance', 'exit_status', running)
       call file%flush()
     end associate
-  end subroutine reopen_run_file
+  end subroutine continue_run_file
 
   !> Give all columns `self%rows` rows.
   subroutine resize_all(self)

@@ -19,8 +19,10 @@ module write_vtkhdf_m
   use file_room_m, only: room_for_change
   implicit none
   private
-  public :: field_file_t, create_field_file, reopen_field_file, write_field_frame
-  public :: block_file_t, create_block_file, reopen_block_file, write_block_frame
+  public :: field_file_t, create_field_file, reopen_field_file, continue_field_file, &
+    write_field_frame
+  public :: block_file_t, create_block_file, reopen_block_file, continue_block_file, &
+    write_block_frame
 
   character(*), parameter :: root = '/VTKHDF', steps = '/VTKHDF/Steps'
   integer, parameter :: n_scalars = 3
@@ -122,9 +124,8 @@ contains
   end subroutine start_steps
 
   !> Open the file of a run that goes on from `clock` and drop the later frames.
-  subroutine reopen_field_file(path, grid, clock, self)
+  subroutine reopen_field_file(path, clock, self)
     character(*), intent(in) :: path
-    type(grid_t), intent(in) :: grid
     type(clock_t), intent(in) :: clock
     type(field_file_t), intent(out) :: self
     integer :: s
@@ -141,9 +142,16 @@ contains
       end do
       call file%count_rows(self%time, clock%n_frames, clock%t, self%frames, self%up_to_date)
     end associate
+  end subroutine reopen_field_file
+
+  !> Drop the frames later than the start of a run that goes on.
+  subroutine continue_field_file(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(field_file_t), intent(inout) :: self
+
     call drop_field_frames(self)
     call make_room(grid, self)
-  end subroutine reopen_field_file
+  end subroutine continue_field_file
 
   !> Keep the first `self%frames` frames.
   subroutine drop_field_frames(self)
@@ -442,8 +450,14 @@ contains
         self%velocity_offset)
       call file%count_rows(self%time, clock%n_frames, clock%t, self%frames, self%up_to_date)
     end associate
-    call drop_block_frames(self)
   end subroutine reopen_block_file
+
+  !> Drop the frames later than the start of a run that goes on.
+  subroutine continue_block_file(self)
+    type(block_file_t), intent(inout) :: self
+
+    if (is_root()) call drop_block_frames(self)
+  end subroutine continue_block_file
 
   !> Keep the first `self%frames` frames.
   subroutine drop_block_frames(self)

@@ -1,0 +1,211 @@
+"""What a run keeps that goes on from a restart file: its bits, its other restart file, its results
+where it is refused; and how a run ends."""
+
+import random
+import resource
+import signal
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from run_cases import CASES, ROOT
+from same_bits import differences
+
+MICS = ROOT / "mics"
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+WET = """&run t_end = {t_end}  dt = 0.01  restart_interval = 0.01  field_interval = 0.01 /
+&grid cells = 8, 8, 8  length = 1, 1, 1 /
+&fluid water_level = 0.5 /
+"""
+BLOCK = """mics-shape 1
+points 4
+0 0 0  {size} 0 0  0 {size} 0  0 0 {size}
+tets 1
+1 2 3 4
+"""
+
+
+def mics(work: Path, case: str, *words: str, folder: str = ".", **settings) -> tuple[int, str]:
+    """Write the case, run it from a folder; exit code and messages."""
+    (work / "case.nml").write_text(case)
+    done = subprocess.run(
+        [str(MICS), "--threads", "1", "--quiet", *words, str(work / "case.nml")],
+        cwd=work / folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        **settings,
+    )
+    return done.returncode, done.stderr
+
+
+def numbers(path: Path) -> dict[str, np.ndarray]:
+    """Time, forces and steps of every row, and how the run ended."""
+    with h5py.File(path / "run.h5") as h5:
+        return {
+            "exit_status": np.ravel(h5["provenance"].attrs["exit_status"]),
+            "finished": np.ravel(h5["provenance"].attrs["finished"]),
+            "time": h5["series/time"][:],
+            "transport_parts": h5["series/transport_parts"][:],
+            "quaternion": h5["bodies/quaternion"][:],
+        }
+
+
+def go_on(tmp_path: Path, case: str) -> list[str]:
+    """What differs after going on from the older of two restart files, in a copy."""
+    assert mics(tmp_path, case, "--output", "whole") == (0, "")
+    files = sorted((tmp_path / "whole").glob("restart-?.h5"), key=lambda p: p.stat().st_mtime_ns)
+    assert len(files) == 2
+    older = f"whole/{files[0].name}"
+    assert mics(tmp_path, case, "--restart", older, "--output", "again") == (0, "")
+    found = differences(tmp_path / "whole", tmp_path / "again")
+    return [line for line in found if not line.startswith("restart-")]
+
+
+@pytest.mark.parametrize("coupling", ["monolithic", "mics"])
+def test_outflow_with_the_predictor_of_the_paper(coupling: str, tmp_path: Path) -> None:
+    """It asks for what is outside the tank at the start of a step."""
+    case = (CASES / "ranks" / "current.nml").read_text()
+    case += f"&numerics momentum = 'c_ismac'  coupling = '{coupling}' /\n"
+    assert go_on(tmp_path, case) == []
+
+
+def test_fast_small_blocks(tmp_path: Path) -> None:
+    """Where blocks are as fast as contact follows, which of them are near limits the substep."""
+    chance = random.Random(2)
+    first = chance.choice([0.05, 0.06, 0.07, 0.08])
+    case = f"""&run physics = 'dry'  t_end = 0.16  dt = 0.004  restart_interval = {first} /
+    &grid cells = 8, 8, 8  length = 0.1, 0.1, 0.4 /
+    &shape name = 'a'  kind = 'cube'  size = 0.005 /
+    """
+    places: list[list[float]] = []
+    while len(places) < 40:
+        place = [chance.uniform(*ends) for ends in ((0.01, 0.09), (0.01, 0.09), (0.05, 0.35))]
+        if all(np.linalg.norm(np.subtract(place, other)) > 0.0095 for other in places):
+            places.append(place)
+    for x, y, z in places:
+        u, v, w, spin = (chance.uniform(*ends) for ends in ((-1, 1), (-1, 1), (-3, 0), (-30, 30)))
+        case += f"&body shape = 'a'  position = {x:.6f}, {y:.6f}, {z:.6f}\n"
+        case += f"  velocity = {u:.4f}, {v:.4f}, {w:.4f}  angular_velocity = {spin:.2f}, 0, 5 /\n"
+    assert go_on(tmp_path, case) == []
+
+
+def test_another_shape_file_is_refused(tmp_path: Path) -> None:
+    case = """&run physics = 'dry'  t_end = 0.04  dt = 0.01  restart_interval = 0.02 /
+    &grid cells = 8, 8, 8  length = 1, 1, 1 /
+    &shape name = 'a'  kind = 'file'  file = 'block.txt' /
+    &body shape = 'a'  position = 0.5, 0.5, 0.5 /
+    """
+    (tmp_path / "block.txt").write_text(BLOCK.format(size=0.1))
+    assert mics(tmp_path, case) == (0, "")
+    (tmp_path / "block.txt").write_text(BLOCK.format(size=0.2))
+    code, said = mics(tmp_path, case, "--restart", "mics-out/restart-a.h5")
+    assert code == 2, said
+    assert "checksum of the shape a" in said
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"), [("mics-out", "restart-a.h5"), (".", "mics-out//restart-a.h5")]
+)
+def test_the_file_that_a_run_goes_on_from_stays(folder: str, name: str, tmp_path: Path) -> None:
+    """Its first restart file takes the place of the other one."""
+    assert mics(tmp_path, WET.format(t_end=0.02)) == (0, "")
+    good = (tmp_path / "mics-out" / "restart-a.h5").read_bytes()
+    longer = WET.format(t_end=0.03).replace("restart_interval = 0.01", "restart_interval = 1")
+    assert mics(tmp_path, longer, "--restart", name, folder=folder) == (0, "")
+    assert (tmp_path / "mics-out" / "restart-a.h5").read_bytes() == good
+
+
+@pytest.mark.parametrize("lost", ["fields.vtkhdf", "run.h5"])
+def test_refused_results_stay_as_they_are(lost: str, tmp_path: Path) -> None:
+    """A file is missing or has lost rows: no other one is changed."""
+    case = WET.format(t_end=0.03)
+    assert mics(tmp_path, case) == (0, "")
+    out = tmp_path / "mics-out"
+    (out / lost).rename(out / "away")
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    code, said = mics(tmp_path, case, "--restart", "mics-out/restart-b.h5")
+    assert code == 4, said
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    (out / "away").rename(out / lost)
+    assert mics(tmp_path, case, "--restart", "mics-out/restart-b.h5") == (0, "")
+
+
+def test_rows_of_every_step_wanted_later(tmp_path: Path) -> None:
+    """The first of them is of the first step, not of the time of the restart file."""
+    case = WET.format(t_end=0.04).replace("&run", "&run history_interval = 0.04 ")
+    assert mics(tmp_path, case) == (0, "")
+    case = case.replace("history_interval = 0.04", "history_interval = 0")
+    assert mics(tmp_path, case, "--restart", "mics-out/restart-a.h5") == (0, "")
+    found = numbers(tmp_path / "mics-out")
+    assert found["time"] == pytest.approx([0.0, 0.04])
+    assert (found["transport_parts"][1:] > 0).all()
+
+
+def test_attitude_after_a_stop_between_rows(tmp_path: Path) -> None:
+    """q and -q are one attitude; which of them is written follows the rows that are due."""
+    case = """&run physics = 'dry'  t_end = {t_end}  dt = 0.01  history_interval = 1 /
+    &grid cells = 8, 8, 8  length = 1, 1, 1 /
+    &shape name = 'a'  kind = 'cube'  size = 0.1 /
+    &body shape = 'a'  position = 0.5, 0.5, 0.5  angular_velocity = 0, 0, 4  fixed = .true. /
+    """
+    whole = case.format(t_end=3)
+    assert mics(tmp_path, whole, "--output", "whole") == (0, "")
+    assert mics(tmp_path, case.format(t_end=0.6), "--output", "parts") == (0, "")
+    assert mics(tmp_path, whole, "--restart", "parts/restart-a.h5") == (0, "")
+    one, two = (numbers(tmp_path / name)["quaternion"] for name in ("whole", "parts"))
+    assert one.shape == two.shape == (4, 1, 4)
+    assert np.abs(one - two).max() < 1e-6
+
+
+def test_no_room_for_the_last_frame(tmp_path: Path) -> None:
+    """A limit stands for a full disk: the results say that the run did not end well."""
+    case = """&run physics = 'dry'  t_end = 0.01  dt = 0.01  field_interval = 0.03 /
+    &grid cells = 8, 8, 8  length = 10, 10, 10 /
+    &shape name = 'a'  kind = 'hexapod'  size = 0.1  refinement = 3 /
+    """
+    case += "".join(
+        f"&body shape = 'a'  position = {x}, {y}, 5 /\n" for x in range(1, 9) for y in range(1, 9)
+    )
+    assert mics(tmp_path, case, "--output", "free") == (0, "")
+    sizes = {path.name: path.stat().st_size for path in (tmp_path / "free").iterdir()}
+    frames = sizes.pop("blocks.vtkhdf")
+    assert max(sizes.values()) < frames // 2
+    codes = set()
+    for percent in range(80, 135, 5):
+
+        def no_room(limit: int = frames * percent // 100) -> None:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+        folder = f"full{percent}"
+        code, said = mics(tmp_path, case, "--output", folder, preexec_fn=no_room)
+        assert (code == 4) == ("blocks.vtkhdf" in said)
+        assert numbers(tmp_path / folder)["exit_status"] == code
+        codes.add(code)
+    assert codes == {0, 4}
+
+
+def test_nothing_left_to_stop(tmp_path: Path) -> None:
+    """The time that is given is over with the last step: the run has reached its end."""
+    case = WET.format(t_end=0.01).replace("8, 8, 8", "96, 96, 96")
+    assert mics(tmp_path, case, "--max-wall", "0:00:01") == (0, "")
+
+
+def test_only_up_is_open_to_fall_back_from(tmp_path: Path) -> None:
+    """With gravity a little aslant a block that leaves by a side has left."""
+    case = """&run physics = 'dry'  t_end = 1  dt = 0.01 /
+    &grid cells = 8, 8, 8  length = 1, 1, 1 /
+    &boundary x_min = 'inflow'  x_min_velocity = 0.1, 0, 0  x_max = 'outflow' /
+    &fluid gravity = -0.5, 0, -9.8  water_level = 0.5 /
+    &shape name = 'a'  kind = 'cube'  size = 0.1 /
+    &body shape = 'a'  position = 0.5, 0.5, 0.8  velocity = 1.5, 0, 0 /
+    """
+    code, said = mics(tmp_path, case)
+    assert code == 3
+    assert "body 1 left the tank" in said
