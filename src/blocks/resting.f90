@@ -58,7 +58,7 @@ contains
     end associate
   end subroutine wake_or_sleep
 
-  !> Let tired blocks sleep that touch something, but nothing that is moved at a given rate, and on
+  !> Let tired blocks sleep that are held up, touch nothing that is moved at a given rate, and on
   !! which the forces of a substep balance if they do not move.
   subroutine let_sleep(gravity, dt_b, contacts, blocks, changed)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -73,11 +73,11 @@ contains
     call match_springs(contacts%touching, contacts%before, contacts%springs)
     call foresee_motion(gravity, dt_b, blocks, contacts)
     call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
-    call know_touching(blocks, contacts)
+    call know_supported(blocks, contacts)
     changed = .false.
     associate (sleep => contacts%sleep, loads => contacts%loads)
       do b = 1, blocks%n
-        if (.not. (sleep%tired(b) .and. sleep%touching(b))) cycle
+        if (.not. (sleep%tired(b) .and. sleep%supported(b))) cycle
         if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
                            blocks%fluid_torque(:, b), sleep%reach(b))) cycle
@@ -113,25 +113,40 @@ contains
     end do
   end subroutine foresee_motion
 
-  !> Which blocks touch anything; those are not tired that touch what is moved at a given rate.
-  subroutine know_touching(blocks, contacts)
+  !> Which blocks are held up: they touch a wall, the bed, a body that is fixed or asleep, or others
+  !! that are held up. Those are not tired that touch what is moved at a given rate.
+  subroutine know_supported(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
+    logical :: changed
     integer :: g, a, b
 
     associate (sleep => contacts%sleep, springs => contacts%springs)
-      sleep%touching = .false.
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
-        sleep%touching(a) = .true.
         if (is_carried(blocks, contacts%touching%partners, b)) sleep%tired(a) = .false.
         if (b < 1) cycle
-        sleep%touching(b) = .true.
         if (is_carried(blocks, contacts%touching%partners, a)) sleep%tired(b) = .false.
       end do
+      sleep%supported = blocks%fixed .or. blocks%asleep
+      changed = .true.
+      do while (changed)
+        changed = .false.
+        do g = 1, springs%n
+          a = springs%a(g)
+          b = springs%b(g)
+          if (b < 1) then
+            changed = changed .or. .not. sleep%supported(a)
+            sleep%supported(a) = .true.
+          else if (sleep%supported(a) .neqv. sleep%supported(b)) then
+            changed = .true.
+            sleep%supported([a, b]) = .true.
+          end if
+        end do
+      end do
     end associate
-  end subroutine know_touching
+  end subroutine know_supported
 
   !> Whether a partner is moved at a given rate.
   pure function is_carried(blocks, partners, b) result(yes)

@@ -30,7 +30,7 @@ module sleep_m
     type(springs_t) :: rest                    !! touches at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
-    logical, allocatable :: tired(:), touching(:), chosen(:)   !! (n), (n), (springs) work
+    logical, allocatable :: tired(:), supported(:), chosen(:)   !! (n), (n), (springs) work
   end type sleep_t
 
 contains
@@ -44,7 +44,7 @@ contains
     sleep%active = active
     sleep%reach = reach
     allocate (sleep%quiet(size(reach)), source=0.0_wp)
-    allocate (sleep%tired(size(reach)), sleep%touching(size(reach)), source=.false.)
+    allocate (sleep%tired(size(reach)), sleep%supported(size(reach)), source=.false.)
     allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
     call reserve_springs(1, sleep%rest)
   end subroutine sleep_init

@@ -35,7 +35,7 @@ contains
       'how long such an impact lasts; shorter makes blocks stiffer', example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
       //'with law = ''constants'', of each pair of spheres', example='2e5')
-    call v%real('gamma_n', contact%gamma_n, positive('-'), &
+    call v%real('gamma_n', contact%gamma_n, between(1.0_wp, 10.0_wp, '-'), &
       'power of the overlap, with law = ''constants''', example='1.5')
     call v%real('eta_n', contact%eta_n, not_negative('N s/m'), &
       'damping normal to the surface, with law = ''constants''', example='5')

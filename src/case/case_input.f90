@@ -55,12 +55,12 @@ contains
     if (case%run%physics == 'fluid') call leave_out_blocks(case)
   end subroutine read_case
 
-  !> Fluid alone: the blocks that the case names are not there.
+  !> Fluid alone: the blocks that the case names and their shapes are not there.
   subroutine leave_out_blocks(case)
     type(case_t), intent(inout) :: case
 
-    deallocate (case%body, case%drop)
-    allocate (case%body(0), case%drop(0))
+    deallocate (case%shape, case%body, case%drop)
+    allocate (case%shape(0), case%body(0), case%drop(0))
   end subroutine leave_out_blocks
 
   !> Texts that the types of a case cannot give a default to.

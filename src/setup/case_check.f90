@@ -81,7 +81,6 @@ contains
     if (case%grid%faulty .or. case%boundary%faulty) return
     call check_water(case, problems)
     call check_capillary_step(case, problems)
-    if (case%run%physics == 'fluid') return
     call check_lengths(case, shapes, problems)
     call set_scene(case, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
@@ -126,13 +125,13 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(problems_t), intent(inout) :: problems
-    real(wp) :: length
+    real(wp) :: length, shortest   ! line of a shape, period [m]
     integer :: s, d
 
-    if (.not. any(case%boundary%kind(1, :) == 'periodic')) return
+    shortest = minval(case%grid%length, case%boundary%kind(1, :) == 'periodic')
     do s = 1, size(shapes)
       if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s)%name)) cycle
-      if (2*shapes(s)%radius <= 0.5_wp*minval(case%grid%length)) cycle   ! no need to look closer
+      if (2*shapes(s)%radius <= 0.5_wp*shortest) cycle   ! no need to look closer
       length = longest_line(shapes(s))
       do d = 1, 3
         if (case%boundary%kind(1, d) /= 'periodic' .or. length <= 0.5_wp*case%grid%length(d)) cycle
@@ -158,20 +157,23 @@ contains
   pure function longest_line(shape) result(length)
     type(shape_t), intent(in) :: shape
     real(wp) :: length
+    logical :: is_corner(size(shape%point, 2))
+    integer, allocatable :: corner(:)
     integer :: i, k
 
     if (shape%kind == 'sphere') then
       length = 2*shape%sphere_radius(1)
       return
     end if
+    is_corner = .false.
+    is_corner(shape%facet_point) = .true.
+    corner = pack([(i, i=1, size(is_corner))], is_corner)
     length = 0.0_wp
-    associate (corner => shape%facet_point)
-      do i = 1, size(corner)
-        do k = i + 1, size(corner)
-          length = max(length, sum((shape%point(:, corner(k)) - shape%point(:, corner(i)))**2))
-        end do
+    do i = 1, size(corner)
+      do k = i + 1, size(corner)
+        length = max(length, sum((shape%point(:, corner(k)) - shape%point(:, corner(i)))**2))
       end do
-    end associate
+    end do
     length = sqrt(length)
   end function longest_line
 
@@ -259,6 +261,7 @@ contains
         one%n = 1
         one%normal(:, 1) = scene%walls%normal(:, w)
         one%offset(1) = scene%walls%offset(w)
+        if (room_for(one, scene%two, 1, scene%overlap)) cycle
         depth = wall_depth(scene%blocks%shapes(scene%blocks%shape(b)), scene%blocks%x(:, b), &
                            scene%blocks%q(:, b), one)
         if (depth <= deepest) cycle

@@ -2,7 +2,8 @@
 module case_oddities_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
+  use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing
+  use run_groups_m, only: side_name
   use tet_mesh_m, only: shape_t
   use wave_step_m, only: gravity_step
   implicit none
@@ -27,7 +28,8 @@ contains
     if (case%fluid%gravity(3) > 0.0_wp) call oddities%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
     if (case%run%physics /= 'dry') call look_at_water(case, oddities)
-    if (case%run%physics == 'fluid') return
+    if (case%run%physics /= 'dry') call look_at_inflows(case, oddities)
+    call look_at_seeds(case, oddities)
     do s = 1, size(shapes)
       call look_at_shape(case, case%shape(s), shapes(s), oddities)
     end do
@@ -59,6 +61,46 @@ contains
     if (below .and. size(case%water) == 0) call oddities%add('&run physics', &
       trim(case%run%physics), 'without any water; give &fluid water_level or &water', case%run%line)
   end subroutine look_at_water
+
+  !> Inflows without a level, through which gas alone comes in.
+  subroutine look_at_inflows(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    integer :: s, d
+
+    if (case%fluid%single_phase .or. is_given(case%fluid%water_level)) return
+    do d = 1, 3
+      do s = 1, 2
+        if (case%boundary%kind(s, d) == 'inflow') call oddities%add_message('&boundary ' &
+          //side_name(s, d)//' = ''inflow'': only gas comes in without &fluid water_level')
+      end do
+    end do
+  end subroutine look_at_inflows
+
+  !> Random drops of the same seed: their blocks have the same shifts and turns.
+  subroutine look_at_seeds(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    integer :: i
+
+    do i = 2, size(case%drop)
+      associate (drop => case%drop(i))
+        if (.not. is_random(drop)) cycle
+        if (.not. any(case%drop(:i - 1)%seed == drop%seed .and. is_random(case%drop(:i - 1)))) cycle
+        call oddities%add('&drop seed', drop%seed, 'is that of another &drop too: their blocks ' &
+          //'have the same shifts and turns', drop%line)
+      end associate
+    end do
+  end subroutine look_at_seeds
+
+  !> Is anything of a drop left to chance?
+  elemental function is_random(drop) result(yes)
+    type(drop_input_t), intent(in) :: drop
+    logical :: yes
+
+    yes = any(abs(drop%spread) > 0.0_wp) .or. drop%orientation == 'random' &
+          .or. drop%tilt_deg > 0.0_wp
+  end function is_random
 
   !> A block too light, too large, too coarse in the grid or in its own tetrahedra.
   subroutine look_at_shape(case, input, shape, oddities)

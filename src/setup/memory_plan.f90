@@ -38,7 +38,6 @@ contains
       if (case%numerics%momentum == 'c_ismac') each = each + bytes_of_c_ismac
       bytes = bytes + each*product(int(case%grid%cells, i8) + 2*halo)
     end if
-    if (case%run%physics == 'fluid') return
     bytes = bytes + bytes_per_body*(size(case%body) + sum(int(case%drop%count, i8)))
     do s = 1, size(shapes)
       bytes = bytes + bytes_per_piece*(size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius))

@@ -285,14 +285,15 @@ contains
                    /real(max(1, n), wp))
   end function mean_spacing
 
-  !> An open edge of the surface inside the tank: the solid would end there without a surface.
+  !> An open edge of the surface inside the tank, or at a periodic side: the solid would end there
+  !! without a surface.
   subroutine check_border(case, bed, message)
     type(case_t), intent(in) :: case
     type(bed_t), intent(in) :: bed
     character(:), allocatable, intent(out) :: message
     type(shape_t) :: net
     integer, allocatable :: edge(:, :)
-    real(wp) :: p(3, 2), low(3), high(3), from, to, at(2)
+    real(wp) :: p(3, 2), low(3), high(3), slack(3), from, to, at(2)
     integer :: e, d, n, m
 
     message = ''
@@ -300,8 +301,10 @@ contains
     net%facet = [(3*m - 2, m=1, size(bed%triangle, 2) + 1)]
     net%facet_point = reshape(bed%triangle, [size(bed%triangle)])
     call pair_edges(net, edge)
-    low = case%grid%origin + round_off*case%grid%length
-    high = case%grid%origin + (1.0_wp - round_off)*case%grid%length
+    slack = round_off*case%grid%length   ! a periodic side is inside
+    where (case%boundary%kind(1, :) == 'periodic') slack = -slack
+    low = case%grid%origin + slack
+    high = case%grid%origin + case%grid%length - slack
     n = 0
     do e = 1, size(edge, 2)
       if (edge(4, e) /= 0) cycle
@@ -326,8 +329,8 @@ contains
     end do
     if (n == 0) return
     message = 'the surface has '//to_text(n)//' open edges inside the tank, one at '//message &
-      //'; it must be closed, or reach the sides of the tank, and its facets must all run ' &
-      //'counter-clockwise seen from outside'
+      //'; it must be closed, or reach the sides of the tank, have the same height at both ends ' &
+      //'of a period, and its facets must all run counter-clockwise seen from outside'
   end subroutine check_border
 
   !> From above every place of the tank must show the surface in order: into the solid, out of it.

@@ -13,7 +13,8 @@ module surface_features_m
   private
   public :: surface_init, pair_edges
 
-  real(wp), parameter :: sharp = 0.02_wp       !! sine by which facets differ at a sharp edge
+  real(wp), parameter :: sharp = 1.0e-3_wp     !! sine by which facets differ at a sharp edge: more
+    !! than by the digits of a file, less than on a smooth form that is cut finely
   real(wp), parameter :: flat_sum = 4.0_wp     !! weight of all corners of a flat face together
   real(wp), parameter :: face_sum = 1.0_wp     !! weight of all points inside a flat face
   real(wp), parameter :: inset = 0.36_wp       !! way of these points from the corner to the middle
@@ -189,7 +190,7 @@ contains
     integer, intent(in) :: edge(:, :), bend(:)    !! (4, edges), (edges)
     real(wp), intent(in) :: point_normal(:, :)    !! (3, points)
     logical, allocatable, intent(out) :: is_corner(:)  !! (points)
-    real(wp), parameter :: jut = 0.01_wp          !! sine by which edges fall away from a corner
+    real(wp), parameter :: jut = 0.5_wp*sharp     !! sine by which edges fall away from a corner
     real(wp) :: along(3)
     integer :: e, c
 
