@@ -30,15 +30,16 @@ contains
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
     type(displaced_t) :: displaced(bodies%n)
-    logical :: moved(bodies%n)
+    logical :: moved(bodies%n), rests
     real(wp) :: push
     integer :: b
 
     moved = .false.
     do b = 1, blocks%n
       push = norm2(blocks%contact_force(:, b))
-      moved(b) = blocks%present(b) .and. .not. blocks%fixed(b) .and. &
-        .not. (push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity))
+      rests = push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity) &
+              .and. blocks%contacts(b) > 0   ! and is not held by a film of lubricant
+      moved(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. rests)
     end do
     displaced = displaced_fluid(grid, fluid, solid, bodies, c, moved)
     do b = 1, blocks%n

@@ -34,6 +34,7 @@ contains
 
     if (case%numerics%coupling == 'monolithic') then
       call find_trend(dt, dt_before, blocks, stage)
+      stage%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
       call find_links_before(grid, solid, stage)
     end if
     if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
@@ -115,7 +116,6 @@ contains
       call set_velocity()
       call overlay_bodies(grid, solid, flow, stage, report)
     else
-      stage%late(:, :blocks%n) = blocks%late_force
       call monolithic_stage(case, grid, solid, dt, flow, stage, report)
       blocks%late_force = stage%late(:, :blocks%n)
       call set_velocity()

@@ -42,17 +42,23 @@ contains
       !! [m/s]
     real(wp), intent(inout) :: to_wall(:, :)
       !! (3, wall cells) momentum that the wall bears at own films, added to [kg m/s]
-    real(wp) :: matrix(3, 3), given(3), t(3, 3), wall(3), part
+    real(wp) :: matrix(3, 3), given(3), part
     real(wp) :: excess(3, self%n_films)   !! of a film over the mean that its masters make it
+    real(wp) :: t(3, 3, masters_at_most, self%n_films), wall(3, masters_at_most, self%n_films)
+      !! T and (1 - T) U_w of the parts of films
     integer :: g, m, d, n
 
-    !$omp parallel do private(given) schedule(static)
+    !$omp parallel do private(n, given) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m)) cycle
-      call film_velocity(grid, self, m, bodies, u, given)
+      do n = 1, masters_at_most
+        if (self%master(n, m) == 0) cycle
+        call profile(grid, self, [m, n], bodies, t(:, :, n, m), wall(:, n, m))
+      end do
+      given = film_velocity(grid, self, m, t(:, :, :, m), wall(:, :, m), u)
       excess(:, m) = before(:, m) - given
     end do
-    !$omp parallel do private(matrix, given, t, wall, part, m, d) schedule(static)
+    !$omp parallel do private(matrix, given, part, m, d) schedule(static)
     do g = 1, self%n_groups
       associate (leader => self%leader(g), c => self%cell(:, self%leader(g)))
         matrix = 0.0_wp
@@ -61,12 +67,12 @@ contains
         end do
         given = 0.0_wp
         do m = self%first(g), self%first(g + 1) - 1
-          call profile(grid, self, self%part(:, m), bodies, t, wall)
-          associate (film => self%part(1, m))
-            part = self%share(self%part(2, m), film)*mass(film)
+          associate (film => self%part(1, m), which => self%part(2, m))
+            part = self%share(which, film)*mass(film)
             given = given + part*to_master(self, self%part(:, m), excess(:, film))
             do d = 1, 3
-              matrix(:, d) = matrix(:, d) + part*to_master(self, self%part(:, m), t(:, d))
+              matrix(:, d) = matrix(:, d) &
+                             + part*to_master(self, self%part(:, m), t(:, d, which, film))
             end do
           end associate
         end do
@@ -75,19 +81,18 @@ contains
         end if
       end associate
     end do
-    !$omp parallel do private(given, t, wall, n) schedule(static)
+    !$omp parallel do private(given, n) schedule(static)
     do m = 1, self%n_films
       if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      call film_velocity(grid, self, m, bodies, u, given)
+      given = film_velocity(grid, self, m, t(:, :, :, m), wall(:, :, m), u)
       associate (f => self%cell(:, m))
         u(f(1), f(2), f(3), :) = given
       end associate
       do n = 1, masters_at_most
         if (self%master(n, m) == 0) cycle
-        call profile(grid, self, [m, n], bodies, t, wall)
         associate (c => self%cell(:, self%master(n, m)))
           given = u(c(1), c(2), c(3), :) - before(:, self%master(n, m))
-          given = excess(:, m) - matmul(t, given)
+          given = excess(:, m) - matmul(t(:, :, n, m), given)
         end associate
         to_wall(:, m) = to_wall(:, m) &
                         + self%share(n, m)*mass(m)*(given - to_master(self, [m, n], given))
@@ -108,25 +113,24 @@ contains
   end function to_master
 
   !> Velocity of a film by those of its masters [m/s].
-  pure subroutine film_velocity(grid, self, film, bodies, u, velocity)
+  pure function film_velocity(grid, self, film, t, wall, u) result(velocity)
     type(grid_t), intent(in) :: grid
     type(linked_cells_t), intent(in) :: self
     integer, intent(in) :: film
-    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: t(:, :, :), wall(:, :)   !! T and (1 - T) U_w of its parts
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(out) :: velocity(3)
-    real(wp) :: t(3, 3), wall(3)
+    real(wp) :: velocity(3)
     integer :: n
 
     velocity = 0.0_wp
     do n = 1, masters_at_most
       if (self%master(n, film) == 0) cycle
-      call profile(grid, self, [film, n], bodies, t, wall)
       associate (c => self%cell(:, self%master(n, film)))
-        velocity = velocity + self%share(n, film)*(matmul(t, u(c(1), c(2), c(3), :)) + wall)
+        velocity = velocity + self%share(n, film)*(matmul(t(:, :, n), u(c(1), c(2), c(3), :)) &
+                                                   + wall(:, n))
       end associate
     end do
-  end subroutine film_velocity
+  end function film_velocity
 
   !> T and (1 - T) U_w of a part of a film.
   pure subroutine profile(grid, self, part, bodies, t, wall)

@@ -314,13 +314,14 @@ contains
     integer, intent(out) :: steps(3, masters_at_most)
     real(wp), intent(out) :: share(masters_at_most)
     integer :: d, f(3), i, j, k
-    real(wp) :: along
+    real(wp) :: along, way(3)
 
     do d = 1, 3
       steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
       f = c + max(steps(:, d), 0)
       share(d) = 0.0_wp
-      if (is_fluid(steps(:, d))) share(d) = solid%open(f(1), f(2), f(3), d)*abs(normal(d))
+      if (is_fluid(steps(:, d))) share(d) = solid%open(f(1), f(2), f(3), d) &
+        *(grid%area(d)/grid%area(1))*abs(normal(d))
     end do
     if (any(share > 0.0_wp)) then
       share = share/sum(share)
@@ -331,8 +332,9 @@ contains
       do j = -1, 1
         do i = -1, 1
           if (.not. is_fluid([i, j, k])) cycle
-          if (dot_product(normal, real([i, j, k], wp))/norm2(real([i, j, k], wp)) <= along) cycle
-          along = dot_product(normal, real([i, j, k], wp))/norm2(real([i, j, k], wp))
+          way = real([i, j, k], wp)*(grid%h/grid%h(1))
+          if (dot_product(normal, way)/norm2(way) <= along) cycle
+          along = dot_product(normal, way)/norm2(way)
           steps(:, 1) = [i, j, k]
           share(1) = 1.0_wp
         end do

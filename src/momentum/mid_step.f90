@@ -25,12 +25,13 @@ module mid_step_m
   use rigid_motion_m, only: rigid_motion_t
   use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces, hold_in_cells
   use carried_pressure_m, only: carry_pressure
+  use mixture_m, only: pure_share
   use parallel_m, only: halo_exchange
   implicit none
   private
   public :: mid_step_t, mid_step_init, to_mid_step
 
-  real(wp), parameter :: full = 1.0_wp - 1.0e-9_wp   !! liquid share of a cell without gas [-]
+  real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
 
   type :: mid_step_t
     logical, allocatable :: takes_part(:, :, :)    !! cells whose neighbours are all full of liquid

@@ -111,7 +111,8 @@ contains
   end subroutine cells_around
 
   !> What the pressure in plane k changes by, to second order in the way; beside a cell without
-  !! fluid by the slope on the other side.
+  !! fluid by the slope on the other side. At the sides of the tank it has no slope but by weight,
+  !! as beside a plane wall.
   pure subroutine find_change(grid, weight, alpha, takes_part, way, p, k, change)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: weight(3)   !! [N/m3]
@@ -134,6 +135,8 @@ contains
         associate (q => p(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1), w => way(i, j, k, :))
           up = [q(3, 2, 2), q(2, 3, 2), q(2, 2, 3)] - q(2, 2, 2) - weight*grid%h
           down = q(2, 2, 2) - [q(1, 2, 2), q(2, 1, 2), q(2, 2, 1)] - weight*grid%h
+          where ([i, j, k] == grid%n .and. .not. grid%periodic) up = 0.0_wp
+          where ([i, j, k] == 1 .and. .not. grid%periodic) down = 0.0_wp
           twist = 0.25_wp*[(q(2, 3, 3) - q(2, 1, 3)) - (q(2, 3, 1) - q(2, 1, 1)), &
                            (q(3, 2, 3) - q(1, 2, 3)) - (q(3, 2, 1) - q(1, 2, 1)), &
                            (q(3, 3, 2) - q(1, 3, 2)) - (q(3, 1, 2) - q(1, 1, 2))]

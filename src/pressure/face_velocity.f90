@@ -512,7 +512,7 @@ contains
       associate (u => flow%u(c(1), c(2), c(3), :))
         time = dt
         if (in_liquid(c(1), c(2), c(3))) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
-        near = near_wall(theta, n(d), solid%open(f(1), f(2), f(3), d))
+        near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
         along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
         velocity = u(d) + near*(along*(wall(d) - u(d)) &
                                      + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
@@ -534,14 +534,21 @@ contains
 
     !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
     !! centre of the cell is.
-    pure function near_wall(theta, n_d, open) result(b)
-      real(wp), intent(in) :: theta, n_d, open   !! leg [cells], normal along it, open share
+    pure function near_wall(theta, n, d, open) result(b)
+      real(wp), intent(in) :: theta, n(3), open   !! leg [cells], normal, open share
+      integer, intent(in) :: d                    !! direction of the leg
       real(wp) :: b
-      real(wp) :: cell, face   !! distances from the wall [cells]
+      real(wp) :: cell, face   !! distances from the wall [spacings along the leg]
+      real(wp) :: across       !! spacing along the face, towards the wall, over that of the leg
 
-      cell = theta*abs(n_d)
-      face = 0.5_wp*open*sqrt(max(1.0_wp - n_d**2, 0.0_wp))
-      if (open >= 1.0_wp) face = (theta - 0.5_wp)*abs(n_d)
+      associate (low => n(1 + mod(d, 3)), high => n(1 + mod(d + 1, 3)), &
+                 h_low => grid%h(1 + mod(d, 3)), h_high => grid%h(1 + mod(d + 1, 3)))
+        across = sqrt(max((low*(h_low/grid%h(d)))**2 + (high*(h_high/grid%h(d)))**2, &
+                          tiny(1.0_wp))/max(low**2 + high**2, tiny(1.0_wp)))
+      end associate
+      cell = theta*abs(n(d))
+      face = 0.5_wp*open*across*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
+      if (open >= 1.0_wp) face = (theta - 0.5_wp)*abs(n(d))
       b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
     end function near_wall
   end subroutine face_velocity_at_walls
