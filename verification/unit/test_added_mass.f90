@@ -19,6 +19,7 @@ program test_added_mass
 
   call push('a free body', 0.0_wp, 0.803_wp*displaced)
   call push('a resting body', 2.9_wp, 0.0_wp)
+  call push('a body on a film of liquid', 2.9_wp, 0.803_wp*displaced, touched=0)
   call push('an impact', 3.1_wp, 0.803_wp*displaced)
   block%blocks%mass = 0.5_wp*block%blocks%mass
   weight = 0.5_wp*weight
@@ -32,10 +33,13 @@ program test_added_mass
 contains
 
   !> Added mass of a body under a contact force of some weights.
-  subroutine push(name, weights, expected)
+  subroutine push(name, weights, expected, touched)
     character(*), intent(in) :: name
     real(wp), intent(in) :: weights, expected   !! [-], [kg]
+    integer, intent(in), optional :: touched    !! partners, default: one under a force
 
+    block%blocks%contacts = merge(1, 0, weights > 0.0_wp)
+    if (present(touched)) block%blocks%contacts = touched
     block%blocks%contact_force(:, 1) = weights*weight*[0.6_wp, 0.0_wp, 0.8_wp]
     call know_added_mass(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
                          block%blocks)
