@@ -1,6 +1,7 @@
 """Smooth forms that are cut finely touch as any other: stones on a floor, a beam on a crest; beds
 and constants that are refused, and who may sleep."""
 
+import itertools
 import subprocess
 from pathlib import Path
 
@@ -33,25 +34,22 @@ def series(work: Path, name: str) -> np.ndarray:
         return h5[name][:]
 
 
-def ellipsoid(path: Path, axes: tuple[float, float, float], rings: int) -> None:
-    """A shape file: triangles between meridians and circles of latitude, each with the centre."""
-    lat = np.linspace(0, np.pi, rings + 1)[1:-1]
-    lon = np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False)
-    grid = np.array([[np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)]
-                     for t in lat for p in lon])  # fmt: skip
-    points = np.concatenate([[[0, 0, 0], [0, 0, 1], [0, 0, -1]], grid]) * axes
-    n = len(lon)
+def ellipsoid(path: Path, axes: tuple[float, float, float], n: int) -> None:
+    """A shape file: n x n squares on each side of a cube, blown up, two triangles each, with the
+    centre."""
+    number: dict[tuple[int, ...], int] = {}
 
-    def at(i: int, j: int) -> int:
-        return 4 + i * n + j % n
+    def at(axis: int, side: int, i: int, j: int) -> int:
+        place = np.roll([side * n, 2 * i - n, 2 * j - n], axis)
+        return number.setdefault(tuple(place.tolist()), 2 + len(number))
 
     tets = []
-    for j in range(n):
-        tets.append((1, 2, at(0, j), at(0, j + 1)))
-        tets.append((1, 3, at(len(lat) - 1, j + 1), at(len(lat) - 1, j)))
-        for i in range(len(lat) - 1):
-            a, b, c, d = at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)
-            tets += [(1, a, c, d), (1, a, d, b)]
+    for axis, side in itertools.product(range(3), (-1, 1)):
+        for i, j in itertools.product(range(n), range(n)):
+            a, b, c, d = (at(axis, side, i + k, j + m) for k, m in ((0, 0), (1, 0), (1, 1), (0, 1)))
+            tets += [(1, a, b, c), (1, a, c, d)]
+    cube = np.tan(np.pi / 4 * np.array(list(number)) / n)
+    points = np.concatenate([[[0, 0, 0]], cube / np.linalg.norm(cube, axis=1)[:, None]]) * axes
     lines = ["mics-shape 1", f"points {len(points)}"]
     lines += [" ".join(repr(float(x)) for x in point) for point in points]
     lines += [f"tets {len(tets)}"] + [" ".join(map(str, tet)) for tet in tets]
@@ -64,11 +62,11 @@ def height_map(path: Path, z: np.ndarray, dx: float, dy: float) -> None:
     path.write_text(f"{z.shape[1]} {z.shape[0]} 0 0 {dx} {dy}\n{heights}\n")
 
 
-@pytest.mark.parametrize("rings", [12, 80])
-def test_a_stone_lies_on_the_floor(rings: int, tmp_path: Path) -> None:
-    """A flat pebble of any number of facets: at its pole 80 rings bend by half a degree only."""
-    ellipsoid(tmp_path / "pebble.txt", (0.03, 0.03, 0.009), rings)
-    case = """&run physics = 'dry'  t_end = 0.3  dt = 0.005  restart_interval = 0 /
+@pytest.mark.parametrize("squares", [6, 40])
+def test_a_stone_lies_on_the_floor(squares: int, tmp_path: Path) -> None:
+    """A flat pebble of any number of facets: the finer one bends by less than a degree."""
+    ellipsoid(tmp_path / "pebble.txt", (0.03, 0.03, 0.009), squares)
+    case = """&run physics = 'dry'  t_end = 0.15  dt = 0.005  restart_interval = 0 /
     &grid cells = 8, 8, 8  length = 0.2, 0.2, 0.2 /
     &shape name = 'pebble'  kind = 'file'  file = 'pebble.txt' /
     &body shape = 'pebble'  position = 0.1, 0.1, 0.0095 /

@@ -38,7 +38,7 @@ contains
     do b = 1, blocks%n
       push = norm2(blocks%contact_force(:, b))
       rests = push > 0.0_wp .and. push <= at_rest*blocks%mass(b)*norm2(fluid%gravity) &
-              .and. blocks%contacts(b) > 0   ! and is not held by a film of lubricant
+              .and. blocks%contacts(b) > 0   ! a film of liquid alone lets nothing rest
       moved(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. rests)
     end do
     displaced = displaced_fluid(grid, fluid, solid, bodies, c, moved)

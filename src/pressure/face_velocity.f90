@@ -539,18 +539,28 @@ contains
       integer, intent(in) :: d                    !! direction of the leg
       real(wp) :: b
       real(wp) :: cell, face   !! distances from the wall [spacings along the leg]
-      real(wp) :: across       !! spacing along the face, towards the wall, over that of the leg
 
-      associate (low => n(1 + mod(d, 3)), high => n(1 + mod(d + 1, 3)), &
-                 h_low => grid%h(1 + mod(d, 3)), h_high => grid%h(1 + mod(d + 1, 3)))
-        across = sqrt(max((low*(h_low/grid%h(d)))**2 + (high*(h_high/grid%h(d)))**2, &
-                          tiny(1.0_wp))/max(low**2 + high**2, tiny(1.0_wp)))
-      end associate
       cell = theta*abs(n(d))
-      face = 0.5_wp*open*across*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
-      if (open >= 1.0_wp) face = (theta - 0.5_wp)*abs(n(d))
+      if (open >= 1.0_wp) then
+        face = (theta - 0.5_wp)*abs(n(d))
+      else
+        face = 0.5_wp*open*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
+      end if
       b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
     end function near_wall
+
+    !> Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
+    pure function spacing_across(n, d) result(ratio)
+      real(wp), intent(in) :: n(3)   !! normal of the wall
+      integer, intent(in) :: d
+      real(wp) :: ratio
+      integer :: a, b
+
+      a = 1 + mod(d, 3)
+      b = 1 + mod(d + 1, 3)
+      ratio = sqrt(max((n(a)*(grid%h(a)/grid%h(d)))**2 + (n(b)*(grid%h(b)/grid%h(d)))**2, &
+                       tiny(1.0_wp))/max(n(a)**2 + n(b)**2, tiny(1.0_wp)))
+    end function spacing_across
   end subroutine face_velocity_at_walls
 
 end module face_velocity_m

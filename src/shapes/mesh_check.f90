@@ -3,7 +3,7 @@ module mesh_check_m
   use kinds_m, only: wp
   use errors_m, only: to_text
   use polyhedron_m, only: tet_volume
-  use tet_mesh_m, only: surface_of_tets, opposite
+  use tet_mesh_m, only: surface_of_tets, chain_of, opposite
   use surface_net_m, only: edge_twins
   use neighbours_m, only: bins_t, bins_build
   implicit none
@@ -141,7 +141,7 @@ contains
     do f = 1, size(face, 2)
       face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
       face(:, f) = cshift(face(:, f), minloc(face(:, f), 1) - 1)
-      m = face(1, f)
+      m = chain_of(face(:, f), n_point)
       g = head(m)
       do while (g > 0)
         if (all(face(:, g) == face(:, f))) n = n + 1

@@ -5,7 +5,7 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, surface_of_tets, opposite, most_facet_corners
+  public :: shape_t, surface_of_tets, chain_of, opposite, most_facet_corners
 
   integer, parameter :: most_facet_corners = 48   !! of one polygon of the surface
 
@@ -47,11 +47,11 @@ contains
     integer :: f, g, m
 
     allocate (face(3, 4*size(tet, 2)), next(4*size(tet, 2)), head(n_point), single(4*size(tet, 2)))
-    head = 0       ! faces are chained by their smallest corner
+    head = 0
     single = .true.
     do f = 1, size(face, 2)
       face(:, f) = tet(opposite(:, mod(f - 1, 4) + 1), (f - 1)/4 + 1)
-      m = minval(face(:, f))
+      m = chain_of(face(:, f), n_point)
       g = head(m)
       do while (g > 0)
         if (same_corners(face(:, f), face(:, g))) then
@@ -72,6 +72,15 @@ contains
       triangle_tet(m) = (f - 1)/4 + 1
     end do
   end subroutine surface_of_tets
+
+  !> One of n chains for a face, the same in whatever order its corners are; few faces share it, even
+  !! where all tetrahedra share a point.
+  pure function chain_of(corners, n) result(chain)
+    integer, intent(in) :: corners(3), n
+    integer :: chain
+
+    chain = 1 + modulo(sum(corners), n)
+  end function chain_of
 
   pure function same_corners(a, b) result(same)
     integer, intent(in) :: a(3), b(3)

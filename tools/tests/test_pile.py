@@ -162,7 +162,7 @@ def test_no_level_without_a_rise(make_run) -> None:
 
 
 def test_two_free_blocks_from_the_start_in_the_papers_words(make_run) -> None:
-    run = make_run(Motion())
+    run = make_run(Motion(t_end=3.0, field_step=3.0, cells=(12, 4, 8)))
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/release_time"][3:5] = 0.0
     run.refresh()
