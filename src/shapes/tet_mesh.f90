@@ -73,8 +73,8 @@ contains
     end do
   end subroutine surface_of_tets
 
-  !> One of n chains for a face, the same in whatever order its corners are; few faces share it, even
-  !! where all tetrahedra share a point.
+  !> One of n chains for a face, the same in whatever order its corners are; few faces share it,
+  !! even where all tetrahedra share a point.
   pure function chain_of(corners, n) result(chain)
     integer, intent(in) :: corners(3), n
     integer :: chain
