@@ -42,7 +42,7 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(blocks_t), intent(in) :: blocks
     type(courant_rate_t) :: rate
-    real(wp) :: fluid(4), spacing
+    real(wp) :: fluid(4)
     integer :: b
 
     fluid = fluid_rates(grid, flow%uf, solid%open, flow%c)
@@ -50,10 +50,9 @@ contains
     rate%followed = fluid(1)
     rate%carried = fluid(2)
     rate%has_surface = all(fluid(3:) >= least_liquid)
-    spacing = minval(grid%h, grid%n > 1)   ! the thickness of a slice of one cell says nothing
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      rate%followed = max(rate%followed, past_wall/spacing*fastest_point(blocks, b))
+      rate%followed = max(rate%followed, past_wall/grid%least_spacing()*fastest_point(blocks, b))
     end do
     rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate

@@ -73,7 +73,7 @@ contains
       associate (dt => sim%clock%dt, v => norm2(sim%blocks%v(:, b)))
         moved = norm2(sim%blocks%x(:, b) - fault%place(:, b))
         explained = dt*(fault%speed(b) + v + dt*norm2(sim%case%fluid%gravity)) &
-          + minval(sim%grid%h, sim%grid%n > 1)
+          + sim%grid%least_spacing()
         if (moved > explained) call set(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
           //' m in a step of '//brief(dt)//' s, though its speed is '//brief(v) &
           //' m/s: its mass of '//brief(sim%blocks%mass(b))//' kg is too small for &run dt', fault)

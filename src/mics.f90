@@ -57,7 +57,9 @@ program mics
 
   call open_output(case, parameters(), options, sim%run_state_t, bed, output)
   call stop_on_trouble()
-  if (len(options%restart) == 0) call write_due_output(sim%run_state_t, report, output)
+  if (len(options%restart) == 0) then   ! else what was due has been written
+    call write_due_output(sim%run_state_t, report, output)
+  end if
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   call note_places(sim, fault)
   call count_from_here()
@@ -86,20 +88,26 @@ contains
   !> All values of the case as text, and what the files of shapes and the bed held.
   function parameters() result(text)
     character(:), allocatable :: text
-    type(checksum_t) :: checksum, none
     integer :: s
 
     text = parameters_text(case)
     do s = 1, size(shapes)
-      if (shapes(s)%kind /= 'file') cycle
-      checksum = none
-      call checksum%add_reals(size(shapes(s)%point), shapes(s)%point)
-      call checksum%add_integers(size(shapes(s)%tet), shapes(s)%tet)
-      text = text//'! checksum of the shape '//trim(shapes(s)%name)//' '//checksum%text() &
-             //new_line('a')
+      if (shapes(s)%kind == 'file') text = text//'! checksum of the shape ' &
+        //trim(shapes(s)%name)//' '//checksum_of(shapes(s))//new_line('a')
     end do
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
   end function parameters
+
+  !> A checksum of the tetrahedra of a shape.
+  function checksum_of(shape) result(text)
+    type(shape_t), intent(in) :: shape
+    character(:), allocatable :: text
+    type(checksum_t) :: checksum
+
+    call checksum%add_reals(size(shape%point), shape%point)
+    call checksum%add_integers(size(shape%tet), shape%tet)
+    text = checksum%text()
+  end function checksum_of
 
   !> The program as it was called.
   function program_name() result(name)

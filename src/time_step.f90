@@ -269,7 +269,7 @@ contains
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
       if (rate%has_surface) then
-        h = minval(sim%grid%h, sim%grid%n > 1)
+        h = sim%grid%least_spacing()
         allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
       end if
     end if

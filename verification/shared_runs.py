@@ -2,12 +2,13 @@
 
 import fcntl
 import os
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from run_cases import CASES, Machine, run
+from run_cases import CASES, ROOT, Machine, run
 
 SharedRun = Callable[[str, Machine], Path]
 
@@ -31,3 +32,19 @@ def shared_run(tmp_path_factory: pytest.TempPathFactory) -> SharedRun:
         return folder
 
     return results
+
+
+def run_text(
+    work: Path, case: str, *words: str, folder: str = ".", **settings
+) -> subprocess.CompletedProcess[str]:
+    """Write a case into a folder and run it, from there or from a folder in it, on one thread."""
+    (work / "case.nml").write_text(case)
+    return subprocess.run(
+        [str(ROOT / "mics"), "--threads", "1", *words, str(work / "case.nml")],
+        cwd=work / folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        **settings,
+    )

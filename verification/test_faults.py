@@ -1,6 +1,5 @@
 """Numbers that cannot be true end a run with code 3, a reason, and results that can be read."""
 
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 from run_cases import ROOT
+from shared_runs import run_text
 
 MICS = ROOT / "mics"
 TANK = "&grid cells = 12, 12, 12  length = 1, 1, 1 /\n"
@@ -25,15 +25,7 @@ pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 def mics(work: Path, groups: str, tank: str = TANK) -> tuple[int, str]:
     """Exit code and messages of a run."""
-    (work / "case.nml").write_text(tank + groups)
-    done = subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = run_text(work, tank + groups, "--quiet")
     return done.returncode, done.stderr
 
 

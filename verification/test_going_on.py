@@ -4,7 +4,6 @@ where it is refused; and how a run ends."""
 import random
 import resource
 import signal
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -13,6 +12,7 @@ import pytest
 
 from run_cases import CASES, ROOT
 from same_bits import differences
+from shared_runs import run_text
 
 MICS = ROOT / "mics"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -29,27 +29,17 @@ tets 1
 """
 
 
-def mics(work: Path, case: str, *words: str, folder: str = ".", **settings) -> tuple[int, str]:
-    """Write the case, run it from a folder; exit code and messages."""
-    (work / "case.nml").write_text(case)
-    done = subprocess.run(
-        [str(MICS), "--threads", "1", "--quiet", *words, str(work / "case.nml")],
-        cwd=work / folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        **settings,
-    )
+def mics(work: Path, case: str, *words: str, **settings) -> tuple[int, str]:
+    """Exit code and messages of a quiet run."""
+    done = run_text(work, case, "--quiet", *words, **settings)
     return done.returncode, done.stderr
 
 
 def numbers(path: Path) -> dict[str, np.ndarray]:
-    """Time, forces and steps of every row, and how the run ended."""
+    """Some of what the rows hold, and how the run ended."""
     with h5py.File(path / "run.h5") as h5:
         return {
             "exit_status": np.ravel(h5["provenance"].attrs["exit_status"]),
-            "finished": np.ravel(h5["provenance"].attrs["finished"]),
             "time": h5["series/time"][:],
             "transport_parts": h5["series/transport_parts"][:],
             "quaternion": h5["bodies/quaternion"][:],

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT
+from shared_runs import run_text
 
 MICS = ROOT / "mics"
 UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
@@ -27,14 +28,10 @@ def mics(
     work: Path, cells: str, *options: str, limit: float = -1, momentum: str = "conservative"
 ) -> subprocess.CompletedProcess[str]:
     """Run a case in a folder, with so many bytes of memory at most."""
-    (work / "case.nml").write_text(CASE.format(cells=cells, momentum=momentum))
-    return subprocess.run(
-        [str(MICS), "--threads", "1", *options, "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
+    return run_text(
+        work,
+        CASE.format(cells=cells, momentum=momentum),
+        *options,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(limit), -1)),
     )
 

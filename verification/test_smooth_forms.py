@@ -2,7 +2,6 @@
 and constants that are refused, and who may sleep."""
 
 import itertools
-import subprocess
 from pathlib import Path
 
 import h5py
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 from run_cases import ROOT
+from shared_runs import run_text
 
 MICS = ROOT / "mics"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -17,15 +17,7 @@ pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
 
 def mics(work: Path, case: str, *words: str) -> tuple[int, str, str]:
     """Exit code, output and messages of a run."""
-    (work / "case.nml").write_text(case)
-    done = subprocess.run(
-        [str(MICS), "--threads", "1", *words, "case.nml"],
-        cwd=work,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = run_text(work, case, *words)
     return done.returncode, done.stdout, done.stderr
 
 

@@ -45,6 +45,7 @@ module grid_m
     procedure :: side_of_face => grid_side_of_face
     procedure :: side_faces => grid_side_faces
     procedure :: side_cells => grid_side_cells
+    procedure :: least_spacing => grid_least_spacing
   end type grid_t
 
 contains
@@ -185,5 +186,14 @@ contains
     lower(d) = lower(d) - 1
     upper(d) = upper(d) - 1
   end subroutine grid_side_cells
+
+  !> Least spacing of the directions that have more than one cell [m]: the thickness of a slice says
+  !! nothing.
+  pure function grid_least_spacing(self) result(h)
+    class(grid_t), intent(in) :: self
+    real(wp) :: h
+
+    h = minval(self%h, self%n > 1)
+  end function grid_least_spacing
 
 end module grid_m

@@ -164,22 +164,22 @@ contains
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
     integer :: up_to_date(2)
-    logical :: frames
 
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    frames = state%clock%n_frames > 0
     call reopen_run_file(output%folder//run_name, state%clock, state%blocks, output%run_file)
-    if (frames .and. output%fluid) call reopen_field_file(output%folder//field_name, state%clock, &
-                                                          output%field_file)
-    if (frames .and. state%blocks%n > 0) call reopen_block_file(output%folder//block_name, &
-      state%blocks, state%clock, output%block_file)
+    if (state%clock%n_frames > 0) then
+      if (output%fluid) call reopen_field_file(output%folder//field_name, state%clock, &
+                                               output%field_file)
+      if (state%blocks%n > 0) call reopen_block_file(output%folder//block_name, state%blocks, &
+                                                     state%clock, output%block_file)
+    end if
     call look_for_trouble(output)
     if (output%code /= exit_ok) return
     call continue_run_file(output%text, output%parameters, output%run_file)
-    if (output%fluid) call continue_fields(frames, state, output)
-    if (state%blocks%n > 0) call continue_surfaces(frames, state, output)
+    if (output%fluid) call continue_fields(state, output)
+    if (state%blocks%n > 0) call continue_surfaces(state, output)
     up_to_date = 0
     if (output%run_file%up_to_date) up_to_date(1) = 1
     if (output%field_file%up_to_date .or. output%block_file%up_to_date) up_to_date(2) = 1
@@ -192,12 +192,11 @@ contains
 
   !> Go on with the frames of the fluid; without any so far the file begins now, and where no more
   !! are wanted it only loses the later ones.
-  subroutine continue_fields(frames, state, output)
-    logical, intent(in) :: frames   !! there are some
+  subroutine continue_fields(state, output)
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (frames) then
+    if (state%clock%n_frames > 0) then
       call continue_field_file(state%grid, output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
@@ -206,12 +205,11 @@ contains
   end subroutine continue_fields
 
   !> The same for the frames of the blocks.
-  subroutine continue_surfaces(frames, state, output)
-    logical, intent(in) :: frames   !! there are some
+  subroutine continue_surfaces(state, output)
     type(run_state_t), intent(in) :: state
     type(output_t), intent(inout) :: output
 
-    if (frames) then
+    if (state%clock%n_frames > 0) then
       call continue_block_file(output%block_file)
       if (.not. output%surfaces) call output%block_file%file%close()
     else if (output%surfaces) then

@@ -123,7 +123,7 @@ contains
     call file%new_column(steps//'/Values', 's', file_real64, [integer ::], chunk_frames, time)
   end subroutine start_steps
 
-  !> Open the file of a run that goes on from `clock` and drop the later frames.
+  !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
   subroutine reopen_field_file(path, clock, self)
     character(*), intent(in) :: path
     type(clock_t), intent(in) :: clock
@@ -420,7 +420,7 @@ contains
     call file%store_wide_integers(name//'/Connectivity', '1', corner)
   end subroutine write_cell_group
 
-  !> Open the file of a run that goes on from `clock` and drop the later frames.
+  !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
   subroutine reopen_block_file(path, blocks, clock, self)
     character(*), intent(in) :: path
     type(blocks_t), intent(in) :: blocks

@@ -27,8 +27,10 @@ contains
 
     if (case%fluid%gravity(3) > 0.0_wp) call oddities%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
-    if (case%run%physics /= 'dry') call look_at_water(case, oddities)
-    if (case%run%physics /= 'dry') call look_at_inflows(case, oddities)
+    if (case%run%physics /= 'dry') then
+      call look_at_water(case, oddities)
+      call look_at_inflows(case, oddities)
+    end if
     call look_at_seeds(case, oddities)
     do s = 1, size(shapes)
       call look_at_shape(case, case%shape(s), shapes(s), oddities)

@@ -38,14 +38,14 @@ def divergence(run: Run, state: State) -> Array:
     """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
     cells that have no open face but walls of the tank and so no fluid that moves."""
     h = run.grid.spacing
-    periodic = tuple(run.sides[f"{axis}_min"] == "periodic" for axis in "xyz")
     walls = {
         (d, end): run.sides[f"{axis}_{('min', 'max')[end]}"] in WALL_KINDS
         for d, axis in enumerate("xyz")
         for end in (0, 1)
     }
     data = [
-        faces(state, f"flow/{name}", run.grid, periodic) for name in ("open", "uf", "solid_flux")
+        faces(state, f"flow/{name}", run.grid, run.periodic)
+        for name in ("open", "uf", "solid_flux")
     ]
     outflow = np.zeros([len(f) - 1 for f in reversed(run.grid.faces)])
     openness = np.zeros_like(outflow)

@@ -32,15 +32,11 @@ def keep(case: Path, text: str) -> None:
 
 def checksums(text: str) -> dict[str, str]:
     """SHA-256 of each file that a case names, by its name; a path is taken from where we are."""
-    counts: dict[str, int] = {}
+    names = [name for name, _, _ in settings.groups(text)]
     found = {}
-    for name, _, _ in settings.groups(text):
-        occurrence = counts.setdefault(name, 0)
-        counts[name] += 1
-        for group, variable in _FILES:
-            if group != name:
-                continue
-            path = Path(str(settings.value(text, group, variable, occurrence) or "").strip())
+    for group, variable in _FILES:
+        for n in range(names.count(group)):
+            path = Path(str(settings.value(text, group, variable, n) or "").strip())
             if path.name and path.is_file():
                 about = path.stat()
                 found[str(path)] = _sum(path.resolve(), about.st_mtime_ns, about.st_size)

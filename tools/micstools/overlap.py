@@ -66,9 +66,9 @@ def present_bodies(run: Run, row: int) -> dict[int, Placed]:
     """The released bodies of a run at a row, by their number; with their centroids in the tank
     where a direction is periodic."""
     b = run.bodies
-    place = run.into_tank(b.position[row])
+    position = run.into_tank(b.position[row])
     return {
-        int(k): Placed(run.shapes[b.shape[k]], place[k], b.quaternion[row, k])
+        int(k): Placed(run.shapes[b.shape[k]], position[k], b.quaternion[row, k])
         for k in np.flatnonzero(b.present(row))
     }
 
@@ -88,6 +88,8 @@ def images(run: Run, bodies: Iterable[Placed]) -> list[Placed]:
 
 def nearest(run: Run, body: Placed, to: Placed) -> Placed:
     """The periodic image of a body that is nearest to another one."""
+    if not any(run.periodic):
+        return body
     way = np.zeros(3)
     for d in np.flatnonzero(run.period):
         periods = np.round((body.position[d] - to.position[d]) / run.period[d])
@@ -195,27 +197,26 @@ class Touches:
 def touches(run: Run, row: int, reach: float = 5e-4) -> Touches:
     """What is within `reach` [m]: pairs of released blocks, and they and walls or the bed."""
     bodies = present_bodies(run, row)
+    balls = {k: _stick_out(body) for k, body in bodies.items() if by_spheres(run, body)}
     blocks = {}
     for i, j in combinations(bodies, 2):
         a = bodies[i]
         b = nearest(run, bodies[j], a)
-        spheres = by_spheres(run, a) and by_spheres(run, b)
-        if near(a, b, reach + (_stick_out(a) + _stick_out(b) if spheres else 0.0)):
+        if near(a, b, reach + balls.get(i, 0.0) + balls.get(j, 0.0)):
             distance = gap(a, b)
             if distance > reach and depth(a, b) > 0:
                 distance = 0.0
-            if distance > reach and spheres:
+            if distance > reach and i in balls and j in balls:
                 distance = sphere_gap(a, b)
             if distance <= reach:
                 blocks[i, j] = distance
     gaps = _all_wall_gaps(run, bodies)
     corners, facets = run.bed
     beds = {k: bed_gap(body, corners[facets], reach) for k, body in bodies.items()}
-    for k, body in bodies.items():
-        if by_spheres(run, body):
-            around = wall_gaps(body, run.grid.low, run.grid.high, run.sides, spheres=True)
-            gaps |= {(k, side): min(g, gaps[k, side]) for side, g in around.items()}
-            beds[k] = min(beds[k], bed_gap(body, corners[facets], reach, spheres=True))
+    for k in balls:
+        around = wall_gaps(bodies[k], run.grid.low, run.grid.high, run.sides, spheres=True)
+        gaps |= {(k, side): min(g, gaps[k, side]) for side, g in around.items()}
+        beds[k] = min(beds[k], bed_gap(bodies[k], corners[facets], reach, spheres=True))
     walls = {key: g for key, g in gaps.items() if g <= reach}
     return Touches(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
 

@@ -13,7 +13,6 @@ from micstools import block_numbers, pile_numbers
 from micstools.block_numbers import BlockNumbers
 from micstools.ensemble import OUTCOMES
 from micstools.geometry import Array
-from micstools.overlap import images, present_bodies
 from micstools.pile import still_level
 from micstools.pile_numbers import PileNumbers
 from micstools.reader import BadRun, Run
@@ -151,8 +150,7 @@ def _about(path: Path) -> dict[str, Any]:
 def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
     run = Run(folder / str(row["folder"]) / "result")
     found = pile_numbers.numbers(run, step, box=box)
-    bodies = images(run, present_bodies(run, -1).values())
-    top = pile_numbers.height_map(bodies, run.grid.low, run.grid.high, step)
+    top = pile_numbers.top_of(run, step)
     return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top)
 
 

@@ -86,6 +86,12 @@ def usual_step(run: Run) -> float:
     return float((run.grid.high - run.grid.low)[:2].max()) / 300
 
 
+def top_of(run: Run, step: float, row: int = -1) -> Array:
+    """Height map of the pile of a run at a row, as the tank shows it."""
+    blocks = images(run, present_bodies(run, row).values())
+    return height_map(blocks, run.grid.low, run.grid.high, step)
+
+
 def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Array:
     """Top of the blocks (ny, nx) [m] above the middle of each square; nan where there is none."""
     n = np.maximum(1, np.round((high[:2] - low[:2]) / step).astype(int))

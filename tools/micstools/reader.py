@@ -215,10 +215,14 @@ class Run:
         return {side: kind.strip() for side, kind in kinds.items()}
 
     @cached_property
+    def periodic(self) -> tuple[bool, ...]:
+        """Which of the three directions are periodic."""
+        return tuple(self.sides[f"{axis}_min"] == "periodic" for axis in "xyz")
+
+    @cached_property
     def period(self) -> Array:
         """Length of the tank in each periodic direction (3) [m], zero in the others."""
-        periodic = [self.sides[f"{axis}_min"] == "periodic" for axis in "xyz"]
-        return np.where(periodic, self.grid.high - self.grid.low, 0.0)
+        return np.where(self.periodic, self.grid.high - self.grid.low, 0.0)
 
     def into_tank(self, place: Array) -> Array:
         """Places (..., 3) [m], which results hold unwrapped, moved by whole periods into the

@@ -119,22 +119,30 @@ height = 0.08 + 0.4 / n**2
 write_run(folder, Motion(places=[(np.array([0.2, 0.05, height]), UPRIGHT)], t_end=1.0,
                          history_step=0.05, field_step=1.0, cells=(12, 4, 8)))
 with h5py.File(folder / "run.h5", "r+") as h5:
-    h5["provenance"].attrs["exit_status"] = 0
+    h5["provenance"].attrs["exit_status"] = code = 3 if n == {broken} else 0
 print("ran", n)
+sys.exit(code)
 """
 
 
-def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
+def study_with(tmp_path: Path, broken: int = 0) -> list[str]:
+    """The words of a study with a stand-in for the program, which ends with code 3 where there are
+    so many cells."""
     program, case = tmp_path / "mics", tmp_path / "case.nml"
     tests = Path(__file__).parent
     program.write_text(
         PROGRAM.replace("{python}", sys.executable)
         .replace("{tools!r}", repr(str(tests.parent)))
         .replace("{tests!r}", repr(str(tests)))
+        .replace("{broken}", str(broken))
     )
     program.chmod(0o755)
     case.write_text("&run t_end = 1.0 /\n&grid cells = 10, 10, 10 length = 1, 1, 1 /\n")
-    words = ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out")]
+    return ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out")]
+
+
+def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
+    words = study_with(tmp_path)
     code, out, _ = call(capfd, *words, "--cells", "1,1.5,2")
     assert code == 0 and out.count("\nran ") == 3
     rows = {row["number"]: row for row in json.loads((tmp_path / "out/study.json").read_text())}
@@ -151,19 +159,7 @@ def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
 
 
 def test_a_grid_that_broke_down_is_left_out(tmp_path: Path, capfd) -> None:
-    program, case = tmp_path / "mics", tmp_path / "case.nml"
-    tests = Path(__file__).parent
-    program.write_text(
-        PROGRAM.replace("{python}", sys.executable)
-        .replace("{tools!r}", repr(str(tests.parent)))
-        .replace("{tests!r}", repr(str(tests)))
-        .replace('attrs["exit_status"] = 0', 'attrs["exit_status"] = 3 if n == 15 else 0')
-        + "sys.exit(3 if n == 15 else 0)\n"
-    )
-    program.chmod(0o755)
-    case.write_text("&run t_end = 1.0 /\n&grid cells = 10, 10, 10 length = 1, 1, 1 /\n")
-    words = ["study", str(case), "--program", str(program), "--out", str(tmp_path / "out"),
-             "--cells", "1,1.5,2"]  # fmt: skip
+    words = [*study_with(tmp_path, broken=15), "--cells", "1,1.5,2"]
     for runs in (3, 0):  # the second call makes none anew
         code, out, err = call(capfd, *words)
         assert code == 3 and out.count("\nran ") == runs

@@ -454,7 +454,7 @@ def test_only_a_bad_restart_file_throws_a_run_back(
         f"#!{sys.executable}\nimport sys\nwords = sys.argv[1:]\n"
         f"open({str(tmp_path / 'calls')!r}, 'a').write("
         "words[words.index('--restart') + 1][-4] + ' ' if '--restart' in words else 'new ')\n"
-        f"sys.exit({said!r} if False else (print({said!r}, file=sys.stderr) or {code}))\n"
+        f"print({said!r}, file=sys.stderr)\nsys.exit({code})\n"
     )
     program.chmod(0o755)
     member = ensemble.Member(1, 1, (), CASE, tmp_path / "0001")

@@ -13,7 +13,6 @@ import numpy as np
 from micstools import block_numbers, command, pile, pile_ensemble, pile_form, pile_numbers
 from micstools.commands.base import Command
 from micstools.geometry import Array
-from micstools.overlap import images, present_bodies
 from micstools.pile_ensemble import Ensemble
 from micstools.reader import BadRun
 from micstools.shares import in_words
@@ -72,9 +71,7 @@ def _of_run(given: argparse.Namespace) -> int:
         values = value if isinstance(value, tuple) else (value,)
         words = ["-" if v != v else f"{v:.5g}" for v in values]
         print(f"     {name:20}{', '.join(words)}")
-    top = pile_numbers.height_map(
-        images(run, present_bodies(run, -1).values()), run.grid.low, run.grid.high, step
-    )
+    top = pile_numbers.top_of(run, step)
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
