@@ -6,7 +6,7 @@ import pytest
 from micstools import balance, buoyancy
 from micstools.checks import Checks
 from micstools.overlap import Placed
-from micstools.reader import Grid
+from micstools.reader import Grid, Run
 from micstools.shapes import box
 
 
@@ -53,11 +53,14 @@ def test_observed_order() -> None:
     assert unknown.errors[-1] == 0.0
 
 
-class FakeRun:
-    """Grid and sides only."""
+class FakeRun(Run):
+    """Grid and sides only, and what follows from them."""
 
     grid = Grid(np.linspace(0, 0.4, 5), np.linspace(0, 0.3, 4), np.linspace(0, 0.1, 3))
     sides = {f"{a}_{e}": "no_slip" for a in "xyz" for e in ("min", "max")}
+
+    def __init__(self) -> None:
+        """No folder."""
 
 
 def linear_flow(run: FakeRun, gradient: tuple[float, float, float]) -> dict[str, np.ndarray]:
