@@ -39,6 +39,9 @@ module time_step_m
   use timers_m, only: timer, tic, toc
   implicit none
   private
+
+  real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
+
   public :: simulation_t, simulation_init, resume, take_step
 
   !> Everything that lives as long as the run.
@@ -257,7 +260,8 @@ contains
   end subroutine swap_solids
 
   !> Length of the step: `cfl_max` of liquid and blocks, `&run dt` and surface tension, or less to
-  !! land on a release or on the end.
+  !! land on a release or on the end. With fluid at most `growth_max` times the step before, whose
+  !! pressure and acceleration this one begins with.
   subroutine choose_step(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
@@ -265,6 +269,7 @@ contains
     real(wp) :: allowed, h
 
     allowed = sim%case%run%dt
+    if (sim%wet .and. sim%clock%step > 0) allowed = min(allowed, growth_max*sim%clock%dt)
     if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)

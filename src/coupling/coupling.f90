@@ -8,7 +8,7 @@ module coupling_m
   use solid_geometry_m, only: solid_geometry_t
   use face_memory_m, only: note_deviation
   use linked_cells_m, only: linked_cells_t, link_cells
-  use mid_step_m, only: to_mid_step
+  use mid_step_m, only: to_mid_step, find_liquid
   use rigid_flux_m, only: all_fluid_of_faces
   use monolithic_m, only: monolithic_stage
   use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
@@ -53,6 +53,7 @@ contains
       call keep_acceleration(grid, case%fluid%gravity, stage%whole%open, stage%rho_mixture, flow, &
                              stage)
     else
+      call find_liquid(grid, flow, stage%mid_step%takes_part)
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
     end if
     call return_surface_force(stage)

@@ -20,6 +20,7 @@ module monolithic_m
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity, face_velocity_at_walls, shorten_at_walls
+  use mid_step_m, only: keep_liquid
   use buoyancy_m, only: uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
@@ -229,11 +230,15 @@ contains
     call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
     call predict_face_velocity(grid, dt, stage%rho, stage%acceleration, flow, stage%deviation)
     if (allocated(stage%deviation)) call swap(flow%solid_flux, stage%deviation)
-    call shorten_at_walls(grid, dt, stage%bodies, stage%links%cell(:, :stage%links%n), &
-                          stage%links%body, stage%links%number, stage%mid_step%takes_part, &
-                          stage%rho, stage%acceleration, flow)
-    call face_velocity_at_walls(grid, solid, stage%foreseen, stage%links%slip, dt, &
-                                stage%mid_step%takes_part, stage%rho, stage%acceleration, flow)
+    associate (in_liquid => stage%mid_step%takes_part, compact => .not. stage%implicit_momentum)
+      call keep_liquid(grid, flow, in_liquid)   ! the surface may have come
+      if (compact) call shorten_at_walls(grid, dt, stage%bodies, &
+                                         stage%links%cell(:, :stage%links%n), stage%links%body, &
+                                         stage%links%number, in_liquid, stage%rho, &
+                                         stage%acceleration, flow)
+      call face_velocity_at_walls(grid, solid, stage%at_start, stage%foreseen, stage%links%slip, &
+                                  dt, compact, in_liquid, stage%rho, stage%acceleration, flow)
+    end associate
     call renew_acceleration(dt, flow, stage)
   end subroutine predict_faces
 

@@ -9,6 +9,11 @@
 !! that has nowhere to go in a sealed pocket; bodies that overlap) stays in its cells as an equal
 !! share of their open volume, unless the part reaches an open side, where it may exchange. With the
 !! carried volume Vt on the right the errors of one step are made good by the next.
+!!
+!! A block that lands moves other than the velocity that the last step ended with: contact stops
+!! it. Where it stands on a wall or on another block without fluid between, the fluid that followed
+!! it is too much for its band, and no flux within the band mends that. In such a step all cells of
+!! the domain are the band: the excess leaves through an open side, or a closed box shares it out.
 module open_flux_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
@@ -27,6 +32,9 @@ module open_flux_m
   public :: open_flux_t, open_flux_init, find_open_flux
 
   real(wp), parameter :: least_open = 1.0e-9_wp   !! mean open share below which a face is closed
+
+  real(wp), parameter :: excess_max = 5.0e-7_wp
+    !! of fluid that a part of the band may keep, over the cells beside it [open volumes]
 
   type :: open_flux_t
     type(solve_control_t) :: control = solve_control_t(tolerance=1.0e-12_wp, max_iterations=200)
@@ -68,7 +76,13 @@ contains
     call find_band(grid, old, new, self%band)
     if (self%band%parts == 0) return
     call find_balances(grid, new, flow%room, q, self%band)
-    call balance_parts(grid, self, balanced)
+    call sum_by_part(grid, self%band)
+    if (excess_stays(grid, flow%room, self%band)) then
+      call widen_to_domain(grid, old, new, self%band)
+      call find_balances(grid, new, flow%room, q, self%band)
+      call sum_by_part(grid, self%band)
+    end if
+    call balance_parts(self, balanced)
     if (balanced) return
     call solve_potential(self)
     call correct_flux(grid, self%band, self%solver%x, q)
@@ -278,23 +292,74 @@ contains
     end do
   end subroutine find_balances
 
+  !> Excess of fluid in a part of the band, which its cells share; none with an open side
+  !! [open volumes].
+  pure function share_of_part(band, c) result(share)
+    type(flux_band_t), intent(in) :: band
+    integer, intent(in) :: c   !! number of the part
+    real(wp) :: share
+
+    share = 0.0_wp
+    if (band%vents(c) == 0_i8) share = band%total(c)/max(band%total(band%parts + c), tiny(share))
+  end function share_of_part
+
+  !> Would a part of the band keep more or less fluid than the cells beside it have? All processes
+  !! get the same.
+  function excess_stays(grid, room, band) result(yes)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(flux_band_t), intent(in) :: band
+    logical :: yes
+    real(wp) :: share, most(1)
+    integer :: c, l, d, s, nb(3)
+
+    most = 0.0_wp
+    do c = 1, band%parts
+      if (band%vents(c) > 0_i8) cycle
+      share = share_of_part(band, c)
+      !$omp parallel do private(d, s, nb) reduction(max: most) schedule(static)
+      do l = band%first(c), band%first(c + 1) - 1
+        do d = 1, 3
+          do s = -1, 1, 2
+            nb = band%cell(:, l) + s*unit_step(:, d)
+            if (grid%beyond(nb(d), d)) cycle
+            if (band%marked(nb(1), nb(2), nb(3)) /= 0) cycle
+            most = max(most, abs(share - (room(nb(1), nb(2), nb(3))/grid%volume - 1.0_wp)))
+          end do
+        end do
+      end do
+    end do
+    call global_max(most)
+    yes = most(1) > excess_max
+  end function excess_stays
+
+  !> All cells of the domain are the band, in this step.
+  subroutine widen_to_domain(grid, old, new, band)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: old, new
+    type(flux_band_t), intent(inout) :: band
+
+    band%poses = 0
+    band%marked = 0
+    band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
+    call halo_exchange(band%marked, 1)
+    call find_conductances(grid, old%open, new%open, band)
+    call list_band(grid, band)
+    call find_parts(grid, band)
+  end subroutine widen_to_domain
+
   !> What the balances of a part without an open side sum up to is taken out of its cells in
   !! proportion to their open volume, so that closing cells still empty. Parts that balance then
   !! need no solution; all of them do if `balanced`.
-  subroutine balance_parts(grid, self, balanced)
-    type(grid_t), intent(in) :: grid
+  subroutine balance_parts(self, balanced)
     type(open_flux_t), intent(inout) :: self
     logical, intent(out) :: balanced
     integer :: c, l
     real(wp) :: share
 
     associate (band => self%band)
-      call sum_by_part(grid, band)
       do c = 1, band%parts
-        share = 0.0_wp
-        if (band%vents(c) == 0_i8) then
-          share = band%total(c)/max(band%total(band%parts + c), tiny(share))
-        end if
+        share = share_of_part(band, c)
         self%unmatched = max(self%unmatched, abs(share))
         band%largest(c) = 0.0_wp
         do l = band%first(c), band%first(c + 1) - 1

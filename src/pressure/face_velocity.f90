@@ -439,14 +439,23 @@ contains
   !! wall: taking the wall's whole velocity there makes the added mass wrong by some per cent. With
   !! it the cell's whole velocity carries up to twice what flows along the wall, and friction is too
   !! large (docs/decisions/cut_cells.md).
-  subroutine face_velocity_at_walls(grid, solid, bodies, slip, dt, in_liquid, rho, a, flow)
+  !!
+  !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
+  !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
+  !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
+  subroutine face_velocity_at_walls(grid, solid, at_start, foreseen, slip, dt, compact, in_liquid, &
+                                    rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(rigid_motion_t), intent(in) :: bodies   !! motion as far as the old pressure makes it
+    type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
+    type(rigid_motion_t), intent(in) :: foreseen   !! motion as far as the old pressure makes it
     real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of the layer along the wall, in cells with their centre in a body, 0 to 1
     real(wp), intent(in) :: dt                   !! [s]
+    logical, intent(in) :: compact
+      !! in liquid the compact acceleration counts for `compact_time`, else for dt
     logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! neither the cell nor those around it hold gas, at the start and at the end of the step
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
@@ -501,24 +510,30 @@ contains
       integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: velocity
-      real(wp) :: x_wall(3), wall(3), n(3), nu, time, near, along
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), nu, time, near, along, push
 
       nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
-      wall = wall_velocity(bodies%motion(:, body), nearest_arm(grid, x_wall, bodies%x(:, body)))
+      arm = nearest_arm(grid, x_wall, foreseen%x(:, body))
       n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
       n = n/max(norm2(n), tiny(1.0_wp))
-      associate (u => flow%u(c(1), c(2), c(3), :))
-        time = dt
-        if (in_liquid(c(1), c(2), c(3))) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
-        near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
-        along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
-        velocity = u(d) + near*(along*(wall(d) - u(d)) &
-                                     + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
-          + face_step(time, nu, sum(1.0_wp/grid%h**2))*(a%face(f(1), f(2), f(3), d) &
-                                                             - a%cell(c(1), c(2), c(3), d))
-      end associate
+      u = flow%u(c(1), c(2), c(3), :)
+      time = dt
+      if (in_liquid(c(1), c(2), c(3))) then
+        wall = wall_velocity(foreseen%motion(:, body), arm)
+        push = a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d)
+        if (compact) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
+      else
+        wall = wall_velocity(at_start%motion(:, body), arm)
+        push = a%face(f(1), f(2), f(3), d)
+        u = u - dt*a%cell(c(1), c(2), c(3), :)
+      end if
+      near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
+      along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
+      velocity = u(d) + near*(along*(wall(d) - u(d)) &
+                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
+                 + face_step(time, nu, sum(1.0_wp/grid%h**2))*push
     end function seen_from
 
     !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond

@@ -7,7 +7,7 @@ program test_face_velocity
   use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity, &
     face_velocity_at_walls, shorten_at_walls
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
-  use rigid_motion_m, only: wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -20,6 +20,8 @@ program test_face_velocity
     !! of the box [m/s, rad/s]
   real(wp), parameter :: stream(3) = [0.6_wp, -0.3_wp, 0.2_wp]       !! [m/s]
   real(wp), parameter :: dt = 0.02_wp, nu = 0.01_wp                  !! [s], [m2/s]
+  real(wp), parameter :: last(6) = [0.1_wp, -0.2_wp, 0.3_wp, -1.0_wp, 0.5_wp, 2.0_wp]
+    !! of the box when the step began [m/s, rad/s]
   real(wp), parameter :: tolerance = 1.0e-13_wp
   type(one_body_t) :: box
   type(linked_cells_t) :: links
@@ -50,6 +52,7 @@ program test_face_velocity
   in_liquid = .true.
   call short_times()
   call normal_to_the_wall()
+  call next_to_gas()
   call along_the_wall()
   call finish_checks()
 
@@ -120,6 +123,31 @@ contains
                + time(x)*(a%face(3, 4, 5, 1) - a%cell(2, 4, 5, 1)), tolerance)
   end subroutine normal_to_the_wall
 
+  !> Next to gas the old pressure, which `flow%u` has in it, acts on the face as a whole, and the
+  !! wall is that of the start of the step: whatever the cell got of it is of no account.
+  subroutine next_to_gas()
+    real(wp), parameter :: share = 0.3_wp/0.8_wp   !! of the cell's distance from the wall
+    real(wp), parameter :: x(3) = [0.57_wp, 0.35_wp, 0.45_wp]
+    real(wp) :: wall(3), expected
+
+    in_liquid(7, 4, 5) = .false.
+    wall = wall_velocity(last, x - middle)
+    expected = wall(1) + share*(stream(1) - wall(1)) &
+               + dt/(1.0_wp + 2.0_wp*nu*dt*3.0_wp/0.1_wp**2)*a%face(7, 4, 5, 1)
+    a%cell(7, 4, 5, :) = 1.0e3_wp*a%cell(7, 4, 5, :)
+    box%flow%u(7, 4, 5, :) = stream + dt*a%cell(7, 4, 5, :)
+    call at_walls()
+    call check('next to gas: by the face alone', box%flow%uf(7, 4, 5, 1), expected, 1.0e-11_wp)
+    box%flow%u(7, 4, 5, :) = stream
+    in_liquid(7, 4, 5) = .true.
+  end subroutine next_to_gas
+
+  !> The box as it moved when the step began.
+  type(rigid_motion_t) function at_start()
+    at_start = box%bodies
+    at_start%motion(:, 1) = last
+  end function at_start
+
   !> At an edge of the box at rest, taken for a plane wall: with a line to the wall the velocity of
   !! a face comes from the same component of the cell, with free slip the wall turns the rest of it.
   !! As far as it is an edge, the face has what it had.
@@ -150,8 +178,8 @@ contains
   end subroutine along_the_wall
 
   subroutine at_walls()
-    call face_velocity_at_walls(box%grid, box%solid, box%bodies, links%slip, dt, in_liquid, &
-                                box%flow%rho, a, box%flow)
+    call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, links%slip, dt, &
+                                .true., in_liquid, box%flow%rho, a, box%flow)
   end subroutine at_walls
 
   !> Velocity in x at a share of the way from the wall at x to the cell [m/s].

@@ -36,9 +36,29 @@ program test_open_flux
   call check('closed: the lower one balances', imbalance(1, 5, 0.0_wp), 0.0_wp, 2.0e-12_wp)
   call check('closed: the upper one shares it out', imbalance(6, 10, flux%unmatched), 0.0_wp, &
              2.0e-12_wp)
+
+  call start(.false.)
+  call stand_on_floor()
+  call find_open_flux(grid, old, new, dt, flow, flux, q)
+  call check('stopped by the floor: told', flux%unmatched, 0.0_wp, 0.0_wp)
+  call check('stopped by the floor: the whole tank is the band', &
+             all(flux%band%marked(1:8, 1:9, 1:10) == 1))
+  call check('stopped by the floor: balance', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
+  call check('stopped by the floor: out at the top', sum(q(1:8, 1:9, 11, 3)), &
+             -0.01_wp*0.25_wp, 1.0e-12_wp)
   call finish_checks()
 
 contains
+
+  !> A box on the floor whose top sinks by 0.01 m, in fluid at rest.
+  subroutine stand_on_floor()
+    call set_boxes(grid, reshape([0.1_wp, 0.2_wp, -1.0_wp], [3, 1]), &
+                   reshape([0.6_wp, 0.7_wp, 0.46_wp], [3, 1]), old)
+    call set_boxes(grid, reshape([0.1_wp, 0.2_wp, -1.0_wp], [3, 1]), &
+                   reshape([0.6_wp, 0.7_wp, 0.45_wp], [3, 1]), new)
+    flow%room = grid%volume*(1.0_wp - old%alpha)
+    flow%uf = 0.0_wp
+  end subroutine stand_on_floor
 
   !> A box near the open top in any flow; or a plate across a closed tank whose upper side rises.
   subroutine start(closed)
