@@ -15,6 +15,7 @@ module monolithic_m
   use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
   use viscous_legs_m, only: build_viscous
+  use wall_shear_m, only: find_wall_speeds
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
@@ -59,6 +60,7 @@ contains
     call note_velocity(grid, stage%links, flow%u, stage%balance%before)
     call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, &
                         stage%balance%before, flow%u, stage%balance%to_wall)
+    call find_wall_speeds(grid, solid, stage%at_start, flow%u, stage%wall_speed)
     associate (system => stage%pressure%system)
       call set_pressure_system(grid, solid%free, stage%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
@@ -204,7 +206,8 @@ contains
         call find_centres(grid, solid, stage%at_start, flow%u, links)
         call to_centres(grid, links, stage%at_start, flow%u)
       end if
-      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links)
+      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links, &
+                         stage%wall_speed)
       call predict_velocity(grid, stage%rho, flow, stage)
       call to_means(grid, links, stage%at_start, flow%u)
       call fill_velocity_halo(grid, flow%u, layers=1)

@@ -54,6 +54,7 @@ module velocity_stage_m
     type(mid_step_t) :: mid_step
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
+    real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
     real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
@@ -101,6 +102,7 @@ contains
       call mid_step_init(grid, stage%mid_step)
       deallocate (stage%mid_step%given)      ! borrowed when there is something to tell
       call wall_balance_init(stage%balance)
+      allocate (stage%wall_speed(0))
       allocate (stage%from_mid_step, stage%late, stage%counted, stage%trend, source=stage%total)
       allocate (stage%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     end if

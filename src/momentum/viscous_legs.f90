@@ -4,6 +4,8 @@
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
 !! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
 !! that of its group (`linked_cells_m`). A film without a master hangs on the walls alone.
+!! Where the cells are too coarse for the boundary layer, wall legs pull with the stress of a rough
+!! one instead (`wall_shear_m`).
 module viscous_legs_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
@@ -14,6 +16,7 @@ module viscous_legs_m
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_legs_t, room_for_walls, set_wall, add_side
   use film_legs_m, only: film_legs
+  use wall_shear_m, only: distance_of_legs, rough_viscosity
   use linked_cells_m, only: linked_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   use parallel_m, only: global_max
@@ -27,7 +30,7 @@ module viscous_legs_m
 contains
 
   !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
-  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, links)
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, links, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -36,6 +39,8 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
     type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
+    real(wp), intent(in), optional :: wall_speed(:)
+      !! past the walls at the ends of the legs, with `links` [m/s]; absent: no rough layers
     integer :: d, k
 
     self%dt = dt
@@ -52,7 +57,7 @@ contains
       call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d))
       call legs_to_sides(grid, solid, mu, d, self)
     end do
-    call legs_to_bodies(grid, solid, bodies, mu, self)
+    call legs_to_bodies(grid, solid, bodies, rho, mu, self, links, wall_speed)
     call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
@@ -184,14 +189,19 @@ contains
   end subroutine ordinary_legs
 
   !> Wall legs, of one or both cells of each face through which a leg meets a surface.
-  subroutine legs_to_bodies(grid, solid, bodies, mu, self)
+  subroutine legs_to_bodies(grid, solid, bodies, rho, mu, self, links, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
+      contiguous :: rho, mu
     type(viscous_t), intent(inout) :: self
+    type(linked_cells_t), intent(in), optional :: links
+    real(wp), intent(in), optional :: wall_speed(:)
+    real(wp) :: spacing
     integer :: m, f(3)
 
+    spacing = grid%volume**(1.0_wp/3.0_wp)
     self%walls%n = 2*solid%n_leg
     call room_for_walls(self%walls%n, self%walls)
     !$omp parallel do private(f) schedule(static)
@@ -210,7 +220,7 @@ contains
     subroutine wall_leg(n, c, d, theta, sense, body)
       integer, intent(in) :: n, c(3), d, sense, body
       real(wp), intent(in) :: theta   !! [cells]
-      real(wp) :: x_wall(3), t
+      real(wp) :: x_wall(3), t, viscosity
       integer :: a
 
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
@@ -220,9 +230,27 @@ contains
         x_wall(a) = grid%centre(c(a), a)
       end do
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
-      call set_wall(n, c, body, mu(c(1), c(2), c(3))*grid%area(d)/(grid%h(d)*t), &
+      viscosity = mu(c(1), c(2), c(3))
+      if (present(wall_speed)) viscosity = max(viscosity, viscosity_at_wall(n, c))
+      call set_wall(n, c, body, viscosity*grid%area(d)/(grid%h(d)*t), &
                     nearest_arm(grid, x_wall, bodies%x(:, body)), self%walls)
     end subroutine wall_leg
+
+    !> That of a rough layer, for leg n of cell c [Pa s]. A fluid without viscosity slips.
+    pure function viscosity_at_wall(n, c) result(mu_w)
+      integer, intent(in) :: n, c(3)
+      real(wp) :: mu_w
+      real(wp) :: at_centre   ! velocity there over the mean
+
+      mu_w = 0.0_wp
+      if (mu(c(1), c(2), c(3)) <= 0.0_wp .or. wall_speed(n) <= 0.0_wp) return
+      at_centre = 1.0_wp
+      associate (m => links%number(c(1), c(2), c(3)))
+        if (m > 0) at_centre = links%centre(m)
+      end associate
+      mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*wall_speed(n), &
+                             distance_of_legs(grid, solid, c), spacing)
+    end function viscosity_at_wall
   end subroutine legs_to_bodies
 
   !> Half a leg in direction d to a wall of the domain or to an inflow, which pulls the cell towards

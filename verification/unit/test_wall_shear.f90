@@ -1,0 +1,113 @@
+!> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
+program test_wall_shear
+  use kinds_m, only: wp
+  use wall_shear_m, only: find_wall_speeds, distance_of_legs, rough_viscosity
+  use viscous_legs_m, only: build_viscous
+  use viscous_system_m, only: viscous_t, viscous_init
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use rigid_motion_m, only: wall_velocity
+  use one_body_m, only: one_body_t, describe, place
+  use check_m, only: check, finish_checks
+  implicit none
+  integer, parameter :: cells(3) = 10
+  real(wp), parameter :: h = 0.1_wp
+  character(8), parameter :: sides(2, 3) = 'slip'
+  real(wp), parameter :: middle(3) = [0.39_wp, 0.35_wp, 0.45_wp]   !! of the box [m]
+  real(wp), parameter :: edges(3) = [0.36_wp, 0.46_wp, 0.46_wp]    !! x: .21 to .57 [m]
+  real(wp), parameter :: motion(6) = [0.3_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.5_wp]
+    !! of the box [m/s, rad/s]
+  real(wp), parameter :: stream(3) = [1.1_wp, 0.4_wp, -0.2_wp]     !! [m/s]
+  real(wp), parameter :: thin = 1.0e-3_wp, thick = 1.0e3_wp        !! [Pa s]
+  integer, parameter :: beside(3) = [7, 4, 5]                      !! its centre .8 h from the wall
+  type(one_body_t) :: box
+  type(linked_cells_t) :: links
+  real(wp), allocatable :: speed(:)
+  real(wp) :: rho
+  integer :: d
+
+  call describe(cells, [1.0_wp, 1.0_wp, 1.0_wp], sides, 'box', edges, middle, box%case)
+  call place(box)
+  rho = box%case%fluid%liquid_density
+  box%bodies%motion(:, 1) = motion
+  do d = 1, 3
+    box%flow%u(:, :, :, d) = stream(d)
+  end do
+  call linked_cells_init(box%grid, links)
+  call link_cells(box%grid, box%solid, links)
+  links%centre = 1.0_wp
+  allocate (speed(0))
+  call find_wall_speeds(box%grid, box%solid, box%bodies, box%flow%u, speed)
+  call law()
+  call at_one_wall()
+  call what_is_left_alone()
+  call finish_checks()
+
+contains
+
+  !> tau = rho (u/U+)^2 with U+ = ln(1 + 30 y/k_s)/0.41, k_s = 2 h: at half a cell .0367 rho u^2.
+  subroutine law()
+    real(wp) :: tau
+
+    tau = rough_viscosity(rho, 2.0_wp, 0.5_wp*h, h)*2.0_wp/(0.5_wp*h)
+    call check('stress at half a cell', tau, 0.0367_wp*rho*4.0_wp, 1.0e-4_wp*rho*4.0_wp)
+    call check('twice as fast, four times the stress', &
+               rough_viscosity(rho, 4.0_wp, 0.5_wp*h, h)*4.0_wp/(0.5_wp*h), 4.0_wp*tau, &
+               1.0e-12_wp*tau)
+    call check('farther off it pulls less', &
+               rough_viscosity(rho, 2.0_wp, h, h)*2.0_wp/h < tau)
+    call check('the cell Reynolds number at which it begins', &
+               rough_viscosity(rho, 1.0_wp, 0.5_wp*h, h)/(rho*h), 1.0_wp/54.5_wp, 1.0e-4_wp)
+  end subroutine law
+
+  !> The leg of a cell beside one wall, pulled as the cell runs past that wall.
+  subroutine at_one_wall()
+    real(wp) :: past, y
+
+    past = norm2(stream - wall_velocity(motion, (beside - 0.5_wp)*h - middle))
+    y = distance_of_legs(box%grid, box%solid, beside)
+    call check('distance from one wall', y, 0.08_wp, 1.0e-12_wp)
+    call check('a cell without walls', distance_of_legs(box%grid, box%solid, [9, 9, 9]) > 1.0e9_wp)
+    call check('pull of the leg', leg_of(beside, thin, speed), &
+               rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
+    links%centre = 0.5_wp
+    call check('by the velocity at the centre', leg_of(beside, thin, speed), &
+               0.5_wp*rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
+    links%centre = 1.0_wp
+  end subroutine at_one_wall
+
+  !> Without viscosity, where the grid is fine enough, with the block: to the bit.
+  subroutine what_is_left_alone()
+    real(wp), allocatable :: none(:)
+
+    call check('no viscosity, no stress', leg_of(beside, 0.0_wp, speed), 0.0_wp, 0.0_wp)
+    call check('a resolved layer', leg_of(beside, thick, speed), leg_of(beside, thick), 0.0_wp)
+    call check('one that is not', leg_of(beside, thin, speed) > 10.0_wp*leg_of(beside, thin))
+    allocate (none(0))
+    do d = 1, 3
+      box%flow%u(:, :, :, d) = motion(d)
+    end do
+    box%bodies%motion(6, 1) = 0.0_wp
+    call find_wall_speeds(box%grid, box%solid, box%bodies, box%flow%u, none)
+    call check('fluid that moves with the block', maxval(none(:2*box%solid%n_leg)), 0.0_wp, 0.0_wp)
+    call check('its leg', leg_of(beside, thin, none), leg_of(beside, thin), 0.0_wp)
+  end subroutine what_is_left_alone
+
+  !> Conductance of the one wall leg of a cell [kg/s].
+  real(wp) function leg_of(c, mu, wall_speed)
+    integer, intent(in) :: c(3)
+    real(wp), intent(in) :: mu   !! of the fluid [Pa s]
+    real(wp), intent(in), optional :: wall_speed(:)
+    type(viscous_t) :: viscous
+    integer :: m
+
+    box%flow%mu = mu
+    call viscous_init(box%grid, 1, viscous)
+    call build_viscous(box%grid, box%solid, box%bodies, box%flow%rho, box%flow%mu, 0.01_wp, &
+                       viscous, links, wall_speed)
+    leg_of = 0.0_wp
+    do m = 1, viscous%walls%n
+      if (all(viscous%walls%cell(:, m) == c)) leg_of = leg_of + viscous%walls%k(m)
+    end do
+  end function leg_of
+
+end program test_wall_shear
