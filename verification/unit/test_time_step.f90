@@ -1,4 +1,4 @@
-!> Whole steps: still water, length of the step, a release, a fall without fluid.
+!> Whole steps: still water, length of the step, a release, noise in gas, a fall without fluid.
 program test_time_step
   use kinds_m, only: wp
   use case_types_m, only: case_t, water_t
@@ -8,6 +8,8 @@ program test_time_step
   use liquid_fill_m, only: liquid_volume
   use diagnostics_m, only: step_report_t
   use time_step_m, only: simulation_t, simulation_init, resume, take_step
+  use boundary_m, only: fill_scalar_halo
+  use one_body_m, only: random_numbers
   use check_m, only: check, finish_checks
   implicit none
   real(wp), parameter :: g = 9.81_wp
@@ -18,8 +20,11 @@ program test_time_step
   call moved_block()
   call slice_with_odd_cells()
   call length_of_steps()
+  call growth_of_steps()
   call spinning_ball()
   call release_into_water()
+  call noise_in_gas(0.0_wp, 1.0e-3_wp)
+  call noise_in_gas(1.0_wp, 0.05_wp)
   call fall_without_fluid()
   call go_on_from_the_state()
   call finish_checks()
@@ -220,6 +225,29 @@ contains
     call check('released', sim%blocks%present(2))
   end subroutine length_of_steps
 
+  !> With fluid a step is at most twice as long as the one before, whatever the case allows.
+  subroutine growth_of_steps()
+    type(case_t) :: case
+    type(simulation_t) :: sim(2)
+    type(step_report_t) :: report
+    character(7), parameter :: physics(2) = [character(7) :: 'coupled', 'dry']
+    real(wp), parameter :: short = 1.0e-4_wp   !! [s]
+    integer :: n
+
+    do n = 1, 2
+      call tank(0, case)
+      case%run%physics = physics(n)
+      case%run%dt = short
+      call start(case, sim(n))
+      call take_step(sim(n), report)
+      call check('growth: the first step', sim(n)%clock%dt, short, 1.0e-9_wp*short)
+      sim(n)%case%run%dt = 10.0_wp*short
+      call take_step(sim(n), report)
+      call check('growth: the second, '//physics(n), sim(n)%clock%dt, merge(2, 10, n == 1)*short, &
+                 1.0e-3_wp*short)
+    end do
+  end subroutine growth_of_steps
+
   !> A ball that spins moves its surface, not the fluid; its surface speed counts all the same.
   subroutine spinning_ball()
     type(case_t) :: case
@@ -262,6 +290,65 @@ contains
                0.04_wp*0.03_wp*0.035_wp, 0.05_wp*0.04_wp*0.03_wp*0.035_wp)
     call check('release: it falls', sim%blocks%v(3, 1) < 0.0_wp)
   end subroutine release_into_water
+
+  !> The old pressure of gas is a guess that the solve replaces. Noise in it hardly changes the
+  !! velocity of a block that falls through the level, with gas in its cut cells: without viscosity
+  !! by 7e-5 of what the noise as a pressure under the block would give, by films; with it by 0.017,
+  !! as the walls rub the gas before the solve. With the old acceleration of gas in the faces at
+  !! walls it is 0.18 either way. C-ISMAC carries the noise into the liquid, and is not tried.
+  subroutine noise_in_gas(viscosity, most)
+    real(wp), intent(in) :: viscosity   !! of both fluids over that of water and air
+    real(wp), intent(in) :: most        !! change, in that unit
+    real(wp), parameter :: noise = 1.0e5_wp   !! [Pa]
+    real(wp) :: unit, change
+    type(simulation_t) :: calm, noisy
+
+    call fall_into_water(viscosity, 0.0_wp, calm)
+    call fall_into_water(viscosity, noise, noisy)
+    unit = noise*2.0_wp*1.5_wp*calm%clock%dt/calm%blocks%mass(1)
+    change = norm2(noisy%blocks%v(:, 1) - calm%blocks%v(:, 1))
+    print '(a, f4.1, es10.2)', 'noise in gas: viscosity, change ', viscosity, change/unit
+    call check('noise in gas: the block', change/unit, 0.0_wp, most)
+    call check('noise in gas: there was some', change > 0.0_wp)
+  end subroutine noise_in_gas
+
+  !> Four steps of a box of 2 m that falls through the level; before the last of them the pressure
+  !! of cells with more gas than liquid gets noise.
+  subroutine fall_into_water(viscosity, noise, sim)
+    real(wp), intent(in) :: viscosity, noise   !! over that of water and air; [Pa]
+    type(simulation_t), intent(inout) :: sim
+    type(case_t) :: case
+    type(step_report_t) :: report
+    real(wp) :: r(12)
+    integer :: seed, step, j, k
+
+    call tank(1, case)
+    case%run%dt = 0.02_wp
+    case%grid%length = 0.4_wp*case%grid%cells
+    case%shape(1)%size = [2.0_wp, 1.5_wp, 1.75_wp]
+    case%fluid%water_level = 2.452_wp
+    case%fluid%liquid_viscosity = viscosity*case%fluid%liquid_viscosity
+    case%fluid%gas_viscosity = viscosity*case%fluid%gas_viscosity
+    case%numerics%divergence_tolerance = 1.0e-9_wp
+    case%body(1)%position = [2.452_wp, 1.556_wp, 2.684_wp]
+    case%body(1)%velocity = [0.3_wp, 0.0_wp, -4.0_wp]
+    case%body(1)%angular_velocity = [0.2_wp, 0.4_wp, 0.0_wp]
+    call start(case, sim)
+    do step = 1, 3
+      call take_step(sim, report)
+    end do
+    seed = 7
+    do k = 1, 12
+      do j = 1, 8
+        call random_numbers(seed, r)
+        where (sim%flow%c(1:12, j, k) < 0.5_wp) &
+          sim%flow%p(1:12, j, k) = sim%flow%p(1:12, j, k) + noise*r
+      end do
+    end do
+    call fill_scalar_halo(sim%grid, sim%flow%p)
+    call take_step(sim, report)
+    call check('noise in gas: converged', report%pressure_converged .and. report%viscous_converged)
+  end subroutine fall_into_water
 
   !> Without fluid a block falls by g t.
   subroutine fall_without_fluid()
