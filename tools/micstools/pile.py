@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from micstools import kicks
 from micstools.geometry import attitude_change_deg, below_plane
 from micstools.overlap import overlap, present_bodies, touches
 from micstools.reader import BadRun, Run
@@ -23,7 +24,7 @@ class Finding:
     """One statement, whether the run shows it, and the figures."""
 
     statement: str
-    seen: bool
+    seen: bool | None  # None: not known
     figures: str
 
 
@@ -53,6 +54,8 @@ def findings(run: Run, paper: bool | None = None) -> list[Finding]:
     found = [at_rest(run), depth(run)]
     if is_papers_tank(run) if paper is None else paper:
         found = [turning(run), *first_block(run), walls(run), found[0], pattern(run), found[1]]
+    if kick := kicks.largest(run):
+        found.append(untouched(kick))
     if has_level(run) and (rise := water_level(run)).shows(run):
         found.append(level(rise))
     return found
@@ -281,7 +284,14 @@ def level(found: Level) -> Finding:
     return Finding(statement, abs(found.error) < LEVEL_BAND, figures)
 
 
+def untouched(kick: kicks.Largest) -> Finding:
+    """No block that touches nothing is kicked by the water."""
+    statement = f"untouched blocks under water accelerate less than {kicks.LIMIT:g} g"
+    return Finding(statement, kick.good, f"{kick} (mean of {kick.window:.2g} s)")
+
+
 def report(found: list[Finding]) -> str:
     """The findings as lines of text."""
-    lines = [f"{'yes' if f.seen else 'no ':3}  {f.statement}\n     {f.figures}" for f in found]
+    marks = {True: "yes", False: "no", None: "?"}
+    lines = [f"{marks[f.seen]:3}  {f.statement}\n     {f.figures}" for f in found]
     return "\n".join(lines)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
+from micstools import kicks
 from micstools.geometry import Array
 from micstools.reader import Run
 from micstools.scene import DROPPED
@@ -29,6 +30,8 @@ def history(run: Run) -> Figure:
     if run.bodies.n:
         panels += [_fluid_force, _contact_force] if run.field_times.size else [_contact_force]
         panels += [_overlap]
+        if np.isfinite(kicks.acceleration(run)).any():
+            panels += [_untouched]
     if np.isfinite(run.series.liquid_volume).any():
         panels += [_liquid, _divergence]
     panels += [_energies, _steps]
@@ -117,6 +120,13 @@ def _contact_force(axis: Axes, run: Run) -> None:
     force = np.linalg.norm(run.bodies.contact_force, axis=2)
     _each_block(axis, run, force, "contact force [N]")
     axis.set_yscale("symlog", linthresh=1.0)
+    axis.set_ylim(bottom=0)
+
+
+def _untouched(axis: Axes, run: Run) -> None:
+    title = "acceleration of untouched blocks under water [g], limit dashed"
+    _each_block(axis, run, kicks.acceleration(run), title)
+    axis.axhline(kicks.LIMIT, color="#d1495b", lw=0.8, ls="--")
     axis.set_ylim(bottom=0)
 
 

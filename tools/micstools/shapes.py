@@ -38,6 +38,11 @@ class Shape:
         return float(np.linalg.norm(self.points, axis=1).max())
 
     @cached_property
+    def length(self) -> float:
+        """The longest edge of the box around it in body axes [m]."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @cached_property
     def samples(self) -> Array:
         """Surface points (n, 3) in body axes, at most a thirtieth of the radius apart [m]."""
         return surface_samples(self.points, self.triangles, self.radius / 30)

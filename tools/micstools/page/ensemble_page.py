@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from micstools import pile, pile_ensemble
+from micstools import kicks, pile, pile_ensemble
 from micstools.energy import made_by_contact
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
@@ -366,6 +366,8 @@ def _health(ensemble: Ensemble) -> Markup:
         ("largest energy that contact made in a step [J]",
          {p.number: float(made_by_contact(p.run).max()) for p in ensemble.piles},
          run_page.energy_limit(ensemble.example.run), ".1e"),
+        ("largest acceleration of an untouched block [g]", _kicks(ensemble),
+         kicks.LIMIT, ".2g"),
     ):  # fmt: skip
         if values:
             where = max(values, key=lambda k: values[k])
@@ -379,6 +381,12 @@ def _health(ensemble: Ensemble) -> Markup:
         rows.append([f"runs that ended: {name}", str(n), "", "", ""])
     said = table(["of all runs, the worst", "found", "wanted", "", "where"], rows, numbers=False)
     return section("health", "Health of the computations", said)
+
+
+def _kicks(ensemble: Ensemble) -> dict[int, float]:
+    """The largest acceleration of untouched blocks [g] of the runs whose rows tell it."""
+    found = {p.number: kicks.largest(p.run) for p in ensemble.piles}
+    return {k: one.acceleration for k, one in found.items() if one and one.good is not None}
 
 
 def _worst(series: dict[int, Any], name: str, scale: float) -> dict[int, float]:

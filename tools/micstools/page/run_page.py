@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from micstools import block_numbers, pile, pile_numbers
+from micstools import block_numbers, kicks, pile, pile_numbers
 from micstools.block_numbers import BlockNumbers
 from micstools.energy import made_by_contact
 from micstools.geometry import Array
@@ -28,6 +28,10 @@ _CELLS = 10.0  # along a block, as the readme asks for
 _MANY = 16  # blocks with a curve of their own
 _OVERLAP = 0.01  # of a block's length
 _MADE = 3e-3  # of a block's weight times its length
+
+
+Row = tuple[str, str, str, bool | None]
+"""Of the health: what, found, wanted, and whether it is as wanted (None: not known)."""
 
 
 @dataclass(frozen=True)
@@ -210,8 +214,10 @@ def _health(run: Run, found: Found | None = None) -> Markup:
     )
 
 
-def mark(good: bool) -> Markup:
-    """Is a number as it should be?"""
+def mark(good: bool | None) -> Markup:
+    """Is a number as it should be? None: it is not known."""
+    if good is None:
+        return tag("span", "–")
     return tag("span", "✓ good", class_="good") if good else tag("span", "! look", class_="look")
 
 
@@ -232,9 +238,9 @@ def divergence_limit(run: Run) -> float:
     return float(run.value("numerics", "divergence_tolerance", 1e-6))
 
 
-def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
+def _checks(run: Run, found: Found | None) -> list[Row]:
     s, code = run.series, int(run.provenance.get("exit_status", -1))
-    rows = [("end of the run", _ending(code), "regular end", code == 0)]
+    rows: list[Row] = [("end of the run", _ending(code), "regular end", code == 0)]
     if found:
         rows += _overlaps(run, found)
     if np.isfinite(s.liquid_volume_drift).any():
@@ -245,6 +251,10 @@ def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
         limit = divergence_limit(run)
         rows.append(("largest divergence", f"{worst:.1e} 1/s", f"below {limit:.0e} 1/s",
                      worst < limit))  # fmt: skip
+        if kick := kicks.largest(run):
+            wanted = f"below {kicks.LIMIT:g} g over {kick.window:.2g} s"
+            name = "largest acceleration of an untouched block"
+            rows.append((name, f"{kick}", wanted, kick.good))
         if found:
             cells = _smallest(run) / float(run.grid.spacing.max())
             rows.append(("cells along the smallest block", f"{cells:.3g}", f"{_CELLS:.0f} or more",
@@ -252,12 +262,12 @@ def _checks(run: Run, found: Found | None) -> list[tuple[str, str, str, bool]]:
     return rows
 
 
-def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
+def _overlaps(run: Run, found: Found) -> list[Row]:
     highest = float(np.nanmax(run.series.max_overlap))
     made, most = float(made_by_contact(run).max()), energy_limit(run)
     energy = ("largest energy that contact made in a step", f"{made:.1e} J", f"below {most:.1e} J",
               made < most)  # fmt: skip
-    return [
+    rows: list[Row] = [
         (name, millimetres(value), f"below {millimetres(limit)}", value < limit)
         for name, value, limit in (
             (
@@ -267,17 +277,13 @@ def _overlaps(run: Run, found: Found) -> list[tuple[str, str, str, bool]]:
             ),
             ("largest overlap at any time", highest, overlap_limit(run)),
         )
-    ] + [energy]
+    ]
+    return [*rows, energy]
 
 
 def _smallest(run: Run) -> float:
     """Length of the smallest block [m]."""
-    return min(_length(run, k) for k in range(run.bodies.n))
-
-
-def _length(run: Run, k: int) -> float:
-    """The longest edge of the box around a block's shape [m]."""
-    return float(np.ptp(run.shapes[run.bodies.shape[k]].points, axis=0).max())
+    return min(run.shapes[name].length for name in run.bodies.shape)
 
 
 def _ending(code: int) -> str:
