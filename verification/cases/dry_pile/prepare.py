@@ -47,7 +47,7 @@ def attitudes(n: int, seed: int) -> np.ndarray:
 
 def mixed() -> None:
     """Sixteen of each shape fall and pile up."""
-    text = HEAD.format(what="mixed pile", cost=25, end=1.0) + KINDS
+    text = HEAD.format(what="mixed pile", cost=21, end=1.0) + KINDS
     text += TANK.format(side=0.3, height=0.5)
     for k, (x, q) in enumerate(zip(grid(64, 4, 0.072, 0.3, 0.04), attitudes(64, 1), strict=True)):
         text += body(SHAPES[k % 4], x, q, np.zeros(3))
@@ -77,7 +77,7 @@ def dumped(name: str, what: str, cost: int, end: float, friction: str) -> None:
 
 def poured(name: str, shape: str, side: float, margin: float, n: int, interval: float) -> None:
     """Blocks fall one by one, at random over the tank and any way up."""
-    text = HEAD.format(what=f"{n} {name}", cost=25 if n < 100 else 60, end=n * interval + 0.6)
+    text = HEAD.format(what=f"{n} {name}", cost=21 if n < 100 else 60, end=n * interval + 0.6)
     text += f"&shape name = 'unit'  {shape} /\n" + TANK.format(side=side, height=0.5)
     middle, spread = 0.5 * side, 0.5 * side - margin
     text += (
