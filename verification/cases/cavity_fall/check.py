@@ -1,0 +1,97 @@
+"""Blocks that fall under water before they touch anything: none is kicked, whatever the step."""
+
+import numpy as np
+
+from micstools import kicks
+from micstools.checks import Checks, sound
+from micstools.geometry import Array
+from micstools.reader import Run
+
+VARIES = ("contact contact_time",)
+"""It goes with the size of the block."""
+
+WINDOW_LIMIT = 0.6  # mean acceleration of a window [g]
+STEP_LIMIT = 3.0  # acceleration of a step [g] above which its change of velocity is looked at
+CHANGE_LIMIT = 0.02  # of such a step [sqrt(g D)]
+STEPS_BAND = 0.05  # of the largest change at different steps, for a block of 2 m [m/s]
+GROWTH_LIMIT = 2.0001  # of a step over the one before
+
+
+class Fall:
+    """What a block of `length` D feels between the surface and its first touch."""
+
+    def __init__(self, run: Run) -> None:
+        """`windows` (T) [g] from each row on, `change` [m/s] the largest of them."""
+        b, g = run.bodies, 9.81
+        level = float(run.value("fluid", "water_level", 0.0))
+        self.length = level / 5.025
+        self.kind = str(run.value("shape", "kind", "")).strip()
+        self.cells = round(self.length / float(run.grid.spacing[2]))
+        self.courant = float(run.value("run", "cfl_max", 0.0))
+        self.seed = int(run.value("drop", "seed", 0))
+        tension = float(run.value("fluid", "surface_tension", 0.0)) > 0
+        size = "2 m" if self.length > 1 else "50 mm"
+        self.name = f"{self.kind} of {size}{', surface tension' if tension else ''}"
+        self.name += f", {self.cells} cells"
+        touches = np.flatnonzero(b.contacts[:, 0] > 0)
+        first = int(touches[0]) if touches.size else b.time.size
+        windows = kicks.acceleration(run, self.length, clear=0.0)[:first, 0]
+        self.time: Array = b.time[:first] / np.sqrt(self.length / g)
+        self.windows: Array = windows
+        self.window = float(np.nanmax(windows))
+        self.change = self.window * g * kicks.window(run, self.length)
+        under = b.position[: first - 1, 0, 2] < level - 0.35 * self.length
+        change = np.linalg.norm(np.diff(b.velocity[:first, 0], axis=0), axis=1)[under]
+        hard = change > STEP_LIMIT * g * np.diff(b.time[:first])[under]
+        self.hardest = float((change / np.diff(b.time[:first])[under]).max() / g)
+        self.hard = float(change[hard].max(initial=0.0) / np.sqrt(g * self.length))
+        dt = run.series.dt[1:]
+        self.growth = float((dt[1:] / dt[:-1]).max())
+
+
+def check(runs: list[Run]) -> Checks:
+    """The worst of the seeds of each shape, size and grid; and the same fall at shorter steps."""
+    checks = Checks("blocks that close a cavity behind them")
+    falls = [Fall(run) for run in runs]
+    groups: dict[str, list[Fall]] = {}
+    for fall in falls:
+        groups.setdefault(fall.name, []).append(fall)
+    for name, group in groups.items():
+        here = f"{name}, {len(group)} falls" if len(group) > 1 else name
+        worst = max(fall.window for fall in group)
+        checks.below(f"{here}: largest acceleration of a window [g]", worst, WINDOW_LIMIT)
+        hard = max(fall.hard for fall in group)
+        said = f"{here}: change of velocity in a step above {STEP_LIMIT:g} g [sqrt(g D)]"
+        checks.below(said, hard, CHANGE_LIMIT)
+        hardest = max(fall.hardest for fall in group)
+        checks.below(f"{here}: largest acceleration of a step [g]", hardest, STEP_LIMIT, False)
+    check_steps(checks, falls)
+    for run in runs:
+        sound(run, checks)
+    growth = max(fall.growth for fall in falls)
+    checks.below("largest step over the one before", growth, GROWTH_LIMIT)
+    shown = {name: max(group, key=lambda fall: fall.window) for name, group in groups.items()}
+    checks.figure(
+        "acceleration over .22 sqrt(D/g), the worst fall of each kind",
+        "t / sqrt(D/g)",
+        "g",
+        {name: (fall.time, fall.windows) for name, fall in shown.items() if fall.length > 1},
+    )
+    return checks
+
+
+def check_steps(checks: Checks, falls: list[Fall]) -> None:
+    """What the water changes of the velocity does not depend on the step."""
+    same: dict[tuple[str, int], dict[float, Fall]] = {}
+    for fall in falls:
+        same.setdefault((fall.name, fall.seed), {})[fall.courant] = fall
+    for (name, seed), of_step in same.items():
+        if len(of_step) < 2:
+            continue
+        found = [of_step[courant] for courant in sorted(of_step, reverse=True)]
+        said = " ".join(f"{fall.change:.3f}" for fall in found)
+        spread = max(fall.change for fall in found) - min(fall.change for fall in found)
+        limit = STEPS_BAND * np.sqrt(found[0].length / 2)
+        steps = ", ".join(f"{fall.courant:g}" for fall in found)
+        text = f"{name}, seed {seed}: largest change in a window, Courant numbers {steps} [m/s]"
+        checks.true(f"{text}, within {limit:g}", spread < limit, said)
