@@ -21,7 +21,7 @@ module monolithic_m
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity, face_velocity_at_walls, shorten_at_walls
-  use mid_step_m, only: keep_liquid
+  use mid_step_m, only: keep_liquid, add_second_half, add_whole
   use buoyancy_m, only: displaced_force, uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
@@ -104,7 +104,8 @@ contains
     end do
   end subroutine find_inertia
 
-  !> Weight, old pressure, surface tension and surface stress into the velocity of the cells.
+  !> Weight, old pressure, surface tension and surface stress into the velocity of the cells in
+  !! liquid; those at the surface and in gas get the first three after the faces.
   subroutine accelerate_fluid(case, grid, solid, dt, flow, stage)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
@@ -122,10 +123,13 @@ contains
       call accelerations_of_groups(grid, solid, dt, stage%trend, stage)
       if (stage%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
-      call accelerate_cells(grid, dt, flow, stage)
+      if (stage%implicit_momentum) then
+        call accelerate_cells(grid, dt, flow, stage)
+      else
+        call add_second_half(grid, dt, a%cell, stage%mid_step, flow%u)
+      end if
       call add_product(grid, dt, by_stress, flow%u)
       if (.not. allocated(stage%mid_step%given)) return   ! nothing has been given before
-      call take_half_back(grid, dt, a%cell, stage%mid_step%takes_part, flow%u)
       call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
                              flow, a%cell, stage%mid_step, stage%from_mid_step)
       call swap(stage%viscous%leg, stage%mid_step%given)
@@ -149,27 +153,6 @@ contains
       call note_change(grid, stage%links, dt, a%cell, balance%gained)
     end associate
   end subroutine accelerations_of_groups
-
-  !> Cells that got half a step of the old pressure before the transport need the other half only.
-  subroutine take_half_back(grid, dt, a, takes_part, u)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: dt
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: i, j, k, d
-
-    !$omp parallel do private(i, j, d) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do d = 1, 3
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            if (takes_part(i, j, k)) u(i, j, k, d) = u(i, j, k, d) - 0.5_wp*dt*a(i, j, k, d)
-          end do
-        end do
-      end do
-    end do
-  end subroutine take_half_back
 
   !> The same forces on the bodies.
   subroutine push_by_known_forces(case, grid, solid, dt, flow, stage)
@@ -231,18 +214,26 @@ contains
     stage%foreseen%motion = stage%at_start%motion + stage%trend
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
-    call predict_face_velocity(grid, dt, stage%rho, stage%acceleration, flow, stage%deviation)
-    if (allocated(stage%deviation)) call swap(flow%solid_flux, stage%deviation)
-    associate (in_liquid => stage%mid_step%takes_part, compact => .not. stage%implicit_momentum)
+    associate (a => stage%acceleration, links => stage%links, &
+               given => stage%mid_step%takes_part, in_liquid => stage%mid_step%in_liquid)
+      in_liquid = given
       call keep_liquid(grid, flow, in_liquid)   ! the surface may have come
-      if (compact) call shorten_at_walls(grid, dt, stage%bodies, &
-                                         stage%links%cell(:, :stage%links%n), stage%links%body, &
-                                         stage%links%number, in_liquid, stage%rho, &
-                                         stage%acceleration, flow)
-      call face_velocity_at_walls(grid, solid, stage%at_start, stage%foreseen, stage%links%slip, &
-                                  dt, compact, in_liquid, stage%rho, stage%acceleration, flow)
+      if (stage%implicit_momentum) then
+        call predict_face_velocity(grid, dt, stage%rho, a, flow)
+      else
+        call predict_face_velocity(grid, dt, stage%rho, a, flow, stage%deviation, given, in_liquid)
+        if (allocated(stage%deviation)) call swap(flow%solid_flux, stage%deviation)
+        call shorten_at_walls(grid, dt, stage%bodies, links%cell(:, :links%n), links%body, &
+                              links%number, in_liquid, stage%rho, a, flow)
+      end if
+      call face_velocity_at_walls(grid, solid, stage%at_start, stage%foreseen, links%slip, dt, &
+                                  stage%implicit_momentum, given, in_liquid, stage%rho, a, flow)
+      if (stage%implicit_momentum) then
+        call renew_acceleration(dt, flow, stage)
+      else
+        call add_whole(grid, dt, a%cell, stage%mid_step, flow%u)
+      end if
     end associate
-    call renew_acceleration(dt, flow, stage)
   end subroutine predict_faces
 
   !> Pressure and motion of the bodies in one solve. What the fluid at the walls owes the bodies

@@ -153,8 +153,8 @@ contains
     end associate
   end subroutine keep_acceleration
 
-  !> Add gravity and old pressure to the cells; with C-ISMAC those of the start of the step, which
-  !! stand in `acceleration%cell` then.
+  !> Add gravity and old pressure to all cells, for 'mics' and C-ISMAC; with C-ISMAC those of the
+  !! start of the step, which stand in `acceleration%cell` then.
   subroutine accelerate_cells(grid, dt, flow, stage)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]

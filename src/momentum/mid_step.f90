@@ -9,9 +9,13 @@
 !! of the middle of the step, and each half is a gradient on its own surface. Near the bodies the
 !! old pressure is carried along with them first (`carried_pressure_m`).
 !!
-!! Only liquid away from the free surface takes part: there and in the gas beside it density and
-!! acceleration jump. Cells at an outflow do not either: the drag of the side, half of which they
-!! take (`predict_face_velocity`), is no part of it.
+!! Only liquid away from the free surface takes part. At the surface and in gas the density changes
+!! from step to step, and the old pressure of a cell that was liquid would act on gas, 830 times as
+!! strongly: there it is only a guess. Neither transport nor viscosity sees it, the faces take it as
+!! a whole, and the cells get it after them (`add_whole`): velocity depends on the sum of old and
+!! new pressure alone. Else columns of viscous liquid made a thousand times the energy that they had
+!! (docs/decisions/surface.md). Cells at an outflow do not take part either: the drag of the
+!! side, half of which they take (`predict_face_velocity`), is no part of it.
 module mid_step_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
@@ -30,11 +34,14 @@ module mid_step_m
   implicit none
   private
   public :: mid_step_t, mid_step_init, to_mid_step, find_liquid, keep_liquid
+  public :: add_second_half, add_whole
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
 
   type :: mid_step_t
-    logical, allocatable :: takes_part(:, :, :)    !! cells whose neighbours are all full of liquid
+    logical, allocatable :: takes_part(:, :, :)
+      !! cells whose neighbours are all full of liquid at the start of the step
+    logical, allocatable :: in_liquid(:, :, :)     !! those of them that are so at its end, too
     real(wp), allocatable :: given(:, :, :, :)     !! momentum given before the transport [kg m/s]
   end type mid_step_t
 
@@ -49,6 +56,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%takes_part(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
+    allocate (self%in_liquid, source=self%takes_part)
     allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
   end subroutine mid_step_init
 
@@ -92,6 +100,54 @@ contains
     end do
     call fill_velocity_halo(grid, flow%u)
   end subroutine to_mid_step
+
+  !> Weight and old pressure in the cells that take part: the second half, or all where nothing was
+  !! given before.
+  subroutine add_second_half(grid, dt, a, self, u)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    type(mid_step_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+
+    call add_where(grid, merge(0.5_wp, 1.0_wp, allocated(self%given))*dt, a, self%takes_part, &
+                   .true., u)
+  end subroutine add_second_half
+
+  !> Weight and old pressure in all other cells.
+  subroutine add_whole(grid, dt, a, self, u)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    type(mid_step_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+
+    call add_where(grid, dt, a, self%takes_part, .false., u)
+  end subroutine add_whole
+
+  !> u += time a in the own cells that take part, or in those that do not.
+  subroutine add_where(grid, time, a, takes_part, those, u)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: time   !! [s]
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(in) :: those
+    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, d
+
+    !$omp parallel do private(i, j, d) schedule(static)
+    do k = grid%lo(3), grid%hi(3)
+      do d = 1, 3
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            if (takes_part(i, j, k) .eqv. those) u(i, j, k, d) = u(i, j, k, d) + time*a(i, j, k, d)
+          end do
+        end do
+      end do
+    end do
+  end subroutine add_where
 
   !> No acceleration of cells that do not take part.
   subroutine leave_out(grid, takes_part, a)

@@ -225,7 +225,7 @@ contains
   !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
   !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
   !! that `a_face` does not hold, so half of it goes to the cell, too.
-  subroutine predict_face_velocity(grid, dt, rho, a, flow, deviation)
+  subroutine predict_face_velocity(grid, dt, rho, a, flow, deviation, given, in_liquid)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -235,12 +235,17 @@ contains
     real(wp), intent(in), contiguous, optional :: &
       deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
+    logical, intent(in), contiguous, optional, &
+      dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: given, in_liquid
+      !! has the cell its acceleration in `flow%u`, is it away from gas; absent: everywhere
     integer :: i, j, k, d, e(3)
 
     do d = 1, 3
       e = unit_step(:, d)
       call interpolate(grid, dt, e, rho, flow%mu, flow%u(:, :, :, d), a%face(:, :, :, d), &
                        a%cell(:, :, :, d), flow%uf(:, :, :, d))
+      if (present(given)) call interpolate_beside_gas(grid, dt, d, flow%u(:, :, :, d), a, given, &
+                                                      in_liquid, flow%uf(:, :, :, d))
       if (present(deviation)) call add_deviation(grid, dt, e, rho, flow%mu, &
                                                  deviation(:, :, :, d), flow%uf(:, :, :, d))
       call sides_of_direction()
@@ -262,7 +267,7 @@ contains
             do i = lower(1), upper(1)
               f = [i, j, k] + merge(0, 1, s == 1)*unit_step(:, d)
               flow%u(i, j, k, d) = flow%u(i, j, k, d) + 0.5_wp*(flow%uf(f(1), f(2), f(3), d) &
-                - flow%u(i, j, k, d) + dt*(a%cell(i, j, k, d) - a%face(f(1), f(2), f(3), d)))
+                - dt*a%face(f(1), f(2), f(3), d) - without_acceleration([i, j, k]))
             end do
           end do
         end do
@@ -283,13 +288,25 @@ contains
               c = [i, j, k] - merge(0, 1, s == 1)*e
               share = 0.5_wp*grid%h(d)/side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), flow%sides)
               mean = merge(-1.0_wp, 1.0_wp, s == 1)*mean_velocity(flow%sides(s, d), c)
-              flow%uf(i, j, k, d) = share*(flow%u(c(1), c(2), c(3), d) &
-                - dt*a%cell(c(1), c(2), c(3), d)) + (1.0_wp - share)*mean + dt*a%face(i, j, k, d)
+              flow%uf(i, j, k, d) = share*without_acceleration(c) + (1.0_wp - share)*mean &
+                + dt*a%face(i, j, k, d)
             end do
           end do
         end do
       end do
     end subroutine sides_of_direction
+
+    !> Velocity of a cell in direction d without its acceleration of this step [m/s].
+    pure function without_acceleration(c) result(u)
+      integer, intent(in) :: c(3)
+      real(wp) :: u
+
+      u = flow%u(c(1), c(2), c(3), d)
+      if (present(given)) then
+        if (.not. given(c(1), c(2), c(3))) return
+      end if
+      u = u - dt*a%cell(c(1), c(2), c(3), d)
+    end function without_acceleration
   end subroutine predict_face_velocity
 
   !> Velocity of the lower faces in one direction, e along it.
@@ -318,6 +335,37 @@ contains
       end do
     end do
   end subroutine interpolate
+
+  !> Velocity of the lower faces in direction d between cells of which one is at or in gas: whatever
+  !! the cells have of the old pressure is taken from them, and the face gets it as a whole,
+  !! $$ u_f = \overline{u - \Delta t\, a} + \Delta t\, a_f $$
+  subroutine interpolate_beside_gas(grid, dt, d, u, a, given, in_liquid, uf)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt
+    integer, intent(in) :: d
+    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(acceleration_t), intent(in) :: a
+    logical, intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      given, in_liquid
+    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
+    integer :: i, j, k, e(3)
+    real(wp) :: low, high
+
+    e = unit_step(:, d)
+    !$omp parallel do private(i, j, low, high) schedule(static)
+    do k = grid%lo(3), grid%hi(3) + e(3)
+      do j = grid%lo(2), grid%hi(2) + e(2)
+        do i = grid%lo(1), grid%hi(1) + e(1)
+          associate (p => i - e(1), q => j - e(2), r => k - e(3))
+            if (in_liquid(p, q, r) .and. in_liquid(i, j, k)) cycle
+            low = u(p, q, r) - merge(dt, 0.0_wp, given(p, q, r))*a%cell(p, q, r, d)
+            high = u(i, j, k) - merge(dt, 0.0_wp, given(i, j, k))*a%cell(i, j, k, d)
+            uf(i, j, k) = face_mean(low, high) + dt*a%face(i, j, k, d)
+          end associate
+        end do
+      end do
+    end do
+  end subroutine interpolate_beside_gas
 
   !> Add what the faces in one direction differed from their cells.
   subroutine add_deviation(grid, dt, e, rho, mu, deviation, uf)
@@ -443,8 +491,8 @@ contains
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
   !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
-  subroutine face_velocity_at_walls(grid, solid, at_start, foreseen, slip, dt, compact, in_liquid, &
-                                    rho, a, flow)
+  subroutine face_velocity_at_walls(grid, solid, at_start, foreseen, slip, dt, c_ismac, given, &
+                                    in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
@@ -452,8 +500,10 @@ contains
     real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of the layer along the wall, in cells with their centre in a body, 0 to 1
     real(wp), intent(in) :: dt                   !! [s]
-    logical, intent(in) :: compact
-      !! in liquid the compact acceleration counts for `compact_time`, else for dt
+    logical, intent(in) :: c_ismac
+      !! all cells are given their acceleration, and the compact one counts for dt
+    logical, intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! the cell has its acceleration in `flow%u`
     logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
       !! neither the cell nor those around it hold gas, at the start and at the end of the step
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -510,31 +560,39 @@ contains
       integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: velocity
-      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), nu, time, near, along, push
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), near, along, gain
 
-      nu = flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3))
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
       arm = nearest_arm(grid, x_wall, foreseen%x(:, body))
       n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
       n = n/max(norm2(n), tiny(1.0_wp))
       u = flow%u(c(1), c(2), c(3), :)
-      time = dt
       if (in_liquid(c(1), c(2), c(3))) then
         wall = wall_velocity(foreseen%motion(:, body), arm)
-        push = a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d)
-        if (compact) time = compact_time(dt, dt*sum(abs(u - wall)/grid%h))
+        gain = time_in_liquid(c, sum(abs(u - wall)/grid%h)) &
+               *(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
       else
         wall = wall_velocity(at_start%motion(:, body), arm)
-        push = a%face(f(1), f(2), f(3), d)
-        u = u - dt*a%cell(c(1), c(2), c(3), :)
+        gain = dt*a%face(f(1), f(2), f(3), d)
+        if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
       near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
       along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
       velocity = u(d) + near*(along*(wall(d) - u(d)) &
-                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) &
-                 + face_step(time, nu, sum(1.0_wp/grid%h**2))*push
+                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
     end function seen_from
+
+    !> Time for which the compact acceleration at a wall counts in liquid [s].
+    pure function time_in_liquid(c, rate) result(time)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: rate   !! Courant number per second of the flow past the wall [1/s]
+      real(wp) :: time
+
+      time = dt
+      if (.not. c_ismac) time = compact_time(dt, dt*rate)
+      time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
+    end function time_in_liquid
 
     !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond
     !! the face; free slip where there is fluid again.
