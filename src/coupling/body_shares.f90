@@ -10,11 +10,13 @@
 !! facets lie.
 !!
 !! Lengths are in cells and counted from a whole number of cells near the body, so images in other
-!! periods and other processes get the same bits. Corners within round-off of a grid plane are put
-!! on it. A corner on a plane counts as below the plane, everywhere, so the lines of a face are
-!! those just above it; a facet that lies in the plane and ends the body there adds its own area. A
-!! face is therefore solid where the body touches it from either side, and full cells are closed
-!! all round.
+!! periods and other processes get the same bits. Corners within a hundred-thousandth of a cell of a
+!! grid plane are put on it, and those as near to a plane of centres beyond it: the two sides of a
+!! body that is aligned with the grid are then seen alike, whatever the last digits of its pose, and
+!! a cube that falls straight down does not spin. A corner on a plane counts as below the plane,
+!! everywhere, so the lines of a face are those just above it; a facet that lies in the plane and
+!! ends the body there adds its own area. A face is therefore solid where the body touches it from
+!! either side, and full cells are closed all round.
 !!
 !! Departure from the paper, which counts the centres of sub-cells that lie in a tetrahedron
 !! (`subcell_shares_m`): those are off by up to 0.08 of a cell. Cutting the tetrahedra themselves
@@ -32,7 +34,7 @@ module body_shares_m
   private
   public :: find_body_shares
 
-  real(wp), parameter :: on_plane = 1.0e-13_wp     !! corners so near a grid plane are on it [cells]
+  real(wp), parameter :: on_plane = 1.0e-5_wp      !! corners so near a plane are on it [cells]
 
 contains
 
@@ -74,11 +76,12 @@ contains
     type(shape_t), intent(in) :: shape
     type(body_shares_t), intent(inout) :: self
     type(share_row_t), intent(inout) :: work
-    real(wp) :: r(3, 3), centre(3), tolerance(3)
+    real(wp) :: r(3, 3), centre(3), tolerance(3), x
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
     call ensure_room(n, work%point)
+    call ensure_room(n, work%seen)
     r = rotation_matrix(self%q)
     centre = (self%x - grid%origin)/grid%h
     self%base = floor(centre)
@@ -86,10 +89,10 @@ contains
     centre = centre - real(self%base, wp)
     do v = 1, n
       do d = 1, 3
-        work%point(d, v) = centre(d) + dot_product(r(d, :), shape%point(:, v))/grid%h(d)
-        if (abs(work%point(d, v) - anint(work%point(d, v))) < tolerance(d)) then
-          work%point(d, v) = anint(work%point(d, v))
-        end if
+        x = centre(d) + dot_product(r(d, :), shape%point(:, v))/grid%h(d)
+        if (abs(x - anint(x)) < tolerance(d)) x = anint(x)
+        work%point(d, v) = x
+        work%seen(d, v) = off_centres(x, centre(d), tolerance(d))
       end do
     end do
     n = size(shape%facet) - 1
@@ -116,5 +119,18 @@ contains
       self%corner(:, :, m) = work%point(:, shape%flow_tet(:, m))
     end do
   end subroutine place_corners
+
+  !> Coordinate of a corner as the centres of cells see it: what lies in a plane of centres, but for
+  !! a little, lies a little beyond it, seen from the middle of the body.
+  elemental function off_centres(x, middle, little) result(moved)
+    real(wp), intent(in) :: x        !! [cells]
+    real(wp), intent(in) :: middle   !! of the body [cells]
+    real(wp), intent(in) :: little   !! [cells]
+    real(wp) :: moved, plane
+
+    moved = x
+    plane = floor(x) + 0.5_wp
+    if (abs(x - plane) < little) moved = plane + sign(little, x - middle)
+  end function off_centres
 
 end module body_shares_m

@@ -417,7 +417,7 @@ contains
       call count_fluid(weightless, dt, stage)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
-      stage%pressure%rough = .true.
+      stage%pressure%rough = .false.
       call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, stage%pressure)
       do b = 1, bodies%n
         a = bodies%motion(:, b)/dt

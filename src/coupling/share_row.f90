@@ -17,6 +17,7 @@ module share_row_m
   !> The corners and facets of the body, and the sums over one row, for one thread.
   type :: share_row_t
     real(wp), allocatable :: point(:, :)       !! (3, points) corners of the body [cells]
+    real(wp), allocatable :: seen(:, :)        !! the same as the centres of cells see them
     real(wp), allocatable :: low(:, :), high(:, :)   !! (3, facets) boxes of the facets [cells]
     !> (7, x, z) volume and first moment; area of the column further down and its moments in x, y.
     real(wp), allocatable :: volume(:, :, :)
@@ -64,9 +65,10 @@ contains
     do m = 1, size(shape%facet) - 1
       call cells_between(work%low(2, m), work%high(2, m), first, last)
       if (j < first .or. j > last) cycle
-      call load_facet(shape, m, work, facet)
-      if (work%low(2, m) <= real(j - 1, wp)) call lines_in_plane(facet, real(j - 1, wp), work)
+      call load_facet(shape, m, work%seen, facet)
       call hits_in_row(facet, j, self, work)
+      call load_facet(shape, m, work%point, facet)
+      if (work%low(2, m) <= real(j - 1, wp)) call lines_in_plane(facet, real(j - 1, wp), work)
       call clip_to_cells(facet, 2, j, work%low(2, m), work%high(2, m), piece)
       call sum_columns(piece, j, flat_direction(work%low(:, m), work%high(:, m)), work)
     end do
@@ -83,16 +85,16 @@ contains
   end function flat_direction
 
   !> The corners of a facet [cells].
-  pure subroutine load_facet(shape, m, work, facet)
+  pure subroutine load_facet(shape, m, point, facet)
     type(shape_t), intent(in) :: shape
     integer, intent(in) :: m
-    type(share_row_t), intent(in) :: work
+    real(wp), intent(in) :: point(:, :)   !! (3, points) [cells]
     type(polygon_t), intent(inout) :: facet
     integer :: v
 
     facet%n = shape%facet(m + 1) - shape%facet(m)
     do v = 1, facet%n
-      facet%x(:, v) = work%point(:, shape%facet_point(shape%facet(m) + v - 1))
+      facet%x(:, v) = point(:, shape%facet_point(shape%facet(m) + v - 1))
     end do
   end subroutine load_facet
 
@@ -232,9 +234,10 @@ contains
     integer :: f, m, n, i, j, k, first(2), last(2)
 
     do f = 1, size(shape%facet) - 1
-      call centres_between(work%low(1, f), work%high(1, f), first(1), last(1))
+      call load_facet(shape, f, work%seen, facet)
+      call centres_between(minval(facet%x(1, :facet%n)), maxval(facet%x(1, :facet%n)), first(1), &
+                           last(1))
       if (first(1) > last(1)) cycle
-      call load_facet(shape, f, work, facet)
       do i = first(1), last(1)
         call cut_by_plane(facet, 1, real(i, wp) - 0.5_wp, line, n)
         do m = 1, n

@@ -24,7 +24,7 @@ program test_time_step
   call spinning_ball()
   call release_into_water()
   call noise_in_gas(0.0_wp, 1.0e-3_wp)
-  call noise_in_gas(1.0_wp, 0.05_wp)
+  call noise_in_gas(1.0_wp, 2.0e-3_wp)
   call fall_without_fluid()
   call go_on_from_the_state()
   call finish_checks()

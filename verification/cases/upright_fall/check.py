@@ -1,0 +1,34 @@
+"""A cube that falls on the axis of a square tank does not spin, wherever its faces lie in the grid.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Run  # noqa: E402
+
+SPIN = 1e-3  # rad/s
+SIDEWAYS = 1e-4  # of the speed
+
+
+def check(runs: list[Run]) -> Checks:
+    """Largest spin and speed sideways of each run."""
+    checks = Checks("upright fall of a cube")
+    for run in runs:
+        b = run.bodies
+        spin = float(np.linalg.norm(b.angular_velocity[:, 0], axis=1).max())
+        checks.below(f"{run.folder.name}: largest spin [rad/s]", spin, SPIN)
+        sideways = float(np.abs(b.velocity[:, 0, :2]).max() / abs(b.velocity[-1, 0, 2]))
+        checks.below(f"{run.folder.name}: speed sideways over that of the fall", sideways, SIDEWAYS)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
