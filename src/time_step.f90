@@ -19,7 +19,7 @@ module time_step_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_init, fastest_point
+  use rigid_body_m, only: blocks_init, fastest_point, turn_with_fluid
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use contacts_m, only: contacts_init, contact_report_t, move_blocks
@@ -28,7 +28,7 @@ module time_step_m
   use release_m, only: release_due_blocks, next_release, none_to_come
   use diagnostics_m, only: step_report_t
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
-  use monolithic_m, only: start_flow
+  use monolithic_m, only: start_flow, begin_motion
   use buoyancy_m, only: displaced_force
   use added_mass_m, only: know_added_mass
   use coupling_m, only: advance_velocity, note_start
@@ -86,6 +86,7 @@ contains
     allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return
+    call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
     if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
       sim%grid%h, sim%blocks, sim%contacts%lubrication)
     call flow_init(sim%grid, sim%flow)
@@ -229,22 +230,29 @@ contains
     call mix_fluid(sim%case%fluid, sim%flow)
   end subroutine release
 
-  !> A block that has just appeared feels the buoyancy of its place; after each step the fluid
-  !! force of that step takes over.
+  !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
+  !! each step the fluid force of that step takes over.
   subroutine first_force(sim)
     type(simulation_t), intent(inout) :: sim
     integer :: b
 
     if (all(sim%felt .or. .not. sim%blocks%present)) return
     call copy_motion(sim%blocks, sim%stage%bodies)
-    call displaced_force(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
-                         sim%stage%from_level)
-    do b = 1, sim%blocks%n
-      if (sim%felt(b) .or. .not. sim%blocks%present(b)) cycle
-      sim%blocks%fluid_force(:, b) = sim%stage%from_level(1:3, b)
-      sim%blocks%fluid_torque(:, b) = sim%stage%from_level(4:6, b)
-      sim%felt(b) = .true.
-    end do
+    associate (force => sim%stage%total)
+      if (sim%case%numerics%coupling == 'monolithic') then
+        call begin_motion(sim%case, sim%grid, sim%solid, sim%blocks%present .and. .not. sim%felt, &
+                          sim%flow, sim%stage, force)
+      else
+        call displaced_force(sim%grid, sim%case%fluid, sim%solid, sim%stage%bodies, sim%flow%c, &
+                             force)
+      end if
+      do b = 1, sim%blocks%n
+        if (sim%felt(b) .or. .not. sim%blocks%present(b)) cycle
+        sim%blocks%fluid_force(:, b) = force(1:3, b)
+        sim%blocks%fluid_torque(:, b) = force(4:6, b)
+        sim%felt(b) = .true.
+      end do
+    end associate
   end subroutine first_force
 
   !> The present solids become those of the start of the step. Of these nobody asks for the legs

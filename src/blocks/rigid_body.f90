@@ -15,9 +15,13 @@ module rigid_body_m
   use drops_m, only: draw_drop
   implicit none
   private
-  public :: blocks_t, blocks_init, release_body
+  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share
   public :: begin_step, drift, kick, hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, kinetic_energy, potential_energy, fastest_point
+
+  real(wp), parameter :: turning_share = 0.02_wp
+    !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
+    !! its radius
 
   !> Given rates: (3, n) velocity [m/s], and spin, space frame [rad/s].
   type :: given_t
@@ -99,6 +103,25 @@ contains
       if (blocks%release_time(b) <= 0.0_wp) call release_body(0.0_wp, b, blocks)
     end do
   end subroutine blocks_init
+
+  !> Blocks lighter than a fiftieth of the liquid turn with the inertia of such a block, before the
+  !! first step: what has less than the boundary layer that it drags along would spin up and down
+  !! within a step.
+  pure subroutine turn_with_fluid(density, blocks)
+    real(wp), intent(in) :: density   !! of the liquid [kg/m3]
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: more
+    integer :: s, b
+
+    do s = 1, size(blocks%shapes)
+      more = max(1.0_wp, turning_share*density/blocks%shapes(s)%density)
+      blocks%shapes(s)%inertia = more*blocks%shapes(s)%inertia
+      blocks%inverse_inertia(:, :, s) = blocks%inverse_inertia(:, :, s)/more
+    end do
+    do b = 1, blocks%n
+      if (blocks%present(b)) call release_body(blocks%release_time(b), b, blocks)
+    end do
+  end subroutine turn_with_fluid
 
   !> Allocate all arrays over bodies, at rest and without forces.
   subroutine allocate_state(blocks)

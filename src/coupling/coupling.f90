@@ -33,7 +33,7 @@ contains
     type(stage_t), intent(inout) :: stage   !! its bodies as they move at the start
 
     if (case%numerics%coupling == 'monolithic') then
-      call find_trend(dt, dt_before, blocks, stage)
+      call find_trend(case%fluid%gravity, dt, blocks, stage)
       stage%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
       call find_links_before(grid, solid, stage)
     end if
@@ -76,20 +76,20 @@ contains
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
   !! the fluid that gets the old pressure.
-  subroutine find_trend(dt, dt_before, blocks, stage)
-    real(wp), intent(in) :: dt, dt_before   !! [s]
+  subroutine find_trend(gravity, dt, blocks, stage)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! [s]
     type(blocks_t), intent(in) :: blocks
     type(stage_t), intent(inout) :: stage
-    real(wp) :: before(6)
     integer :: b
 
     stage%trend = 0.0_wp
-    if (dt_before <= 0.0_wp) return
     do b = 1, blocks%n
       if (.not. stage%bodies%free(b)) cycle
-      before(1:3) = blocks%v_start(:, b)
-      before(4:6) = matmul(stage%bodies%inverse_inertia(:, :, b), blocks%l_start(:, b))
-      stage%trend(:, b) = dt/dt_before*(stage%bodies%motion(:, b) - before)
+      stage%trend(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
+                                          /blocks%mass(b))
+      stage%trend(4:6, b) = dt*matmul(stage%bodies%inverse_inertia(:, :, b), &
+                                      blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
     end do
   end subroutine find_trend
 

@@ -22,7 +22,7 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity, face_velocity_at_walls, shorten_at_walls
   use mid_step_m, only: keep_liquid
-  use buoyancy_m, only: uncounted_fluid
+  use buoyancy_m, only: displaced_force, uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
@@ -37,7 +37,7 @@ module monolithic_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: monolithic_stage, start_flow
+  public :: monolithic_stage, start_flow, begin_motion
 
 contains
 
@@ -391,6 +391,55 @@ contains
                               flow%solid_flux)
     end associate
   end subroutine start_flow
+
+  !> Force and torque of the fluid on bodies that are let go, with the pressure by which they
+  !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.
+  subroutine begin_motion(case, grid, solid, begins, flow, stage, force)
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    logical, intent(in) :: begins(:)         !! (blocks) those let go; all others are held
+    type(flow_t), intent(inout) :: flow      !! only its pressure changes
+    type(stage_t), intent(inout) :: stage    !! its bodies in place
+    real(wp), intent(out) :: force(:, :)     !! (6, bodies), of those let go [N, N m]
+    real(wp), parameter :: weightless(3) = 0.0_wp
+    real(wp), allocatable :: uf(:, :, :, :), solid_flux(:, :, :, :)
+    type(rigid_motion_t) :: moving
+    real(wp) :: a(6)
+    integer :: b
+
+    moving = stage%bodies
+    allocate (uf, source=flow%uf)
+    allocate (solid_flux, source=flow%solid_flux)
+    call displaced_force(grid, case%fluid, solid, stage%bodies, flow%c, force)
+    associate (bodies => stage%bodies, system => stage%pressure%system, dt => case%run%dt)
+      bodies%motion = 0.0_wp
+      do b = 1, bodies%n
+        bodies%free(b) = .false.
+        if (b <= size(begins)) bodies%free(b) = moving%free(b) .and. begins(b)
+        force(1:3, b) = force(1:3, b) + bodies%mass(b)*case%fluid%gravity
+      end do
+      stage%at_start = bodies
+      call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
+      call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
+      stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, system%operator%flux, flow)
+      call count_fluid(weightless, dt, stage)
+      call push_bodies(dt, force, bodies)
+      flow%uf = 0.0_wp
+      stage%pressure%rough = .true.
+      call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, stage%pressure)
+      do b = 1, bodies%n
+        a = bodies%motion(:, b)/dt
+        force(1:3, b) = bodies%mass(b)*(a(1:3) - case%fluid%gravity)
+        force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
+      end do
+      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
+                           stage%pressure%known, stage%pressure%closed, flow%p)
+    end associate
+    stage%bodies = moving
+    call move_alloc(uf, flow%uf)
+    call move_alloc(solid_flux, flow%solid_flux)
+  end subroutine begin_motion
 
   !> Cells in a body that hold no film move with it.
   subroutine impose_rigid_velocity(grid, solid, links, bodies, u)

@@ -4,6 +4,7 @@ module case_oddities_m
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing
   use run_groups_m, only: side_name
+  use rigid_body_m, only: turning_share
   use tet_mesh_m, only: shape_t
   use wave_step_m, only: gravity_step
   implicit none
@@ -111,12 +112,18 @@ contains
     type(shape_t), intent(in) :: shape
     type(problems_t), intent(inout) :: oddities
     character(:), allocatable :: name
-    real(wp) :: extent, cells
+    real(wp) :: extent, cells, least_turning   ! [m], [cells], [kg/m3]
 
     name = trim(input%name)
     extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
     if (input%density < least_density) call oddities%add('&shape density', input%density, &
       'of '//name//' is in kg/m3; concrete has about 2300', input%line)
+    least_turning = turning_share*case%fluid%liquid_density
+    if (case%run%physics == 'coupled' .and. input%density < least_turning) then
+      call oddities%add('&shape density', input%density, 'of '//name//': it turns with the ' &
+        //'inertia of '//brief(least_turning, 3)//' kg/m3, for the liquid that it drags along', &
+        input%line)
+    end if
     if (extent > largest_block) then
       if (input%kind == 'file') then
         call oddities%add('&shape scale', input%scale, name//' is '//brief(extent, 3) &

@@ -1,4 +1,4 @@
-"""Acceleration of a sphere let go in still water against potential theory for the box.
+"""Way and speed of a sphere let go in still water against potential theory for the box.
 
 usage: python check.py RUN [RUN ...]; runs that differ in dt only are compared with one another
 """
@@ -15,6 +15,9 @@ from micstools.reader import Run  # noqa: E402
 
 VARIES = ("numerics momentum", "numerics solid_fraction", "numerics pressure_solver")  # of one run
 THEORY_BAND, STEP_BAND = 0.02, 0.01
+START_BAND = 0.03  # of way and speed at the ends of the first steps, at the default step
+SPIN_BAND = 1.0  # speed of the surface by spin over that of the sphere
+SHORT = 0.01  # s: runs with longer steps are looked at step by step
 
 
 def image_sum(reach: int) -> float:
@@ -48,8 +51,23 @@ def acceleration(run: Run) -> float:
     return float((b.velocity[-1, 0, 2] - b.velocity[0, 0, 2]) / (b.time[-1] - b.time[0]))
 
 
+def start(run: Run, theory: float, checks: Checks) -> None:
+    """Way and speed at the end of each step of the first thirtieth of a diameter."""
+    b = run.bodies
+    t = b.time - b.time[0]
+    way = b.position[:, 0, 2] - b.position[0, 0, 2]
+    diameter = 2 * run.shapes[b.shape[0]].radius
+    for row in range(1, len(t)):
+        if abs(way[row]) > diameter / 30:
+            break
+        name = f"{run.folder.name}: step {row}"
+        checks.close(f"{name}, way [m]", float(way[row]), theory * t[row] ** 2 / 2, START_BAND)
+        speed = float(b.velocity[row, 0, 2])
+        checks.close(f"{name}, speed [m/s]", speed, theory * t[row], START_BAND)
+
+
 def check(runs: list[Run]) -> Checks:
-    """Each run against theory, and the heavy ones against the one with the shortest step."""
+    """Each run against theory, and those of a density against the one with the shortest step."""
     checks = Checks("released sphere")
     box = float((runs[0].grid.high - runs[0].grid.low)[2])
     by_ratio: dict[float, list[Run]] = {}
@@ -60,12 +78,21 @@ def check(runs: list[Run]) -> Checks:
         ratio = shape.density / fluid
         diameter = 2 * (3 * shape.volume / (4 * np.pi)) ** (1 / 3)
         theory = (ratio - 1) / (ratio + added_mass(diameter, box))
+        sound(run, checks)
+        if run.folder.name.endswith("spin"):
+            spin = np.linalg.norm(run.bodies.angular_velocity[1:, 0], axis=1) * diameter / 2
+            speed = np.linalg.norm(run.bodies.velocity[1:, 0], axis=1)
+            name = f"{run.folder.name}: largest speed of the surface by spin / speed"
+            checks.below(name, float((spin / speed).max()), SPIN_BAND)
+            continue
+        if float(run.value("run", "dt", 1e-2)) >= SHORT:
+            start(run, theory * g, checks)
+            continue
         name = f"{run.folder.name}: s = {ratio:.3g}, dt = {run.value('run', 'dt', 1e-2):.2g} s"
         checks.close(f"{name}, a/g", acceleration(run) / g, theory, THEORY_BAND)
         sideways = float(np.abs(run.bodies.velocity[-1, 0, :2]).max())
         along = abs(float(run.bodies.velocity[-1, 0, 2]))
         checks.below(f"{name}, sideways speed / speed", sideways / along, 1e-6)
-        sound(run, checks)
         by_ratio.setdefault(round(ratio, 6), []).append(run)
     for same in by_ratio.values():
         finest = min(same, key=lambda run: float(run.value("run", "dt", 1e-2)))
