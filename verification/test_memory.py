@@ -79,3 +79,21 @@ def test_what_is_planned_is_enough(cells: str, momentum: str, tmp_path: Path) ->
     plan, _ = planned(mics(tmp_path, cells, "--check", momentum=momentum).stdout)
     done = mics(tmp_path, cells, "--quiet", limit=1.05 * plan + 11e6, momentum=momentum)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_block_on_the_floor_has_enough(tmp_path: Path) -> None:
+    """When a block leaves or meets the floor, all cells are in the lists of the band around it."""
+    case = CASE.replace("kind = 'hexapod'", "kind = 'cube'").replace("size = 0.02", "size = 0.025")
+    case = case.replace(
+        "0.05, 0.05, 0.06", "0.05, 0.05, 0.0125  fixed = .true.  velocity = 0, 0, 0.3"
+    )
+    case = case.replace("t_end = 2.0e-3", "t_end = 1.0e-2")
+    text = case.format(cells="48, 48, 48", momentum="conservative")
+    plan, _ = planned(run_text(tmp_path, text, "--check").stdout)
+    done = run_text(
+        tmp_path,
+        text,
+        "--quiet",
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (int(1.05 * plan + 11e6), -1)),
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -48,6 +48,7 @@ SERIES = {
     "solver_iterations": "1",
     "liquid_volume": "m3",
     "liquid_volume_drift": "1",
+    "volume_excess_max": "1",
     "kinetic_energy_fluid": "J",
     "kinetic_energy_bodies": "J",
     "potential_energy_bodies": "J",
@@ -70,6 +71,7 @@ OF_THE_FLUID = {
     "transport_parts",
     "liquid_volume",
     "liquid_volume_drift",
+    "volume_excess_max",
     "kinetic_energy_fluid",
 }
 

@@ -16,16 +16,15 @@ module flux_band_m
   use messages_m, only: begin_search, end_search
   implicit none
   private
-  public :: flux_band_t, flux_band_init, make_room, find_parts, sum_by_part, drop_part, &
-            find_open_lines
+  public :: flux_band_t, flux_band_init, make_room, make_room_for_all, find_parts, sum_by_part, &
+            drop_part, find_open_lines
 
   !> Work of finding and sorting the parts.
   type :: part_finder_t
-    integer, allocatable :: root(:)          !! of a cell: the first of its part on this process
-    integer, allocatable :: part(:)          !! of a cell: number of its part
-    integer, allocatable :: order(:)         !! the cells by part
-    integer, allocatable :: spare(:)
-    integer, allocatable :: moved_cell(:, :)
+    integer, allocatable :: root(:)          !! of a cell: the first of its part on this process;
+                                             !! then the cells by part
+    integer, allocatable :: part(:)          !! of a cell: smallest number in its part, then the
+                                             !! number of the part; then work
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
     integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
     integer(i8), allocatable :: bins(:, :)   !! of the sums
@@ -100,11 +99,20 @@ contains
     associate (f => self%finder)
       call ensure_room(n, f%root)
       call ensure_room(n, f%part)
-      call ensure_room(n, f%order)
-      call ensure_room(n, f%spare)
-      call ensure_room(n, f%moved_cell)
     end associate
   end subroutine make_room
+
+  !> Room in the lists for all own cells and no more; what they held is lost.
+  subroutine make_room_for_all(grid, self)
+    type(grid_t), intent(in) :: grid
+    type(flux_band_t), intent(inout) :: self
+    integer :: n
+
+    n = product(grid%hi - grid%lo + 1)
+    if (size(self%cell, 2) >= n) return
+    deallocate (self%cell, self%r, self%open, self%finder%root, self%finder%part)
+    allocate (self%cell(3, n), self%r(n), self%open(n), self%finder%root(n), self%finder%part(n))
+  end subroutine make_room_for_all
 
   !> Number of a cell in the whole domain, from 1.
   pure function global_number(grid, c) result(g)
@@ -216,9 +224,9 @@ contains
       end do
     end do
     do l = 1, self%n
-      call find_root(self%finder%root, l, self%finder%spare(l))
+      call find_root(self%finder%root, l, self%finder%part(l))
     end do
-    self%finder%root(1:self%n) = self%finder%spare(1:self%n)
+    self%finder%root(1:self%n) = self%finder%part(1:self%n)
   end subroutine join_neighbours
 
   !> Root of a cell; the path to it is shortened for the next call.
@@ -241,7 +249,7 @@ contains
     integer :: l, c(3)
     integer(i8) :: changes(1)
 
-    associate (smallest => self%finder%spare)
+    associate (smallest => self%finder%part)
       do l = 1, self%n   ! a root stands first in the list and has the smallest number of its part
         smallest(l) = global_number(grid, self%cell(:, l))
       end do
@@ -361,29 +369,35 @@ contains
   !> Stable sort of the cells by part; `first` marks where each begins.
   subroutine sort_by_part(self)
     type(flux_band_t), intent(inout) :: self
-    integer :: l, c
+    integer :: l, c, d
 
-    self%first(1:self%parts + 1) = 0
-    do l = 1, self%n
-      self%first(self%finder%part(l) + 1) = self%first(self%finder%part(l) + 1) + 1
-    end do
-    self%first(1) = 1
-    do c = 1, self%parts
-      self%first(c + 1) = self%first(c + 1) + self%first(c)
-    end do
-    do l = self%n, 1, -1   ! from the back, so that a part keeps its order
-      c = self%finder%part(l)
-      self%first(c + 1) = self%first(c + 1) - 1
-      self%finder%order(self%first(c + 1)) = l
-    end do
-    do c = 1, self%parts       ! the ends have moved down to the begins
-      self%first(c) = self%first(c + 1)
-    end do
-    self%first(self%parts + 1) = self%n + 1
-    do l = 1, self%n
-      self%finder%moved_cell(:, l) = self%cell(:, self%finder%order(l))
-    end do
-    self%cell(:, 1:self%n) = self%finder%moved_cell(:, 1:self%n)
+    associate (part => self%finder%part, order => self%finder%root, n => self%n)
+      self%first(1:self%parts + 1) = 0
+      do l = 1, n
+        self%first(part(l) + 1) = self%first(part(l) + 1) + 1
+      end do
+      self%first(1) = 1
+      do c = 1, self%parts
+        self%first(c + 1) = self%first(c + 1) + self%first(c)
+      end do
+      do l = n, 1, -1   ! from the back, so that a part keeps its order
+        c = part(l)
+        self%first(c + 1) = self%first(c + 1) - 1
+        order(self%first(c + 1)) = l
+      end do
+      do c = 1, self%parts       ! the ends have moved down to the begins
+        self%first(c) = self%first(c + 1)
+      end do
+      self%first(self%parts + 1) = n + 1
+      associate (moved => part)   ! no longer needed
+        do d = 1, 3
+          do l = 1, n
+            moved(l) = self%cell(d, order(l))
+          end do
+          self%cell(d, 1:n) = moved(1:n)
+        end do
+      end associate
+    end associate
   end subroutine sort_by_part
 
   !> Cells at an open side, sum of r and sum of the open volume of each part, over all processes.

@@ -20,8 +20,8 @@ module open_flux_m
   use boundary_kinds_m, only: is_wall, gives_pressure
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, make_room, find_parts, sum_by_part, &
-                         drop_part, find_open_lines
+  use flux_band_m, only: flux_band_t, flux_band_init, make_room, make_room_for_all, &
+                         find_parts, sum_by_part, drop_part, find_open_lines
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
   use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
@@ -344,6 +344,7 @@ contains
     band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
     call halo_exchange(band%marked, 1)
     call find_conductances(grid, old%open, new%open, band)
+    call make_room_for_all(grid, band)
     call list_band(grid, band)
     call find_parts(grid, band)
   end subroutine widen_to_domain

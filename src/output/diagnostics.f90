@@ -2,6 +2,7 @@
 module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
+  use parallel_m, only: global_max
   use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
@@ -42,6 +43,8 @@ module diagnostics_m
     real(wp) :: solver_iterations = 0.0_wp
     real(wp) :: liquid_volume = 0.0_wp        !! [m3]
     real(wp) :: liquid_volume_drift = 0.0_wp  !! (volume - initial - inflow)/initial
+    real(wp) :: volume_excess_max = 0.0_wp
+      !! largest |Vt - V (1 - alpha)|/V of a cell: fluid it holds beyond its room, or lacks
     real(wp) :: kinetic_energy_fluid = 0.0_wp, kinetic_energy_bodies = 0.0_wp      !! [J]
     real(wp) :: potential_energy_bodies = 0.0_wp, contact_energy = 0.0_wp          !! [J]
     real(wp) :: max_overlap = 0.0_wp          !! [m]
@@ -53,15 +56,15 @@ module diagnostics_m
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 19
+  integer, parameter :: n_columns = 20
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
-    'liquid_volume_drift', &
+    'liquid_volume_drift', 'volume_excess_max', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
     'max_overlap', 'contact_courant_max', 'substeps', 'sleeping', &
     'curvature_fallback', 'transport_parts', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
-    '1/s', '1', '1', 'm3', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
+    '1/s', '1', '1', 'm3', '1', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
     '1', '1', 's']
 
 contains
@@ -103,6 +106,7 @@ contains
       row%solver_iterations = row%cfl
       row%liquid_volume = row%cfl
       row%liquid_volume_drift = row%cfl
+      row%volume_excess_max = row%cfl
       row%kinetic_energy_fluid = row%cfl
       row%curvature_fallback = row%cfl
       row%transport_parts = row%cfl
@@ -114,29 +118,29 @@ contains
     row%solver_iterations = real(report%solver_iterations, wp)
     row%curvature_fallback = real(report%curvature_fallback, wp)
     row%transport_parts = real(report%transport_parts, wp)
-    call sum_fluid(fluid, grid, flow, solid, row%liquid_volume, row%kinetic_energy_fluid)
+    call sum_fluid(fluid, grid, flow, solid, row)
     if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
       (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
   end subroutine add_fluid
 
   !> Volume of liquid, and kinetic energy sum 1/2 m |u|^2 of the fluid that a cell holds, exact and
-  !! therefore the same on any number of threads and processes.
-  subroutine sum_fluid(fluid, grid, flow, solid, volume, energy)
+  !! therefore the same on any number of threads and processes, and the largest excess of a cell.
+  subroutine sum_fluid(fluid, grid, flow, solid, row)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(in) :: flow
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(out) :: volume   !! [m3]
-    real(wp), intent(out) :: energy   !! [J]
+    type(row_t), intent(inout) :: row
     integer(i8) :: bins(bin_size, 2), mine(bin_size, 2)
     real(wp), allocatable :: terms(:, :)   ! of one plane
-    real(wp) :: total(2)
+    real(wp) :: total(2), excess(1)
     integer :: k, m
 
     do m = 1, 2
       bins(:, m) = no_terms
     end do
-    !$omp parallel private(mine, terms, k, m)
+    excess = 0.0_wp
+    !$omp parallel private(mine, terms, k, m) reduction(max: excess)
     allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), 2))
     do m = 1, 2
       mine(:, m) = no_terms
@@ -147,6 +151,7 @@ contains
       do m = 1, 2
         call exact_add(terms(:, m), mine(:, m))
       end do
+      excess = max(excess, excess_of_plane(grid, k, flow%room, solid%alpha))
     end do
     !$omp end do nowait
     !$omp critical (merge_fluid_sums)
@@ -156,8 +161,10 @@ contains
     !$omp end critical (merge_fluid_sums)
     !$omp end parallel
     call exact_totals(bins, total)
-    volume = total(1)
-    energy = total(2)
+    call global_max(excess)
+    row%liquid_volume = total(1)
+    row%kinetic_energy_fluid = total(2)
+    row%volume_excess_max = excess(1)
   end subroutine sum_fluid
 
   !> Volume of liquid and kinetic energy of the cells of plane k. The mass is that of the liquid and
@@ -187,6 +194,23 @@ contains
     end do
   end subroutine plane_terms
 
+  !> Largest difference of the fluid that a cell of plane k holds from its open volume [V].
+  pure function excess_of_plane(grid, k, room, alpha) result(excess)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: k
+    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
+      room, alpha
+    real(wp) :: excess
+    integer :: i, j
+
+    excess = 0.0_wp
+    do j = grid%lo(2), grid%hi(2)
+      do i = grid%lo(1), grid%hi(1)
+        excess = max(excess, abs(room(i, j, k)/grid%volume - (1.0_wp - alpha(i, j, k))))
+      end do
+    end do
+  end function excess_of_plane
+
   !> The columns as an array, in the order of `column_name`.
   pure function row_values(row) result(v)
     type(row_t), intent(in) :: row
@@ -194,7 +218,8 @@ contains
 
     v = [row%time, row%dt, row%cfl, row%divergence_max, row%pressure_passes, &
       row%solver_iterations, &
-         row%liquid_volume, row%liquid_volume_drift, row%kinetic_energy_fluid, &
+         row%liquid_volume, row%liquid_volume_drift, row%volume_excess_max, &
+         row%kinetic_energy_fluid, &
          row%kinetic_energy_bodies, &
          row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
          row%contact_courant_max, &

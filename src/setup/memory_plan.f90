@@ -2,7 +2,8 @@
 !!
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
 !! and both couplings (gfortran 12): 460 to 734 B for a cell, those of the halo counted, 1200 B
-!! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods.
+!! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
+!! cells come on top (`make_room_for_all` in `flux_band_m`): 36 B for a cell.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp, i8
@@ -17,6 +18,7 @@ module memory_plan_m
 
   integer(i8), parameter :: bytes_per_cell = 810       !! all arrays: fields, solids, solvers [B]
   integer(i8), parameter :: bytes_of_c_ismac = 470     !! more for each cell [B]
+  integer(i8), parameter :: bytes_of_landing = 36      !! more for each cell where blocks land [B]
   integer(i8), parameter :: bytes_per_piece = 1000     !! of a tetrahedron or a sphere [B]
   integer(i8), parameter :: bytes_per_body = 30000     !! contacts and surface of a body [B]
   integer(i8), parameter :: bytes_at_rest = 30000000   !! program and libraries [B]
@@ -29,16 +31,18 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     integer(i8) :: bytes
-    integer(i8) :: each
+    integer(i8) :: each, blocks
     integer :: s
 
+    blocks = size(case%body) + sum(int(case%drop%count, i8))
     bytes = bytes_at_rest
     if (case%run%physics /= 'dry') then
       each = bytes_per_cell
       if (case%numerics%momentum == 'c_ismac') each = each + bytes_of_c_ismac
+      if (case%run%physics == 'coupled' .and. blocks > 0) each = each + bytes_of_landing
       bytes = bytes + each*product(int(case%grid%cells, i8) + 2*halo)
     end if
-    bytes = bytes + bytes_per_body*(size(case%body) + sum(int(case%drop%count, i8)))
+    bytes = bytes + bytes_per_body*blocks
     do s = 1, size(shapes)
       bytes = bytes + bytes_per_piece*(size(shapes(s)%tet, 2) + size(shapes(s)%sphere_radius))
     end do

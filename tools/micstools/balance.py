@@ -13,6 +13,7 @@ from micstools.overlap import WALL_KINDS
 from micstools.reader import Grid, Run
 
 State = dict[str, Any]
+EXCESS_LIMIT = 1e-6  # of the volume of a cell: what the program lets a cell hold beyond its room
 
 
 def faces(state: State, name: str, grid: Grid, periodic: tuple[bool, ...]) -> list[Array]:
@@ -32,6 +33,12 @@ def faces(state: State, name: str, grid: Grid, periodic: tuple[bool, ...]) -> li
             values = np.concatenate([values, np.take(values, [0], axis=axis)], axis=axis)
         found.append(values)
     return found
+
+
+def excess(run: Run, state: State) -> Array:
+    """Fluid that each cell holds beyond its open volume, of the cell volume (nz, ny, nx)."""
+    room = np.asarray(state["flow/room"]).squeeze() / run.grid.spacing.prod()
+    return np.asarray(room - (1.0 - np.asarray(state["flow/alpha"]).squeeze()))
 
 
 def divergence(run: Run, state: State) -> Array:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from micstools import kicks
+from micstools.balance import EXCESS_LIMIT
 from micstools.geometry import Array
 from micstools.reader import Run
 from micstools.scene import DROPPED
@@ -34,6 +35,8 @@ def history(run: Run) -> Figure:
             panels += [_untouched]
     if np.isfinite(run.series.liquid_volume).any():
         panels += [_liquid, _divergence]
+    if np.isfinite(run.series.volume_excess_max).any():
+        panels.append(_excess)
     panels += [_energies, _steps]
     if np.isfinite(run.series.solver_iterations).any():
         panels.append(_solver)
@@ -138,6 +141,12 @@ def _overlap(axis: Axes, run: Run) -> None:
 def _liquid(axis: Axes, run: Run) -> None:
     axis.plot(run.series.time, run.series.liquid_volume_drift, color="#00798c", lw=0.8)
     axis.set_title("drift of the liquid volume [-]", loc="left")
+
+
+def _excess(axis: Axes, run: Run) -> None:
+    axis.semilogy(run.series.time, _positive(run.series.volume_excess_max), color="#00798c", lw=0.8)
+    axis.axhline(EXCESS_LIMIT, color="#d1495b", lw=0.8, ls="--")
+    axis.set_title("largest excess of fluid in a cell [V], limit dashed", loc="left")
 
 
 def _divergence(axis: Axes, run: Run) -> None:

@@ -131,6 +131,7 @@ class Series:
     solver_iterations: Array
     liquid_volume: Array
     liquid_volume_drift: Array
+    volume_excess_max: Array
     kinetic_energy_fluid: Array
     kinetic_energy_bodies: Array
     potential_energy_bodies: Array

@@ -161,6 +161,7 @@ def _write_series(group: h5py.Group, time: Array, drops: int) -> None:
         "solver_iterations": (14 + 5 * noise).astype(int),
         "liquid_volume": np.full(len(time), 4.35e-3),
         "liquid_volume_drift": 1e-14 * (noise - 0.5),
+        "volume_excess_max": 1e-8 * noise,
         "kinetic_energy_fluid": 0.02 * falling,
         "kinetic_energy_bodies": 0.04 * falling,
         "potential_energy_bodies": 1.2 - 0.08 * time,

@@ -77,6 +77,20 @@ def test_a_run_without_blocks_has_a_page(make_run) -> None:
     assert "drift of the liquid volume" in text and "overlap" not in text.split("<main>")[1]
 
 
+def test_cells_that_hold_too_much_are_to_be_looked_at(make_run) -> None:
+    run = make_run(Motion(t_end=0.1))
+    good = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    assert "largest excess of fluid in a cell" in good and "level of the water" not in good
+    most = np.full_like(run.series.volume_excess_max, 2e-6)
+    run.__dict__["series"] = replace(run.series, volume_excess_max=most)
+    bad = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    assert bad.count("! look") == good.count("! look") + 1
+    assert "2.0e-06" in bad and "the level of the water is not exact" in bad
+    unknown = np.full_like(most, np.nan)  # of older programs
+    run.__dict__["series"] = replace(run.series, volume_excess_max=unknown)
+    assert "excess" not in run_page.page(run).split('id="health"')[1].split("</section>")[0]
+
+
 def test_make_run_makes_the_page() -> None:
     """The newcomer's one command ends with the page of its case."""
     root = Path(__file__).parents[2]

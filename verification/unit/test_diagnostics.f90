@@ -30,8 +30,10 @@ program test_diagnostics
   state%flow%liquid = 0.0_wp   ! as far as the surface around tells
   state%flow%rho = case%fluid%liquid_density
   state%flow%liquid(1:4, 1:4, 1:2) = volume
+  state%flow%room = volume
   call make_row(case%fluid, 0.0_wp, state, report, row)
   call check('liquid', row%liquid_volume, 32*volume, 1.0e-15_wp)
+  call check('no excess', row%volume_excess_max, 0.0_wp, 1.0e-15_wp)
   call check('at rest', row%kinetic_energy_fluid, 0.0_wp, 0.0_wp)
 
   state%flow%u(2, 2, 2, :) = [1.0_wp, -2.0_wp, 2.0_wp]   ! a cell of liquid
@@ -50,5 +52,15 @@ program test_diagnostics
   call make_row(case%fluid, 0.0_wp, state, report, row)
   mass = (case%fluid%gas_density*0.05_wp + case%fluid%liquid_density*0.2_wp)*volume
   call check('both in a cut cell', row%kinetic_energy_fluid, 0.5_wp*mass*6400, 1.0e-9_wp*mass)
+
+  state%flow%room(3, 2, 3) = 0.25_wp*volume              ! just its open volume
+  state%flow%room(1, 4, 4) = (1.0_wp + 2.0e-6_wp)*volume
+  state%flow%room(4, 1, 1) = (1.0_wp - 3.0e-6_wp)*volume
+  state%flow%room(0, 1, 1) = 2.0_wp*volume               ! of the halo
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  call check('the largest excess, of either sign', row%volume_excess_max, 3.0e-6_wp, 1.0e-15_wp)
+  state%flow%room(3, 2, 3) = 0.4_wp*volume
+  call make_row(case%fluid, 0.0_wp, state, report, row)
+  call check('excess of a cut cell', row%volume_excess_max, 0.15_wp, 1.0e-15_wp)
   call finish_checks()
 end program test_diagnostics

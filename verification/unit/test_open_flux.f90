@@ -46,6 +46,26 @@ program test_open_flux
   call check('stopped by the floor: balance', imbalance(1, 10, 0.0_wp), 0.0_wp, 2.0e-12_wp)
   call check('stopped by the floor: out at the top', sum(q(1:8, 1:9, 11, 3)), &
              -0.01_wp*0.25_wp, 1.0e-12_wp)
+
+  call start(.false.)
+  call stand_on_floor()
+  grid%side = side_slip
+  new = old
+  flow%room = (1.0_wp + 1.0e-4_wp)*flow%room
+  call find_open_flux(grid, old, new, dt, flow, flux, q)
+  call check('no way out: told', flux%unmatched, 1.0e-4_wp, 1.0e-12_wp)
+  call check('no way out: what all cells share is left alone', &
+             any(flux%band%marked(1:8, 1:9, 1:10) == 0))
+
+  call start(.true.)
+  call set_boxes(grid, reshape([0.15_wp, -1.0_wp, -1.0_wp], [3, 1]), &
+                 reshape([0.65_wp, 2.0_wp, 2.0_wp], [3, 1]), old)
+  call find_open_flux(grid, old, old, dt, flow, flux, q)
+  call check('side by side: two parts', flux%band%parts, 2)
+  associate (x => flux%band%cell(1, :), first => flux%band%first)
+    call check('side by side: the left one', all(x(1:first(2) - 1) <= 2))
+    call check('side by side: the right one', all(x(first(2):first(3) - 1) >= 7))
+  end associate
   call finish_checks()
 
 contains

@@ -1,0 +1,83 @@
+"""Fluid that cells hold beyond their open volume when blocks land, in rows, restart file, frames.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+
+from micstools.balance import EXCESS_LIMIT, excess  # noqa: E402
+from micstools.checks import Checks, main, sound  # noqa: E402
+from micstools.reader import Fields, Run  # noqa: E402
+
+LEVEL_BAND = 1e-3  # of the rise
+FRAME_BAND = 1e-6  # of the volume of the liquid
+
+
+def squeezed(run: Run, frame: Fields) -> float:
+    """Share by which the fluid of a closed tank must be more than its room: what overlaps of blocks
+    with one another and with the floor leave open; none in a tank with an open top."""
+    if run.sides["z_max"] == "open":
+        return 0.0
+    bodies = run.bodies
+    there = bodies.release_time < frame.time - 1e-9  # a drop that is due now is not there yet
+    volume = np.array([run.shapes[name].volume for name in bodies.shape])
+    tank = float(np.prod(run.grid.high - run.grid.low))
+    room = float((1.0 - frame.solid.astype(float)).mean()) * tank
+    return (tank - float(volume[there].sum())) / room - 1.0
+
+
+def excess_of(run: Run, name: str, checks: Checks) -> None:
+    """At all rows, with a lid at the rows of the frames, and in all cells of the restart file."""
+    series = run.series
+    times = run.field_times[1:]  # at 0 no drop is there
+    frames = [run.fields(t) for t in times]
+    share = np.array([squeezed(run, frame) for frame in frames])
+    if run.sides["z_max"] == "open":
+        checks.below(f"{name}: largest excess [V]", series.volume_excess_max.max(), EXCESS_LIMIT)
+    else:
+        rows = [run.bodies.row(t) for t in times]
+        unlike = np.abs(series.volume_excess_max[rows] - np.abs(share)).max()
+        checks.below(f"{name}: excess against that of overlaps [V]", unlike, EXCESS_LIMIT)
+    state = run.restart()
+    open_share = 1.0 - np.asarray(state["flow/alpha"]).squeeze()
+    left = float(np.abs(excess(run, state) - share[-1] * open_share).max())
+    checks.below(f"{name}: in the restart file [V]", left, EXCESS_LIMIT)
+    volume = run.grid.spacing.prod()
+    held = [(f.liquid.astype(float) * (1.0 - f.solid.astype(float))).sum() for f in frames]
+    counted = np.interp(times, series.time, series.liquid_volume)
+    off = np.array(held) * volume * (1.0 + share) / counted - 1.0
+    checks.below(f"{name}: liquid of the frames / of the rows - 1", np.abs(off).max(), FRAME_BAND)
+
+
+def rise_of(run: Run, name: str, checks: Checks) -> None:
+    """Height of the water with the blocks under it at the end, over that of the start."""
+    length = run.grid.high - run.grid.low
+    frame, area = run.fields(run.field_times[-1]), float(length[0] * length[1])
+    solid = frame.solid.astype(float)
+    height = float((solid + (1.0 - solid) * frame.liquid).mean() * length[2])
+    wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / area
+    level = float(run.value("fluid", "water_level", 0.0))
+    checks.close(f"{name}: rise of the level [m]", height - level, wanted, LEVEL_BAND)
+
+
+def check(runs: list[Run]) -> Checks:
+    """Every run keeps its room; where all blocks are dropped the level tells their volume."""
+    checks = Checks("landing")
+    for run in runs:
+        name = run.folder.name
+        excess_of(run, name, checks)
+        if name.startswith(("case", "flat")):
+            rise_of(run, name, checks)
+        sound(run, checks)
+    curves = {run.folder.name: (run.series.time, run.series.volume_excess_max) for run in runs}
+    checks.figure("largest excess of fluid in a cell", "t [s]", "V", curves)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
