@@ -1,6 +1,6 @@
 !> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
 program test_wall_shear
-  use kinds_m, only: wp
+  use kinds_m, only: wp, pi
   use wall_shear_m, only: find_wall_speeds, distance_of_legs, rough_viscosity
   use viscous_legs_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
@@ -40,6 +40,7 @@ program test_wall_shear
   call law()
   call at_one_wall()
   call what_is_left_alone()
+  call across_an_oblique_wall()
   call finish_checks()
 
 contains
@@ -91,6 +92,21 @@ contains
     call check('fluid that moves with the block', maxval(none(:2*box%solid%n_leg)), 0.0_wp, 0.0_wp)
     call check('its leg', leg_of(beside, thin, none), leg_of(beside, thin), 0.0_wp)
   end subroutine what_is_left_alone
+
+  !> A cube of 0.5 m turned by 30 degrees about z: its wall lies at n.x = 0.25 from its middle.
+  subroutine across_an_oblique_wall()
+    real(wp), parameter :: cos_30 = sqrt(0.75_wp)
+    integer, parameter :: beside_wall(3) = [8, 7, 5]   !! 0.25 and 0.15 m from the middle
+    type(one_body_t) :: cube
+
+    call describe(cells, [1.0_wp, 1.0_wp, 1.0_wp], sides, 'cube', [0.5_wp, 0.0_wp, 0.0_wp], &
+                  [0.5_wp, 0.5_wp, 0.5_wp], cube%case)
+    cube%case%body(1)%quaternion = [cos(pi/12.0_wp), 0.0_wp, 0.0_wp, sin(pi/12.0_wp)]
+    call place(cube)
+    call check('distance from an oblique wall', &
+               distance_of_legs(cube%grid, cube%solid, beside_wall), &
+               0.25_wp*cos_30 + 0.15_wp*0.5_wp - 0.25_wp, 1.0e-12_wp)
+  end subroutine across_an_oblique_wall
 
   !> Conductance of the one wall leg of a cell [kg/s].
   real(wp) function leg_of(c, mu, wall_speed)
