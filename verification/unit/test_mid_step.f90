@@ -1,9 +1,9 @@
-!> What the transport gets of half a step of weight and pressure, which cells get it, and how much
-!! momentum that is.
+!> What the transport gets of half a step of weight and pressure, which cells get it, how much
+!! momentum that is, and what the cells get after it.
 program test_mid_step
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step
+  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, add_second_half, add_whole
   use mixture_m, only: mix_fluid
   use momentum_conservative_m, only: mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init
@@ -70,9 +70,34 @@ program test_mid_step
       end do
     end do
   end associate
+  call after_transport()
   call finish_checks()
 
 contains
+
+  !> Cells in liquid get the other half, or all where the transport took nothing; all others get the
+  !! whole later, and both together leave out none.
+  subroutine after_transport()
+    real(wp), parameter :: gain(3) = dt*[7.0_wp, -11.0_wp, 13.0_wp]   !! of the whole [m/s]
+
+    do i = 1, 3
+      a%cell(:, :, :, i) = gain(i)/dt
+    end do
+    before = box%flow%u
+    call add_second_half(box%grid, dt, a%cell, mid_step, box%flow%u)
+    call check('liquid: the other half', maxval(abs(change(7, 3, 2) - 0.5_wp*gain)), 0.0_wp, &
+               1.0e-14_wp)
+    call check('not at the surface', maxval([abs(change(7, 6, 5)), abs(change(6, 5, 4))]), 0.0_wp, &
+               0.0_wp)
+    call add_whole(box%grid, dt, a%cell, mid_step, box%flow%u)
+    call check('liquid: no more', maxval(abs(change(7, 3, 2) - 0.5_wp*gain)), 0.0_wp, 1.0e-14_wp)
+    call check('the whole at the surface', maxval(abs(change(7, 6, 5) - gain)), 0.0_wp, 1.0e-14_wp)
+    call check('and beside it', maxval(abs(change(6, 5, 4) - gain)), 0.0_wp, 1.0e-14_wp)
+    deallocate (mid_step%given)
+    before = box%flow%u
+    call add_second_half(box%grid, dt, a%cell, mid_step, box%flow%u)
+    call check('no half before', maxval(abs(change(7, 3, 2) - gain)), 0.0_wp, 1.0e-14_wp)
+  end subroutine after_transport
 
   !> How the velocity of a cell has changed [m/s].
   pure function change(i, j, k) result(du)
