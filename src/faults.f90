@@ -24,6 +24,8 @@ module faults_m
   !! in steps of 18 cells still had its energy, in steps of 400 eight times as much.
   real(wp), parameter :: highest_courant = 50.0_wp
 
+  real(wp), parameter :: excess_max = 0.1_wp   !! energy made, over that set free
+
 contains
 
   !> Where the blocks are and how fast; call it before the first step, `find_fault` does it later.
@@ -52,6 +54,9 @@ contains
       call set(sim, 'divergence '//to_text(report%divergence_max)//' 1/s after ' &
                //to_text(report%pressure_passes)//' passes: above `divergence_tolerance`', fault)
     end if
+    if (report%energy_excess > excess_max) call set(sim, 'fluid and blocks have ' &
+      //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was set' &
+      //' free: &run dt or cfl_max is too long for this flow', fault)
     call look_at_blocks(sim, fault)
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)

@@ -29,7 +29,7 @@ program mics
   use output_m, only: output_t, check_output, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
-  use time_step_m, only: simulation_t, simulation_init, resume, take_step
+  use time_step_m, only: simulation_t, simulation_init, resume, take_step, measure
   use faults_m, only: fault_t, note_places, find_fault, find_final_fault
   implicit none
   type(options_t) :: options
@@ -57,6 +57,7 @@ program mics
 
   call open_output(case, parameters(), options, sim%run_state_t, bed, output)
   call stop_on_trouble()
+  call measure(sim, report)
   if (len(options%restart) == 0) then   ! else what was due has been written
     call write_due_output(sim%run_state_t, report, output)
   end if

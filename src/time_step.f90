@@ -19,14 +19,17 @@ module time_step_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_init, fastest_point, turn_with_fluid
+  use rigid_body_m, only: blocks_init, fastest_point, turn_with_fluid, kinetic_energy, &
+                          potential_energy
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use contacts_m, only: contacts_init, contact_report_t, move_blocks
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
   use release_m, only: release_due_blocks, next_release, none_to_come
-  use diagnostics_m, only: step_report_t
+  use diagnostics_m, only: step_report_t, measure_fluid, energy_of_level
+  use energy_m, only: energy_parts_t, energy_init, begin_energy, note_energy, note_release, &
+                      energy_excess
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
   use monolithic_m, only: start_flow, begin_motion
   use buoyancy_m, only: displaced_force
@@ -42,7 +45,7 @@ module time_step_m
 
   real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
 
-  public :: simulation_t, simulation_init, resume, take_step
+  public :: simulation_t, simulation_init, resume, take_step, measure
 
   !> Everything that lives as long as the run.
   type, extends(run_state_t) :: simulation_t
@@ -86,6 +89,7 @@ contains
     allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return
+    call energy_init(case, sim%grid, sim%blocks, sim%energy)
     call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
     if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
       sim%grid%h, sim%blocks, sim%contacts%lubrication)
@@ -209,11 +213,38 @@ contains
     report%solver_iterations = stage%pressure%iterations
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
+    call measure(sim, report)
+    call note_energy(parts_of(sim, report), sim%energy)
+    report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%parts
     report%transport_converged = sim%transport%liquid%small%converged
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%stage%tension%surface%fallback
   end subroutine tell
+
+  !> Sums over the fluid of now; before the first step the energy that a run begins with, too.
+  subroutine measure(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+
+    if (.not. sim%wet) return
+    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    if (sim%clock%step == 0) call begin_energy(parts_of(sim, report), &
+      report%fluid%potential - energy_of_level(sim%case%fluid, sim%grid, sim%flow%c), sim%energy)
+    report%energy_excess = energy_excess(sim%energy)
+  end subroutine measure
+
+  !> Energies of fluid and blocks, once the fluid is measured.
+  function parts_of(sim, report) result(parts)
+    type(simulation_t), intent(in) :: sim
+    type(step_report_t), intent(in) :: report
+    type(energy_parts_t) :: parts
+
+    parts%kinetic = report%fluid%kinetic + kinetic_energy(sim%blocks)
+    parts%contact = report%contact_energy
+    parts%potential = report%fluid%potential &
+                      + potential_energy(sim%case%fluid%gravity, sim%blocks)
+  end function parts_of
 
   !> Blocks whose time has come; the liquid in their place raises the free surface.
   subroutine release(sim, report)
@@ -228,6 +259,9 @@ contains
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
+    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    report%contact_energy = sim%energy%parts%contact
+    call note_release(parts_of(sim, report), sim%energy)
   end subroutine release
 
   !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after

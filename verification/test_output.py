@@ -51,8 +51,10 @@ SERIES = {
     "volume_excess_max": "1",
     "kinetic_energy_fluid": "J",
     "kinetic_energy_bodies": "J",
+    "potential_energy_fluid": "J",
     "potential_energy_bodies": "J",
     "contact_energy": "J",
+    "energy_excess": "1",
     "max_overlap": "m",
     "contact_courant_max": "1",
     "substeps": "1",
@@ -73,6 +75,8 @@ OF_THE_FLUID = {
     "liquid_volume_drift",
     "volume_excess_max",
     "kinetic_energy_fluid",
+    "potential_energy_fluid",
+    "energy_excess",
 }
 
 
@@ -594,7 +598,7 @@ def test_no_room_for_files(tmp_path: Path) -> None:
     """A limit stands for a full disk: exit code 4, the file is named, older rows can be read."""
 
     def no_large_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (640_000, 640_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (690_000, 690_000))
 
     code, said = run(tmp_path / "run", preexec_fn=no_large_files)
     assert code == 4, said

@@ -13,6 +13,15 @@ module diagnostics_m
   implicit none
   private
   public :: step_report_t, row_t, make_row, row_values, column_name, column_units, n_columns
+  public :: fluid_sums_t, measure_fluid, energy_of_level
+
+  !> Of all the fluid.
+  type :: fluid_sums_t
+    real(wp) :: liquid_volume = 0.0_wp   !! [m3]
+    real(wp) :: kinetic = 0.0_wp         !! energy [J]
+    real(wp) :: potential = 0.0_wp       !! energy, zero at the lower corner of the tank [J]
+    real(wp) :: excess_max = 0.0_wp      !! of the fluid of a cell over its open volume [V]
+  end type fluid_sums_t
 
   !> What one fluid step, with its body substeps, tells about itself.
   type :: step_report_t
@@ -31,6 +40,8 @@ module diagnostics_m
     integer :: warnings = 0                   !! printed in this step
     logical :: pressure_converged = .true., viscous_converged = .true., contacts_solved = .true.
     logical :: transport_converged = .true.
+    type(fluid_sums_t) :: fluid               !! at its end
+    real(wp) :: energy_excess = 0.0_wp        !! over what was put in (`energy_m`) [-]
   end type step_report_t
 
   !> The columns of /series, in the order of `column_name`.
@@ -46,7 +57,9 @@ module diagnostics_m
     real(wp) :: volume_excess_max = 0.0_wp
       !! largest |Vt - V (1 - alpha)|/V of a cell: fluid it holds beyond its room, or lacks
     real(wp) :: kinetic_energy_fluid = 0.0_wp, kinetic_energy_bodies = 0.0_wp      !! [J]
+    real(wp) :: potential_energy_fluid = 0.0_wp      !! zero at the lower corner of the tank [J]
     real(wp) :: potential_energy_bodies = 0.0_wp, contact_energy = 0.0_wp          !! [J]
+    real(wp) :: energy_excess = 0.0_wp        !! over what was put in, over what was set free
     real(wp) :: max_overlap = 0.0_wp          !! [m]
     real(wp) :: contact_courant_max = 0.0_wp
     real(wp) :: substeps = 0.0_wp
@@ -56,20 +69,21 @@ module diagnostics_m
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 20
+  integer, parameter :: n_columns = 22
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
     'liquid_volume_drift', 'volume_excess_max', &
-    'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_bodies', 'contact_energy', &
-    'max_overlap', 'contact_courant_max', 'substeps', 'sleeping', &
+    'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_fluid', &
+    'potential_energy_bodies', 'contact_energy', 'energy_excess', 'max_overlap', &
+    'contact_courant_max', 'substeps', 'sleeping', &
     'curvature_fallback', 'transport_parts', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
-    '1/s', '1', '1', 'm3', '1', '1', 'J', 'J', 'J', 'J', 'm', '1', '1', '1', &
+    '1/s', '1', '1', 'm3', '1', '1', 'J', 'J', 'J', 'J', 'J', '1', 'm', '1', '1', '1', &
     '1', '1', 's']
 
 contains
 
-  !> The row of this moment. Without fluid its columns are NaN. All processes call.
+  !> The row of this moment. Without fluid its columns are NaN.
   subroutine make_row(fluid, wall_time, state, report, row)
     type(fluid_t), intent(in) :: fluid            !! its properties
     real(wp), intent(in) :: wall_time             !! [s]
@@ -80,7 +94,7 @@ contains
     row%time = state%clock%t
     row%dt = state%clock%dt
     row%wall_time = wall_time
-    call add_fluid(fluid, state%grid, state%flow, state%solid, report, row)
+    call add_fluid(state%flow, report, row)
     row%kinetic_energy_bodies = kinetic_energy(state%blocks)
     row%potential_energy_bodies = potential_energy(fluid%gravity, state%blocks)
     row%contact_energy = report%contact_energy
@@ -91,11 +105,8 @@ contains
   end subroutine make_row
 
   !> The columns of the fluid.
-  subroutine add_fluid(fluid, grid, flow, solid, report, row)
-    type(fluid_t), intent(in) :: fluid
-    type(grid_t), intent(in) :: grid
+  subroutine add_fluid(flow, report, row)
     type(flow_t), intent(in) :: flow
-    type(solid_geometry_t), intent(in) :: solid
     type(step_report_t), intent(in) :: report
     type(row_t), intent(inout) :: row
 
@@ -108,6 +119,8 @@ contains
       row%liquid_volume_drift = row%cfl
       row%volume_excess_max = row%cfl
       row%kinetic_energy_fluid = row%cfl
+      row%potential_energy_fluid = row%cfl
+      row%energy_excess = row%cfl
       row%curvature_fallback = row%cfl
       row%transport_parts = row%cfl
       return
@@ -118,81 +131,136 @@ contains
     row%solver_iterations = real(report%solver_iterations, wp)
     row%curvature_fallback = real(report%curvature_fallback, wp)
     row%transport_parts = real(report%transport_parts, wp)
-    call sum_fluid(fluid, grid, flow, solid, row)
+    row%liquid_volume = report%fluid%liquid_volume
+    row%volume_excess_max = report%fluid%excess_max
+    row%kinetic_energy_fluid = report%fluid%kinetic
+    row%potential_energy_fluid = report%fluid%potential
+    row%energy_excess = report%energy_excess
     if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
       (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
   end subroutine add_fluid
 
-  !> Volume of liquid, and kinetic energy sum 1/2 m |u|^2 of the fluid that a cell holds, exact and
-  !! therefore the same on any number of threads and processes, and the largest excess of a cell.
-  subroutine sum_fluid(fluid, grid, flow, solid, row)
+  !> Volume of liquid, energies and largest excess of the fluid. The sums are exact and therefore
+  !! the same on any number of threads and processes. All processes call.
+  function measure_fluid(fluid, grid, flow, solid) result(sums)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(in) :: flow
     type(solid_geometry_t), intent(in) :: solid
-    type(row_t), intent(inout) :: row
-    integer(i8) :: bins(bin_size, 2), mine(bin_size, 2)
+    type(fluid_sums_t) :: sums
+    integer, parameter :: n = 3
+    integer(i8) :: bins(bin_size, n), mine(bin_size, n)
     real(wp), allocatable :: terms(:, :)   ! of one plane
-    real(wp) :: total(2), excess(1)
+    real(wp) :: total(n), excess(1)
     integer :: k, m
 
-    do m = 1, 2
+    do m = 1, n
       bins(:, m) = no_terms
     end do
     excess = 0.0_wp
     !$omp parallel private(mine, terms, k, m) reduction(max: excess)
-    allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), 2))
-    do m = 1, 2
+    allocate (terms(product(grid%hi(:2) - grid%lo(:2) + 1), n))
+    do m = 1, n
       mine(:, m) = no_terms
     end do
     !$omp do schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      call plane_terms(fluid, grid, k, flow%liquid, solid%alpha, flow%u, terms)
-      do m = 1, 2
+      call plane_terms(fluid, grid, k, flow, solid%alpha, terms)
+      do m = 1, n
         call exact_add(terms(:, m), mine(:, m))
       end do
       excess = max(excess, excess_of_plane(grid, k, flow%room, solid%alpha))
     end do
     !$omp end do nowait
     !$omp critical (merge_fluid_sums)
-    do m = 1, 2
+    do m = 1, n
       call merge_bins(mine(:, m), bins(:, m))
     end do
     !$omp end critical (merge_fluid_sums)
     !$omp end parallel
     call exact_totals(bins, total)
     call global_max(excess)
-    row%liquid_volume = total(1)
-    row%kinetic_energy_fluid = total(2)
-    row%volume_excess_max = excess(1)
-  end subroutine sum_fluid
+    sums = fluid_sums_t(total(1), total(2), total(3), excess(1))
+  end function measure_fluid
 
-  !> Volume of liquid and kinetic energy of the cells of plane k. The mass is that of the liquid and
-  !! the gas in the open part: `flow%rho` of a cut cell is that of its level, gas that leaves a cut
-  !! cell under water would have a thousand times its energy.
-  pure subroutine plane_terms(fluid, grid, k, liquid, alpha, u, terms)
+  !> Potential energy that the fluid would have if its liquid, and what blocks displace of it, lay
+  !! level; gravity along a direction of the grid [J].
+  function energy_of_level(fluid, grid, c) result(energy)
+    type(fluid_t), intent(in) :: fluid
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp) :: energy
+    integer(i8) :: bins(bin_size, 1)
+    real(wp) :: total(1), depth, g
+    integer :: j, k, d
+
+    bins(:, 1) = no_terms
+    do k = grid%lo(3), grid%hi(3)
+      do j = grid%lo(2), grid%hi(2)
+        call exact_add(c(grid%lo(1):grid%hi(1), j, k), bins(:, 1))
+      end do
+    end do
+    call exact_totals(bins, total)
+    d = maxloc(abs(fluid%gravity), 1)
+    g = abs(fluid%gravity(d))
+    associate (area => product(grid%length)/grid%length(d), length => grid%length(d))
+      depth = total(1)*grid%volume/area
+      energy = 0.5_wp*g*area*(fluid%liquid_density*depth**2 &
+                              + fluid%gas_density*(length**2 - depth**2))
+      if (fluid%gravity(d) > 0.0_wp) energy = energy - g*length*area &   ! down is the upper side
+        *(fluid%liquid_density*depth + fluid%gas_density*(length - depth))
+    end associate
+  end function energy_of_level
+
+  !> Volume of liquid, kinetic energy 1/2 m |u|^2 and potential energy -m g.x of the cells of plane
+  !! k. The mass is that of the liquid and the gas in the open part: `flow%rho` of a cut cell is
+  !! that of its level, gas that leaves a cut cell under water would have a thousand times its
+  !! energy.
+  pure subroutine plane_terms(fluid, grid, k, flow, alpha, terms)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: k
-    real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, alpha
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 2) [m3], [J]
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(out), contiguous :: terms(:, :)   !! (cells of the plane, 3) [m3], [J]
     integer :: i, j, first, last, at
-    real(wp) :: mass
+    real(wp) :: mass, gas, height, rest   !! [kg], [m3], times gravity, without that along x [m2/s2]
 
     first = grid%lo(1)
     last = grid%hi(1)
     do j = grid%lo(2), grid%hi(2)
       at = (j - grid%lo(2))*(last - first + 1) + 1 - first
+      rest = -fluid%gravity(2)*(grid%centre(j, 2) - grid%origin(2)) &
+             - fluid%gravity(3)*(grid%centre(k, 3) - grid%origin(3))
       do i = first, last
-        terms(at + i, 1) = liquid(i, j, k)
-        mass = fluid%liquid_density*liquid(i, j, k) + fluid%gas_density &
-          *max(0.0_wp, grid%volume*(1.0_wp - alpha(i, j, k)) - liquid(i, j, k))
-        terms(at + i, 2) = 0.5_wp*mass*(u(i, j, k, 1)**2 + u(i, j, k, 2)**2 + u(i, j, k, 3)**2)
+        associate (liquid => flow%liquid(i, j, k), u => flow%u(i, j, k, :), c => flow%c)
+          gas = max(0.0_wp, grid%volume*(1.0_wp - alpha(i, j, k)) - liquid)
+          mass = fluid%liquid_density*liquid + fluid%gas_density*gas
+          height = rest - fluid%gravity(1)*(grid%centre(i, 1) - grid%origin(1))
+          terms(at + i, 1) = liquid
+          terms(at + i, 2) = 0.5_wp*mass*(u(1)**2 + u(2)**2 + u(3)**2)
+          terms(at + i, 3) = mass*height
+          if (liquid <= 0.0_wp .or. gas <= 0.0_wp) cycle
+          terms(at + i, 3) = terms(at + i, 3) - (fluid%liquid_density - fluid%gas_density) &
+            *gas*liquid/(gas + liquid)*below(fluid%gravity, grid%h, &
+            [c(i + 1, j, k) - c(i - 1, j, k), c(i, j + 1, k) - c(i, j - 1, k), &
+             c(i, j, k + 1) - c(i, j, k - 1)])
+        end associate
       end do
     end do
   end subroutine plane_terms
+
+  !> How much deeper the liquid of a cell with a surface lies than its gas, times gravity, by the
+  !! change of the liquid share along each direction: half a cell where the surface is level
+  !! [m2/s2].
+  pure function below(gravity, h, change) result(depth)
+    real(wp), intent(in) :: gravity(3), h(3), change(3)
+    real(wp) :: depth
+    real(wp) :: normal(3)
+
+    normal = change/h
+    depth = 0.5_wp*dot_product(gravity, h*normal)/max(norm2(normal), tiny(depth))
+  end function below
 
   !> Largest difference of the fluid that a cell of plane k holds from its open volume [V].
   pure function excess_of_plane(grid, k, room, alpha) result(excess)
@@ -220,8 +288,8 @@ contains
       row%solver_iterations, &
          row%liquid_volume, row%liquid_volume_drift, row%volume_excess_max, &
          row%kinetic_energy_fluid, &
-         row%kinetic_energy_bodies, &
-         row%potential_energy_bodies, row%contact_energy, row%max_overlap, &
+         row%kinetic_energy_bodies, row%potential_energy_fluid, &
+         row%potential_energy_bodies, row%contact_energy, row%energy_excess, row%max_overlap, &
          row%contact_courant_max, &
          row%substeps, row%sleeping, row%curvature_fallback, row%transport_parts, row%wall_time]
   end function row_values

@@ -6,6 +6,7 @@ module run_state_m
   use rigid_body_m, only: blocks_t
   use contacts_m, only: contacts_t
   use clock_m, only: clock_t
+  use energy_m, only: energy_t
   implicit none
   private
   public :: run_state_t
@@ -17,6 +18,7 @@ module run_state_m
     type(solid_geometry_t), allocatable :: solid   !! likewise
     type(blocks_t) :: blocks
     type(contacts_t) :: contacts
+    type(energy_t) :: energy
   end type run_state_t
 
 end module run_state_m

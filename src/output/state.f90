@@ -22,7 +22,7 @@ module state_m
 
   !> Groups of the names below, in their order.
   character(*), parameter :: state_groups(*) = &
-    [character(9) :: '/clock', '/flow', '/blocks', '/contacts']
+    [character(9) :: '/clock', '/energy', '/flow', '/blocks', '/contacts']
 
   integer, parameter :: most_springs = 100000000
 
@@ -78,6 +78,14 @@ contains
     type(run_state_t), intent(inout) :: state
 
     call visit_clock(visitor, state%clock)
+    call visitor%real_number('/energy/put_in', 'J', state%energy%put_in)
+    call visitor%real_number('/energy/set_free', 'J', state%energy%set_free)
+    call visitor%real_number('/energy/excess', 'J', state%energy%excess)
+    associate (parts => state%energy%parts)
+      call visitor%real_number('/energy/kinetic', 'J', parts%kinetic)
+      call visitor%real_number('/energy/contact', 'J', parts%contact)
+      call visitor%real_number('/energy/potential', 'J', parts%potential)
+    end associate
     if (allocated(state%flow%u)) call visit_flow(visitor, state%grid, state%flow, state%solid)
     call visit_blocks(visitor, state%blocks)
     call visit_contacts(visitor, state%contacts)

@@ -1,9 +1,38 @@
-"""Energy that contact makes, which it must not."""
+"""Energy that steps and contacts make, which they must not."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from micstools.geometry import Array
 from micstools.reader import Run
+
+EXCESS_LIMIT = 0.01  # of the energy set free: more than was put in is to be looked at
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Largest energy of fluid and blocks over what was put in, of what was set free."""
+
+    share: float
+    time: float  # s
+
+    @property
+    def good(self) -> bool:
+        """Is it within what a step may be off?"""
+        return self.share <= EXCESS_LIMIT
+
+    def __str__(self) -> str:
+        return f"{100 * max(self.share, 0.0):.2g} %, t = {self.time:.3g} s"
+
+
+def largest_excess(run: Run) -> Excess | None:
+    """None where the program does not know it: `energy_excess` of `/series` is NaN."""
+    values = run.series.energy_excess
+    if not np.isfinite(values).any():
+        return None
+    row = int(np.nanargmax(values))
+    return Excess(float(values[row]), float(run.series.time[row]))
 
 
 def made_by_contact(run: Run) -> Array:

@@ -134,8 +134,10 @@ class Series:
     volume_excess_max: Array
     kinetic_energy_fluid: Array
     kinetic_energy_bodies: Array
+    potential_energy_fluid: Array
     potential_energy_bodies: Array
     contact_energy: Array
+    energy_excess: Array
     max_overlap: Array
     contact_courant_max: Array
     substeps: Array

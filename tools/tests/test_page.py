@@ -91,6 +91,20 @@ def test_cells_that_hold_too_much_are_to_be_looked_at(make_run) -> None:
     assert "excess" not in run_page.page(run).split('id="health"')[1].split("</section>")[0]
 
 
+def test_energy_that_a_run_made_is_to_be_looked_at(make_run) -> None:
+    run = make_run(Motion(t_end=0.1))
+    good = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    assert "over what was put in" in good and "0 %" in good
+    made = np.linspace(0.0, 0.03, run.series.energy_excess.size)
+    run.__dict__["series"] = replace(run.series, energy_excess=made)
+    bad = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    assert bad.count("! look") == good.count("! look") + 1
+    assert f"3 %, t = {run.series.time[-1]:.3g} s" in bad and "smaller dt" in bad
+    run.__dict__["series"] = replace(run.series, energy_excess=np.full_like(made, np.nan))
+    unknown = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    assert "not known" in unknown and unknown.count("! look") == good.count("! look")
+
+
 def test_make_run_makes_the_page() -> None:
     """The newcomer's one command ends with the page of its case."""
     root = Path(__file__).parents[2]

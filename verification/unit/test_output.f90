@@ -7,7 +7,7 @@ program test_output
   use parallel_m, only: parallel_init, parallel_final, is_root, broadcast
   use command_line_m, only: options_t
   use clock_m, only: clock_init
-  use diagnostics_m, only: step_report_t
+  use diagnostics_m, only: step_report_t, measure_fluid
   use output_m, only: output_t, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use hdf5_file_m, only: h5_file_t
@@ -87,12 +87,14 @@ contains
     call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
     call check('the output is opened', output%code, exit_ok)
+    report%fluid = measure_fluid(s%case%fluid, s%grid, s%flow, s%solid)
     call write_due_output(s%run_state_t, report, output)
     do while (.not. s%clock%finished())
       call s%clock%choose_step(0.25_wp, huge(1.0_wp))
       call s%clock%advance()
       call move(s)
       report%substeps = s%clock%step
+      report%fluid = measure_fluid(s%case%fluid, s%grid, s%flow, s%solid)
       if (s%clock%t >= t_stop) exit   ! as for a signal
       call write_due_output(s%run_state_t, report, output)
     end do

@@ -12,6 +12,7 @@ import numpy as np
 
 from micstools import kicks, pile, pile_ensemble
 from micstools.balance import EXCESS_LIMIT
+from micstools.energy import EXCESS_LIMIT as ENERGY_LIMIT
 from micstools.energy import made_by_contact
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
@@ -364,6 +365,8 @@ def _health(ensemble: Ensemble) -> Markup:
          run_page.DRIFT, ".1e"),
         ("largest excess of fluid in a cell, of its volume",
          _worst(series, "volume_excess_max", 1.0), EXCESS_LIMIT, ".1e"),
+        ("largest energy over what was put in, of what was set free",
+         _worst(series, "energy_excess", 1.0), ENERGY_LIMIT, ".1e"),
         ("largest divergence [1/s]", _worst(series, "divergence_max", 1.0),
          run_page.divergence_limit(ensemble.example.run), ".1e"),
         ("largest energy that contact made in a step [J]",

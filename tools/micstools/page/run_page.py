@@ -8,7 +8,8 @@ import numpy as np
 from micstools import block_numbers, kicks, pile, pile_numbers
 from micstools.balance import EXCESS_LIMIT
 from micstools.block_numbers import BlockNumbers
-from micstools.energy import made_by_contact
+from micstools.energy import EXCESS_LIMIT as ENERGY_LIMIT
+from micstools.energy import largest_excess, made_by_contact
 from micstools.geometry import Array
 from micstools.overlap import Overlap, Placed, overlap, present_bodies
 from micstools.page import charts, motion, run_words
@@ -250,6 +251,7 @@ def _checks(run: Run, found: Found | None) -> list[Row]:
                      drift < DRIFT))  # fmt: skip
         if np.isfinite(s.volume_excess_max).any():
             rows.append(_excess(float(np.nanmax(s.volume_excess_max))))
+        rows.append(_energy(run))
         worst = float(np.nanmax(s.divergence_max[1:], initial=0.0))
         limit = divergence_limit(run)
         rows.append(("largest divergence", f"{worst:.1e} 1/s", f"below {limit:.0e} 1/s",
@@ -275,6 +277,17 @@ def _excess(most: float) -> Row:
             " is not exact; in a closed tank overlaps of blocks do this"
         )
     return "largest excess of fluid in a cell, of its volume", f"{most:.1e}", wanted, good
+
+
+def _energy(run: Run) -> Row:
+    """Largest energy of fluid and blocks over what was put in."""
+    name = "largest energy of fluid and blocks over what was put in, of what was set free"
+    wanted = f"up to {100 * ENERGY_LIMIT:.0f} %"
+    if not (excess := largest_excess(run)):
+        return name, "not known", f"{wanted}; known where only weight does work", None
+    if not excess.good:
+        wanted += ": the steps make energy, take a smaller dt or cfl_max"
+    return name, f"{excess}", wanted, excess.good
 
 
 def _overlaps(run: Run, found: Found) -> list[Row]:

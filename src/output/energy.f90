@@ -1,0 +1,133 @@
+!> Energy of fluid and blocks against what was put in: no step may make any.
+!!
+!! $$ E = E_{kin} + E_{pot} + E_{contact} \le E(0) + \sum_{releases} \Delta E $$
+!! The excess is told over the energy set free, the most of what was put in that was no potential
+!! energy at some time. Known where nothing else does work: no side moves, no stream comes in, only
+!! the top is open, no block is driven, no surface tension.
+!!
+!! The liquid moves with the velocity of the start of a step, and its velocity changes after that.
+!! So the velocity of a moment belongs to the mean of its places then and a step later, and the
+!! excess of a step is known after the next one.
+module energy_m
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use boundary_kinds_m, only: is_wall, gives_velocity
+  use grid_m, only: grid_t
+  use rigid_body_m, only: blocks_t
+  implicit none
+  private
+  public :: energy_t, energy_parts_t, energy_init, begin_energy, note_energy, note_release, &
+            energy_excess
+
+  !> Of a moment [J].
+  type :: energy_parts_t
+    real(wp) :: kinetic = 0.0_wp    !! of fluid and blocks
+    real(wp) :: contact = 0.0_wp    !! elastic
+    real(wp) :: potential = 0.0_wp  !! of fluid and blocks
+  end type energy_parts_t
+
+  type :: energy_t
+    logical :: known = .false.
+    real(wp) :: floor = 0.0_wp      !! energy below which an excess means nothing [J]
+    real(wp) :: put_in = 0.0_wp     !! at the start and by releases [J]
+    real(wp) :: set_free = 0.0_wp   !! most of it that was no potential energy [J]
+    real(wp) :: excess = 0.0_wp     !! of the step before the last over what was put in [J]
+    type(energy_parts_t) :: parts   !! at the end of the last step
+  end type energy_t
+
+contains
+
+  !> What a case lets one know, and how exact it is: by the surface within a cell, and by the fall
+  !! of the blocks through a quarter of their length.
+  subroutine energy_init(case, grid, blocks, self)
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(energy_t), intent(out) :: self
+    integer :: b, d
+    real(wp) :: g
+
+    self%known = case%run%physics /= 'dry' .and. case%fluid%surface_tension <= 0.0_wp &
+                 .and. .not. any(abs(grid%side_velocity) > 0.0_wp) .and. only_top_is_open() &
+                 .and. .not. any(grid%periodic .and. abs(case%fluid%gravity) > 0.0_wp)
+    do b = 1, blocks%n
+      if (.not. blocks%fixed(b)) cycle
+      self%known = self%known .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
+                   .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp)
+    end do
+    if (.not. self%known) return
+    g = norm2(case%fluid%gravity)
+    d = maxloc(abs(case%fluid%gravity), 1)
+    self%floor = 0.5_wp*(case%fluid%liquid_density - case%fluid%gas_density)*g*grid%h(d)**2 &
+                 *product(grid%length)/grid%length(d)
+    do b = 1, blocks%n
+      if (.not. blocks%fixed(b)) self%floor = self%floor + 0.5_wp*blocks%mass(b)*g &
+        *blocks%shapes(blocks%shape(b))%radius
+    end do
+  contains
+    !> Is the side against gravity the only one that lets fluid through, and none a stream?
+    logical function only_top_is_open()
+      integer :: e, s
+      logical :: top
+
+      only_top_is_open = .true.
+      do e = 1, 3
+        do s = 1, 2
+          if (grid%periodic(e) .or. is_wall(grid%side(s, e))) cycle
+          top = e == maxloc(abs(case%fluid%gravity), 1) &
+                .and. merge(case%fluid%gravity(e), -case%fluid%gravity(e), s == 1) > 0.0_wp
+          only_top_is_open = only_top_is_open .and. top .and. .not. gives_velocity(grid%side(s, e))
+        end do
+      end do
+    end function only_top_is_open
+  end subroutine energy_init
+
+  !> What is there before the first step. What the liquid sets free when it comes to lie level
+  !! counts from the start.
+  subroutine begin_energy(parts, slope, self)
+    type(energy_parts_t), intent(in) :: parts
+    real(wp), intent(in) :: slope   !! potential energy of the fluid over that of a level one [J]
+    type(energy_t), intent(inout) :: self
+
+    self%parts = parts
+    self%put_in = sum_of(parts)
+    self%set_free = parts%kinetic + max(0.0_wp, slope)
+  end subroutine begin_energy
+
+  !> A release has changed the energy since the last step: velocity given, liquid lifted.
+  subroutine note_release(parts, self)
+    type(energy_parts_t), intent(in) :: parts   !! after it
+    type(energy_t), intent(inout) :: self
+
+    self%put_in = self%put_in + sum_of(parts) - sum_of(self%parts)
+    self%parts = parts
+  end subroutine note_release
+
+  !> After a step.
+  subroutine note_energy(parts, self)
+    type(energy_parts_t), intent(in) :: parts
+    type(energy_t), intent(inout) :: self
+
+    self%excess = sum_of(self%parts) + 0.5_wp*(parts%potential - self%parts%potential) &
+                  - self%put_in
+    self%set_free = max(self%set_free, self%put_in - parts%potential)
+    self%parts = parts
+  end subroutine note_energy
+
+  pure real(wp) function sum_of(parts)
+    type(energy_parts_t), intent(in) :: parts
+
+    sum_of = parts%kinetic + parts%contact + parts%potential
+  end function sum_of
+
+  !> The excess over the energy set free; NaN where it is not known [-].
+  pure function energy_excess(self) result(excess)
+    type(energy_t), intent(in) :: self
+    real(wp) :: excess
+
+    excess = ieee_value(excess, ieee_quiet_nan)
+    if (self%known) excess = self%excess/max(self%set_free + self%floor, tiny(excess))
+  end function energy_excess
+
+end module energy_m
