@@ -20,7 +20,8 @@ module monolithic_m
   use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
-                             predict_face_velocity, face_velocity_at_walls, shorten_at_walls
+                             predict_face_velocity
+  use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use mid_step_m, only: keep_liquid, add_second_half, add_whole
   use buoyancy_m, only: displaced_force, uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities

@@ -83,8 +83,8 @@ contains
 
     call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
     call ready()
-    p = block%flow%p
-    uf = block%flow%uf
+    allocate (p, source=block%flow%p)
+    allocate (uf, source=block%flow%uf)
     call begin_motion(block%case, block%grid, block%solid, [.true.], block%flow, stage, force)
     a(1:3) = force(1:3, 1)/block%blocks%mass(1) - [0.0_wp, 0.0_wp, g]
     expected = (s - 1.0_wp)/(s + 0.5_wp)

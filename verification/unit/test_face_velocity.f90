@@ -4,8 +4,8 @@ program test_face_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo, unit_step
   use boundary_m, only: fill_velocity_halo
-  use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity, &
-    face_velocity_at_walls, shorten_at_walls
+  use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity
+  use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers

@@ -1,0 +1,235 @@
+!> Velocity of the faces at the walls of bodies, before the pressure stage: between that of the cell
+!! and that of the wall.
+module wall_faces_m
+  use kinds_m, only: wp
+  use grid_m, only: grid_t, unit_step
+  use fields_m, only: flow_t
+  use boundary_kinds_m, only: no_side
+  use solid_geometry_m, only: solid_geometry_t, wall_area, edge_in
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: nearest_arm, arm_to_cell
+  use mixture_m, only: face_mean
+  use wall_profile_m, only: slip_at
+  use face_velocity_m, only: acceleration_t, compact_time, face_step
+  implicit none
+  private
+  public :: face_velocity_at_walls, shorten_at_walls
+
+contains
+
+  !> Faces of the cells at walls: their compact acceleration counts for `compact_time` by the
+  !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
+  !! all of its damping and has no drag worth the name.
+  subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: dt                   !! [s]
+    type(rigid_motion_t), intent(in) :: bodies
+    integer, intent(in) :: wall_cell(:, :)       !! (3, *) those cells, of the halo too
+    integer, intent(in) :: body(:)               !! (*) whose wall it is
+    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of a wall cell in that list, 0: none
+    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    type(acceleration_t), intent(in) :: a
+    type(flow_t), intent(inout) :: flow
+    real(wp) :: reach
+    integer :: m, d, c(3)
+
+    reach = sum(1.0_wp/grid%h**2)
+    !$omp parallel do private(d, c) schedule(dynamic, 64)
+    do m = 1, size(wall_cell, 2)
+      do d = 1, 3
+        call shorten(wall_cell(:, m), d, body(m))
+        c = wall_cell(:, m) + unit_step(:, d)
+        if (c(d) > grid%hi(d) + 1) cycle
+        if (number(c(1), c(2), c(3)) == 0) call shorten(c, d, body(m))
+      end do
+    end do
+  contains
+    !> The lower face of cell f in direction d, at the wall of body b.
+    subroutine shorten(f, d, b)
+      integer, intent(in) :: f(3), d, b
+      integer :: low(3)
+      real(wp) :: nu, past(3), time
+
+      if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
+      if (grid%side_of_face(f(d), d) /= no_side) return
+      low = f - unit_step(:, d)
+      if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
+      associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
+        past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
+          - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
+        time = compact_time(dt, dt*sum(abs(past)/grid%h))
+        if (time >= dt) return   ! as everywhere
+        nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
+        flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
+          - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
+              - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
+      end associate
+    end subroutine shorten
+  end subroutine shorten_at_walls
+
+  !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
+  !! that of the cell to that of the wall, where the leg through the face ends; the rest by the
+  !! layer along the wall, as with the film on the other side of the face.
+  !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
+  !! `solid%edge` goes to 1: the stream leaves the edge straight.
+  !!
+  !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
+  !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
+  !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
+  !! smaller (measured: docs/decisions/coupling.md). Without viscosity the fluid slips past the
+  !! wall: taking the wall's whole velocity there makes the added mass wrong by some per cent. With
+  !! it the cell's whole velocity carries up to twice what flows along the wall, and friction is too
+  !! large (docs/decisions/cut_cells.md).
+  !!
+  !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
+  !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
+  !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
+  subroutine face_velocity_at_walls(grid, solid, at_start, foreseen, slip, dt, c_ismac, given, &
+                                    in_liquid, rho, a, flow)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
+    type(rigid_motion_t), intent(in) :: foreseen   !! motion as far as the old pressure makes it
+    real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of the layer along the wall, in cells with their centre in a body, 0 to 1
+    real(wp), intent(in) :: dt                   !! [s]
+    logical, intent(in) :: c_ismac
+      !! all cells are given their acceleration, and the compact one counts for dt
+    logical, intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! the cell has its acceleration in `flow%u`
+    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! neither the cell nor those around it hold gas, at the start and at the end of the step
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    type(acceleration_t), intent(in) :: a
+    type(flow_t), intent(inout) :: flow
+    integer :: m
+
+    !$omp parallel do schedule(static)
+    do m = 1, solid%n_leg
+      call set_face(m, solid%leg(1:3, m), solid%leg(4, m))
+    end do
+  contains
+    !> The lower face of cell f in direction d, with leg m: mean of what the cells of the leg see.
+    subroutine set_face(m, f, d)
+      integer, intent(in) :: m, f(3), d
+      integer :: low(3), sides
+      real(wp) :: total, plane
+
+      low = f - unit_step(:, d)
+      if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
+      if (any((low < 1 .or. f > grid%n) .and. .not. grid%periodic)) return
+      sides = 0
+      total = 0.0_wp
+      associate (i => f(1), j => f(2), k => f(3))
+        if (solid%open(i, j, k, d) <= 0.0_wp) return
+        if (solid%inside(low(1), low(2), low(3)) == 0) then
+          sides = sides + 1
+          total = total + seen_from(low, 1, solid%leg_length(1, m), solid%leg_body(1, m), f, d)
+        end if
+        if (solid%inside(i, j, k) == 0) then
+          sides = sides + 1
+          total = total + seen_from(f, -1, solid%leg_length(2, m), solid%leg_body(2, m), f, d)
+        end if
+        if (sides == 0) return
+        plane = behind_plane(low, f, d)
+        flow%uf(i, j, k, d) = (1.0_wp - plane)*flow%uf(i, j, k, d) + plane*(total/real(sides, wp))
+      end associate
+    end subroutine set_face
+
+    !> Is what lies behind face f a plane wall, 1, or an edge that the stream passes straight, 0?
+    pure function behind_plane(low, f, d) result(share)
+      integer, intent(in) :: low(3), f(3), d
+      real(wp) :: share
+
+      share = 1.0_wp
+      if (solid%open(f(1), f(2), f(3), d) >= 1.0_wp) then
+        share = 1.0_wp - max(edge_in(solid, low), edge_in(solid, f))
+      end if
+    end function behind_plane
+
+    !> Velocity of face f as seen from cell c, whose leg along +d or -d ends at theta cells.
+    pure function seen_from(c, sense, theta, body, f, d) result(velocity)
+      integer, intent(in) :: c(3), sense, body, f(3), d
+      real(wp), intent(in) :: theta   !! [cells]
+      real(wp) :: velocity
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), near, along, gain
+
+      x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
+      x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
+      arm = nearest_arm(grid, x_wall, foreseen%x(:, body))
+      n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
+      n = n/max(norm2(n), tiny(1.0_wp))
+      u = flow%u(c(1), c(2), c(3), :)
+      if (in_liquid(c(1), c(2), c(3))) then
+        wall = wall_velocity(foreseen%motion(:, body), arm)
+        gain = time_in_liquid(c, sum(abs(u - wall)/grid%h)) &
+               *(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
+      else
+        wall = wall_velocity(at_start%motion(:, body), arm)
+        gain = dt*a%face(f(1), f(2), f(3), d)
+        if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
+      end if
+      near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
+      along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
+      velocity = u(d) + near*(along*(wall(d) - u(d)) &
+                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
+    end function seen_from
+
+    !> Time for which the compact acceleration at a wall counts in liquid [s].
+    pure function time_in_liquid(c, rate) result(time)
+      integer, intent(in) :: c(3)
+      real(wp), intent(in) :: rate   !! Courant number per second of the flow past the wall [1/s]
+      real(wp) :: time
+
+      time = dt
+      if (.not. c_ismac) time = compact_time(dt, dt*rate)
+      time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
+    end function time_in_liquid
+
+    !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond
+    !! the face; free slip where there is fluid again.
+    pure function slip_beyond(o, r) result(s)
+      integer, intent(in) :: o(3)
+      real(wp), intent(in) :: r
+      real(wp) :: s
+
+      s = 1.0_wp
+      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(slip(o(1), o(2), o(3)), r)
+    end function slip_beyond
+
+    !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
+    !! centre of the cell is.
+    pure function near_wall(theta, n, d, open) result(b)
+      real(wp), intent(in) :: theta, n(3), open   !! leg [cells], normal, open share
+      integer, intent(in) :: d                    !! direction of the leg
+      real(wp) :: b
+      real(wp) :: cell, face   !! distances from the wall [spacings along the leg]
+
+      cell = theta*abs(n(d))
+      if (open >= 1.0_wp) then
+        face = (theta - 0.5_wp)*abs(n(d))
+      else
+        face = 0.5_wp*open*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
+      end if
+      b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
+    end function near_wall
+
+    !> Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
+    pure function spacing_across(n, d) result(ratio)
+      real(wp), intent(in) :: n(3)   !! normal of the wall
+      integer, intent(in) :: d
+      real(wp) :: ratio
+      integer :: a, b
+
+      a = 1 + mod(d, 3)
+      b = 1 + mod(d + 1, 3)
+      ratio = sqrt(max((n(a)*(grid%h(a)/grid%h(d)))**2 + (n(b)*(grid%h(b)/grid%h(d)))**2, &
+                       tiny(1.0_wp))/max(n(a)**2 + n(b)**2, tiny(1.0_wp)))
+    end function spacing_across
+  end subroutine face_velocity_at_walls
+
+end module wall_faces_m
