@@ -4,7 +4,7 @@ A height belongs to the middle of its cell, so a map reaches half a cell less fa
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +15,8 @@ from micstools.reader import BadRun
 
 MARKS = (-9999.0, -99999.0, -999999.0, -32768.0, -32767.0, 9999.0, 32767.0)
 """Heights that the program takes for the mark of a missing one, too."""
+GROUND = (-12_000.0, 9_000.0)
+"""Heights that ground on Earth can have [m]."""
 MOST_POINTS = 20_000_000
 """Points of a map that the program reads."""
 OFF_GRID = 0.03
@@ -43,13 +45,16 @@ class HeightMap:
         return x + (nx - 1) * dx, y + (ny - 1) * dy
 
 
-def load(path: Path, grid: float | None = None) -> HeightMap:
-    """The map of a file; `grid` [m] draws scattered points of an .xyz file to that spacing."""
+def load(path: Path, grid: float | None = None, marks: Sequence[float] = ()) -> HeightMap:
+    """The map of a file; `grid` [m] draws scattered points of an .xyz file to that spacing.
+
+    `marks` are heights that stand for a missing one, beside those of the file.
+    """
     readers: dict[str, Callable[[Path], HeightMap]] = {
-        ".asc": _esri,
-        ".xyz": lambda p: _points(p, grid),
-        ".tif": _geotiff,
-        ".tiff": _geotiff,
+        ".asc": lambda p: _esri(p, marks),
+        ".xyz": lambda p: _points(p, grid, marks),
+        ".tif": lambda p: _geotiff(p, marks),
+        ".tiff": lambda p: _geotiff(p, marks),
     }
     if path.suffix.lower() not in readers:
         raise BadRun(f"{path}: must end in one of {', '.join(readers)}")
@@ -61,6 +66,26 @@ def load(path: Path, grid: float | None = None) -> HeightMap:
     if not np.isfinite(found.z).any():
         raise BadRun(f"{path}: holds no height")
     return found
+
+
+def require_ground(found: HeightMap) -> None:
+    """Refuse heights that are no height of ground, or that mark a missing one in other files."""
+    outside = (found.z < GROUND[0]) | (found.z > GROUND[1])  # nan is neither
+    doubtful = outside | np.isin(found.z, MARKS)
+    if not doubtful.any():
+        return
+    row, column = np.argwhere(doubtful)[0]
+    x, y = np.array(found.first) + np.array(found.spacing) * (column, row)
+    z = float(found.z[row, column])
+    if outside[row, column]:
+        said = f"ground has heights of {GROUND[0]:,.0f} to {GROUND[1]:,.0f} m"
+    else:
+        said = "is it the mark of a missing one?"
+    raise BadRun(
+        f"{int(doubtful.sum())} of {found.z.size} points have doubtful heights, the first "
+        f"{z:.9g} m at {x:.10g}, {y:.10g}: {said}; --nodata={z:.9g} takes it as missing, "
+        "--window cuts it off"
+    )
 
 
 def filled(found: HeightMap, height: float | None) -> HeightMap:
@@ -125,10 +150,16 @@ def report(found: HeightMap) -> str:
     return "\n".join(f"{name:10}{text}" for name, text in rows)
 
 
-def _without_marks(z: Array, mark: float | None) -> Array:
-    """Heights with nan for the mark of a missing one, the usual marks where none is named."""
-    known = MARKS if mark is None else (mark,)
-    return np.where(np.isin(z, known) | ~np.isfinite(z), np.nan, z)
+def _without_marks(z: Array, marks: Sequence[float]) -> Array:
+    """Heights with nan for the marks of a missing one.
+
+    A mark may be rounded otherwise than the data: to single precision, or, where neither can be
+    a height, to six figures.
+    """
+    missing = ~np.isfinite(z)
+    for mark in marks:
+        missing |= np.isclose(z, mark, rtol=1e-5 if abs(mark) > 1e20 else 2.0**-23, atol=0)
+    return np.where(missing, np.nan, z)
 
 
 def _number(path: Path, word: str) -> float:
@@ -145,7 +176,7 @@ def _numbers(path: Path, words: list[str]) -> Array:
         return np.array([_number(path, word) for word in words])
 
 
-def _esri(path: Path) -> HeightMap:
+def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
     """An Esri ASCII raster: its rows come from the north."""
     words = path.read_text(errors="replace").split()
     head: dict[str, float] = {}
@@ -168,11 +199,11 @@ def _esri(path: Path) -> HeightMap:
     if len(words) - at != nx * ny:
         raise BadRun(f"{path}: holds {len(words) - at} heights, {nx} x {ny} were announced")
     z = _numbers(path, words[at:]).reshape(ny, nx)[::-1]
-    mark = head.get("nodata_value", -9999.0)
-    return HeightMap((first[0], first[1]), (edges[0], edges[1]), _without_marks(z, mark))
+    z = _without_marks(z, [head.get("nodata_value", -9999.0), *marks])
+    return HeightMap((first[0], first[1]), (edges[0], edges[1]), z)
 
 
-def _points(path: Path, grid: float | None) -> HeightMap:
+def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap:
     """Points x, y, z in lines, parted by blanks, commas or semicolons; the first may be names."""
     lines = path.read_text(errors="replace").replace(",", " ").replace(";", " ").splitlines()
     rows = [line.split("#")[0].split() for line in lines]
@@ -184,7 +215,7 @@ def _points(path: Path, grid: float | None) -> HeightMap:
     points = _numbers(path, [word for row in rows for word in row]).reshape(-1, 3)
     if not np.isfinite(points[:, :2]).all():
         raise BadRun(f"{path}: a place is not a number")
-    points[:, 2] = _without_marks(points[:, 2], None)
+    points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
     return _regular(path, points) if grid is None else _drawn(path, points, grid)
 
 
@@ -251,7 +282,7 @@ def _drawn(path: Path, points: Array, grid: float) -> HeightMap:
     return HeightMap((float(low[0]), float(low[1])), (grid, grid), z.filled(np.nan))
 
 
-def _geotiff(path: Path) -> HeightMap:
+def _geotiff(path: Path, marks: Sequence[float]) -> HeightMap:
     """A GeoTIFF with one band of integers or single precision, in metres; Pillow unpacks it, its
     tags tell where it lies."""
     from PIL import Image
@@ -273,7 +304,8 @@ def _geotiff(path: Path) -> HeightMap:
         ) from error
     corner, step = _place(path, tags)
     mark = tags.get(42113)
-    z = _without_marks(z, None if mark is None else _number(path, str(mark).strip("\0 ")))
+    own = MARKS if mark is None else (_number(path, str(mark).strip("\0 ")),)
+    z = _without_marks(z, [*own, *marks])
     if step[1] < 0:  # rows come from the north, as a rule
         z, corner[1], step[1] = z[::-1], corner[1] + (len(z) - 1) * step[1], -step[1]
     return HeightMap((corner[0], corner[1]), (step[0], step[1]), z)

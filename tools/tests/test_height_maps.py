@@ -117,6 +117,44 @@ def test_a_geotiff_of_points_and_gaps(tmp_path: Path) -> None:
     same(found, np.where(Z == 21, np.nan, Z))
 
 
+@pytest.mark.parametrize("written", ["-3.4028235e+38", "-3.40282e+38", "-3.4028234663852886e+38"])
+def test_a_mark_of_single_precision(tmp_path: Path, written: str) -> None:
+    """However the lowest number of single precision is rounded, in the data or in the tag."""
+    gap = np.where(Z == 12, np.nan, Z)
+    for mark, datum in ((written, "-3.4028234663852886e+38"), ("-3.4028235e+38", written)):
+        text = ESRI.replace("-99", mark).replace("12", datum)
+        same(height_maps.load(save(tmp_path / "a.asc", text)), gap)
+    z = np.where(Z == 12, np.finfo(np.float32).min, Z).astype(np.float32)
+    path = geotiff(tmp_path / "a.tif", z, AREA, tags={**SCALE, 42113: written})
+    same(height_maps.load(path), gap)
+    z = np.where(Z == 12, np.float32(-99.99), Z).astype(np.float32)
+    path = geotiff(tmp_path / "b.tif", z, AREA, tags={**SCALE, 42113: "-99.99"})
+    same(height_maps.load(path), gap)
+
+
+@pytest.mark.parametrize("height", ["-3.4e38", "1e21", "-12001", "9001", "-32768", "-9999"])
+@pytest.mark.parametrize("kind", ["asc", "tif"])
+def test_a_doubtful_height_is_asked_about(
+    tmp_path: Path, height: str, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a file that names -99 as its mark; the command refuses it, or takes it as missing."""
+    path = save(tmp_path / "a.asc", ESRI.replace("12", height))
+    if kind == "tif":
+        z = np.where(Z == 12, float(height), Z).astype(np.float32)
+        path = geotiff(tmp_path / "a.tif", z, AREA, tags={**SCALE, 42113: "-99"})
+    words = ["bed", str(path), "--out", str(tmp_path / "bed.txt")]
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "1 of 12 points have doubtful heights" in line and " at 105, 203: " in line
+    assert "--nodata=" + height[0] in line and not (tmp_path / "bed.txt").exists()
+    for more in ([f"--nodata={height}", "--fill", "12"], ["--window", "101,201,103,203"]):
+        with pytest.raises(SystemExit) as end:
+            cli.main([*words, *more])
+        assert end.value.code == 0
+
+
 @pytest.mark.parametrize(
     ("keys", "tags", "said"),
     [
