@@ -128,6 +128,33 @@ def test_control_characters(role: str, bad: str, tmp_path: Path) -> None:
     assert not (tmp_path / "mics-out").exists()
 
 
+TETS = "mics-shape 1\npoints 4\n0 0 0\n.1 0 0\n0 .1 0\n0 0 .1\ntets 1\n1 2 3 4\n"
+CORNERS = ("0 0 0", ".1 0 0", "0 .1 0", "0 0 .1")
+STL = "solid a\n" + "".join(
+    "facet normal 0 0 0\nouter loop\n"
+    + "".join(f"vertex {CORNERS[k]}\n" for k in facet)
+    + "endloop\nendfacet\n"
+    for facet in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+) + "endsolid a\n"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("group", "text"),
+    [
+        ("&shape name = 'a'  kind = 'file'  file = 'named' /", TETS),
+        ("&bed file = 'named' /", "2 2 0 0 1 1\n.1 .1 .1 .1\n"),
+        ("&bed file = 'named' /", "# a remark\n2 2 0 0 1 1\n.1 .1 .1 .1\n"),
+        ("&bed file = 'named'  kind = 'stl' /", STL),
+    ],
+)
+def test_byte_order_mark(group: str, text: str, tmp_path: Path) -> None:
+    """The case and each file that it names may begin with one."""
+    (tmp_path / "named").write_text("\ufeff" + text, encoding="utf-8")
+    (tmp_path / "case.nml").write_text("\ufeff" + case(groups=group), encoding="utf-8")
+    done = mics(tmp_path, "--check", "case.nml")
+    assert done.returncode == 0, done.stderr
+
+
 def test_letters_of_any_language(tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(case().replace("&run", "&run title = 'Blöcke\t消波 ≤ 1'"))
     assert mics(tmp_path, "case.nml").returncode == 0

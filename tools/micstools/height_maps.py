@@ -178,7 +178,7 @@ def _numbers(path: Path, words: list[str]) -> Array:
 
 def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
     """An Esri ASCII raster: its rows come from the north."""
-    words = path.read_text(errors="replace").split()
+    words = path.read_text("utf-8-sig", errors="replace").split()
     head: dict[str, float] = {}
     at = 0
     while at + 1 < len(words) and words[at].lower() in _HEADER:
@@ -205,10 +205,10 @@ def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
 
 def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap:
     """Points x, y, z in lines, parted by blanks, commas or semicolons; the first may be names."""
-    lines = path.read_text(errors="replace").replace(",", " ").replace(";", " ").splitlines()
-    rows = [line.split("#")[0].split() for line in lines]
+    text = path.read_text("utf-8-sig", errors="replace").replace(",", " ").replace(";", " ")
+    rows = [line.split("#")[0].split() for line in text.splitlines()]
     rows = [row for row in rows if row]
-    if rows and not _is_number(rows[0][0]):
+    if rows and not any(map(_is_number, rows[0])):
         rows = rows[1:]
     if not rows or any(len(row) != 3 for row in rows):
         raise BadRun(f"{path}: must hold x, y and z in each line")

@@ -62,6 +62,15 @@ def test_points_in_any_order(tmp_path: Path) -> None:
         same(height_maps.load(save(tmp_path / "a.xyz", text)))
 
 
+@pytest.mark.parametrize("head", ["", "x,y,z\n", "# Höhen\n"])
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path, head: str) -> None:
+    points = head + "\n".join(f"{101 + 2 * k},{201 + 2 * j},{Z[j, k]}"
+                              for j in range(3) for k in range(4))  # fmt: skip
+    for name, text in (("a.asc", ESRI), ("a.xyz", points)):
+        (tmp_path / name).write_text("\ufeff" + text, encoding="utf-8")
+        same(height_maps.load(tmp_path / name))
+
+
 def test_points_with_rounded_figures_are_a_grid(tmp_path: Path) -> None:
     text = "\n".join(f"{k / 3:.2f} {j / 7:.3f} {k}" for k in range(10) for j in range(8))
     found = height_maps.load(save(tmp_path / "a.xyz", text))
@@ -192,6 +201,7 @@ def test_a_picture_is_no_map(tmp_path: Path) -> None:
         ("a.asc", re.sub(r"\b\d+ \d+ \d+ \d+\b", "-99 -99 -99 -99", ESRI), "holds no height"),
         ("a.xyz", "", "must hold x, y and z"),
         ("a.xyz", "1 2\n", "must hold x, y and z"),
+        ("a.xyz", "1O 0 1\n0 1 1\n1 1 1\n", "'1O' stands where a number should"),
         ("a.xyz", "1 2 3\n1 3 4\n", "stand on one line"),
         ("a.xyz", "0 0 1\n1 0 1\n0 1 1\n1 1 1\n1 1 2\n", "two points stand in the same place"),
         ("a.asc", ESRI.replace("12", "-99"), "1 of 12 points have no height, the first at 105, 20"),
