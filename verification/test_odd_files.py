@@ -2,8 +2,10 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
 from run_cases import ROOT
@@ -158,6 +160,29 @@ def test_byte_order_mark(group: str, text: str, tmp_path: Path) -> None:
 def test_letters_of_any_language(tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(case().replace("&run", "&run title = 'Blöcke\t消波 ≤ 1'"))
     assert mics(tmp_path, "case.nml").returncode == 0
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_remarks_and_titles_of_any_encoding(encoding: str, tmp_path: Path) -> None:
+    """Also blanks that do not break, by the program and by the tools, with the same result."""
+    text = case().replace("&run t_end =", "! Blöcke 5\xa0mm, it's ä\n&run title = 'Bl\xf6cke\xa05'"
+                          "  t_end\xa0=\xa0").replace(" /", "\xa0/")  # fmt: skip
+    (tmp_path / "case.nml").write_bytes(text.encode(encoding))
+    done = mics(tmp_path, "case.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as file:
+        assert "title = 'Bl\xf6cke\xa05'\n" in file["provenance"].attrs["parameters"]
+    tools = {**os.environ, "PYTHONPATH": str(ROOT / "tools"), "PYTHONUTF8": "1"}
+    plans = []
+    for words in ([], ["--set", "run.t_end=0.01"]):
+        plan = subprocess.run(
+            [sys.executable, "-m", "micstools.cli", "check", "case.nml", *words],
+            cwd=tmp_path, env=tools, capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+        assert plan.returncode == 0, plan.stderr
+        plans.append(plan.stdout)
+    assert plans[0] == plans[1]
+    assert "Bl\xf6cke" in plans[0] and "Bl\xf6cke" in mics(tmp_path, "--check", "case.nml").stdout
 
 
 @pytest.mark.parametrize(("given", "code"), [("2", 0), ("1024", 0), ("1025", 2), ("100000", 2)])
