@@ -21,6 +21,8 @@ MOST_POINTS = 20_000_000
 """Points of a map that the program reads."""
 OFF_GRID = 0.03
 """How far a point of a regular grid may lie aside, for rounded figures, over the spacing."""
+NARROW = 1e-7
+"""Width of places on one line, over their length; rounding leaves less."""
 _HEADER = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize",
            "dx", "dy", "nodata_value")  # fmt: skip
 
@@ -216,7 +218,24 @@ def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap
     if not np.isfinite(points[:, :2]).all():
         raise BadRun(f"{path}: a place is not a number")
     points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
-    return _regular(path, points) if grid is None else _drawn(path, points, grid)
+    if grid is None:
+        _require_width(path, points[:, :2])
+        return _regular(path, points)
+    known = points[np.isfinite(points[:, 2])]
+    if not len(known):
+        raise BadRun(f"{path}: holds no height")
+    _require_width(path, known[:, :2])
+    return _drawn(path, known, grid)
+
+
+def _require_width(path: Path, places: Array) -> None:
+    """Refuse places (n, 2) on one line, which no triangles join."""
+    across = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    if len(across) < 2 or across[1] <= NARROW * across[0]:
+        raise BadRun(
+            f"{path}: all points stand on one line; a bed needs points beside it, and one that is "
+            "the same across the tank needs the line twice, along both sides"
+        )
 
 
 def _is_number(word: str) -> bool:
@@ -233,8 +252,6 @@ def _regular(path: Path, points: Array) -> HeightMap:
     for axis in range(2):
         values = points[:, axis] - first[axis]
         gaps = np.diff(np.unique(values))
-        if not len(gaps):
-            raise BadRun(f"{path}: all points stand on one line")
         gaps = gaps[gaps > OFF_GRID * gaps.max()]
         count = round(float(values.max() / gaps.min()))
         spacing.append(float(values.max()) / count)
@@ -262,23 +279,23 @@ def _regular(path: Path, points: Array) -> HeightMap:
 
 
 def _drawn(path: Path, points: Array, grid: float) -> HeightMap:
-    """Heights on a grid, linear on the triangles between points (n, 3); nan outside of them."""
+    """Heights on a grid, linear on the triangles between points (n, 3) with heights; nan outside of
+    them."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
 
     if not grid > 0:
         raise BadRun(f"--grid {grid:g}: must be positive [m]")
-    known = points[np.isfinite(points[:, 2])]
-    low = known[:, :2].min(axis=0)
-    x, y = (known[:, :2] - low).T
+    low = points[:, :2].min(axis=0)
+    x, y = (points[:, :2] - low).T
     nx, ny = (int(float(values.max()) / grid + 1e-9) + 1 for values in (x, y))
     if nx * ny > MOST_POINTS:
         raise BadRun(f"--grid {grid:g}: {nx} x {ny} points, more than {MOST_POINTS}")
     try:
         triangles = Triangulation(x, y)
     except (ValueError, RuntimeError) as error:
-        raise BadRun(f"{path}: no triangles between the points ({error})") from error
+        raise BadRun(f"{path}: no triangles fit between the points") from error
     at = np.meshgrid(grid * np.arange(nx), grid * np.arange(ny))
-    z = LinearTriInterpolator(triangles, known[:, 2])(*at)
+    z = LinearTriInterpolator(triangles, points[:, 2])(*at)
     return HeightMap((float(low[0]), float(low[1])), (grid, grid), z.filled(np.nan))
 
 

@@ -93,6 +93,30 @@ def test_scattered_points_are_refused_or_drawn(tmp_path: Path) -> None:
     assert inside == pytest.approx(3 + 2 * gx - gy, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ([(0, 0, 1), (1, 0, 2), (2, 0, 1.5), (3.3, 0, 1)], "stand on one line"),
+        ([(0, 0, 1), (1, 1, 2), (2.5, 2.5, 1.5)], "stand on one line"),
+        ([(5e6 + 1.1 * k, 4e5 + 2.2 * k, k) for k in range(9)], "stand on one line"),
+        ([(0, 0, 1), (1, 1, 2)], "stand on one line"),
+        ([(0, 0, 1), (0, 0, 1)], "stand on one line"),
+        ([(0, 0, 1), (1, 0, 1), (2, 0, 1), (0, 1, -9999), (1, 1, -9999)], "stand on one line"),
+        ([(0, 0, -9999), (1, 0, -9999), (0, 1, -9999)], "holds no height"),
+    ],
+)
+def test_points_on_one_line_cannot_be_drawn(tmp_path: Path, points: list, said: str) -> None:
+    """A section through a flume, as some solvers write their bed: it is needed twice."""
+    path = save(tmp_path / "a.xyz", "\n".join(f"{x!r} {y!r} {z!r}" for x, y, z in points))
+    with pytest.raises(BadRun, match=said) as fault:
+        height_maps.load(path, 0.5)
+    assert "qhull" not in str(fault.value) and "\n" not in str(fault.value)
+    if len({x for x, _, _ in points}) > 1 and "line" in said:
+        both = "".join(f"{x!r} {y + d!r} {z!r}\n" for x, y, z in points for d in (0.0, 3.0))
+        found = height_maps.load(save(path, both), 0.5)
+        assert found.z.shape[0] >= 7
+
+
 def geotiff(path: Path, z: np.ndarray, keys: tuple[int, ...], **more: object) -> Path:
     """Rows from the north, as ESRI above."""
     tags = TiffImagePlugin.ImageFileDirectory_v2()
