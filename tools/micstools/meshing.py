@@ -6,6 +6,7 @@ are imported when they are needed; Gmsh (GPL) runs as a tool of its own, the pro
 contain it.
 """
 
+import codecs
 import re
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -68,8 +69,12 @@ def load(path: Path, element: float = 0.0) -> Surface:
     import trimesh
 
     try:
-        if path.suffix.lower() == ".stl":
-            mesh = trimesh.load_mesh(BytesIO(_plain_stl(path.read_bytes())), file_type="stl")
+        kind = path.suffix.lower()[1:]
+        data = path.read_bytes().removeprefix(codecs.BOM_UTF8)
+        if kind == "stl":
+            mesh = trimesh.load_mesh(BytesIO(_plain_stl(data)), file_type=kind)
+        elif kind == "obj":
+            mesh = trimesh.load_mesh(BytesIO(data), file_type=kind)
         else:
             mesh = trimesh.load_mesh(path)
         return _closed_near_zero(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))

@@ -140,6 +140,13 @@ def test_an_stl_of_any_writing_is_read(tmp_path: Path, change: Callable[[str], s
     assert meshing.load(tmp_path / "a.stl").volume == pytest.approx(7 * D**3, rel=1e-6)
 
 
+def test_a_byte_order_mark_hides_no_point(tmp_path: Path) -> None:
+    lines = str(hexapod_surface().export(file_type="obj")).splitlines()
+    text = "\n".join(line for line in lines if line.startswith(("v ", "f ")))
+    (tmp_path / "a.obj").write_text("\ufeff" + text, encoding="utf-8")
+    assert meshing.load(tmp_path / "a.obj").volume == pytest.approx(7 * D**3, rel=1e-6)
+
+
 @pytest.mark.parametrize("more", [b"\n", b"\0" * 49])
 def test_bytes_behind_a_binary_stl_are_passed_over(tmp_path: Path, more: bytes) -> None:
     path = save(hexapod_surface(), tmp_path / "a.stl")
