@@ -2,8 +2,10 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
 from run_cases import ROOT
@@ -128,9 +130,59 @@ def test_control_characters(role: str, bad: str, tmp_path: Path) -> None:
     assert not (tmp_path / "mics-out").exists()
 
 
+TETS = "mics-shape 1\npoints 4\n0 0 0\n.1 0 0\n0 .1 0\n0 0 .1\ntets 1\n1 2 3 4\n"
+CORNERS = ("0 0 0", ".1 0 0", "0 .1 0", "0 0 .1")
+STL = "solid a\n" + "".join(
+    "facet normal 0 0 0\nouter loop\n"
+    + "".join(f"vertex {CORNERS[k]}\n" for k in facet)
+    + "endloop\nendfacet\n"
+    for facet in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+) + "endsolid a\n"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("group", "text"),
+    [
+        ("&shape name = 'a'  kind = 'file'  file = 'named' /", TETS),
+        ("&bed file = 'named' /", "2 2 0 0 1 1\n.1 .1 .1 .1\n"),
+        ("&bed file = 'named' /", "# a remark\n2 2 0 0 1 1\n.1 .1 .1 .1\n"),
+        ("&bed file = 'named'  kind = 'stl' /", STL),
+    ],
+)
+def test_byte_order_mark(group: str, text: str, tmp_path: Path) -> None:
+    """The case and each file that it names may begin with one."""
+    (tmp_path / "named").write_text("\ufeff" + text, encoding="utf-8")
+    (tmp_path / "case.nml").write_text("\ufeff" + case(groups=group), encoding="utf-8")
+    done = mics(tmp_path, "--check", "case.nml")
+    assert done.returncode == 0, done.stderr
+
+
 def test_letters_of_any_language(tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(case().replace("&run", "&run title = 'Blöcke\t消波 ≤ 1'"))
     assert mics(tmp_path, "case.nml").returncode == 0
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
+def test_remarks_and_titles_of_any_encoding(encoding: str, tmp_path: Path) -> None:
+    """Also blanks that do not break, by the program and by the tools, with the same result."""
+    text = case().replace("&run t_end =", "! Blöcke 5\xa0mm, it's ä\n&run title = 'Bl\xf6cke\xa05'"
+                          "  t_end\xa0=\xa0").replace(" /", "\xa0/")  # fmt: skip
+    (tmp_path / "case.nml").write_bytes(text.encode(encoding))
+    done = mics(tmp_path, "case.nml")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as file:
+        assert "title = 'Bl\xf6cke\xa05'\n" in file["provenance"].attrs["parameters"]
+    tools = {**os.environ, "PYTHONPATH": str(ROOT / "tools"), "PYTHONUTF8": "1"}
+    plans = []
+    for words in ([], ["--set", "run.t_end=0.01"]):
+        plan = subprocess.run(
+            [sys.executable, "-m", "micstools.cli", "check", "case.nml", *words],
+            cwd=tmp_path, env=tools, capture_output=True, text=True, timeout=60,
+        )  # fmt: skip
+        assert plan.returncode == 0, plan.stderr
+        plans.append(plan.stdout)
+    assert plans[0] == plans[1]
+    assert "Bl\xf6cke" in plans[0] and "Bl\xf6cke" in mics(tmp_path, "--check", "case.nml").stdout
 
 
 @pytest.mark.parametrize(("given", "code"), [("2", 0), ("1024", 0), ("1025", 2), ("100000", 2)])

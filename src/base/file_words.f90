@@ -1,4 +1,5 @@
 !> Text files that are read word by word: words between blanks and line ends, `#` begins a remark.
+!! A byte-order mark at the start of a file is passed over.
 module file_words_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
@@ -11,6 +12,7 @@ module file_words_m
   public :: expected, complain, place_of
 
   integer, parameter :: longest_text = 500000000   !! bytes
+  character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)   !! of UTF-8
 
   !> A text that is read word by word; after a problem nothing more is read.
   type :: words_t
@@ -70,6 +72,7 @@ contains
 
     word = ''
     if (len(words%problem) > 0) return
+    if (words%at == 1 .and. index(words%text, byte_order_mark) == 1) words%at = 4
     do while (words%at <= len(words%text))
       select case (words%text(words%at:words%at))
       case (' ', achar(9), achar(13))

@@ -1,6 +1,7 @@
 !> The bytes of a case file, from a file or from standard input.
 !!
-!! Read through the C library: pipes work, nothing is rewound, and bytes stay as they are.
+!! Read through the C library: pipes work, nothing is rewound. Text in UTF-8 stays as it is; any
+!! other is taken as Latin-1, where each byte is a character, and comes back in UTF-8.
 module case_file_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
     c_associated, c_loc
@@ -56,7 +57,7 @@ module case_file_m
 
 contains
 
-  !> Read a whole file, or standard input if `file` is empty, byte for byte.
+  !> Read a whole file, or standard input if `file` is empty.
   !!
   !! Call it on one process and broadcast the text. Pipes work; nothing is ever rewound. A named
   !! pipe is refused, nobody may ever write to it; one of the shell (`/dev/fd/63`) has its writer.
@@ -102,9 +103,10 @@ contains
     if (c_ferror(stream) /= 0) call problems%add_message(source//': could not be read')
     status = c_fclose(stream)
     call check_text(source, text, problems)
+    if (.not. is_utf8(text)) text = utf8_of_latin1(text)
   end subroutine read_text
 
-  !> Refuse what cannot be a case: nothing at all, binary data, another encoding than UTF-8.
+  !> Refuse what cannot be a case: nothing at all, binary data.
   subroutine check_text(source, text, problems)
     character(*), intent(in) :: source
     character(*), intent(in) :: text
@@ -119,5 +121,54 @@ contains
       call problems%add_message(source//': holds zero bytes; a case is plain UTF-8 text')
     end if
   end subroutine check_text
+
+  !> Is every character of a text well formed in UTF-8? Source: table 3-7 of the Unicode standard.
+  pure function is_utf8(text) result(yes)
+    character(*), intent(in) :: text
+    logical :: yes
+    integer :: i, byte, following   ! bytes that belong to the character begun
+    integer :: low, high            ! what the next of them may be
+
+    following = 0
+    low = 128
+    high = 191
+    yes = .false.
+    do i = 1, len(text)
+      byte = ichar(text(i:i))
+      if (following > 0) then
+        if (byte < low .or. byte > high) return
+        following = following - 1
+        low = 128
+        high = 191
+      else if (byte >= 128) then
+        if (byte < 194 .or. byte > 244) return
+        following = count(byte >= [194, 224, 240])
+        low = merge(160, merge(144, 128, byte == 240), byte == 224)
+        high = merge(159, merge(143, 191, byte == 244), byte == 237)
+      end if
+    end do
+    yes = following == 0
+  end function is_utf8
+
+  !> A text in Latin-1 in UTF-8: two bytes for each that is not ASCII.
+  pure function utf8_of_latin1(text) result(utf8)
+    character(*), intent(in) :: text
+    character(:), allocatable :: utf8
+    integer :: i, n, byte
+
+    allocate (character(2*len(text)) :: utf8)
+    n = 0
+    do i = 1, len(text)
+      byte = ichar(text(i:i))
+      if (byte < 128) then
+        utf8(n + 1:n + 1) = text(i:i)
+        n = n + 1
+      else
+        utf8(n + 1:n + 2) = char(192 + byte/64)//char(128 + mod(byte, 64))
+        n = n + 2
+      end if
+    end do
+    utf8 = utf8(:n)
+  end function utf8_of_latin1
 
 end module case_file_m

@@ -29,24 +29,39 @@ contains
     cursor%text = plain_lines(text)
   end function start_of
 
-  !> Line ends of every system as one line feed; a byte-order mark dropped; the last line ended.
+  !> Line ends of every system as one line feed; a byte-order mark dropped; blanks that do not break
+  !! as blanks, but in strings; the last line ended.
   pure function plain_lines(text) result(plain)
     character(*), intent(in) :: text
     character(:), allocatable :: plain
     character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+    character(*), parameter :: no_break_space = char(194)//char(160)
+    character(1) :: quote   ! that has begun a string on this line, or blank
     integer :: i, n, first
 
     first = 1
     if (index(text, byte_order_mark) == 1) first = 4
     allocate (character(len(text) + 1) :: plain)
     n = 0
+    quote = ' '
     do i = first, len(text)
       if (text(i:i) == line_feed .and. i > 1) then
         if (text(i - 1:i - 1) == carriage_return) cycle
       end if
+      if (quote == ' ' .and. i > 1) then
+        if (text(i - 1:i) == no_break_space) then
+          plain(n:n) = ' '   ! where its first byte stands
+          cycle
+        end if
+      end if
       n = n + 1
       plain(n:n) = text(i:i)
       if (text(i:i) == carriage_return) plain(n:n) = line_feed
+      if (plain(n:n) == line_feed .or. plain(n:n) == quote) then
+        quote = ' '
+      else if (quote == ' ' .and. scan(plain(n:n), '"''') == 1) then
+        quote = plain(n:n)
+      end if
     end do
     plain = plain(:n)//line_feed
   end function plain_lines

@@ -6,8 +6,9 @@
 !!     z z z ...              nx*ny heights [m], x fastest, then y
 !!
 !! Between four points the bed is two triangles, parted along the diagonal from (i, j) to
-!! (i+1, j+1). STL files may be ASCII or binary, in metres; their normals are not looked at, the
-!! corners of a facet run counter-clockwise seen from outside.
+!! (i+1, j+1). STL files may be ASCII, with keywords in small or capital letters, or binary, in
+!! metres; their normals are not looked at, the corners of a facet run counter-clockwise seen from
+!! outside.
 module bed_file_m
   use, intrinsic :: iso_fortran_env, only: real32
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
@@ -15,7 +16,8 @@ module bed_file_m
   use growing_m, only: ensure_room
   use errors_m, only: to_text
   use checksum_m, only: checksum_t
-  use value_text_m, only: quoted_text
+  use value_text_m, only: quoted_text, lower_case
+  use vectors_m, only: cross
   use file_words_m, only: words_t, read_whole, next_word, skip_line, get_integer, get_real, &
     expected, complain, place_of
   implicit none
@@ -25,6 +27,8 @@ module bed_file_m
   integer, parameter :: most_points = 20000000
   integer, parameter :: stl_head = 84, stl_facet = 50   !! bytes of a binary STL file
   real(real32), parameter :: farthest = 1.0e20_real32   !! coordinate, as in text files [m]
+  real(wp), parameter :: coarse = 1.0e3_wp   !! steps of single precision along a form, too few [-]
+  real(wp), parameter :: fine = 1.0e5_wp     !! enough of them, whatever the facets are like [-]
 
   !> Triangles as the file gives them, counter-clockwise from outside.
   type :: bed_form_t
@@ -60,6 +64,7 @@ contains
       else
         call read_ascii_stl(words, form)
       end if
+      if (kind == 'stl') call check_rounding(words, form)
     end if
     message = place_of(words)//words%problem
   end subroutine read_bed_file
@@ -72,7 +77,7 @@ contains
     real(wp) :: first(2), spacing(2)
     integer :: n(2), i, j, k
 
-    if (index(words%text, achar(0)) > 0 .or. index(words%text, 'solid') == 1) then
+    if (index(words%text, achar(0)) > 0 .or. starts_as_stl(words%text)) then
       words%line = 0
       call complain(words, 'looks like an STL or another binary file, not a map of heights; ' &
         //'an STL file is read with kind = ''stl''')
@@ -115,6 +120,14 @@ contains
     end do
   end subroutine read_heights
 
+  !> Does a text begin with the first keyword of an ASCII STL file?
+  pure function starts_as_stl(text) result(yes)
+    character(*), intent(in) :: text
+    logical :: yes
+
+    yes = lower_case(text(:min(5, len(text)))) == 'solid'
+  end function starts_as_stl
+
   !> A height; the numbers that maps of measured ground write where there is none are asked about.
   subroutine get_height(words, z)
     type(words_t), intent(inout) :: words
@@ -136,7 +149,7 @@ contains
     logical :: open_facet
 
     word = next_word(words)
-    if (word /= 'solid') then
+    if (lower_case(word) /= 'solid') then
       call expected(words, '''solid'', the start of an STL file,', word)
       return
     end if
@@ -146,7 +159,8 @@ contains
     open_facet = .false.
     do
       word = next_word(words)
-      select case (word)
+      if (lower_case(word) == 'end') word = word//next_word(words)   ! some write `end solid`
+      select case (lower_case(word))
       case ('')
         exit
       case ('solid', 'endsolid')
@@ -190,13 +204,18 @@ contains
     end do
   end subroutine read_corner
 
-  !> Has a text the length of a binary STL file? Some of those begin with `solid` too.
+  !> Has a text the length of a binary STL file, or less than a facet more, as some writers leave
+  !! there? Some of those begin with `solid` too. Four letters in the place of the number would
+  !! announce more facets than a file can hold.
   pure function is_binary_stl(text) result(yes)
     character(*), intent(in) :: text
     logical :: yes
+    real(wp) :: more   ! bytes behind the facets announced
 
     yes = len(text) >= stl_head
-    if (yes) yes = abs(real(len(text) - stl_head, wp) - stl_facet*facets_announced(text)) < 0.5_wp
+    if (.not. yes) return
+    more = real(len(text) - stl_head, wp) - stl_facet*facets_announced(text)
+    yes = more > -0.5_wp .and. more < stl_facet - 0.5_wp
   end function is_binary_stl
 
   !> Number of facets in the head of a binary STL file, lowest byte first.
@@ -237,5 +256,41 @@ contains
     end do
     form%triangle = reshape([(k, k=1, 3*n)], [3, n])
   end subroutine read_binary_stl
+
+  !> Refuse a form that single precision has spoiled, as it does with the coordinates of a survey.
+  subroutine check_rounding(words, form)
+    type(words_t), intent(inout) :: words
+    type(bed_form_t), intent(in) :: form
+    real(wp) :: step, length
+
+    if (len(words%problem) > 0) return
+    step = real(spacing(real(maxval(abs(form%point)), real32)), wp)
+    length = maxval(maxval(form%point, dim=2) - minval(form%point, dim=2))
+    if (length >= fine*step) return
+    if (length >= coarse*step .or. any(abs(form%point - real(real(form%point, real32), wp)) &
+                                       > 0.0_wp)) then
+      if (.not. has_flat_facet(form)) return
+    end if
+    words%line = 0
+    call complain(words, 'lies too far from zero: coordinates of ' &
+      //to_text(maxval(abs(form%point)))//' m are rounded to '//to_text(step) &
+      //' m in single precision, and the form is ' &
+      //to_text(length)//' m long; move it near zero where it was made, and write it anew')
+  end subroutine check_rounding
+
+  !> Has any facet of a form no area?
+  pure function has_flat_facet(form) result(yes)
+    type(bed_form_t), intent(in) :: form
+    logical :: yes
+    integer :: f
+
+    yes = .false.
+    do f = 1, size(form%triangle, 2)
+      associate (p => form%point(:, form%triangle(:, f)))
+        yes = all(abs(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1))) <= 0.0_wp)
+      end associate
+      if (yes) return
+    end do
+  end function has_flat_facet
 
 end module bed_file_m

@@ -28,9 +28,9 @@ def results_of(path: Path) -> Path:
     if h5py.is_hdf5(path):
         return path.parent
     try:
-        case = path.read_text()
+        case = settings.read(path)
         output = settings.value(case, "run", "output")
-    except (UnicodeDecodeError, BadRun) as error:
+    except BadRun as error:
         raise BadRun(f"{path}: neither a folder of results nor a case file ({error})") from error
     if "grid" not in (name for name, _, _ in settings.groups(case)):
         raise BadRun(f"{path}: neither a folder of results nor a case file (it has no &grid)")

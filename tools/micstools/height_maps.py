@@ -4,7 +4,7 @@ A height belongs to the middle of its cell, so a map reaches half a cell less fa
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +15,14 @@ from micstools.reader import BadRun
 
 MARKS = (-9999.0, -99999.0, -999999.0, -32768.0, -32767.0, 9999.0, 32767.0)
 """Heights that the program takes for the mark of a missing one, too."""
+GROUND = (-12_000.0, 9_000.0)
+"""Heights that ground on Earth can have [m]."""
 MOST_POINTS = 20_000_000
 """Points of a map that the program reads."""
 OFF_GRID = 0.03
 """How far a point of a regular grid may lie aside, for rounded figures, over the spacing."""
+NARROW = 1e-7
+"""Width of places on one line, over their length; rounding leaves less."""
 _HEADER = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize",
            "dx", "dy", "nodata_value")  # fmt: skip
 
@@ -43,13 +47,16 @@ class HeightMap:
         return x + (nx - 1) * dx, y + (ny - 1) * dy
 
 
-def load(path: Path, grid: float | None = None) -> HeightMap:
-    """The map of a file; `grid` [m] draws scattered points of an .xyz file to that spacing."""
+def load(path: Path, grid: float | None = None, marks: Sequence[float] = ()) -> HeightMap:
+    """The map of a file; `grid` [m] draws scattered points of an .xyz file to that spacing.
+
+    `marks` are heights that stand for a missing one, beside those of the file.
+    """
     readers: dict[str, Callable[[Path], HeightMap]] = {
-        ".asc": _esri,
-        ".xyz": lambda p: _points(p, grid),
-        ".tif": _geotiff,
-        ".tiff": _geotiff,
+        ".asc": lambda p: _esri(p, marks),
+        ".xyz": lambda p: _points(p, grid, marks),
+        ".tif": lambda p: _geotiff(p, marks),
+        ".tiff": lambda p: _geotiff(p, marks),
     }
     if path.suffix.lower() not in readers:
         raise BadRun(f"{path}: must end in one of {', '.join(readers)}")
@@ -61,6 +68,26 @@ def load(path: Path, grid: float | None = None) -> HeightMap:
     if not np.isfinite(found.z).any():
         raise BadRun(f"{path}: holds no height")
     return found
+
+
+def require_ground(found: HeightMap) -> None:
+    """Refuse heights that are no height of ground, or that mark a missing one in other files."""
+    outside = (found.z < GROUND[0]) | (found.z > GROUND[1])  # nan is neither
+    doubtful = outside | np.isin(found.z, MARKS)
+    if not doubtful.any():
+        return
+    row, column = np.argwhere(doubtful)[0]
+    x, y = np.array(found.first) + np.array(found.spacing) * (column, row)
+    z = float(found.z[row, column])
+    if outside[row, column]:
+        said = f"ground has heights of {GROUND[0]:,.0f} to {GROUND[1]:,.0f} m"
+    else:
+        said = "is it the mark of a missing one?"
+    raise BadRun(
+        f"{int(doubtful.sum())} of {found.z.size} points have doubtful heights, the first "
+        f"{z:.9g} m at {x:.10g}, {y:.10g}: {said}; --nodata={z:.9g} takes it as missing, "
+        "--window cuts it off"
+    )
 
 
 def filled(found: HeightMap, height: float | None) -> HeightMap:
@@ -125,10 +152,16 @@ def report(found: HeightMap) -> str:
     return "\n".join(f"{name:10}{text}" for name, text in rows)
 
 
-def _without_marks(z: Array, mark: float | None) -> Array:
-    """Heights with nan for the mark of a missing one, the usual marks where none is named."""
-    known = MARKS if mark is None else (mark,)
-    return np.where(np.isin(z, known) | ~np.isfinite(z), np.nan, z)
+def _without_marks(z: Array, marks: Sequence[float]) -> Array:
+    """Heights with nan for the marks of a missing one.
+
+    A mark may be rounded otherwise than the data: to single precision, or, where neither can be
+    a height, to six figures.
+    """
+    missing = ~np.isfinite(z)
+    for mark in marks:
+        missing |= np.isclose(z, mark, rtol=1e-5 if abs(mark) > 1e20 else 2.0**-23, atol=0)
+    return np.where(missing, np.nan, z)
 
 
 def _number(path: Path, word: str) -> float:
@@ -145,9 +178,9 @@ def _numbers(path: Path, words: list[str]) -> Array:
         return np.array([_number(path, word) for word in words])
 
 
-def _esri(path: Path) -> HeightMap:
+def _esri(path: Path, marks: Sequence[float]) -> HeightMap:
     """An Esri ASCII raster: its rows come from the north."""
-    words = path.read_text(errors="replace").split()
+    words = path.read_text("utf-8-sig", errors="replace").split()
     head: dict[str, float] = {}
     at = 0
     while at + 1 < len(words) and words[at].lower() in _HEADER:
@@ -168,24 +201,41 @@ def _esri(path: Path) -> HeightMap:
     if len(words) - at != nx * ny:
         raise BadRun(f"{path}: holds {len(words) - at} heights, {nx} x {ny} were announced")
     z = _numbers(path, words[at:]).reshape(ny, nx)[::-1]
-    mark = head.get("nodata_value", -9999.0)
-    return HeightMap((first[0], first[1]), (edges[0], edges[1]), _without_marks(z, mark))
+    z = _without_marks(z, [head.get("nodata_value", -9999.0), *marks])
+    return HeightMap((first[0], first[1]), (edges[0], edges[1]), z)
 
 
-def _points(path: Path, grid: float | None) -> HeightMap:
+def _points(path: Path, grid: float | None, marks: Sequence[float]) -> HeightMap:
     """Points x, y, z in lines, parted by blanks, commas or semicolons; the first may be names."""
-    lines = path.read_text(errors="replace").replace(",", " ").replace(";", " ").splitlines()
-    rows = [line.split("#")[0].split() for line in lines]
+    text = path.read_text("utf-8-sig", errors="replace").replace(",", " ").replace(";", " ")
+    rows = [line.split("#")[0].split() for line in text.splitlines()]
     rows = [row for row in rows if row]
-    if rows and not _is_number(rows[0][0]):
+    if rows and not any(map(_is_number, rows[0])):
         rows = rows[1:]
     if not rows or any(len(row) != 3 for row in rows):
         raise BadRun(f"{path}: must hold x, y and z in each line")
     points = _numbers(path, [word for row in rows for word in row]).reshape(-1, 3)
     if not np.isfinite(points[:, :2]).all():
         raise BadRun(f"{path}: a place is not a number")
-    points[:, 2] = _without_marks(points[:, 2], None)
-    return _regular(path, points) if grid is None else _drawn(path, points, grid)
+    points[:, 2] = _without_marks(points[:, 2], [*MARKS, *marks])
+    if grid is None:
+        _require_width(path, points[:, :2])
+        return _regular(path, points)
+    known = points[np.isfinite(points[:, 2])]
+    if not len(known):
+        raise BadRun(f"{path}: holds no height")
+    _require_width(path, known[:, :2])
+    return _drawn(path, known, grid)
+
+
+def _require_width(path: Path, places: Array) -> None:
+    """Refuse places (n, 2) on one line, which no triangles join."""
+    across = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    if len(across) < 2 or across[1] <= NARROW * across[0]:
+        raise BadRun(
+            f"{path}: all points stand on one line; a bed needs points beside it, and one that is "
+            "the same across the tank needs the line twice, along both sides"
+        )
 
 
 def _is_number(word: str) -> bool:
@@ -202,8 +252,6 @@ def _regular(path: Path, points: Array) -> HeightMap:
     for axis in range(2):
         values = points[:, axis] - first[axis]
         gaps = np.diff(np.unique(values))
-        if not len(gaps):
-            raise BadRun(f"{path}: all points stand on one line")
         gaps = gaps[gaps > OFF_GRID * gaps.max()]
         count = round(float(values.max() / gaps.min()))
         spacing.append(float(values.max()) / count)
@@ -231,27 +279,27 @@ def _regular(path: Path, points: Array) -> HeightMap:
 
 
 def _drawn(path: Path, points: Array, grid: float) -> HeightMap:
-    """Heights on a grid, linear on the triangles between points (n, 3); nan outside of them."""
+    """Heights on a grid, linear on the triangles between points (n, 3) with heights; nan outside of
+    them."""
     from matplotlib.tri import LinearTriInterpolator, Triangulation
 
     if not grid > 0:
         raise BadRun(f"--grid {grid:g}: must be positive [m]")
-    known = points[np.isfinite(points[:, 2])]
-    low = known[:, :2].min(axis=0)
-    x, y = (known[:, :2] - low).T
+    low = points[:, :2].min(axis=0)
+    x, y = (points[:, :2] - low).T
     nx, ny = (int(float(values.max()) / grid + 1e-9) + 1 for values in (x, y))
     if nx * ny > MOST_POINTS:
         raise BadRun(f"--grid {grid:g}: {nx} x {ny} points, more than {MOST_POINTS}")
     try:
         triangles = Triangulation(x, y)
     except (ValueError, RuntimeError) as error:
-        raise BadRun(f"{path}: no triangles between the points ({error})") from error
+        raise BadRun(f"{path}: no triangles fit between the points") from error
     at = np.meshgrid(grid * np.arange(nx), grid * np.arange(ny))
-    z = LinearTriInterpolator(triangles, known[:, 2])(*at)
+    z = LinearTriInterpolator(triangles, points[:, 2])(*at)
     return HeightMap((float(low[0]), float(low[1])), (grid, grid), z.filled(np.nan))
 
 
-def _geotiff(path: Path) -> HeightMap:
+def _geotiff(path: Path, marks: Sequence[float]) -> HeightMap:
     """A GeoTIFF with one band of integers or single precision, in metres; Pillow unpacks it, its
     tags tell where it lies."""
     from PIL import Image
@@ -273,7 +321,8 @@ def _geotiff(path: Path) -> HeightMap:
         ) from error
     corner, step = _place(path, tags)
     mark = tags.get(42113)
-    z = _without_marks(z, None if mark is None else _number(path, str(mark).strip("\0 ")))
+    own = MARKS if mark is None else (_number(path, str(mark).strip("\0 ")),)
+    z = _without_marks(z, [*own, *marks])
     if step[1] < 0:  # rows come from the north, as a rule
         z, corner[1], step[1] = z[::-1], corner[1] + (len(z) - 1) * step[1], -step[1]
     return HeightMap((corner[0], corner[1]), (step[0], step[1]), z)

@@ -6,7 +6,10 @@ are imported when they are needed; Gmsh (GPL) runs as a tool of its own, the pro
 contain it.
 """
 
+import codecs
+import re
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,8 @@ from micstools import holes, solids
 from micstools.geometry import Array, IntArray, tet_volumes
 from micstools.shapes import Shape, from_tets
 
+STL_HEAD, STL_FACET = 84, 50
+"""Bytes of a binary STL file."""
 LARGEST_CHANGE = 0.01
 """Change of volume by repairs or by meshing that is refused."""
 STEP_UNIT = 1.0e-3
@@ -24,6 +29,10 @@ LONGEST = 20.0
 """Length of a block above which its file is taken to be in mm or cm [m]."""
 LONG = 1.0
 """Length of a block above which its unit is asked after [m]."""
+COARSE = 1e3
+"""Steps of single precision along a surface that are too few [-]."""
+FINE = 1e5
+"""Steps with which rounding cannot have opened a surface [-]."""
 
 
 class BadSurface(Exception):
@@ -60,10 +69,48 @@ def load(path: Path, element: float = 0.0) -> Surface:
     import trimesh
 
     try:
-        mesh = trimesh.load_mesh(path)
-        return closed(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
+        kind = path.suffix.lower()[1:]
+        data = path.read_bytes().removeprefix(codecs.BOM_UTF8)
+        if kind == "stl":
+            mesh = trimesh.load_mesh(BytesIO(_plain_stl(data)), file_type=kind)
+        elif kind == "obj":
+            mesh = trimesh.load_mesh(BytesIO(data), file_type=kind)
+        else:
+            mesh = trimesh.load_mesh(path)
+        return _closed_near_zero(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64))
     except (ValueError, NotImplementedError, AttributeError, IndexError) as error:
         raise BadSurface(f"{path}: cannot be read as a surface ({error})") from error
+
+
+def _plain_stl(data: bytes) -> bytes:
+    """An STL file as trimesh reads it: binary without what follows its last facet, as some writers
+    leave bytes there; ASCII with `end solid` as one word."""
+    if len(data) >= STL_HEAD:
+        end = STL_HEAD + STL_FACET * int.from_bytes(data[STL_HEAD - 4 : STL_HEAD], "little")
+        if end <= len(data) < end + STL_FACET:
+            return data[:end]
+    return re.sub(rb"(?im)^([ \t]*end)[ \t]+(solid|facet|loop)\b", rb"\1\2", data)
+
+
+def _closed_near_zero(points: Array, triangles: IntArray) -> Surface:
+    """`closed`, but a surface that single precision has spoiled is refused for that: coordinates of
+    a survey round to halves of a metre, small triangles to lines."""
+    if not len(points):
+        return closed(points, triangles)
+    far, length = float(np.abs(points).max()), float(np.ptp(points, axis=0).max())
+    step = float(np.spacing(np.float32(far)))
+    too_far = BadSurface(
+        f"the surface lies too far from zero: coordinates of {far:.7g} are rounded to {step:.2g} "
+        f"in single precision, and it is {length:.3g} long; move it near zero where it was drawn"
+    )
+    if length < COARSE * step and np.array_equal(points, points.astype(np.float32)):
+        raise too_far
+    try:
+        return closed(points, triangles)
+    except BadSurface as reason:
+        if length < FINE * step:
+            raise too_far from reason
+        raise
 
 
 def closed(points: Array, triangles: IntArray, volume: float | None = None) -> Surface:

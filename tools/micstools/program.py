@@ -41,10 +41,7 @@ def add_case(parser: argparse.ArgumentParser) -> None:
 
 def case_text(case: Path, words: list[str]) -> str:
     """The text of a case with settings."""
-    try:
-        text = case.read_text()
-    except UnicodeDecodeError as error:
-        raise BadRun(f"{case}: is no text") from error
+    text = settings.read(case)
     return settings.set_variables(text, map(settings.parse, words)) if words else text
 
 

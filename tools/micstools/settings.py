@@ -14,6 +14,7 @@ from micstools.reader import BadRun
 _FORM = re.compile(r"([A-Za-z]\w*)\.([A-Za-z]\w*)\s*=(.*)", re.DOTALL)
 _LOGICALS = {".true.": True, "true": True, ".false.": False, "false": False}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+_STRINGS = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"|![^\n]*|\xa0")
 _TOKENS = re.compile(r"'[^']*'|\"[^\"]*\"|![^\n]*|&\s*\w+|/")
 
 
@@ -29,6 +30,20 @@ class Setting:
     def name(self) -> str:
         """As in `contact.friction`."""
         return f"{self.group}.{self.variable}"
+
+
+def read(path: Path) -> str:
+    """The text of a case file as the program takes it: UTF-8, else Latin-1, without a byte-order
+    mark; blanks that do not break are blanks, but in strings."""
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise BadRun(f"{path}: is no text")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return _STRINGS.sub(lambda found: " " if found[0] == "\xa0" else found[0], text)
 
 
 def parse(word: str) -> Setting:

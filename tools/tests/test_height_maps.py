@@ -62,6 +62,15 @@ def test_points_in_any_order(tmp_path: Path) -> None:
         same(height_maps.load(save(tmp_path / "a.xyz", text)))
 
 
+@pytest.mark.parametrize("head", ["", "x,y,z\n", "# Höhen\n"])
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path, head: str) -> None:
+    points = head + "\n".join(f"{101 + 2 * k},{201 + 2 * j},{Z[j, k]}"
+                              for j in range(3) for k in range(4))  # fmt: skip
+    for name, text in (("a.asc", ESRI), ("a.xyz", points)):
+        (tmp_path / name).write_text("\ufeff" + text, encoding="utf-8")
+        same(height_maps.load(tmp_path / name))
+
+
 def test_points_with_rounded_figures_are_a_grid(tmp_path: Path) -> None:
     text = "\n".join(f"{k / 3:.2f} {j / 7:.3f} {k}" for k in range(10) for j in range(8))
     found = height_maps.load(save(tmp_path / "a.xyz", text))
@@ -82,6 +91,30 @@ def test_scattered_points_are_refused_or_drawn(tmp_path: Path) -> None:
     inside = found.z[1:-1, 1:-1]
     gx, gy = np.meshgrid(0.5 * np.arange(1, 20), 0.5 * np.arange(1, 12))
     assert inside == pytest.approx(3 + 2 * gx - gy, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ([(0, 0, 1), (1, 0, 2), (2, 0, 1.5), (3.3, 0, 1)], "stand on one line"),
+        ([(0, 0, 1), (1, 1, 2), (2.5, 2.5, 1.5)], "stand on one line"),
+        ([(5e6 + 1.1 * k, 4e5 + 2.2 * k, k) for k in range(9)], "stand on one line"),
+        ([(0, 0, 1), (1, 1, 2)], "stand on one line"),
+        ([(0, 0, 1), (0, 0, 1)], "stand on one line"),
+        ([(0, 0, 1), (1, 0, 1), (2, 0, 1), (0, 1, -9999), (1, 1, -9999)], "stand on one line"),
+        ([(0, 0, -9999), (1, 0, -9999), (0, 1, -9999)], "holds no height"),
+    ],
+)
+def test_points_on_one_line_cannot_be_drawn(tmp_path: Path, points: list, said: str) -> None:
+    """A section through a flume, as some solvers write their bed: it is needed twice."""
+    path = save(tmp_path / "a.xyz", "\n".join(f"{x!r} {y!r} {z!r}" for x, y, z in points))
+    with pytest.raises(BadRun, match=said) as fault:
+        height_maps.load(path, 0.5)
+    assert "qhull" not in str(fault.value) and "\n" not in str(fault.value)
+    if len({x for x, _, _ in points}) > 1 and "line" in said:
+        both = "".join(f"{x!r} {y + d!r} {z!r}\n" for x, y, z in points for d in (0.0, 3.0))
+        found = height_maps.load(save(path, both), 0.5)
+        assert found.z.shape[0] >= 7
 
 
 def geotiff(path: Path, z: np.ndarray, keys: tuple[int, ...], **more: object) -> Path:
@@ -115,6 +148,44 @@ def test_a_geotiff_of_points_and_gaps(tmp_path: Path) -> None:
     tags = {33550: SCALE[33550], 33922: (1.0, 1.0, 0.0, 103.0, 203.0, 0.0), 42113: "21"}
     found = height_maps.load(geotiff(tmp_path / "a.tif", Z.astype(np.float32), POINT, tags=tags))
     same(found, np.where(Z == 21, np.nan, Z))
+
+
+@pytest.mark.parametrize("written", ["-3.4028235e+38", "-3.40282e+38", "-3.4028234663852886e+38"])
+def test_a_mark_of_single_precision(tmp_path: Path, written: str) -> None:
+    """However the lowest number of single precision is rounded, in the data or in the tag."""
+    gap = np.where(Z == 12, np.nan, Z)
+    for mark, datum in ((written, "-3.4028234663852886e+38"), ("-3.4028235e+38", written)):
+        text = ESRI.replace("-99", mark).replace("12", datum)
+        same(height_maps.load(save(tmp_path / "a.asc", text)), gap)
+    z = np.where(Z == 12, np.finfo(np.float32).min, Z).astype(np.float32)
+    path = geotiff(tmp_path / "a.tif", z, AREA, tags={**SCALE, 42113: written})
+    same(height_maps.load(path), gap)
+    z = np.where(Z == 12, np.float32(-99.99), Z).astype(np.float32)
+    path = geotiff(tmp_path / "b.tif", z, AREA, tags={**SCALE, 42113: "-99.99"})
+    same(height_maps.load(path), gap)
+
+
+@pytest.mark.parametrize("height", ["-3.4e38", "1e21", "-12001", "9001", "-32768", "-9999"])
+@pytest.mark.parametrize("kind", ["asc", "tif"])
+def test_a_doubtful_height_is_asked_about(
+    tmp_path: Path, height: str, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a file that names -99 as its mark; the command refuses it, or takes it as missing."""
+    path = save(tmp_path / "a.asc", ESRI.replace("12", height))
+    if kind == "tif":
+        z = np.where(Z == 12, float(height), Z).astype(np.float32)
+        path = geotiff(tmp_path / "a.tif", z, AREA, tags={**SCALE, 42113: "-99"})
+    words = ["bed", str(path), "--out", str(tmp_path / "bed.txt")]
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "1 of 12 points have doubtful heights" in line and " at 105, 203: " in line
+    assert "--nodata=" + height[0] in line and not (tmp_path / "bed.txt").exists()
+    for more in ([f"--nodata={height}", "--fill", "12"], ["--window", "101,201,103,203"]):
+        with pytest.raises(SystemExit) as end:
+            cli.main([*words, *more])
+        assert end.value.code == 0
 
 
 @pytest.mark.parametrize(
@@ -154,6 +225,7 @@ def test_a_picture_is_no_map(tmp_path: Path) -> None:
         ("a.asc", re.sub(r"\b\d+ \d+ \d+ \d+\b", "-99 -99 -99 -99", ESRI), "holds no height"),
         ("a.xyz", "", "must hold x, y and z"),
         ("a.xyz", "1 2\n", "must hold x, y and z"),
+        ("a.xyz", "1O 0 1\n0 1 1\n1 1 1\n", "'1O' stands where a number should"),
         ("a.xyz", "1 2 3\n1 3 4\n", "stand on one line"),
         ("a.xyz", "0 0 1\n1 0 1\n0 1 1\n1 1 1\n1 1 2\n", "two points stand in the same place"),
         ("a.asc", ESRI.replace("12", "-99"), "1 of 12 points have no height, the first at 105, 20"),

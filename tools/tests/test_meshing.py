@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,54 @@ def test_a_surface_that_is_far_from_closed_is_refused(tmp_path: Path) -> None:
     mesh.update_faces(np.arange(len(mesh.faces)) % 3 > 0)
     with pytest.raises(meshing.BadSurface, match="surface is open"):
         meshing.load(save(mesh, tmp_path / "open.stl"))
+
+
+def ascii_stl() -> str:
+    """The hexapod as text."""
+    return str(trimesh.exchange.stl.export_stl_ascii(hexapod_surface()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        str.upper,
+        lambda text: text.replace("endsolid", "ENDSOLID hexapod"),
+        lambda text: text.replace("endsolid", "end solid").replace("endloop", "End Loop"),
+        lambda text: "\ufeff" + text,
+    ],
+    ids=["capitals", "ENDSOLID", "end solid", "byte-order mark"],
+)
+def test_an_stl_of_any_writing_is_read(tmp_path: Path, change: Callable[[str], str]) -> None:
+    (tmp_path / "a.stl").write_text(change(ascii_stl()), encoding="utf-8")
+    assert meshing.load(tmp_path / "a.stl").volume == pytest.approx(7 * D**3, rel=1e-6)
+
+
+def test_a_byte_order_mark_hides_no_point(tmp_path: Path) -> None:
+    lines = str(hexapod_surface().export(file_type="obj")).splitlines()
+    text = "\n".join(line for line in lines if line.startswith(("v ", "f ")))
+    (tmp_path / "a.obj").write_text("\ufeff" + text, encoding="utf-8")
+    assert meshing.load(tmp_path / "a.obj").volume == pytest.approx(7 * D**3, rel=1e-6)
+
+
+@pytest.mark.parametrize("more", [b"\n", b"\0" * 49])
+def test_bytes_behind_a_binary_stl_are_passed_over(tmp_path: Path, more: bytes) -> None:
+    path = save(hexapod_surface(), tmp_path / "a.stl")
+    path.write_bytes(path.read_bytes() + more)
+    assert meshing.load(path).volume == pytest.approx(7 * D**3, rel=1e-6)
+
+
+def test_a_surface_that_rounding_has_spoiled_is_refused(tmp_path: Path) -> None:
+    """At the coordinates of a survey; a drawing that keeps all digits is taken there."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
+    for radius in (2.0, 20.0, 200.0):  # less than COARSE steps of 0.5, and more
+        far = ball.copy().apply_scale(radius).apply_translation((354200.0, 5621080.0, 0.0))
+        if radius == 200.0:
+            far.update_faces(np.arange(len(far.faces)) % 3 > 0)
+        with pytest.raises(meshing.BadSurface, match=r"too far from zero: .* 562\d+ .* to 0.5 "):
+            meshing.load(save(far, tmp_path / "a.stl"))
+    ball.apply_translation((5e6 + 0.1, 0.0, 0.0))
+    found = meshing.load(save(ball, tmp_path / "a.obj"))
+    assert found.volume == pytest.approx(ball.volume, rel=1e-4)
 
 
 def test_flipped_triangles_are_turned_with_a_warning(tmp_path: Path) -> None:

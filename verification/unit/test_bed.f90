@@ -29,6 +29,7 @@ program test_bed
   real(wp), parameter :: slope(3) = [0.31_wp, -0.17_wp, 0.02_wp]   !! z = slope.(x, y, 1)
 
   call files()
+  call odd_stl_files()
   call volume_of_slope()
   call volume_of_closed_form()
   call periodic_bed()
@@ -70,7 +71,6 @@ contains
     type(bed_form_t) :: form
     character(:), allocatable :: message
     real(real32), parameter :: corner(9) = [0.0, 0.0, 0.1, 1.0, 0.0, 0.2, 0.0, 1.0, 0.3]
-    integer :: unit
 
     call write_text('a.txt', '2 3 0 1 0.5 0.25 # head'//lf//'1 2'//lf//'3 4'//lf//'5 6'//lf)
     call read_bed_file('a.txt', 'heightmap', form, message)
@@ -83,10 +83,7 @@ contains
     call read_bed_file('a.stl', 'stl', form, message)
     call check('ASCII STL: '//message, size(form%triangle, 2), 1)
     call check('its corners', reshape(form%point, [9]), real(corner, wp), 1.0e-7_wp)
-    open (newunit=unit, file='b.stl', access='stream', form='unformatted', status='replace')
-    write (unit) 'solid'//repeat(' ', 75), 1_int32, [0.0_real32, 0.0_real32, 1.0_real32], corner, &
-      'xx'
-    close (unit)
+    call write_binary_stl(corner, '')
     call read_bed_file('b.stl', 'stl', form, message)
     call check('binary STL: '//message, size(form%triangle, 2), 1)
     call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
@@ -132,6 +129,55 @@ contains
     call bad('a.stl', 'stl', &
       'line 1: ''hollow'' stands where ''solid'', the start of an STL file, should')
   end subroutine files
+
+  !> Keywords in capitals or in two words, a byte too much, coordinates of a survey.
+  subroutine odd_stl_files()
+    real(real32), parameter :: corner(9) = [0.0, 0.0, 0.1, 1.0, 0.0, 0.2, 0.0, 1.0, 0.3]
+    character(*), parameter :: vertices = 'VERTEX 0 0 .1'//lf//'Vertex 1 0 .2'//lf//'vertex 0 1 .3'
+    character(*), parameter :: far = 'vertex 5621080 0 0'//lf//'vertex 5621080.5 0 0'//lf
+    type(bed_form_t) :: form
+    character(:), allocatable :: message
+
+    call write_text('a.stl', 'SOLID A'//lf//'FACET NORMAL 0 0 1'//lf//'OUTER LOOP'//lf//vertices &
+      //lf//'ENDLOOP'//lf//'ENDFACET'//lf//'ENDSOLID A'//lf)
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('capitals: '//message, size(form%triangle, 2), 1)
+    call bad('a.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
+      //'heights; an STL file is read with kind = ''stl''')
+    call write_text('a.stl', 'solid a'//lf//'facet normal 0 0 1'//lf//'outer loop'//lf//vertices &
+      //lf//'end loop'//lf//'end facet'//lf//'End Solid a'//lf)
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('end solid: '//message, size(form%triangle, 2), 1)
+    call write_binary_stl(corner, lf)
+    call read_bed_file('b.stl', 'stl', form, message)
+    call check('a byte too much: '//message, size(form%triangle, 2), 1)
+    call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
+    call write_binary_stl(corner, repeat('x', 50))
+    call read_bed_file('b.stl', 'stl', form, message)
+    call check('a facet too much is none', len(message) > 0)
+    call write_binary_stl(corner + 4.0e6_real32, '')
+    call bad('b.stl', 'stl', 'lies too far from zero: coordinates of 4000001 m are rounded to ' &
+      //'0.25 m in single precision, and the form is 1 m long; move it near zero where it was ' &
+      //'made, and write it anew')
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621081.1 0 0'//lf//'endfacet')
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('flat facets far from zero: '//message, index(message, 'lies too far') == 1)
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621080 .1 0'//lf//'endfacet')
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('far from zero with all digits: '//message, len(message) == 0)
+  end subroutine odd_stl_files
+
+  !> A binary file of one facet, and what follows it.
+  subroutine write_binary_stl(corner, more)
+    real(real32), intent(in) :: corner(9)
+    character(*), intent(in) :: more
+    integer :: unit
+
+    open (newunit=unit, file='b.stl', access='stream', form='unformatted', status='replace')
+    write (unit) 'solid'//repeat(' ', 75), 1_int32, [0.0_real32, 0.0_real32, 1.0_real32], corner, &
+      'xx', more
+    close (unit)
+  end subroutine write_binary_stl
 
   subroutine bad(file, kind, expected)
     character(*), intent(in) :: file, kind, expected

@@ -36,6 +36,9 @@ contains
     call check('nothing follows', next_word(words) == '')
     call check('that is no problem', len(words%problem), 0)
     call check('no place without a problem', place_of(words) == '')
+    words = text_of(char(239)//char(187)//char(191)//'one '//char(239)//char(187)//char(191))
+    call check('behind a byte-order mark', next_word(words) == 'one')
+    call check('which is one at the start only', len(next_word(words)), 3)
   end subroutine words_and_remarks
 
   subroutine numbers()

@@ -16,6 +16,7 @@ program test_namelist_text
   call test_spelling()
   call test_form()
   call test_line_ends()
+  call test_no_break_space()
   call test_faults()
   call test_files()
   call finish_checks()
@@ -188,6 +189,21 @@ contains
     end do
   end subroutine test_line_ends
 
+  !> Blanks that do not break, as word processors write them, are blanks, but in strings.
+  subroutine test_no_break_space()
+    character(*), parameter :: b = char(194)//char(160)
+    type(namelist_text_t) :: list
+    type(problems_t) :: problems
+
+    call cut_groups(b//'! it''s'//b//lf//'&run'//b//'dt'//b//'='//b//'1'//b//'title = ''a'//b &
+      //'"'''//b//'n = 2'//b//'/'//b//lf, list, problems)
+    call check('no problem with blanks that do not break', problems%n, 0)
+    call check('three variables', list%group(1)%n, 3)
+    call check('number', list%group(1)%assignment(1)%value(1)%text == '1')
+    call check('a string keeps it', list%group(1)%assignment(2)%value(1)%text == 'a'//b//'"')
+    call check('lines', list%group(1)%line, 2)
+  end subroutine test_no_break_space
+
   !> One message for each fault, all of them in one go.
   subroutine test_faults()
     call expect('&run dt = 1'//lf//'t_end = 2'//lf, &
@@ -277,6 +293,15 @@ contains
     call read_text(path, text, problems)
     call check('long file', len(text), 400000)
 
+    call check_encoding('B'//char(246)//'e'//char(228)//char(223), &
+                        'B'//char(195)//char(182)//'e'//char(195)//char(164)//char(195)//char(159))
+    call check_encoding(char(195)//char(182)//char(226)//char(137)//char(164)//' ')
+    call check_encoding(char(240)//char(159)//char(140)//char(138))
+    call check_encoding(char(195), char(195)//char(131))
+    call check_encoding(char(192)//char(128), char(195)//char(128)//char(194)//char(128))
+    call check_encoding(char(237)//char(160)//char(128), &
+                        char(195)//char(173)//char(194)//char(160)//char(194)//char(128))
+
     open (newunit=unit, file=path, access='stream', form='unformatted', status='replace')
     write (unit) 'a'//achar(0)//'b'
     close (unit)
@@ -291,5 +316,25 @@ contains
     call check('folder in place of a file', problems%n, 3)
     call read_text('/dev/null', text, problems)
   end subroutine test_files
+
+  !> A text in UTF-8 stays, any other is Latin-1.
+  subroutine check_encoding(content, wanted)
+    character(*), intent(in) :: content
+    character(*), intent(in), optional :: wanted   !! default: the content
+    character(*), parameter :: path = 'test_encoding.nml'
+    type(problems_t) :: problems
+    character(:), allocatable :: text, expected
+    integer :: unit
+
+    expected = content
+    if (present(wanted)) expected = wanted
+    open (newunit=unit, file=path, access='stream', form='unformatted', status='replace')
+    write (unit) content
+    close (unit)
+    call read_text(path, text, problems)
+    call check('in UTF-8: '//expected, text == expected .and. problems%n == 0)
+    open (newunit=unit, file=path)
+    close (unit, status='delete')
+  end subroutine check_encoding
 
 end program test_namelist_text

@@ -15,6 +15,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("file", type=Path, help="Esri raster .asc, points .xyz, or GeoTIFF .tif, in metres")
     add("--out", type=Path, required=True, help="map of heights to write, for &bed file")
     add("--fill", type=float, metavar="HEIGHT", help="where the file has none (NODATA) [m]")
+    add("--nodata", type=float, action="append", default=[], metavar="HEIGHT", help="takes this "
+        "height as missing, beside the file's own mark; --nodata=-9999 with a sign")  # fmt: skip
     add("--grid", type=float, metavar="SPACING", help="draw scattered points to a grid [m]")
     add("--window", metavar="X0,Y0,X1,Y1", help="keep this part, in the file's coordinates [m]")
     add("--origin", default="0,0,0", metavar="X,Y,Z", help="place of the file that becomes 0,0,0 "
@@ -38,9 +40,10 @@ def _bed(given: argparse.Namespace) -> int:
     if not given.scale > 0:
         raise BadRun(f"--scale {given.scale:g}: must be positive")
     window = given.window and _parts("--window", given.window, "X0,Y0,X1,Y1")
-    found = height_maps.load(given.file, given.grid)
+    found = height_maps.load(given.file, given.grid, given.nodata)
     if window:
         found = height_maps.cut(found, (window[0], window[1]), (window[2], window[3]))
+    height_maps.require_ground(found)
     missing = found.missing
     found = height_maps.moved(height_maps.filled(found, given.fill), (x, y, z), given.scale)
     given.out.parent.mkdir(parents=True, exist_ok=True)
