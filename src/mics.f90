@@ -18,6 +18,7 @@ program mics
   use case_file_m, only: read_text
   use case_types_m, only: case_t
   use case_input_m, only: read_case, parameters_text
+  use named_files_m, only: look_beside
   use reference_m, only: reference_text
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
@@ -153,6 +154,7 @@ contains
     if (n > 0) call refuse(problems)
     call broadcast(text)
     call read_case(text, case, problems)
+    call look_beside(options%case_file, case)
     call make_shapes(case, shapes, problems)
     call make_bed(case, bed, problems)
     call check_case(case, shapes, bed, problems)

@@ -1,12 +1,16 @@
 """Good cases are accepted and bad ones refused: exit code, messages, and nothing written."""
 
 import os
+import re
 import resource
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from micstools.initial_state import write_initial_state
+from micstools.reader import Run
 from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, prepare
 
 INPUT = sorted((ROOT / "input").glob("*.nml"))
@@ -112,6 +116,86 @@ def test_plan_tells_the_numbers(tmp_path: Path) -> None:
     assert mass == pytest.approx(2300 * volume, rel=1e-3)
     assert weight == pytest.approx(9.81 * mass, rel=1e-3)
     assert submerged == pytest.approx((2300 - 998.2) * 9.81 * volume, rel=1e-3)
+
+
+FILES = """&run t_end = 1e-6  dt = 1e-6 /
+&grid cells = 3, 2, 2  length = 0.3, 0.2, 0.2 /
+&bed file = 'flat.txt' /
+&shape name = 'a'  kind = 'file'  file = 'block.txt' /
+&body shape = 'a'  position = 0.15, 0.1, 0.15  fixed = .true. /
+&fluid initial_state = 'state.h5' /
+"""
+
+
+def write_named_files(folder: Path, height: float, size: float, liquid: float) -> None:
+    """What FILES names."""
+    folder.mkdir(exist_ok=True)
+    (folder / "flat.txt").write_text("2 2 0 0 0.3 0.2\n" + 4 * f"{height}\n")
+    corners = f"0 0 0\n{size} 0 0\n0 {size} 0\n0 0 {size}\n"
+    (folder / "block.txt").write_text(f"mics-shape 1\npoints 4\n{corners}tets 1\n1 2 3 4\n")
+    write_initial_state(folder / "state.h5", np.full((2, 2, 3), liquid))
+
+
+def from_lines(plan: str) -> list[str]:
+    """What a plan says of the files of FILES."""
+    lines = [" ".join(line.split()) for line in plan.splitlines()]
+    return [line for line in lines if line.startswith(("bed from", "a from", "initial state"))]
+
+
+BESIDE = [
+    "bed from flat.txt, 2 facets, heights from 0.01 to 0.01 m",
+    "initial state from state.h5",
+    "a from block.txt, 0.05 x 0.05 x 0.05 m, 4 facets",
+]
+HERE = [
+    "bed from flat.txt, 2 facets, heights from 0.02 to 0.02 m",
+    "initial state from state.h5",
+    "a from block.txt, 0.06 x 0.06 x 0.06 m, 4 facets",
+]
+
+
+def test_files_are_looked_for_beside_the_case_first(tmp_path: Path) -> None:
+    """Then in the working folder, which the plan says; standard input has no folder."""
+    write_named_files(tmp_path / "sub", 0.01, 0.05, 1.0)
+    write_named_files(tmp_path, 0.02, 0.06, 0.0)
+    case = tmp_path / "sub" / "case.nml"
+    case.write_text(FILES)
+    for words, folder, text, wanted in (
+        ([str(case)], tmp_path, "", BESIDE),
+        (["sub/case.nml"], tmp_path, "", BESIDE),
+        (["case.nml"], tmp_path / "sub", "", BESIDE),
+        ([], tmp_path, FILES, HERE),
+        (["/dev/stdin"], tmp_path, FILES, HERE),
+    ):
+        done = mics(["--check", *words], folder, text)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert from_lines(done.stdout) == wanted, words
+    for words, text, share in (["sub/case.nml"], "", 1.0), ([], FILES, 0.0):
+        done = mics([*words, "--quiet", "--output", f"out{share}"], tmp_path, text)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert Run(tmp_path / f"out{share}").fields(0.0).liquid.max() == pytest.approx(share)
+    for name in ("flat.txt", "block.txt", "state.h5"):
+        (tmp_path / "sub" / name).unlink()
+    done = mics(["--check", "sub/case.nml"], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    there = " in the working folder, not beside the case"
+    wanted = [re.sub(r"(from \S+?)(,|$)", rf"\1{there}\2", line) for line in HERE]
+    assert from_lines(done.stdout) == wanted
+
+
+def test_a_run_goes_on_with_the_files_beside_its_case(tmp_path: Path) -> None:
+    """From another working folder, too; from standard input it is another case."""
+    write_named_files(tmp_path / "sub", 0.01, 0.05, 1.0)
+    write_named_files(tmp_path, 0.02, 0.06, 0.0)
+    case, out = tmp_path / "sub" / "case.nml", tmp_path / "out"
+    case.write_text(FILES)
+    assert mics(["--quiet", "--output", str(out), "sub/case.nml"], tmp_path).returncode == 0
+    case.write_text(FILES.replace("t_end = 1e-6", "t_end = 2e-6"))
+    restart = ["--quiet", "--restart", str(out / "restart-a.h5")]
+    done = mics(restart, tmp_path, case.read_text())
+    assert done.returncode == 2 and "checksum of the bed" in done.stderr
+    done = mics([*restart, "case.nml"], tmp_path / "sub")
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -296,7 +296,7 @@ def test_vtk_reads_the_blocks(wet: Path) -> None:
                 v = h5["bodies/velocity"][row, body] + np.cross(
                     h5["bodies/angular_velocity"][row, body], arm
                 )
-                assert np.allclose(seen.points[part], at, rtol=0, atol=1e-7)
+                assert np.allclose(seen.points[part], at, rtol=0, atol=1e-12)
                 assert np.allclose(seen.point_data["velocity"][part], v, rtol=1e-6, atol=1e-6)
                 triangles = len(shape["triangles"])
                 mine = seen.cell_data["body"] == body + 1  # for people, blocks count from 1
@@ -305,6 +305,24 @@ def test_vtk_reads_the_blocks(wet: Path) -> None:
                 there = due[body] == 0 or due[body] < times[frame]  # released as a step begins
                 assert (seen.cell_data["released"][mine] == there).all()
             assert seen.n_points == first
+
+
+def test_frames_keep_their_digits_in_map_coordinates(tmp_path: Path) -> None:
+    """A tank with the coordinates of a map: the block has its size, the fluid its place."""
+    case, out = tmp_path / "case.nml", tmp_path / "out"
+    case.write_text("""&run t_end = 0.01 /
+&grid cells = 4, 4, 4  length = 0.4, 0.4, 0.4  origin = 354200, 562108, -12 /
+&shape name = 'cube'  kind = 'cube'  size = 0.063 /
+&body shape = 'cube'  position = 354200.21, 562108.17, -11.8  fixed = .true. /
+""")
+    assert run(out, case=case) == (0, "")
+    block, fluid = (seen_by_vtk(out / f"{name}.vtkhdf", 1) for name in ("blocks", "fields"))
+    low, high = np.array(block.bounds).reshape(3, 2).T
+    assert high - low == pytest.approx([0.063] * 3, rel=0, abs=1e-9)
+    assert (low + high) / 2 == pytest.approx([354200.21, 562108.17, -11.8], rel=0, abs=1e-9)
+    low, high = np.array(fluid.bounds).reshape(3, 2).T
+    assert low == pytest.approx([354200, 562108, -12], rel=0, abs=1e-9)
+    assert high - low == pytest.approx([0.4] * 3, rel=0, abs=1e-9)
 
 
 def test_divergence_from_the_restart_file(wet: Path) -> None:

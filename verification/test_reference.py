@@ -136,7 +136,7 @@ def write_files(folder: Path) -> None:
     ]
     (folder / "slope.stl").write_text("solid bed\n" + "".join(facets) + "endsolid bed\n")
     (folder / "block.txt").write_text(
-        "mics-shape 1\npoints 4\n0 0 0\n0.1 0 0\n0 0.1 0\n0 0 0.1\ntets 1\n1 2 3 4\n"
+        "mics-shape 1\npoints 4\n0 0 0\n0.05 0 0\n0 0.05 0\n0 0 0.05\ntets 1\n1 2 3 4\n"
     )
     write_initial_state(folder / "start.h5", liquid=np.zeros((4, 2, 6)))
 
@@ -169,13 +169,32 @@ GIVEN = {
 }
 """A case with a group of each name that says no more than it must."""
 
+CHOSEN = {
+    **GIVEN,
+    "shape": "name = 'hexapod'  kind = 'file'  file = 'block.txt'  spheres = 'dense'",
+    "contact": "law = 'constants'",
+    "numerics": "coupling = 'mics'  solid_fraction = 'subcell'",
+}
+"""The same with other choices, which give variables a meaning that have none by default."""
 
-def used_by_program(folder: Path, defaults: dict[str, str]) -> dict[str, list[dict[str, Any]]]:
+NEEDED = {
+    "scale": "kind = 'file'",
+    "sphere_spacing": "spheres = 'dense'",
+    "coupling_passes": "coupling = 'mics'",
+    "subcells": "solid_fraction = 'subcell'",
+    **dict.fromkeys(("k_n", "gamma_n", "eta_n", "k_t", "gamma_t", "eta_t"), "law = 'constants'"),
+}
+"""The choice that each of them needs."""
+
+
+def used_by_program(
+    folder: Path, given: dict[str, str], defaults: dict[str, str]
+) -> dict[str, list[dict[str, Any]]]:
     """All values that a run used, from its results, with more written into some groups."""
     folder.mkdir()
     write_files(folder)
     case = "".join(
-        f"&{group}\n{GIVEN.get(group, '')}\n{defaults.get(group, '')}/\n" for group in CONTRACT
+        f"&{group}\n{given.get(group, '')}\n{defaults.get(group, '')}/\n" for group in CONTRACT
     )
     done = mics([], folder, case)
     assert done.returncode == 0, done.stderr
@@ -183,19 +202,25 @@ def used_by_program(folder: Path, defaults: dict[str, str]) -> dict[str, list[di
 
 
 def test_defaults_are_those_of_the_program(rows: list[Row], tmp_path: Path) -> None:
-    """A run without a variable uses its printed default, and is the same when it is written."""
-    used = used_by_program(tmp_path / "without", {})
-    defaults: dict[str, str] = {}
-    for row in rows:
-        if row.default == "required" or f"{row.name} = " in GIVEN.get(row.group, ""):
-            continue
-        if row.default == "no default":
-            assert row.name not in used[row.group][0]
-            continue
-        value = f90nml.reads(f"&a b = {row.default} /")["a"]["b"]
-        assert value == used[row.group][0][row.name], (row.group, row.name)
-        defaults[row.group] = f"{defaults.get(row.group, '')}{row.name} = {row.default}\n"
-    assert used_by_program(tmp_path / "with", defaults) == used
+    """A run without a variable uses its printed default, and is the same when it is written; one
+    without a meaning is not used."""
+    seen = set()
+    for number, given in enumerate((GIVEN, CHOSEN)):
+        used = used_by_program(tmp_path / f"without-{number}", given, {})
+        defaults: dict[str, str] = {}
+        for row in rows:
+            if f" {row.name} = " in f" {given.get(row.group, '')}":
+                seen.add((row.group, row.name))
+                continue
+            if row.default == "no default":
+                assert row.name not in used[row.group][0]
+            elif row.name in used[row.group][0]:
+                value = f90nml.reads(f"&a b = {row.default} /")["a"]["b"]
+                assert value == used[row.group][0][row.name], (row.group, row.name)
+                defaults[row.group] = f"{defaults.get(row.group, '')}{row.name} = {row.default}\n"
+                seen.add((row.group, row.name))
+        assert used_by_program(tmp_path / f"with-{number}", given, defaults) == used
+    assert seen >= {(row.group, row.name) for row in rows if row.default != "no default"}
 
 
 def edges(rule: dict[str, Any]) -> Iterator[tuple[float, bool]]:
@@ -218,7 +243,8 @@ def test_bounds_are_those_of_the_program(schema: dict[str, Any], tmp_path: Path)
         for name, rule in rules["properties"].items():
             one = rule["anyOf"][0] if "anyOf" in rule else rule.get("items", rule)
             for value, good in edges(one):
-                text = f"&{group} {name} = {rule.get('minItems', 1)}*{value!r} /"
+                choice = NEEDED.get(name, "")
+                text = f"&{group} {name} = {rule.get('minItems', 1)}*{value!r} {choice} /"
                 errors = mics(["--check"], tmp_path, text).stderr.splitlines()
                 start = f"mics: &{group} {name} = {value!r}"
                 refused = any(e.startswith(start) and " must " in e for e in errors)

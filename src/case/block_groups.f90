@@ -29,22 +29,36 @@ contains
       example='''spheres''')
     call v%option('law', contact%law, 'restitution constants', 'where the forces come from: ' &
       //'restitution and contact_time, or the constants k_n to eta_t', example='''constants''')
+    if (v%good('law')) then
+      call v%without_meaning(contact%law == 'restitution', &
+        'k_n gamma_n eta_n k_t gamma_t eta_t', 'law = ''restitution''', &
+        'only law = ''constants'' has them')
+      call v%without_meaning(contact%law == 'constants', 'restitution', 'law = ''constants''', &
+        'only law = ''restitution'' has it')
+    end if
     call v%real('restitution', contact%restitution, share(), &
       'speed after over speed before a central impact without friction', example='0.5')
     call v%real('contact_time', contact%contact_time, positive('s'), &
-      'how long such an impact lasts; shorter makes blocks stiffer', example='0.001')
+      'how long such an impact lasts; shorter makes blocks stiffer. With any law a step of the ' &
+      //'blocks is a twentieth of it at most', example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
-      //'with law = ''constants'', of each pair of spheres', example='2e5')
+      //'with law = ''constants'', of each pair of spheres', &
+      example='law = ''constants''  k_n = 2e5')
     call v%real('gamma_n', contact%gamma_n, between(1.0_wp, 10.0_wp, '-'), &
-      'power of the overlap, with law = ''constants''', example='1.5')
+      'power of the overlap, with law = ''constants''', &
+      example='law = ''constants''  gamma_n = 1.5')
     call v%real('eta_n', contact%eta_n, not_negative('N s/m'), &
-      'damping normal to the surface, with law = ''constants''', example='5')
+      'damping normal to the surface, with law = ''constants''', &
+      example='law = ''constants''  eta_n = 5')
     call v%real('k_t', contact%k_t, not_negative('N/m^gamma_t'), &
-      'stiffness along the surface, with law = ''constants''', example='2e5')
+      'stiffness along the surface, with law = ''constants''', &
+      example='law = ''constants''  k_t = 2e5')
     call v%real('gamma_t', contact%gamma_t, positive('-'), &
-      'power of the displacement along the surface, with law = ''constants''', example='1.5')
+      'power of the displacement along the surface, with law = ''constants''', &
+      example='law = ''constants''  gamma_t = 1.5')
     call v%real('eta_t', contact%eta_t, not_negative('N s/m'), &
-      'damping along the surface, with law = ''constants''', example='5')
+      'damping along the surface, with law = ''constants''', &
+      example='law = ''constants''  eta_t = 5')
     call v%real('friction', contact%friction, not_negative('-'), &
       'coefficient of Coulomb friction, block on block', example='0.5')
     call v%real('wall_friction', contact%wall_friction, not_negative('-'), &
@@ -90,6 +104,14 @@ contains
       'hexapod cube box sphere cylinder tetrapod dolos reef_cube file', &
       'the form, such as ''hexapod''', example='size = 0.02  kind = ''hexapod''', &
       required=.true.)
+    if (shape%kind /= '') then
+      call v%without_meaning(shape%kind == 'file', 'size refinement', 'kind = ''file''', &
+        'the file has the size and the tetrahedra')
+      call v%without_meaning(shape%kind /= 'file', 'file scale', &
+        'kind = '//quoted_text(trim(shape%kind)), 'only kind = ''file'' has it')
+      call v%without_meaning(shape%kind == 'sphere', 'spheres sphere_spacing', &
+        'kind = ''sphere''', 'a sphere touches as one')
+    end if
     n = size_count(shape%kind)
     if (shape%kind /= '' .and. n > 0) call v%needed('size', size_meaning(shape%kind)//' [m]')
     if (shape%kind == '') n = 0
@@ -115,13 +137,12 @@ contains
     call v%option('spheres', shape%spheres, 'centroid inscribed dense', 'contact spheres of the ' &
       //'shape: one about the centroid of each tetrahedron as in the paper, the largest in ' &
       //'each tetrahedron, or close together along the surface', example='''dense''')
+    call v%without_meaning(shape%spheres /= 'dense' .and. v%good('spheres'), 'sphere_spacing', &
+      'spheres = '//quoted_text(trim(shape%spheres)), 'only ''dense'' has it')
     call v%real('sphere_spacing', shape%sphere_spacing, &
       not_negative('m', zero='0 means a tenth of the smallest edge'), &
       'distance of the contact spheres, for spheres = ''dense''', &
       example='spheres = ''dense''  sphere_spacing = 0.002')
-
-    call v%require('file', shape%kind == 'file' .or. shape%file == '', &
-                   'only a shape of kind ''file'' is read from one')
   end subroutine visit_shape
 
   !> What the size of a kind of shape means [m].
@@ -166,10 +187,6 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(drop_input_t), intent(inout) :: drop
     character(name_length), intent(in) :: shapes(:)
-    logical :: given_attitude
-    integer :: i
-    character(10), parameter :: attitude(4) = &
-      [character(10) :: 'quaternion', 'axis', 'angle_deg', 'tilt_deg']
 
     drop%line = v%group%line
     call v%about('blocks dropped one after another from one place')
@@ -187,21 +204,15 @@ contains
     call v%option('orientation', drop%orientation, 'given random', 'attitude of the blocks: by ' &
       //'quaternion, or axis and angle_deg; or at random, any rotation as likely as another', &
       example='''random''')
-    given_attitude = drop%orientation == 'given'
-    if (given_attitude .or. .not. v%writing) then
-      call visit_attitude(v, drop%quaternion)
-      call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
-        'each block is tilted at random by up to this about an axis at random', example='10')
-    end if
+    call v%without_meaning(drop%orientation == 'random', 'quaternion axis angle_deg tilt_deg', &
+      'orientation = ''random''', 'any attitude is as likely as another')
+    call visit_attitude(v, drop%quaternion)
+    call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
+      'each block is tilted at random by up to this about an axis at random', example='10')
     call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
       example='0, 0, -0.1')
     call v%integer('seed', drop%seed, any_whole(), 'the random places and attitudes: ' &
       //'another number draws others, the same number the same on every machine', example='7')
-
-    do i = 1, size(attitude)
-      call v%require(trim(attitude(i)), given_attitude .or. .not. v%given(trim(attitude(i))), &
-                     'has no meaning with orientation = ''random''')
-    end do
   end subroutine visit_drop
 
   !> The shape of a body or drop: one that exists.

@@ -51,6 +51,7 @@ module case_types_m
     logical :: single_phase = .false.
     real(wp) :: velocity(3) = 0.0_wp                !! uniform initial velocity [m/s]
     character(:), allocatable :: initial_state      !! HDF5 file; '': none
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     integer :: line = 0                             !! of the case file, where the group begins
   end type fluid_t
 
@@ -93,6 +94,7 @@ module case_types_m
     real(wp) :: size(3) = absent                    !! required [m]
     real(wp) :: density = 2300.0_wp                 !! [kg/m3]
     character(:), allocatable :: file
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     real(wp) :: scale = 1.0_wp
     integer :: refinement = 2
     character(name_length) :: spheres = 'centroid'
@@ -131,6 +133,7 @@ module case_types_m
 
   type :: bed_input_t
     character(:), allocatable :: file
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(name_length) :: kind = 'heightmap'
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! something is wrong with the group

@@ -68,6 +68,8 @@ contains
     call v%option('coupling', numerics%coupling, 'monolithic mics', 'fluid and blocks: pressure ' &
       //'and rigid motions in one solve, or the mass-averaged mixture of the paper', &
       example='''mics''')
+    call v%without_meaning(numerics%coupling == 'monolithic' .and. v%good('coupling'), &
+      'coupling_passes', 'coupling = ''monolithic''', 'only ''mics'' makes passes')
     call v%integer('coupling_passes', numerics%coupling_passes, between(1, 1000), &
       'passes of projection and rigid motion in a step, for coupling = ''mics'' only', &
       example='coupling = ''mics''  coupling_passes = 3')
@@ -83,6 +85,8 @@ contains
     call v%option('solid_fraction', numerics%solid_fraction, 'exact subcell', &
       'share of a cell that is block: from clipped tetrahedra, or counted in the sub-cells of ' &
       //'the paper', example='''subcell''')
+    call v%without_meaning(numerics%solid_fraction == 'exact' .and. v%good('solid_fraction'), &
+      'subcells', 'solid_fraction = ''exact''', 'only ''subcell'' counts sub-cells')
     call v%integer('subcells', numerics%subcells, between(1, 32), 'sub-cells in each direction ' &
       //'of a cell, for solid_fraction = ''subcell''', &
       example='solid_fraction = ''subcell''  subcells = 8')
@@ -95,11 +99,6 @@ contains
       'the passes of the pressure end when no cell has a divergence above this', example='1e-7')
     call v%integer('max_pressure_passes', numerics%max_pressure_passes, between(1, 1000), &
       'passes of the pressure in a step after which the run ends with code 3', example='20')
-
-    if (.not. v%good('coupling')) return
-    call v%require('coupling_passes', &
-                   numerics%coupling_passes == 1 .or. numerics%coupling == 'mics', &
-                   'only coupling = ''mics'' makes more than one pass')
   end subroutine visit_numerics
 
 end module fluid_groups_m

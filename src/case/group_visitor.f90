@@ -34,9 +34,10 @@ module group_visitor_m
     integer, private :: n_known = 0
     integer, private :: n_before = 0       !! problems before this group
     character(name_length), private :: known(most_variables) = ''
+    character(:), allocatable, private :: left_out   !! not written: they have no meaning
   contains
     procedure :: start_reading, start_writing, start_describing, about, finish
-    procedure :: given, good, all_good, needed, require, note
+    procedure :: given, good, all_good, needed, require, without_meaning, note
     procedure :: name, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
@@ -63,6 +64,7 @@ contains
     character(*), intent(in) :: group
 
     self%writing = .true.
+    self%left_out = ' '
     call self%written%add_line('&'//group)
   end subroutine start_writing
 
@@ -166,6 +168,28 @@ contains
       call self%note(' '//variable//' (by default): '//allowed)
     end if
   end subroutine require
+
+  !> Variables that have no meaning if `idle`, because of what was chosen: each that is given is a
+  !! problem, and none is written. To be called before they are read.
+  subroutine without_meaning(self, idle, variables, chosen, remedy)
+    class(group_visitor_t), intent(inout) :: self
+    logical, intent(in) :: idle
+    character(*), intent(in) :: variables   !! one blank between them
+    character(*), intent(in) :: chosen      !! as in `law = 'constants'`
+    character(*), intent(in) :: remedy      !! what is allowed
+    integer :: first, last, i
+
+    if (.not. idle) return
+    if (self%writing) self%left_out = self%left_out//variables//' '
+    if (.not. self%reading) return
+    first = 1
+    do while (first <= len(variables))
+      last = first + scan(variables(first:)//' ', ' ') - 2
+      i = self%group%find(variables(first:last))
+      if (i > 0) call self%fault(i, 'has no meaning with '//chosen//'; '//remedy)
+      first = last + 2
+    end do
+  end subroutine without_meaning
 
   !> Report a problem of the group; `what` goes on right after its name.
   subroutine note(self, what)
@@ -396,7 +420,7 @@ contains
     type(variable_t), intent(in) :: variable
 
     if (self%writing) then
-      if (len(variable%value) == 0) return
+      if (len(variable%value) == 0 .or. index(self%left_out, ' '//variable%name//' ') > 0) return
       call self%written%add_line('  '//variable%name//' = '//variable%value)
     else
       self%told%n = self%told%n + 1

@@ -2,7 +2,8 @@
 !! ParaView and pyvista read them.
 !!
 !! Layout: VTKHDF 2.0, temporal ImageData (a frame is a row of each dataset) and temporal PolyData
-!! (the points of all frames one after another, the triangles once). A frame is complete when
+!! (the points of all frames one after another, the triangles once). Numbers are single, but the
+!! points double: map coordinates of six digits leave single ones 0.06 m. A frame is complete when
 !! `Steps@NSteps` counts it, which is flushed after everything else. Source: VTK, "VTKHDF file
 !! format".
 module write_vtkhdf_m
@@ -72,10 +73,11 @@ contains
       layers = max(1, chunk_bytes/(4*n(1)*n(2)))
       do s = 1, n_scalars
         call file%new_compressed_column(root//'/CellData/'//trim(scalar_name(s)), &
-                                        trim(scalar_units(s)), n, 1, layers, self%scalar(s))
+                                        trim(scalar_units(s)), file_real32, n, 1, layers, &
+                                        self%scalar(s))
       end do
-      call file%new_compressed_column(root//'/CellData/velocity', 'm/s', [3, n], 1, &
-                                      max(1, layers/3), self%velocity)
+      call file%new_compressed_column(root//'/CellData/velocity', 'm/s', file_real32, [3, n], &
+                                      1, max(1, layers/3), self%velocity)
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       do s = 1, n_scalars + 1
@@ -308,12 +310,13 @@ contains
       call file%create(path, .false.)
       call start_file(file, 'PolyData')
       call file%store_wide_integers(root//'/NumberOfPoints', '1', [n])
-      call file%new_compressed_column(root//'/Points', 'm', [3], n, 3, self%points)
+      call file%new_compressed_column(root//'/Points', 'm', file_real64, [3], n, 3, self%points)
       call write_cells(blocks, file)
       call file%new_column(root//'/CellData/released', '1', file_integer32, [integer ::], &
         self%n_cells, self%released)
       call file%group(root//'/PointData')
-      call file%new_compressed_column(root//'/PointData/velocity', 'm/s', [3], n, 3, self%velocity)
+      call file%new_compressed_column(root//'/PointData/velocity', 'm/s', file_real32, [3], n, &
+                                      3, self%velocity)
       call start_steps(file, self%time)
       call file%group(steps//'/CellDataOffsets')
       call file%group(steps//'/PointDataOffsets')
@@ -432,7 +435,7 @@ contains
     self%n_cells = count_cells(blocks)
     associate (file => self%file)
       call file%open(path, .false., .true.)
-      call file%open_column(root//'/Points', file_real32, self%points)
+      call file%open_column(root//'/Points', file_real64, self%points)
       call file%open_column(root//'/PointData/velocity', file_real32, self%velocity)
       call file%open_column(root//'/CellData/released', file_integer32, self%released)
       call file%open_column(steps//'/Values', file_real64, self%time)

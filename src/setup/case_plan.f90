@@ -2,7 +2,8 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, is_given, smallest_spacing
+  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
+  use named_files_m, only: told_file
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
   use tet_mesh_m, only: shape_t
@@ -93,7 +94,8 @@ contains
 
     low = minval(bed%point, 2)
     high = maxval(bed%point, 2)
-    call entry(unit, 'bed from', trim(case%bed%file)//', '//to_text(bed%n_given)//' facets, ' &
+    call entry(unit, 'bed from', told_file(case%bed%folder, trim(case%bed%file))//', ' &
+               //to_text(bed%n_given)//' facets, ' &
                //'heights from '//brief(low(3))//' to '//brief(high(3))//' m')
   end subroutine print_bed
 
@@ -119,7 +121,8 @@ contains
     end if
     if (size(case%water) > 0) call entry(unit, 'boxes of liquid', to_text(size(case%water)))
     if (len(case%fluid%initial_state) > 0) then
-      call entry(unit, 'initial state', 'from '//case%fluid%initial_state)
+      call entry(unit, 'initial state', 'from ' &
+                 //told_file(case%fluid%folder, case%fluid%initial_state))
     else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
       call entry(unit, 'water level', 'none: no liquid at all')
     end if
@@ -153,18 +156,18 @@ contains
         right(brief(mass*g), 12), right(submerged, 13)
     end do
     do s = 1, size(shapes)
-      if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s)%file, shapes(s))
+      if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s), shapes(s))
       if (case%contact%model == 'spheres') call print_height_errors(unit, shapes(s))
     end do
   end subroutine print_shapes
 
   !> How long a block from a file is, so that a wrong unit shows.
-  subroutine print_file_shape(unit, file, shape)
+  subroutine print_file_shape(unit, input, shape)
     integer, intent(in) :: unit
-    character(*), intent(in) :: file
+    type(shape_input_t), intent(in) :: input
     type(shape_t), intent(in) :: shape
 
-    call entry(unit, trim(shape%name)//' from', file//', ' &
+    call entry(unit, trim(shape%name)//' from', told_file(input%folder, input%file)//', ' &
                //triple(maxval(shape%point, 2) - minval(shape%point, 2))//' m, ' &
                //to_text(size(shape%facet) - 1)//' facets')
   end subroutine print_file_shape

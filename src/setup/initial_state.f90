@@ -14,6 +14,7 @@ module initial_state_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, fatal, to_text, exit_files
   use case_types_m, only: case_t, fluid_t, is_given
+  use named_files_m, only: found_file
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo, fill_velocity_halo
@@ -37,7 +38,7 @@ contains
     logical :: liquid, velocity
 
     if (.not. is_named(case%fluid) .or. case%run%physics == 'dry' .or. case%grid%faulty) return
-    call file%open(case%fluid%initial_state, .false., .false.)
+    call file%open(found_file(case%fluid%folder, case%fluid%initial_state), .false., .false.)
     liquid = file%has(liquid_name)
     velocity = file%has(velocity_name)
     if (file%info /= 0) then
@@ -136,7 +137,7 @@ contains
     integer :: extent(3)
 
     if (.not. is_named(fluid)) return
-    call file%open(fluid%initial_state, .false., .false.)
+    call file%open(found_file(fluid%folder, fluid%initial_state), .false., .false.)
     if (file%has(liquid_name)) then
       extent = grid%hi - grid%lo + 1
       allocate (part(product(extent)), source=0.0_wp)
@@ -162,7 +163,7 @@ contains
     integer :: d, extent(3)
 
     if (.not. is_named(fluid)) return
-    call file%open(fluid%initial_state, .false., .false.)
+    call file%open(found_file(fluid%folder, fluid%initial_state), .false., .false.)
     if (file%has(velocity_name)) then
       extent = grid%hi - grid%lo + 1
       allocate (part(3*product(extent)), source=0.0_wp)

@@ -9,6 +9,7 @@ module bed_m
   use growing_m, only: ensure_room
   use errors_m, only: problems_t, to_text
   use case_types_m, only: case_t
+  use named_files_m, only: found_file
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t
@@ -60,7 +61,8 @@ contains
     integer :: n_before
 
     if (len_trim(case%bed%file) == 0 .or. case%bed%faulty) return
-    call read_bed_file(trim(case%bed%file), case%bed%kind, form, message)
+    call read_bed_file(found_file(case%bed%folder, trim(case%bed%file)), case%bed%kind, form, &
+      message)
     if (len(message) > 0) then
       call note(message)
       return

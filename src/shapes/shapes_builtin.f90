@@ -6,6 +6,7 @@
 module shapes_builtin_m
   use kinds_m, only: wp, pi
   use case_types_m, only: shape_input_t, size_count
+  use named_files_m, only: found_file
   use tet_mesh_m, only: shape_t, surface_of_tets
   use vectors_m, only: cross
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
@@ -118,7 +119,7 @@ contains
     real(wp) :: volume, centroid(3), extent
     integer :: m
 
-    call read_shape_file(input%file, shape%point, shape%tet, message)
+    call read_shape_file(found_file(input%folder, input%file), shape%point, shape%tet, message)
     if (len(message) == 0) call check_mesh(shape%point, shape%tet, message)
     if (len(message) > 0) then
       message = 'file = '//quoted_text(input%file)//': '//message

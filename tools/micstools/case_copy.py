@@ -3,12 +3,26 @@
 import functools
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from micstools import settings
 from micstools.reader import BadRun
 
 _FILES = (("shape", "file"), ("bed", "file"), ("fluid", "initial_state"))
+
+
+def from_here(text: str, folder: Path) -> str:
+    """A case of a folder as it can stand in another: a file that lies beside the case, where the
+    program looks first, gets its path from where we are."""
+    if folder == Path():
+        return text
+    with suppress(BadRun):  # what is wrong with a group the program tells
+        for group, variable, n, name in list(_named(text)):
+            if not name.is_absolute() and (folder / name).exists():
+                text = settings.set_group(text, group, {variable: str(folder / name)}, n)
+    return text
 
 
 def keep(case: Path, text: str) -> None:
@@ -32,15 +46,22 @@ def keep(case: Path, text: str) -> None:
 
 def checksums(text: str) -> dict[str, str]:
     """SHA-256 of each file that a case names, by its name; a path is taken from where we are."""
-    names = [name for name, _, _ in settings.groups(text)]
     found = {}
+    for _, _, _, path in _named(text):
+        if path.is_file():
+            about = path.stat()
+            found[str(path)] = _sum(path.resolve(), about.st_mtime_ns, about.st_size)
+    return found
+
+
+def _named(text: str) -> Iterator[tuple[str, str, int, Path]]:
+    """Every file that a case names: group, variable, which of the groups of that name, path."""
+    names = [name for name, _, _ in settings.groups(text)]
     for group, variable in _FILES:
         for n in range(names.count(group)):
             path = Path(str(settings.value(text, group, variable, n) or "").strip())
-            if path.name and path.is_file():
-                about = path.stat()
-                found[str(path)] = _sum(path.resolve(), about.st_mtime_ns, about.st_size)
-    return found
+            if path.name:
+                yield group, variable, n, path
 
 
 @functools.lru_cache

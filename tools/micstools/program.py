@@ -6,7 +6,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from micstools import settings
+from micstools import case_copy, settings
 from micstools.reader import BadRun
 
 CASE_HELP = "case file"
@@ -40,9 +40,12 @@ def add_case(parser: argparse.ArgumentParser) -> None:
 
 
 def case_text(case: Path, words: list[str]) -> str:
-    """The text of a case with settings."""
+    """The text of a case with settings; files beside it are named from where we are, since the
+    program does not see where a text comes from."""
     text = settings.read(case)
-    return settings.set_variables(text, map(settings.parse, words)) if words else text
+    if words:
+        text = settings.set_variables(text, map(settings.parse, words))
+    return case_copy.from_here(text, case.parent)
 
 
 def check(program: Path, text: str) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import fcntl
+import json
 import os
 import signal
 import subprocess
@@ -434,6 +435,30 @@ def test_another_file_of_the_same_name_is_refused(tmp_path: Path, program: Path,
     block.write_text("mics-shape 1 of another size")
     assert call(program, *words) == 2
     assert f"{block} has changed since" in capsys.readouterr().err
+
+
+def test_a_file_beside_the_case_is_found_from_its_copies(
+    tmp_path: Path, program: Path, monkeypatch
+) -> None:
+    """The copies name it from where we are; one that lies there alone keeps its name."""
+    monkeypatch.chdir(tmp_path)
+    Path("study").mkdir()
+    Path("study/block.txt").write_text("beside the case")
+    for name in ("block.txt", "mound.txt"):
+        Path(name).write_text("elsewhere")
+    case = Path("study/case.nml")
+    case.write_text(
+        CASE + "&shape name = 'a' kind = 'file' file = 'block.txt' /\n&bed file = 'mound.txt' /\n"
+    )
+    words = ("ensemble", str(case), "--program", str(program), "--runs", "1", "--slurm")
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*words, "--out", "out"])
+    assert ended.value.code == 0
+    copy = Path("out/0001/case.nml").read_text()
+    assert settings.value(copy, "shape", "file") == "study/block.txt"
+    assert settings.value(copy, "bed", "file") == "mound.txt"
+    sums = json.loads(Path("out/0001/files.json").read_text())
+    assert set(sums) == {"study/block.txt", "mound.txt"}
 
 
 @pytest.mark.parametrize(

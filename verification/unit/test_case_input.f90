@@ -99,6 +99,9 @@ contains
 
   !> Quaternion, axis and angle.
   subroutine test_attitudes()
+    character(*), parameter :: idle = 'has no meaning with orientation = ''random''; any ' &
+      //'attitude is as likely as another (line 4)'
+
     call check('none', attitude(''), [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
     call check('normalised', attitude('quaternion=3,0,4,0'), [0.6_wp, 0.0_wp, 0.8_wp, 0.0_wp], &
       1.0e-15_wp)
@@ -129,10 +132,10 @@ contains
       '&body quaternion = 1, 0, 0: 3 values given, 4 needed (line 4)')
     call expect(cube//'&drop shape=''c'' position=3*0.05 orientation=''random'' tilt_deg=3 ' &
       //'axis=1,0,0' &
-      //' angle_deg=4/', '&drop axis = 1, 0, 0: has no meaning with orientation = ''random'' ' &
-      //'(line 4)|' &
-      //'&drop angle_deg = 4: has no meaning with orientation = ''random'' (line 4)|' &
-      //'&drop tilt_deg = 3: has no meaning with orientation = ''random'' (line 4)')
+      //' angle_deg=4/', '&drop axis = 1, 0, 0: '//idle//'|&drop angle_deg = 4: '//idle &
+      //'|&drop tilt_deg = 3: '//idle)
+    call expect(cube//'&drop shape=''c'' position=3*0.05 orientation=''random'' ' &
+      //'quaternion=1,0,0,0/', '&drop quaternion = 1, 0, 0, 0: '//idle)
   end subroutine test_attitudes
 
   !> Attitude of a body with these variables.
@@ -179,6 +182,14 @@ contains
     call check('random drop', again%drop(2)%orientation == 'random')
     call read_case(parameters_text(again), case, problems)
     call check('third time', parameters_text(case) == text)
+    call check('no restitution with constants', index(text, 'restitution =') == 0)
+    call check('no sizes of a file', index(text, 'scale =') == 0)
+    call read_case(base//'&shape name=''f'' kind=''file'' file=''a''/ &shape name=''s'' ' &
+      //'kind=''sphere'' size=1/', case, problems)
+    text = parameters_text(case)
+    call read_case(text, again, problems)
+    call check('parameters of files and spheres are a good case', problems%n, 0)
+    call check('a file has a scale', index(text, 'scale = 1') > 0)
     call read_case(base, case, problems)
     call check('an absent level is not written', index(parameters_text(case), 'water_level') == 0)
   end subroutine test_way_back
@@ -360,9 +371,15 @@ contains
       '&numerics coupling = ''mix'': unknown, must be one of ''monolithic'', ''mics'' (line 3)')
     call expect(base//'&numerics coupling=''mics'' coupling_passes=0/', &
       '&numerics coupling_passes = 0: must lie between 1 and 1000 (line 3)')
-    call expect(base//'&numerics coupling=''monolithic'' coupling_passes=2/', &
-      '&numerics coupling_passes = 2: only coupling = ''mics'' makes more than one pass (line 3)')
-    call expect(base//'&numerics divergence_tolerance=0 max_pressure_passes=0 subcells=0/', &
+    call expect(base//'&numerics coupling=''monolithic'' coupling_passes=1/', &
+      '&numerics coupling_passes = 1: has no meaning with coupling = ''monolithic''; only ' &
+      //'''mics'' makes passes (line 3)')
+    call expect(base//'&numerics coupling=''mix'' coupling_passes=2/', &
+      '&numerics coupling = ''mix'': unknown, must be one of ''monolithic'', ''mics'' (line 3)')
+    call expect(base//'&numerics subcells=4/', '&numerics subcells = 4: has no meaning with ' &
+      //'solid_fraction = ''exact''; only ''subcell'' counts sub-cells (line 3)')
+    call expect(base//'&numerics divergence_tolerance=0 max_pressure_passes=0 subcells=0 ' &
+      //'solid_fraction=''subcell''/', &
       '&numerics subcells = 0: must lie between 1 and 32 (line 3)|' &
       //'&numerics divergence_tolerance = 0: must be positive [1/s] (line 3)|' &
       //'&numerics max_pressure_passes = 0: must lie between 1 and 1000 (line 3)')
@@ -373,17 +390,26 @@ contains
   end subroutine test_fluid_and_numerics
 
   subroutine test_contact()
+    character(*), parameter :: idle = ': has no meaning with law = ''restitution''; only law = ' &
+      //'''constants'' has them (line 3)|'
     character(*), parameter :: share = 'must be above 0 and at most 1 (line 3)'
 
     call expect(base//'&contact restitution=0/', '&contact restitution = 0: '//share)
     call expect(base//'&contact restitution=1.01/', '&contact restitution = 1.01: '//share)
-    call expect(base//'&contact restitution=1 law=''constants''/', '')
-    call expect(base//'&contact contact_time=0 k_n=0 gamma_n=0 gamma_t=0/', &
+    call expect(base//'&contact contact_time=1 law=''constants''/', '')
+    call expect(base//'&contact restitution=1 law=''constants''/', '&contact restitution = 1: ' &
+      //'has no meaning with law = ''constants''; only law = ''restitution'' has it (line 3)')
+    call expect(base//'&contact k_n=1 gamma_n=1 eta_n=1 k_t=1 gamma_t=1 eta_t=1 friction=-1/', &
+      '&contact k_n = 1'//idle//'&contact gamma_n = 1'//idle//'&contact eta_n = 1'//idle &
+      //'&contact k_t = 1'//idle//'&contact gamma_t = 1'//idle//'&contact eta_t = 1'//idle &
+      //'&contact friction = -1: must not be negative [-] (line 3)')
+    call expect(base//'&contact law=''constants'' contact_time=0 k_n=0 gamma_n=0 gamma_t=0/', &
       '&contact contact_time = 0: must be positive [s] (line 3)|' &
       //'&contact k_n = 0: must be positive [N/m^gamma_n] (line 3)|' &
       //'&contact gamma_n = 0: must be positive [-] (line 3)|' &
       //'&contact gamma_t = 0: must be positive [-] (line 3)')
-    call expect(base//'&contact eta_n=-1 k_t=-1 eta_t=-1 friction=-1 wall_friction=-1/', &
+    call expect(base//'&contact law=''constants'' eta_n=-1 k_t=-1 eta_t=-1 friction=-1 ' &
+      //'wall_friction=-1/', &
       '&contact eta_n = -1: must not be negative [N s/m] (line 3)|' &
       //'&contact k_t = -1: must not be negative [N/m^gamma_t] (line 3)|' &
       //'&contact eta_t = -1: must not be negative [N s/m] (line 3)|' &
@@ -396,6 +422,12 @@ contains
 
   subroutine test_shapes()
     character(*), parameter :: a = '&shape name=''a'' kind='
+    character(*), parameter :: idle = ': has no meaning with kind = ''cube''; only kind = ' &
+      //'''file'' has it (line 3)'
+    character(*), parameter :: of_file = ': has no meaning with kind = ''file''; the file has ' &
+      //'the size and the tetrahedra (line 3)'
+    character(*), parameter :: of_sphere = ': has no meaning with kind = ''sphere''; a sphere ' &
+      //'touches as one (line 3)'
     character(*), parameter :: rule = 'a name has 1 to 64 letters, digits or _ - . and does ' &
       //'not begin' &
       //' with a point (line 3)'
@@ -417,15 +449,28 @@ contains
     call expect(base//a//'''file''/', &
       '&shape file: missing, required: a Gmsh .msh file or a mics-shape file (line 3)')
     call expect(base//a//'''cube'' size=1 file=''a.msh''/', &
-      '&shape file = ''a.msh'': only a shape of kind ''file'' is read from one (line 3)')
+      '&shape file = ''a.msh'''//idle)
+    call expect(base//a//'''cube'' size=1 file='''' scale=1/', '&shape file = '''''//idle &
+      //'|&shape scale = 1'//idle)
+    call expect(base//a//'''file'' file=''a.msh'' size=1 refinement=2 scale=2/', &
+      '&shape size = 1'//of_file//'|&shape refinement = 2'//of_file)
+    call expect(base//a//'''file'' file=''a.msh'' scale=0/', &
+      '&shape scale = 0: must be positive [-] (line 3)')
+    call expect(base//a//'''sphere'' size=1 refinement=2 spheres=''dense'' sphere_spacing=1/', &
+      '&shape spheres = ''dense'''//of_sphere//'|&shape sphere_spacing = 1'//of_sphere)
+    call expect(base//a//'''cube'' size=1 sphere_spacing=1/', '&shape sphere_spacing = 1: has no ' &
+      //'meaning with spheres = ''centroid''; only ''dense'' has it (line 3)')
+    call expect(base//a//'''cube'' size=1 sphere_spacing=1 spheres=''dense''/', '')
+    call expect(base//'&shape name=''a'' size=1 scale=2/', '&shape kind: missing, required: the ' &
+      //'form, such as ''hexapod'' (line 3)')
     call expect(base//a//'''cylinder'' size=1/', &
       '&shape size = 1: 1 value given, 2 needed (line 3)')
     call expect(base//a//'''cube'' size=1 spheres=''many''/', &
       '&shape spheres = ''many'': unknown, must be one of ''centroid'', ''inscribed'', ' &
       //'''dense'' (line 3)')
-    call expect(base//a//'''cube'' size=1 density=0 scale=0 refinement=0 sphere_spacing=-1/', &
+    call expect(base//a//'''cube'' size=1 density=0 refinement=0 spheres=''dense'' ' &
+      //'sphere_spacing=-1/', &
       '&shape density = 0: must be positive [kg/m3] (line 3)|' &
-      //'&shape scale = 0: must be positive [-] (line 3)|' &
       //'&shape refinement = 0: must lie between 1 and 8 (line 3)|' &
       //'&shape sphere_spacing = -1: must not be negative [m]; 0 means a tenth of the smallest ' &
       //'edge (line 3)')

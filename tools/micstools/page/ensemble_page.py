@@ -145,8 +145,9 @@ def _friction(run: Run, varied: list[str]) -> str:
     known = [
         ("friction", "friction of blocks", 0.6),
         ("wall_friction", "friction of walls and floor", 0.4),
-        ("restitution", "restitution", 0.3),
     ]
+    if str(run.value("contact", "law", "restitution")).strip() == "restitution":
+        known.append(("restitution", "restitution", 0.3))
     return ", ".join(
         f"{words} {run.value('contact', name, usual):.3g}"
         for name, words, usual in known
