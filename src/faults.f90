@@ -64,9 +64,8 @@ contains
     if (sim%case%run%cfl_max <= 0.0_wp) call look_at_courant(sim, fault)
   end subroutine find_fault
 
-  !> A block moves as far as its speeds at both ends of the step and its weight let it. One that is
-  !! very much lighter than water is thrown by the buoyancy of its first step, as if there were no
-  !! water to push away; more than a cell of that is a fault.
+  !> A block moves as far as its speeds at both ends of the step and its weight let it; a cell more
+  !! is a fault.
   subroutine look_for_jumps(sim, fault)
     type(simulation_t), intent(in) :: sim
     type(fault_t), intent(inout) :: fault

@@ -36,17 +36,11 @@ def complete(work: Path, code: int) -> bool:
         return told == code and (work / "mics-out" / "restart-a.h5").exists()
 
 
-def test_light_body_jumps(tmp_path: Path) -> None:
-    """A cube of 1 kg/m3 under water is thrown half a metre by the buoyancy of its first step."""
-    code, said = mics(tmp_path, LIGHT.format(density=1.0, height=0.3))
-    assert code == 3, said
-    assert "body 1 jumped 0.489" in said and "is too small for &run dt" in said
-    assert complete(tmp_path, 3)
-
-
-@pytest.mark.parametrize(("density", "height"), [(1.0, 0.8), (100.0, 0.3), (2300.0, 0.3)])
-def test_others_do_not(density: float, height: float, tmp_path: Path) -> None:
-    """Bodies in air, and such as there are, go on."""
+@pytest.mark.parametrize(
+    ("density", "height"), [(1.0, 0.3), (1.0, 0.8), (100.0, 0.3), (2300.0, 0.3)]
+)
+def test_light_bodies_go_on(density: float, height: float, tmp_path: Path) -> None:
+    """A cube of 1 kg/m3 under water was thrown half a metre by the buoyancy of its first step."""
     assert mics(tmp_path, LIGHT.format(density=density, height=height)) == (0, "")
 
 

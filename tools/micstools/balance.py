@@ -43,7 +43,10 @@ def excess(run: Run, state: State) -> Array:
 
 def divergence(run: Run, state: State) -> Array:
     """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
-    cells that have no open face but walls of the tank and so no fluid that moves."""
+    cells that have no open face but walls of the tank and so no fluid that moves.
+
+    In a closed tank less its mean: what a block presses into a wall all cells share, as the
+    program has it (`uneven` of src/pressure/pressure.f90)."""
     h = run.grid.spacing
     walls = {
         (d, end): run.sides[f"{axis}_{('min', 'max')[end]}"] in WALL_KINDS
@@ -66,7 +69,10 @@ def divergence(run: Run, state: State) -> Array:
                 beyond[-end] = 0.0
             n = len(beyond) - 1
             openness += np.moveaxis(beyond[end : end + n], 0, axis)
-    return np.where(openness > 0, outflow / h.prod(), 0.0)
+    found = np.where(openness > 0, outflow / h.prod(), 0.0)
+    if all(run.sides[side] in {*WALL_KINDS, "periodic"} for side in run.sides):
+        found[openness > 0] -= found[openness > 0].mean()
+    return found
 
 
 def liquid_between(run: Run, state: State, axis: int, low: float, high: float) -> float:
