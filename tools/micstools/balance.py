@@ -43,10 +43,7 @@ def excess(run: Run, state: State) -> Array:
 
 def divergence(run: Run, state: State) -> Array:
     """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
-    cells that have no open face but walls of the tank and so no fluid that moves.
-
-    In a closed tank less its mean: what a block presses into a wall all cells share, as the
-    program has it (`uneven` of src/pressure/pressure.f90)."""
+    cells that have no open face but walls of the tank and so no fluid that moves."""
     h = run.grid.spacing
     walls = {
         (d, end): run.sides[f"{axis}_{('min', 'max')[end]}"] in WALL_KINDS
@@ -69,9 +66,16 @@ def divergence(run: Run, state: State) -> Array:
                 beyond[-end] = 0.0
             n = len(beyond) - 1
             openness += np.moveaxis(beyond[end : end + n], 0, axis)
-    found = np.where(openness > 0, outflow / h.prod(), 0.0)
-    if all(run.sides[side] in {*WALL_KINDS, "periodic"} for side in run.sides):
-        found[openness > 0] -= found[openness > 0].mean()
+    return np.where(openness > 0, outflow / h.prod(), 0.0)
+
+
+def uneven_divergence(run: Run, state: State) -> Array:
+    """The same, in a closed tank less its mean over the cells that have one: what a block presses
+    into a wall all cells share, as the program has it (`uneven` of src/pressure/pressure.f90)."""
+    found = divergence(run, state)
+    if all(kind in {*WALL_KINDS, "periodic"} for kind in run.sides.values()):
+        there = found != 0.0
+        found[there] -= found[there].mean() if there.any() else 0.0
     return found
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from micstools.balance import divergence
+from micstools.balance import uneven_divergence
 from micstools.geometry import Array
 from micstools.reader import Run
 
@@ -222,7 +222,7 @@ def _sound(run: Run, here: str, checks: Checks) -> None:
     drift = float(np.abs(run.series.liquid_volume_drift).max())
     checks.below(f"{here}: largest drift of the liquid of all rows", drift, DRIFT_BAND)
     for name in run.restart_files:
-        worst = float(np.abs(divergence(run, run.restart(name))).max())
+        worst = float(np.abs(uneven_divergence(run, run.restart(name))).max())
         said = f"{here}: divergence from the faces in {name} [1/s]"
         checks.below(said, worst, tolerance, claims)
 
