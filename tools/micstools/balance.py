@@ -7,6 +7,7 @@ liquid from the cells.
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from micstools.geometry import Array
 from micstools.overlap import WALL_KINDS
@@ -44,6 +45,21 @@ def excess(run: Run, state: State) -> Array:
 def divergence(run: Run, state: State) -> Array:
     """Net outflow of fluid and solid of each cell per cell volume (nz, ny, nx) [1/s], zero in
     cells that have no open face but walls of the tank and so no fluid that moves."""
+    return _divergence(run, state)[0]
+
+
+def uneven_divergence(run: Run, state: State) -> Array:
+    """The same, in a closed tank less its mean over the cells with fluid that moves: what a block
+    presses into a wall all cells share, as the program has it (`uneven` of
+    src/pressure/pressure.f90)."""
+    found, moves = _divergence(run, state)
+    if all(kind in {*WALL_KINDS, "periodic"} for kind in run.sides.values()):
+        found[moves] -= found[moves].mean()
+    return found
+
+
+def _divergence(run: Run, state: State) -> tuple[Array, NDArray[np.bool_]]:
+    """The divergence, and which cells hold fluid that moves."""
     h = run.grid.spacing
     walls = {
         (d, end): run.sides[f"{axis}_{('min', 'max')[end]}"] in WALL_KINDS
@@ -66,17 +82,8 @@ def divergence(run: Run, state: State) -> Array:
                 beyond[-end] = 0.0
             n = len(beyond) - 1
             openness += np.moveaxis(beyond[end : end + n], 0, axis)
-    return np.where(openness > 0, outflow / h.prod(), 0.0)
-
-
-def uneven_divergence(run: Run, state: State) -> Array:
-    """The same, in a closed tank less its mean over the cells that have one: what a block presses
-    into a wall all cells share, as the program has it (`uneven` of src/pressure/pressure.f90)."""
-    found = divergence(run, state)
-    if all(kind in {*WALL_KINDS, "periodic"} for kind in run.sides.values()):
-        there = found != 0.0
-        found[there] -= found[there].mean() if there.any() else 0.0
-    return found
+    moves = openness > 0
+    return np.where(moves, outflow / h.prod(), 0.0), moves
 
 
 def liquid_between(run: Run, state: State, axis: int, low: float, high: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from micstools.geometry import Array
 from micstools.reader import Run
 
-EXCESS_LIMIT = 0.01  # of the energy set free: more than was put in is to be looked at
+ENERGY_LIMIT = 0.01  # of the energy set free: more than was put in is to be looked at
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Excess:
     @property
     def good(self) -> bool:
         """Is it within what a step may be off?"""
-        return self.share <= EXCESS_LIMIT
+        return self.share <= ENERGY_LIMIT
 
     def __str__(self) -> str:
         return f"{100 * max(self.share, 0.0):.2g} %, t = {self.time:.3g} s"

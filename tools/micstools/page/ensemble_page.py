@@ -12,8 +12,7 @@ import numpy as np
 
 from micstools import kicks, pile, pile_ensemble
 from micstools.balance import EXCESS_LIMIT
-from micstools.energy import EXCESS_LIMIT as ENERGY_LIMIT
-from micstools.energy import made_by_contact
+from micstools.energy import ENERGY_LIMIT, made_by_contact
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
 from micstools.page.html import (

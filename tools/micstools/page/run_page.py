@@ -8,8 +8,7 @@ import numpy as np
 from micstools import block_numbers, kicks, pile, pile_numbers
 from micstools.balance import EXCESS_LIMIT
 from micstools.block_numbers import BlockNumbers
-from micstools.energy import EXCESS_LIMIT as ENERGY_LIMIT
-from micstools.energy import largest_excess, made_by_contact
+from micstools.energy import ENERGY_LIMIT, largest_excess, made_by_contact
 from micstools.geometry import Array
 from micstools.overlap import Overlap, Placed, overlap, present_bodies
 from micstools.page import charts, motion, run_words
