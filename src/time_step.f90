@@ -27,7 +27,7 @@ module time_step_m
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init, max_overlap
   use release_m, only: release_due_blocks, next_release, none_to_come
-  use diagnostics_m, only: step_report_t, measure_fluid, energy_of_level
+  use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
   use energy_m, only: energy_parts_t, energy_init, begin_energy, note_energy, note_release, &
                       energy_excess
   use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
@@ -213,8 +213,8 @@ contains
     report%solver_iterations = stage%pressure%iterations
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
-    call measure(sim, report)
-    call note_energy(parts_of(sim, report), sim%energy)
+    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    call note_energy(parts_of(sim, report%fluid, report%contact_energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%parts
     report%transport_converged = sim%transport%liquid%small%converged
@@ -222,34 +222,36 @@ contains
     report%curvature_fallback = sim%stage%tension%surface%fallback
   end subroutine tell
 
-  !> Sums over the fluid of now; before the first step the energy that a run begins with, too.
+  !> Sums over the fluid before the first step of a run, or after a restart; of a run that begins,
+  !! the energy that it has, too.
   subroutine measure(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
 
     if (.not. sim%wet) return
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    if (sim%clock%step == 0) call begin_energy(parts_of(sim, report), &
+    if (sim%clock%step == 0) call begin_energy(parts_of(sim, report%fluid, 0.0_wp), &
       report%fluid%potential - energy_of_level(sim%case%fluid, sim%grid, sim%flow%c), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
   end subroutine measure
 
-  !> Energies of fluid and blocks, once the fluid is measured.
-  function parts_of(sim, report) result(parts)
+  !> Energies of fluid and blocks.
+  function parts_of(sim, fluid, contact) result(parts)
     type(simulation_t), intent(in) :: sim
-    type(step_report_t), intent(in) :: report
+    type(fluid_sums_t), intent(in) :: fluid
+    real(wp), intent(in) :: contact   !! elastic energy [J]
     type(energy_parts_t) :: parts
 
-    parts%kinetic = report%fluid%kinetic + kinetic_energy(sim%blocks)
-    parts%contact = report%contact_energy
-    parts%potential = report%fluid%potential &
-                      + potential_energy(sim%case%fluid%gravity, sim%blocks)
+    parts%kinetic = fluid%kinetic + kinetic_energy(sim%blocks)
+    parts%contact = contact
+    parts%potential = fluid%potential + potential_energy(sim%case%fluid%gravity, sim%blocks)
   end function parts_of
 
   !> Blocks whose time has come; the liquid in their place raises the free surface.
   subroutine release(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
+    type(fluid_sums_t) :: fluid
     logical :: released
 
     call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
@@ -259,9 +261,8 @@ contains
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
-    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    report%contact_energy = sim%energy%parts%contact
-    call note_release(parts_of(sim, report), sim%energy)
+    fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    call note_release(parts_of(sim, fluid, sim%energy%parts%contact), sim%energy)
   end subroutine release
 
   !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after

@@ -22,7 +22,7 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use mid_step_m, only: keep_liquid, add_second_half, add_whole
+  use mid_step_m, only: find_liquid, add_second_half, add_whole
   use buoyancy_m, only: displaced_force, uncounted_fluid
   use linked_cells_m, only: linked_cells_t, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
@@ -217,8 +217,7 @@ contains
     call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
     associate (a => stage%acceleration, links => stage%links, &
                given => stage%mid_step%takes_part, in_liquid => stage%mid_step%in_liquid)
-      in_liquid = given
-      call keep_liquid(grid, flow, in_liquid)   ! the surface may have come
+      call find_liquid(grid, flow, in_liquid, among=given)   ! the surface may have come
       if (stage%implicit_momentum) then
         call predict_face_velocity(grid, dt, stage%rho, a, flow)
       else

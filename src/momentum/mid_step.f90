@@ -33,7 +33,7 @@ module mid_step_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: mid_step_t, mid_step_init, to_mid_step, find_liquid, keep_liquid
+  public :: mid_step_t, mid_step_init, to_mid_step, find_liquid
   public :: add_second_half, add_whole
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
@@ -168,23 +168,14 @@ contains
     end do
   end subroutine leave_out
 
-  !> The cells in liquid: away from outflows, full of liquid with all cells around.
-  subroutine find_liquid(grid, flow, in_liquid)
+  !> The cells in liquid, of all or `among` some: away from outflows, full of liquid with all cells
+  !! around.
+  subroutine find_liquid(grid, flow, in_liquid, among)
     type(grid_t), intent(in) :: grid
     type(flow_t), intent(in) :: flow
     logical, intent(inout), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
-
-    associate (a => grid%first + 1, z => grid%last - 1)
-      in_liquid(a(1):z(1), a(2):z(2), a(3):z(3)) = .true.
-    end associate
-    call keep_liquid(grid, flow, in_liquid)
-  end subroutine find_liquid
-
-  !> Of some cells keep those in liquid.
-  subroutine keep_liquid(grid, flow, in_liquid)
-    type(grid_t), intent(in) :: grid
-    type(flow_t), intent(in) :: flow
-    logical, intent(inout), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
+    logical, intent(in), contiguous, optional :: &
+      among(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k, low(3), high(3)
     real(wp) :: least(grid%first(1):grid%last(1))   ! share of the nine cells around a line
     logical :: inside
@@ -200,11 +191,12 @@ contains
                       c(:, 1, 3), c(:, 2, 3), c(:, 3, 3))
         end associate
         do i = grid%first(1) + 1, grid%last(1) - 1
-          in_liquid(i, j, k) = in_liquid(i, j, k) .and. inside .and. i >= low(1) &
-            .and. i <= high(1) .and. min(least(i - 1), least(i), least(i + 1)) >= full
+          in_liquid(i, j, k) = inside .and. i >= low(1) .and. i <= high(1) &
+                               .and. min(least(i - 1), least(i), least(i + 1)) >= full
         end do
+        if (present(among)) in_liquid(:, j, k) = in_liquid(:, j, k) .and. among(:, j, k)
       end do
     end do
-  end subroutine keep_liquid
+  end subroutine find_liquid
 
 end module mid_step_m
