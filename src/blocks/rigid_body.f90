@@ -165,8 +165,6 @@ contains
     blocks%v(:, b) = blocks%given%v(:, b)
     blocks%omega(:, b) = blocks%given%omega(:, b)
     call set_momentum(b, blocks)
-    blocks%v_start(:, b) = blocks%v(:, b)
-    blocks%l_start(:, b) = blocks%l(:, b)
   end subroutine release_body
 
   !> Angular momentum of body b from its angular velocity.

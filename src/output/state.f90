@@ -157,8 +157,6 @@ contains
       call visitor%reals('/blocks/velocity', 'm/s', [3, n], blocks%v)
       call visitor%reals('/blocks/angular_momentum', 'kg m2/s', [3, n], blocks%l)
       call visitor%reals('/blocks/angular_velocity', 'rad/s', [3, n], blocks%omega)
-      call visitor%reals('/blocks/velocity_at_start', 'm/s', [3, n], blocks%v_start)
-      call visitor%reals('/blocks/angular_momentum_at_start', 'kg m2/s', [3, n], blocks%l_start)
       call visitor%reals('/blocks/fluid_force', 'N', [3, n], blocks%fluid_force)
       call visitor%reals('/blocks/fluid_torque', 'N m', [3, n], blocks%fluid_torque)
       call visitor%reals('/blocks/late_force', 'N, N m', [6, n], blocks%late_force)
