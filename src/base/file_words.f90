@@ -4,7 +4,7 @@ module file_words_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use plain_file_m, only: is_pipe
-  use value_text_m, only: parse_real, parse_integer, value_ok, value_too_large, &
+  use value_text_m, only: byte_order_mark, parse_real, parse_integer, value_ok, value_too_large, &
     quoted_text, printable
   implicit none
   private
@@ -12,7 +12,6 @@ module file_words_m
   public :: expected, complain, place_of
 
   integer, parameter :: longest_text = 500000000   !! bytes
-  character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)   !! of UTF-8
 
   !> A text that is read word by word; after a problem nothing more is read.
   type :: words_t

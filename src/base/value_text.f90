@@ -9,6 +9,7 @@ module value_text_m
   public :: parse_real, parse_integer, parse_logical
   public :: quoted_text, printable, tame, fixed_text
   public :: lower_case, nearest_name, edit_distance
+  public :: byte_order_mark
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
   !> What a parser found.
@@ -20,6 +21,8 @@ module value_text_m
   integer, parameter :: largest_exponent = 20
 
   integer, parameter :: longest_shown = 60   !! characters of a value in a message
+
+  character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)   !! of UTF-8
 
 contains
 

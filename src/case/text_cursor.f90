@@ -1,5 +1,6 @@
 !> A place in the text of a case, and the steps a reader takes from it.
 module text_cursor_m
+  use value_text_m, only: byte_order_mark
   implicit none
   private
   public :: cursor_t, start_of, next, at_end, skip_blanks, skip_line, past_blanks
@@ -34,7 +35,6 @@ contains
   pure function plain_lines(text) result(plain)
     character(*), intent(in) :: text
     character(:), allocatable :: plain
-    character(*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
     character(*), parameter :: no_break_space = char(194)//char(160)
     character(1) :: quote   ! that has begun a string on this line, or blank
     integer :: i, n, first
