@@ -111,8 +111,7 @@ contains
         if (.not. all(ieee_is_finite(x)) .or. .not. all(ieee_is_finite(sim%blocks%v(:, b)))) then
           call set(sim, 'body '//to_text(b)//': its place or speed is not a number', fault)
         else if (has_left(sim%grid, sim%case%fluid%gravity, x, sim%blocks%v(:, b))) then
-          call set(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x(1))//', ' &
-                   //to_text(x(2))//', '//to_text(x(3))//') m', fault)
+          call set(sim, 'body '//to_text(b)//' left the tank at ('//to_text(x)//') m', fault)
         end if
       end associate
     end do

@@ -33,9 +33,9 @@ module errors_m
     procedure :: report => problems_report
   end type problems_t
 
-  !> Shortest text that a value can be read back from.
+  !> Shortest text that a value can be read back from; commas between several, empty for none.
   interface to_text
-    procedure :: integer_text, real_text, logical_text
+    procedure :: integer_text, real_text, logical_text, integers_text, reals_text
   end interface to_text
 
 contains
@@ -193,6 +193,32 @@ contains
       text = '.false.'
     end if
   end function logical_text
+
+  !> Real numbers between commas.
+  pure function reals_text(x) result(text)
+    real(wp), intent(in) :: x(:)
+    character(:), allocatable :: text
+    integer :: j
+
+    text = ''
+    do j = 1, size(x)
+      if (j > 1) text = text//', '
+      text = text//to_text(x(j))
+    end do
+  end function reals_text
+
+  !> Whole numbers between commas.
+  pure function integers_text(n) result(text)
+    integer, intent(in) :: n(:)
+    character(:), allocatable :: text
+    integer :: j
+
+    text = ''
+    do j = 1, size(n)
+      if (j > 1) text = text//', '
+      text = text//to_text(n(j))
+    end do
+  end function integers_text
 
   !> A real with as few digits as give the same number back: 0.01, -1, 1.5e-7.
   pure function real_text(value) result(text)

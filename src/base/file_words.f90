@@ -71,7 +71,9 @@ contains
 
     word = ''
     if (len(words%problem) > 0) return
-    if (words%at == 1 .and. index(words%text, byte_order_mark) == 1) words%at = 4
+    if (words%at == 1 .and. index(words%text, byte_order_mark) == 1) then
+      words%at = len(byte_order_mark) + 1
+    end if
     do while (words%at <= len(words%text))
       select case (words%text(words%at:words%at))
       case (' ', achar(9), achar(13))

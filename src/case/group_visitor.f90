@@ -233,7 +233,7 @@ contains
     integer :: i, j, fewest
 
     if (.not. self%reading) then
-      told = described(variable, 'number', reals_text(pack(x, is_given(x))), meaning, example, &
+      told = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, &
         required)
       told%allowed = allowed
       told%most = size(x)
@@ -286,7 +286,7 @@ contains
     integer :: i, j
 
     if (.not. self%reading) then
-      told = described(variable, 'number', integers_text(n), meaning, example, required)
+      told = described(variable, 'number', to_text(n), meaning, example, required)
       told%allowed = allowed
       told%most = size(n)
       call self%tell(told)
@@ -564,32 +564,6 @@ contains
       end if
     end associate
   end subroutine read_text
-
-  !> Real numbers between commas; empty for none.
-  pure function reals_text(x) result(text)
-    real(wp), intent(in) :: x(:)
-    character(:), allocatable :: text
-    integer :: j
-
-    text = ''
-    do j = 1, size(x)
-      if (j > 1) text = text//', '
-      text = text//to_text(x(j))
-    end do
-  end function reals_text
-
-  !> Whole numbers between commas.
-  pure function integers_text(n) result(text)
-    integer, intent(in) :: n(:)
-    character(:), allocatable :: text
-    integer :: j
-
-    text = ''
-    do j = 1, size(n)
-      if (j > 1) text = text//', '
-      text = text//to_text(n(j))
-    end do
-  end function integers_text
 
   !> A word between quotes; empty for none.
   pure function word_text(word) result(text)

@@ -40,7 +40,7 @@ contains
     integer :: i, n, first
 
     first = 1
-    if (index(text, byte_order_mark) == 1) first = 4
+    if (index(text, byte_order_mark) == 1) first = len(byte_order_mark) + 1
     allocate (character(len(text) + 1) :: plain)
     n = 0
     quote = ' '

@@ -101,8 +101,8 @@ contains
       if (case%water(i)%faulty) cycle
       if (any(case%water(i)%min >= case%grid%origin + case%grid%length) .or. &
           any(case%water(i)%max <= case%grid%origin)) then
-        call problems%add_message('&water min = '//vector_text(case%water(i)%min)//', max = ' &
-          //vector_text(case%water(i)%max)//': lies outside the tank', case%water(i)%line)
+        call problems%add_message('&water min = '//to_text(case%water(i)%min)//', max = ' &
+          //to_text(case%water(i)%max)//': lies outside the tank', case%water(i)%line)
       end if
     end do
   end subroutine check_water
@@ -235,7 +235,7 @@ contains
       where_to = way_out(case, scene, b)
       scene%outside(b) = len(where_to) > 0
       if (scene%outside(b)) then
-        call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b))//': ' &
+        call problems%add_message('&body position = '//to_text(scene%blocks%x(:, b))//': ' &
                                   //where_to//'; a body must lie inside the tank', scene%line(b))
       end if
     end do
@@ -319,7 +319,7 @@ contains
         if (depth <= 0.0_wp) cycle
         n = n + 1
         if (n > most_reported) cycle
-        call problems%add_message('&body position = '//vector_text(scene%blocks%x(:, b)) &
+        call problems%add_message('&body position = '//to_text(scene%blocks%x(:, b)) &
           //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth, 3) &
           //' m; bodies must lie apart at the start', scene%line(b))
       end do
@@ -429,14 +429,14 @@ contains
       n = n + 1
       if (n > 1) cycle
       first = reason
-      if (drop%count > 1) first = 'block '//to_text(k)//' at '//vector_text(scene%blocks%x(:, b)) &
+      if (drop%count > 1) first = 'block '//to_text(k)//' at '//to_text(scene%blocks%x(:, b)) &
         //' '//reason
     end do
     if (n == 0) return
     first = first//'; it could never be released'
     if (n > 1) first = first//'; '//to_text(n)//' of '//to_text(drop%count) &
       //' blocks have such places'
-    call problems%add_message('&drop position = '//vector_text(drop%position)//': '//first, &
+    call problems%add_message('&drop position = '//to_text(drop%position)//': '//first, &
       drop%line)
   end subroutine check_drop
 
@@ -470,13 +470,5 @@ contains
       if (shapes(s)%name == name) return
     end do
   end function findloc_name
-
-  !> Three numbers between commas.
-  pure function vector_text(x) result(text)
-    real(wp), intent(in) :: x(3)
-    character(:), allocatable :: text
-
-    text = to_text(x(1))//', '//to_text(x(2))//', '//to_text(x(3))
-  end function vector_text
 
 end module case_check_m

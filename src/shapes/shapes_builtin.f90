@@ -242,16 +242,12 @@ contains
   pure function given_size(input) result(text)
     type(shape_input_t), intent(in) :: input
     character(:), allocatable :: text
-    integer :: d
 
     if (trim(input%kind) == 'file') then
       text = 'file = '//quoted_text(input%file)
       return
     end if
-    text = 'size = '//to_text(input%size(1))
-    do d = 2, size_count(input%kind)
-      text = text//', '//to_text(input%size(d))
-    end do
+    text = 'size = '//to_text(input%size(:size_count(input%kind)))
   end function given_size
 
   !> Occupied places of a hexapod in a block of 3 x 3 x 3 cubes.
