@@ -44,7 +44,7 @@ def _of_block(run: Run, k: int, rest_speed: float) -> BlockNumbers:
         impact_speed=impact_speed(run, k),
         contact_force=_largest(b.contact_force[start:, k]),
         fluid_force=_largest(b.fluid_force[start:, k]),
-        weight=float(b.mass[k] * np.linalg.norm(run.value("fluid", "gravity", [0, 0, -9.81]))),
+        weight=float(b.mass[k] * np.linalg.norm(run.gravity)),
         turned=float(attitude_change_deg(b.quaternion[-1, k], b.quaternion[start, k])),
         place=(x, y, z),
     )

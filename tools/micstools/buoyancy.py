@@ -30,18 +30,19 @@ def buoyancy_rows(run: Run, checks: Checks) -> None:
         float(run.value("fluid", "liquid_density", 998.2)),
         float(run.value("fluid", "gas_density", 1.204)),
     )
-    g = np.array(run.value("fluid", "gravity", [0.0, 0.0, -9.81]), float)
     for k, body in present_bodies(run, len(run.bodies.time) - 1).items():
         heights = body.points[:, 2]
         crossing = heights.min() < level < heights.max()
         band = CROSSING_BAND if crossing else SUBMERGED_BAND
         where = "crossing" if crossing else ("in water" if heights.max() <= level else "in gas")
         mass, moment = displaced(body, level, *densities)
-        weight = mass * float(np.linalg.norm(g))
+        weight = mass * float(np.linalg.norm(run.gravity))
         name = f"{run.folder.name}: body {k + 1} ({body.shape.name}, {where})"
         force, torque = run.bodies.fluid_force[-1, k], run.bodies.fluid_torque[-1, k]
         checks.close(f"{name} vertical force [N]", float(force[2]), weight, band)
         sideways = float(np.linalg.norm(force[:2])) / weight
         checks.below(f"{name} force sideways / weight", sideways, band)
-        turning = np.linalg.norm(torque + np.cross(moment, g)) / (weight * body.shape.radius)
+        turning = np.linalg.norm(torque + np.cross(moment, run.gravity)) / (
+            weight * body.shape.radius
+        )
         checks.below(f"{name} torque error / (weight size)", float(turning), band)

@@ -47,7 +47,7 @@ class Largest:
 
 def window(run: Run, length: float) -> float:
     """Time over which the acceleration of a block of that length [m] is a mean [s]."""
-    return _WINDOW * float(np.sqrt(length / _gravity(run)))
+    return _WINDOW * float(np.sqrt(length / np.linalg.norm(run.gravity)))
 
 
 def largest(run: Run) -> Largest | None:
@@ -107,7 +107,7 @@ def _of_block(run: Run, k: int, length: float, clear: float) -> tuple[Array, Arr
     far[1:] = np.diff(time) > (1 + _SAME) * np.maximum(_rows_apart(run, length), _steps(run)[1:])
     later = [np.interp(time + span, time, b.velocity[:, k, d]) for d in range(3)]
     change = np.linalg.norm(np.stack(later, axis=1) - b.velocity[:, k], axis=1)
-    values = np.where(whole, change / (span * _gravity(run)), np.nan)
+    values = np.where(whole, change / (span * np.linalg.norm(run.gravity)), np.nan)
     return values, whole & _none(far, np.minimum(past + 1, row + 1), late)
 
 
@@ -138,8 +138,4 @@ def _has_level(run: Run) -> bool:
     wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
     level = run.value("fluid", "water_level", None) is not None
     single = bool(run.value("fluid", "single_phase", False))
-    return wet and level and not single and _gravity(run) > 0
-
-
-def _gravity(run: Run) -> float:
-    return float(np.linalg.norm(run.value("fluid", "gravity", [0.0, 0.0, -9.81])))
+    return wet and level and not single and bool(run.gravity.any())

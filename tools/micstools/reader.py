@@ -212,6 +212,11 @@ class Run:
         return default if found is None else found
 
     @cached_property
+    def gravity(self) -> Array:
+        """Acceleration of gravity (3) [m/s2]."""
+        return np.array(self.value("fluid", "gravity", [0.0, 0.0, -9.81]), float)
+
+    @cached_property
     def sides(self) -> dict[str, str]:
         """Kind of boundary on each of the six sides."""
         kinds = {s: self.value("boundary", s, _DEFAULT_SIDES.get(s, "no_slip")) for s in _SIDES}

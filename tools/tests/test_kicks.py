@@ -27,7 +27,6 @@ def falling(step: float = 1e-3, kick: float = 0.0, **other: Any) -> Any:
     position[..., 2] = LEVEL - 0.2
     values: dict[tuple[str, str], Any] = {
         ("run", "physics"): "coupled",
-        ("fluid", "gravity"): [0.0, 0.0, -G],
         ("fluid", "water_level"): LEVEL,
         ("contact", "contact_time"): 2e-3,
     } | other.pop("values", {})
@@ -44,6 +43,7 @@ def falling(step: float = 1e-3, kick: float = 0.0, **other: Any) -> Any:
     }
     return SimpleNamespace(
         value=lambda group, name, default: values.get((group, name), default),
+        gravity=np.array([0.0, 0.0, -G]),
         bodies=SimpleNamespace(**(bodies | other)),
         series=SimpleNamespace(dt=np.full(time.size, dt)),
         shapes={"block": SimpleNamespace(length=LENGTH)},

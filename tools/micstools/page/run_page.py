@@ -230,7 +230,7 @@ def overlap_limit(run: Run) -> float:
 def energy_limit(run: Run) -> float:
     """What contact may make in a step by rounding and by the length of its substeps [J]; infinite
     where nothing has weight."""
-    g = float(np.linalg.norm(run.value("fluid", "gravity", [0.0, 0.0, -9.81])))
+    g = float(np.linalg.norm(run.gravity))
     return _MADE * float(run.bodies.mass.min()) * g * _smallest(run) if g > 0 else np.inf
 
 
