@@ -5,7 +5,7 @@ module faults_m
   use errors_m, only: exit_ok, exit_numerics, to_text, brief
   use grid_m, only: grid_t
   use boundary_kinds_m, only: is_wall
-  use time_step_m, only: simulation_t
+  use simulation_m, only: simulation_t
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
   use release_m, only: n_waiting

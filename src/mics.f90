@@ -30,7 +30,8 @@ program mics
   use output_m, only: output_t, check_output, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
-  use time_step_m, only: simulation_t, simulation_init, resume, take_step, measure
+  use simulation_m, only: simulation_t, simulation_init, resume, measure
+  use step_m, only: take_step
   use faults_m, only: fault_t, note_places, find_fault, find_final_fault
   implicit none
   type(options_t) :: options

@@ -1,150 +1,303 @@
-!> Fluid and bodies move each other: one velocity stage for both, by the chosen coupling.
+!> Fluid and bodies move each other: what both couplings share, and the stages that each has its own
+!! way for.
+!!
+!! A coupling is an object with its own work. `step_m` calls its stages in order; what they hand on
+!! to each other are the velocity of cells and faces, the pressure, the motion of the bodies, and
+!! the fields of the type.
 module coupling_m
   use kinds_m, only: wp
-  use swap_m, only: swap
-  use case_types_m, only: case_t
   use grid_m, only: grid_t
-  use fields_m, only: flow_t
+  use scratch_m, only: scratch_t, take, give, give_faces, clear
   use solid_geometry_m, only: solid_geometry_t
-  use face_memory_m, only: note_deviation
-  use linked_cells_m, only: linked_cells_t, link_cells
-  use mid_step_m, only: to_mid_step, find_liquid
-  use rigid_flux_m, only: all_fluid_of_faces
-  use monolithic_m, only: monolithic_stage
-  use mass_average_m, only: mass_average_stage, overlay_bodies, density_of_mixture
-  use velocity_stage_m, only: stage_t, stage_report_t, copy_motion, keep_acceleration, &
-    find_surface_force, return_surface_force
-  use rigid_body_m, only: blocks_t, set_velocity_after_fluid
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
+  use case_types_m, only: case_t, numerics_t, fluid_t
+  use fields_m, only: flow_t, add_product
+  use viscous_system_m, only: viscous_t, viscous_init, take_arrays, give_arrays
+  use viscous_m, only: solve_viscous
+  use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
+  use pressure_m, only: pressure_t, pressure_report_t, pressure_init
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+                             cell_mean_of_faces
+  use surface_tension_m, only: surface_tension_t, surface_tension_init, find_tension, add_tension
+  use rigid_body_m, only: blocks_t, space_tensor, set_velocity_after_fluid
   implicit none
   private
-  public :: advance_velocity, note_start
+  public :: coupling_t, coupling_report_t, coupling_init, copy_motion, push_bodies
+  public :: keep_acceleration, accelerate_cells, predict_velocity, renew_acceleration
+  public :: find_surface_force, start_of_stages, motion_after_fluid
+
+  type :: coupling_report_t
+    type(pressure_report_t) :: pressure
+    logical :: viscous_converged = .true.
+  end type coupling_report_t
+
+  type, abstract :: coupling_t
+    type(rigid_motion_t) :: bodies
+    type(rigid_motion_t) :: at_start
+      !! the same with the motion at the start of the step
+    type(viscous_t) :: viscous
+    logical :: implicit_momentum = .false.         !! advection by C-ISMAC, in the predictor
+    type(c_ismac_t) :: c_ismac                     !! allocated for it only
+    type(pressure_t) :: pressure
+    type(surface_tension_t) :: tension
+    type(acceleration_t) :: acceleration
+    real(wp), allocatable :: from_pressure(:, :)   !! (6, n) force and torque [N, N m]
+    real(wp), allocatable :: from_level(:, :)      !! (6, n) buoyancy beyond the face pressures
+    real(wp), allocatable :: total(:, :)           !! (6, n)
+  contains
+    procedure(of_release), deferred :: force_at_release
+    procedure(of_start), deferred :: begin
+    procedure(of_stage), deferred :: merge_cells
+    procedure(of_stage), deferred :: add_forces
+    procedure(of_stage), deferred :: add_viscosity
+    procedure(of_stage), deferred :: predict_faces
+    procedure(of_projection), deferred :: project
+    procedure(of_end), deferred :: close
+  end type coupling_t
+
+  abstract interface
+    !> Force and torque with which bodies that are let go begin to move (6, bodies) [N, N m].
+    subroutine of_release(self, case, grid, solid, begins, flow, scratch, force)
+      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+      implicit none
+      class(coupling_t), intent(inout) :: self   !! its bodies in place
+      type(case_t), intent(in) :: case
+      type(grid_t), intent(in) :: grid
+      type(solid_geometry_t), intent(in) :: solid
+      logical, intent(in) :: begins(:)           !! (blocks) those let go; all others are held
+      type(flow_t), intent(inout) :: flow        !! only its pressure changes
+      type(scratch_t), intent(inout) :: scratch
+      real(wp), intent(out) :: force(:, :)
+    end subroutine of_release
+
+    !> What the stages will need of the start of the step, and what acts before the transport.
+    subroutine of_start(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
+      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, blocks_t, scratch_t, wp
+      implicit none
+      class(coupling_t), intent(inout) :: self   !! its bodies as they move at the start
+      type(case_t), intent(in) :: case
+      type(grid_t), intent(in) :: grid
+      type(solid_geometry_t), intent(in) :: solid
+      real(wp), intent(in) :: dt, dt_before      !! of this step and of the one before, 0: none [s]
+      type(flow_t), intent(inout) :: flow
+      type(blocks_t), intent(in) :: blocks
+      type(scratch_t), intent(inout) :: scratch
+    end subroutine of_start
+
+    !> A stage after the transport: fluid and bodies are where the step ends.
+    subroutine of_stage(self, case, grid, solid, dt, flow, scratch)
+      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+      implicit none
+      class(coupling_t), intent(inout) :: self
+      type(case_t), intent(in) :: case
+      type(grid_t), intent(in) :: grid
+      type(solid_geometry_t), intent(in) :: solid
+      real(wp), intent(in) :: dt   !! [s]
+      type(flow_t), intent(inout) :: flow
+      type(scratch_t), intent(inout) :: scratch
+    end subroutine of_stage
+
+    !> Pressure; velocity of faces, cells and bodies; force and torque of the step on each body.
+    subroutine of_projection(self, case, grid, solid, dt, flow, scratch, report)
+      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp, &
+        coupling_report_t
+      implicit none
+      class(coupling_t), intent(inout) :: self
+      type(case_t), intent(in) :: case
+      type(grid_t), intent(in) :: grid
+      type(solid_geometry_t), intent(in) :: solid
+      real(wp), intent(in) :: dt   !! [s]
+      type(flow_t), intent(inout) :: flow
+      type(scratch_t), intent(inout) :: scratch
+      type(coupling_report_t), intent(inout) :: report
+    end subroutine of_projection
+
+    !> The faces as the next step carries fluid through them, with the final motion of the bodies.
+    subroutine of_end(self, grid, solid, flow, blocks, report)
+      import :: coupling_t, grid_t, solid_geometry_t, flow_t, blocks_t, coupling_report_t
+      implicit none
+      class(coupling_t), intent(inout) :: self
+      type(grid_t), intent(in) :: grid
+      type(solid_geometry_t), intent(in) :: solid
+      type(flow_t), intent(inout) :: flow
+      type(blocks_t), intent(inout) :: blocks
+      type(coupling_report_t), intent(inout) :: report
+    end subroutine of_end
+  end interface
 
 contains
 
-  !> What the velocity stage will need of the start of the step: for C-ISMAC the acceleration, else
-  !! how the faces at the surface differ from the cells; and the first half of the old pressure.
-  subroutine note_start(case, grid, solid, dt, dt_before, flow, blocks, stage)
+  !> Allocate what both couplings need, for a grid and n bodies; work arrays go to the pool.
+  subroutine coupling_init(grid, n, case, scratch, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n
     type(case_t), intent(in) :: case
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt, dt_before   !! of this step and of the one before, 0: none [s]
-    type(flow_t), intent(inout) :: flow
-    type(blocks_t), intent(in) :: blocks
-    type(stage_t), intent(inout) :: stage   !! its bodies as they move at the start
+    type(scratch_t), intent(inout) :: scratch
+    class(coupling_t), intent(inout) :: self
 
-    if (case%numerics%coupling == 'monolithic') then
-      call find_trend(case%fluid%gravity, dt, blocks, stage)
-      stage%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
-      call find_links_before(grid, solid, stage)
-    end if
-    if (case%numerics%coupling == 'monolithic' .and. .not. stage%implicit_momentum) then
-      if (.not. allocated(stage%deviation)) then
-        call swap(flow%solid_flux, stage%deviation)          ! lent until the pressure and
-        call swap(stage%viscous%leg, stage%mid_step%given)   ! the viscosity need them
-      end if
-      call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, stage%deviation)
-      call to_mid_step(grid, case%fluid, solid, stage%links_before, stage%bodies, stage%trend, dt, &
-                       flow, stage%acceleration, stage%mid_step)
-    end if
-    if (.not. stage%implicit_momentum) return
-    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
-    if (case%numerics%coupling == 'mics') then
-      call density_of_mixture(grid, solid, stage%bodies, flow%rho, stage%rho_mixture)
-      call keep_acceleration(grid, case%fluid%gravity, stage%whole%open, stage%rho_mixture, flow, &
-                             stage)
-    else
-      call find_liquid(grid, flow, stage%mid_step%takes_part)
-      call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, stage)
-    end if
-    call return_surface_force(stage)
-  end subroutine note_start
+    call rigid_motion_init(n, self%bodies)
+    call rigid_motion_init(n, self%at_start)
+    call viscous_init(grid, n, self%viscous)
+    call give_arrays(scratch, self%viscous)
+    call clear(scratch)
+    self%implicit_momentum = case%numerics%momentum == 'c_ismac'
+    if (self%implicit_momentum) call c_ismac_init(grid, n, case%numerics%advection, self%c_ismac)
+    call pressure_init(grid, n, case%numerics, self%pressure)
+    call give_faces(scratch, self%pressure%system%operator%cf)
+    call clear(scratch)
+    call acceleration_init(grid, self%acceleration)
+    call surface_tension_init(grid, case%fluid, self%tension)
+    allocate (self%from_pressure(6, n), source=0.0_wp)
+    allocate (self%from_level, self%total, source=self%from_pressure)
+  end subroutine coupling_init
 
-  !> The links of the start of the step: those of the end of the last one, or new ones if blocks
-  !! have come.
-  subroutine find_links_before(grid, solid, stage)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid   !! at the start
-    type(stage_t), intent(inout) :: stage
-    type(linked_cells_t), allocatable :: keep
-
-    call move_alloc(stage%links_before, keep)
-    call move_alloc(stage%links, stage%links_before)
-    call move_alloc(keep, stage%links)
-    call move_alloc(stage%links_before%slip, stage%links%slip)   ! nothing reads it at the start
-    call link_cells(grid, solid, stage%links_before)
-  end subroutine find_links_before
-
-  !> What the motion changes by in this step if the bodies accelerate as in the step before, like
-  !! the fluid that gets the old pressure.
-  subroutine find_trend(gravity, dt, blocks, stage)
+  !> Before the stages that follow the transport: the bodies move as contact and weight make them,
+  !! no force of the fluid is known yet.
+  subroutine start_of_stages(gravity, dt, blocks, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
-    type(blocks_t), intent(in) :: blocks
-    type(stage_t), intent(inout) :: stage
+    type(blocks_t), intent(inout) :: blocks
+    class(coupling_t), intent(inout) :: self
     integer :: b
 
-    stage%trend = 0.0_wp
+    self%total = 0.0_wp
+    call motion_after_fluid(gravity, dt, blocks, self)
+    self%at_start = self%bodies
     do b = 1, blocks%n
-      if (.not. stage%bodies%free(b)) cycle
-      stage%trend(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
-                                          /blocks%mass(b))
-      stage%trend(4:6, b) = dt*matmul(stage%bodies%inverse_inertia(:, :, b), &
-                                      blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
+      if (.not. self%bodies%free(b)) cycle
+      self%at_start%motion(1:3, b) = blocks%v_start(:, b)
+      self%at_start%motion(4:6, b) = matmul(self%bodies%inverse_inertia(:, :, b), &
+                                            blocks%l_start(:, b))
     end do
-  end subroutine find_trend
+  end subroutine start_of_stages
 
-  !> Velocity of the fluid and of the bodies at the end of the step.
-  !!
-  !! On entry the liquid and the bodies are where the step ends, `flow%u` is the transported
-  !! velocity; the bodies carry the mean contact force of the step. On return the bodies have their
-  !! final velocity and the force from the fluid; face velocity and solid flux are those the next
-  !! step uses.
-  subroutine advance_velocity(case, grid, solid, dt, flow, blocks, stage, report)
-    type(case_t), intent(in) :: case
+  !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.
+  subroutine motion_after_fluid(gravity, dt, blocks, self)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! [s]
+    type(blocks_t), intent(inout) :: blocks
+    class(coupling_t), intent(inout) :: self
+
+    call set_velocity_after_fluid(gravity, dt, self%total(1:3, :blocks%n), &
+                                  self%total(4:6, :blocks%n), blocks)
+    call copy_motion(blocks, self%bodies)
+  end subroutine motion_after_fluid
+
+  !> Force of the surface at the faces; `tension%force` is taken and has to be given back.
+  subroutine find_surface_force(fluid, grid, solid, c, scratch, self)
+    type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! C^, halo filled [-]
+    type(scratch_t), intent(inout) :: scratch
+    class(coupling_t), intent(inout) :: self
+
+    associate (tension => self%tension)
+      call take(scratch, tension%force)
+      call take(scratch, tension%surface%place)
+      call take(scratch, tension%surface%curvature)
+      call find_tension(grid, fluid, solid, c, tension)
+      call give(scratch, tension%surface%place)
+      call give(scratch, tension%surface%curvature)
+    end associate
+  end subroutine find_surface_force
+
+  !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
+  !! solids change; `self%tension` is that of the start.
+  subroutine keep_acceleration(grid, gravity, open, rho, flow, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    type(flow_t), intent(in) :: flow
+    class(coupling_t), intent(inout) :: self
+
+    associate (a => self%acceleration)
+      call face_acceleration(grid, gravity, flow%rho, rho, flow%p, a%face, flow%sides)
+      call add_tension(grid, rho, self%tension, a%face)
+      call cell_mean_of_faces(grid, open, a%face, self%c_ismac%a_old)
+    end associate
+  end subroutine keep_acceleration
+
+  !> Add gravity and old pressure to all cells, for 'mics' and C-ISMAC; with C-ISMAC those of the
+  !! start of the step, which stand in `acceleration%cell` then.
+  subroutine accelerate_cells(grid, dt, flow, self)
+    type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(inout) :: flow
-    type(blocks_t), intent(inout) :: blocks
-    type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(out) :: report
+    class(coupling_t), intent(inout) :: self
 
-    stage%total = 0.0_wp
-    call set_velocity()
-    call motion_at_start(blocks, stage)
-    if (case%numerics%coupling == 'mics') then
-      call mass_average_stage(case, grid, solid, dt, flow, stage, report)
-      call set_velocity()
-      call overlay_bodies(grid, solid, flow, stage, report)
-    else
-      call monolithic_stage(case, grid, solid, dt, flow, stage, report)
-      blocks%late_force = stage%late(:, :blocks%n)
-      call set_velocity()
-      call all_fluid_of_faces(grid, solid, stage%bodies, stage%pressure%system%operator%flux, &
-                              flow%uf, flow%solid_flux)
+    if (self%implicit_momentum) then
+      call begin_predictor(grid, flow%u, self%c_ismac)
+      self%c_ismac%a_new = self%acceleration%cell
+      self%acceleration%cell = self%c_ismac%a_old
     end if
-  contains
-    !> Velocity of the blocks from contact, weight and the total fluid force; the flow sees it too.
-    subroutine set_velocity()
-      call set_velocity_after_fluid(case%fluid%gravity, dt, stage%total(1:3, :blocks%n), &
-                                    stage%total(4:6, :blocks%n), blocks)
-      call copy_motion(blocks, stage%bodies)
-    end subroutine set_velocity
-  end subroutine advance_velocity
+    call add_product(grid, dt, self%acceleration%cell, flow%u)
+  end subroutine accelerate_cells
 
-  !> The bodies at their new place with the motion they had when the step began.
-  subroutine motion_at_start(blocks, stage)
+  !> With C-ISMAC: exchange the acceleration in the cells for that of the density at hand, once the
+  !! velocity of the faces is predicted.
+  subroutine renew_acceleration(dt, flow, self)
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(inout) :: flow
+    class(coupling_t), intent(in) :: self
+
+    if (self%implicit_momentum) flow%u = flow%u + dt*(self%c_ismac%a_new - self%c_ismac%a_old)
+  end subroutine renew_acceleration
+
+  !> Viscosity, and with C-ISMAC advection, into a velocity that has gravity and old pressure in.
+  subroutine predict_velocity(grid, rho, flow, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! that of the system [kg/m3]
+    type(flow_t), intent(inout) :: flow
+    class(coupling_t), intent(inout) :: self
+
+    if (self%implicit_momentum) then
+      call solve_predictor(grid, rho, self%bodies, flow, self%viscous, self%c_ismac)
+    else
+      call solve_viscous(grid, self%bodies, flow, self%viscous)
+    end if
+  end subroutine predict_velocity
+
+  !> What the flow has to know of the blocks, at their present pose and velocity.
+  subroutine copy_motion(blocks, bodies)
     type(blocks_t), intent(in) :: blocks
-    type(stage_t), intent(inout) :: stage
+    type(rigid_motion_t), intent(inout) :: bodies
     integer :: b
 
-    stage%at_start = stage%bodies
     do b = 1, blocks%n
-      if (.not. stage%bodies%free(b)) cycle
-      stage%at_start%motion(1:3, b) = blocks%v_start(:, b)
-      stage%at_start%motion(4:6, b) = matmul(stage%bodies%inverse_inertia(:, :, b), &
-                                             blocks%l_start(:, b))
+      associate (shape => blocks%shapes(blocks%shape(b)))
+        bodies%present(b) = blocks%present(b)
+        bodies%free(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. blocks%asleep(b))
+        bodies%x(:, b) = blocks%x(:, b)
+        bodies%motion(1:3, b) = merge(blocks%v(:, b), 0.0_wp, blocks%present(b))
+        bodies%motion(4:6, b) = merge(blocks%omega(:, b), 0.0_wp, blocks%present(b))
+        bodies%mass(b) = blocks%mass(b)
+        bodies%volume(b) = shape%volume
+        bodies%radius(b) = shape%radius
+        bodies%inertia(:, :, b) = space_tensor(blocks%q(:, b), shape%inertia)
+        bodies%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
+                                                       blocks%inverse_inertia(:, :, &
+                                                           blocks%shape(b)))
+      end associate
+      call set_inertia(b, bodies)
     end do
-  end subroutine motion_at_start
+  end subroutine copy_motion
+
+  !> Change the motion of the free bodies by forces acting over dt.
+  pure subroutine push_bodies(dt, force, bodies)
+    real(wp), intent(in) :: dt
+    real(wp), intent(in) :: force(:, :)   !! (6, n) [N, N m]
+    type(rigid_motion_t), intent(inout) :: bodies
+    integer :: b
+
+    do b = 1, bodies%n
+      if (.not. bodies%free(b)) cycle
+      bodies%motion(:, b) = bodies%motion(:, b) + dt*matmul(bodies%mobility(:, :, b), force(:, b))
+    end do
+  end subroutine push_bodies
 
 end module coupling_m

@@ -12,10 +12,12 @@ module mass_average_m
   use vectors_m, only: cross
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo, unit_step
+  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
   use fields_m, only: flow_t, add_product
-  use solid_geometry_m, only: solid_geometry_t
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
+  use viscous_system_m, only: take_arrays, give_arrays
   use viscous_legs_m, only: build_viscous
   use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
   use pressure_system_m, only: set_pressure_system
@@ -24,8 +26,9 @@ module mass_average_m
   use buoyancy_m, only: displaced_force
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension
-  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
-    predict_velocity, renew_acceleration, find_surface_force, return_surface_force
+  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
+    accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
+  use rigid_body_m, only: blocks_t
   use mixture_m, only: face_mean
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
@@ -33,53 +36,207 @@ module mass_average_m
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
   implicit none
   private
-  public :: mass_average_stage, overlay_bodies, density_of_mixture
+  public :: mass_average_t, mass_average_init, density_of_mixture
 
   real(wp), parameter :: held_density = 1.0e6_wp   !! inertia of a fixed body in the mixture [kg/m3]
 
+  type, extends(coupling_t) :: mass_average_t
+    type(solid_geometry_t) :: whole                !! the domain without solids
+    real(wp), allocatable :: rho(:, :, :)          !! of the mixture of fluid and solid [kg/m3]
+    real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor [m/s]
+    real(wp), allocatable :: terms(:, :)           !! (*, 6) of the sums over the cells of a body
+  contains
+    procedure :: force_at_release
+    procedure :: begin
+    procedure :: merge_cells
+    procedure :: add_forces
+    procedure :: add_viscosity
+    procedure :: predict_faces
+    procedure :: project
+    procedure :: close => overlay_bodies
+  end type mass_average_t
+
 contains
 
-  !> Velocity after predictor and projection of the mixture, `coupling_passes` times, and the force.
-  !!
-  !! Weight less buoyancy and the contact force act on the mixture before the projection, in the
-  !! cells of the body; gravity in the mixture is that of the fluid, so still water stays still.
-  subroutine mass_average_stage(case, grid, solid, dt, flow, stage, report)
+  !> Allocate for a grid and n bodies; work arrays go to the pool.
+  subroutine mass_average_init(grid, n, case, scratch, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n
+    type(case_t), intent(in) :: case
+    type(scratch_t), intent(inout) :: scratch
+    type(mass_average_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    call coupling_init(grid, n, case, scratch, self)
+    a = grid%first
+    b = grid%last
+    call solid_geometry_init(grid, self%whole, n)
+    allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+    allocate (self%u_before(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    allocate (self%terms(0, 6))
+  end subroutine mass_average_init
+
+  !> Archimedes' force: the mixture makes the inertia of the fluid.
+  subroutine force_at_release(self, case, grid, solid, begins, flow, scratch, force)
+    class(mass_average_t), intent(inout) :: self
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt   !! [s]
+    logical, intent(in) :: begins(:)
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(inout) :: report
+    type(scratch_t), intent(inout) :: scratch
+    real(wp), intent(out) :: force(:, :)
+
+    associate (unused => begins, unused_too => scratch)
+    end associate
+    call displaced_force(grid, case%fluid, solid, self%bodies, flow%c, force)
+  end subroutine force_at_release
+
+  !> Stage 3: with C-ISMAC the acceleration of the cells.
+  subroutine begin(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt, dt_before
+    type(flow_t), intent(inout) :: flow
+    type(blocks_t), intent(in) :: blocks
+    type(scratch_t), intent(inout) :: scratch
+
+    associate (unused => dt, unused_too => dt_before, unused_as_well => blocks)
+    end associate
+    if (.not. self%implicit_momentum) return
+    call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+    call density_of_mixture(grid, solid, self%bodies, flow%rho, self%rho)
+    call keep_acceleration(grid, case%fluid%gravity, self%whole%open, self%rho, flow, self)
+    call give(scratch, self%tension%force)
+  end subroutine begin
+
+  !> Stage 9: one velocity for fluid and bodies in a cell, the mean by mass. Buoyancy and the
+  !! contact force act on the bodies before; gravity in the mixture is that of the fluid, so still
+  !! water stays still.
+  subroutine merge_cells(self, case, grid, solid, dt, flow, scratch)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+
+    associate (unused => scratch)
+    end associate
+    associate (bodies => self%bodies, system => self%pressure%system)
+      call displaced_force(grid, case%fluid, solid, bodies, flow%c, self%from_level)
+      call push_bodies(dt, self%from_level, bodies)
+      self%total = self%from_level
+      call density_of_mixture(grid, solid, bodies, flow%rho, self%rho)
+      call take_faces(scratch, system%operator%cf)
+      call set_pressure_system(grid, self%whole%open, self%rho, system, flow%sides)
+      call build_rigid_flux(grid, self%whole, bodies, system%active, system%operator%flux)
+      call average_cells(grid, solid, bodies, flow, self%rho)
+    end associate
+    self%u_before = flow%u
+  end subroutine merge_cells
+
+  !> Stage 10: old pressure, weight of the fluid, surface tension and surface stress.
+  subroutine add_forces(self, case, grid, solid, dt, flow, scratch)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+    real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
+
+    call take(scratch, by_stress)
+    associate (a => self%acceleration)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
+                             flow%sides)
+      call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+      call add_tension(grid, self%rho, self%tension, a%face)
+      call give(scratch, self%tension%force)
+      call cell_mean_of_faces(grid, self%whole%open, a%face, a%cell)
+    end associate
+    if (self%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, self%c_ismac%q)
+    call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
+    call accelerate_cells(grid, dt, flow, self)
+    call add_product(grid, dt, by_stress, flow%u)
+    call give(scratch, by_stress)
+  end subroutine add_forces
+
+  !> Stage 11: viscosity of the mixture; with C-ISMAC advection, too.
+  subroutine add_viscosity(self, case, grid, solid, dt, flow, scratch)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+
+    associate (unused => case, unused_too => solid)
+    end associate
+    call take_arrays(scratch, self%viscous)
+    call build_viscous(grid, self%whole, self%bodies, self%rho, flow%mu, dt, self%viscous)
+    call predict_velocity(grid, self%rho, flow, self)
+    if (self%implicit_momentum) then   ! the force on a body has no part in advection
+      call advected_velocity(grid, self%rho, dt, self%viscous, self%c_ismac, self%u_before)
+    end if
+    call give_arrays(scratch, self%viscous)
+  end subroutine add_viscosity
+
+  !> Stage 12: velocity of the faces before the pressure.
+  subroutine predict_faces(self, case, grid, solid, dt, flow, scratch)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+
+    associate (unused => case, unused_too => solid, unused_as_well => scratch)
+    end associate
+    call halo_exchange(self%acceleration%cell, n_halo)
+    call fill_velocity_halo(grid, flow%u)
+    call predict_face_velocity(grid, dt, self%rho, self%acceleration, flow)
+    call renew_acceleration(dt, flow, self)
+  end subroutine predict_faces
+
+  !> Stage 13: projection of the mixture and the force on the bodies; `coupling_passes` times, later
+  !! passes from the mean by mass alone.
+  subroutine project(self, case, grid, solid, dt, flow, scratch, report)
+    class(mass_average_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+    type(coupling_report_t), intent(inout) :: report
     integer :: pass
 
-    associate (bodies => stage%bodies, system => stage%pressure%system)
-      call displaced_force(grid, case%fluid, solid, bodies, flow%c, stage%from_level)
-      call push_bodies(dt, stage%from_level, bodies)
-      stage%total = stage%from_level
-      call density_of_mixture(grid, solid, bodies, flow%rho, stage%rho_mixture)
-      call set_pressure_system(grid, stage%whole%open, stage%rho_mixture, system, flow%sides)
-      call build_rigid_flux(grid, stage%whole, bodies, system%active, system%operator%flux)
+    associate (bodies => self%bodies, last => self%pressure%report)
       do pass = 1, case%numerics%coupling_passes
-        call average_cells(grid, solid, bodies, flow, stage%rho_mixture)
-        stage%u_before = flow%u
-        if (pass == 1) then
-          call predict_mixture(case, grid, solid, dt, flow, stage)
-        else
-          call predict_again(grid, dt, flow, stage)
+        if (pass > 1) then
+          call average_cells(grid, solid, bodies, flow, self%rho)
+          self%u_before = flow%u
+          call predict_again(grid, dt, flow, self)
         end if
-        call project_mixture(grid, dt, flow, stage)
-        report%pressure%passes = report%pressure%passes + stage%pressure%report%passes
-        report%pressure%iterations = report%pressure%iterations + stage%pressure%report%iterations
-        report%pressure%converged = stage%pressure%report%converged &
-                                    .and. (pass == 1 .or. report%pressure%converged)
-        call momentum_gained(grid, solid, dt, flow%u, stage)
-        call push_bodies(dt, stage%from_pressure, bodies)
-        stage%total = stage%total + stage%from_pressure
+        call project_mixture(grid, dt, flow, self)
+        report%pressure%passes = report%pressure%passes + last%passes
+        report%pressure%iterations = report%pressure%iterations + last%iterations
+        report%pressure%converged = last%converged .and. (pass == 1 .or. report%pressure%converged)
+        call momentum_gained(grid, solid, dt, flow%u, self)
+        call push_bodies(dt, self%from_pressure, bodies)
+        self%total = self%total + self%from_pressure
       end do
     end associate
-    report%viscous_converged = stage%viscous%converged
-  end subroutine mass_average_stage
+    call give_faces(scratch, self%pressure%system%operator%cf)
+    report%viscous_converged = self%viscous%converged
+  end subroutine project
 
   !> Density of fluid and solids in each cell: rho = (1 - alpha) rho_fl + sum alpha_k rho_k [kg/m3].
   subroutine density_of_mixture(grid, solid, bodies, rho, mixture)
@@ -140,67 +297,35 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine average_cells
 
-  !> Predictor of the mixture: old pressure and gravity of the fluid, then viscosity.
-  subroutine predict_mixture(case, grid, solid, dt, flow, stage)
-    type(case_t), intent(in) :: case
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt
-    type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-
-    ! `y` is free until the viscous stage.
-    associate (a => stage%acceleration, rho => stage%rho_mixture, by_stress => stage%viscous%y)
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, rho, flow%p, a%face, flow%sides)
-      call find_surface_force(case%fluid, grid, solid, flow%c, stage)
-      call add_tension(grid, rho, stage%tension, a%face)
-      call return_surface_force(stage)
-      call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
-      if (stage%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, stage%c_ismac%q)
-      call surface_stress(grid, solid%alpha, rho, flow%mu, flow%u, by_stress)
-      call accelerate_cells(grid, dt, flow, stage)
-      call add_product(grid, dt, by_stress, flow%u)
-      call build_viscous(grid, stage%whole, stage%bodies, rho, flow%mu, dt, stage%viscous)
-      call predict_velocity(grid, rho, flow, stage)
-      if (stage%implicit_momentum) then   ! the force on a body has no part in advection
-        call advected_velocity(grid, rho, dt, stage%viscous, stage%c_ismac, stage%u_before)
-      end if
-      call halo_exchange(a%cell, n_halo)
-      call fill_velocity_halo(grid, flow%u)
-      call predict_face_velocity(grid, dt, rho, a, flow)
-    end associate
-    call renew_acceleration(dt, flow, stage)
-  end subroutine predict_mixture
-
   !> Later passes start from the mass average alone.
-  subroutine predict_again(grid, dt, flow, stage)
+  subroutine predict_again(grid, dt, flow, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    class(mass_average_t), intent(inout) :: self
 
-    stage%acceleration%cell = 0.0_wp
-    stage%acceleration%face = 0.0_wp
+    self%acceleration%cell = 0.0_wp
+    self%acceleration%face = 0.0_wp
     call fill_velocity_halo(grid, flow%u)
-    call predict_face_velocity(grid, dt, stage%rho_mixture, stage%acceleration, flow)
+    call predict_face_velocity(grid, dt, self%rho, self%acceleration, flow)
   end subroutine predict_again
 
   !> Projection of the mixture velocity, on the faces and in the cells.
-  subroutine project_mixture(grid, dt, flow, stage)
+  subroutine project_mixture(grid, dt, flow, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    class(mass_average_t), intent(inout) :: self
     real(wp), parameter :: weightless(3) = 0.0_wp
     type(rigid_motion_t) :: none
 
     none%n = 0
     allocate (none%free(0))
-    associate (p => stage%pressure, a => stage%acceleration)
-      call solve_pressure(grid, stage%whole, stage%rho_mixture, dt, flow, none, p)
-      call face_acceleration(grid, weightless, flow%rho, stage%rho_mixture, p%phi_total, a%face, &
+    associate (p => self%pressure, a => self%acceleration)
+      call solve_pressure(grid, self%whole, self%rho, dt, flow, none, p)
+      call face_acceleration(grid, weightless, flow%rho, self%rho, p%phi_total, a%face, &
                              flow%sides)
-      call cell_mean_of_faces(grid, stage%whole%open, a%face, a%cell)
+      call cell_mean_of_faces(grid, self%whole%open, a%face, a%cell)
       call add_product(grid, dt, a%cell, flow%u)
     end associate
     call fill_velocity_halo(grid, flow%u)
@@ -208,58 +333,61 @@ contains
 
   !> Volume integral of -grad p + div tau less its hydrostatic part over each body: the momentum
   !! that the mixture gained in its cells since `u_before`.
-  subroutine momentum_gained(grid, solid, dt, u, stage)
+  subroutine momentum_gained(grid, solid, dt, u, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    type(stage_t), intent(inout) :: stage
-    integer(i8) :: bins(bin_size, 6*stage%bodies%n)
-    real(wp) :: total(6*stage%bodies%n), f(3)
+    class(mass_average_t), intent(inout) :: self
+    integer(i8) :: bins(bin_size, 6*self%bodies%n)
+    real(wp) :: total(6*self%bodies%n), f(3)
     integer :: b, m, n
 
-    bins = spread(no_terms, 2, 6*stage%bodies%n)
-    do b = 1, stage%bodies%n
+    bins = spread(no_terms, 2, 6*self%bodies%n)
+    do b = 1, self%bodies%n
       n = 0
-      call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), stage%terms)
+      call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), self%terms)
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         associate (i => solid%cell(:, m))
           if (any(i < grid%lo) .or. any(i > grid%hi)) cycle
           n = n + 1
-          f = solid%cell_alpha(m)*grid%volume*stage%rho_mixture(i(1), i(2), i(3))/dt &
-              *(u(i(1), i(2), i(3), :) - stage%u_before(i(1), i(2), i(3), :))
-          stage%terms(n, 1:3) = f
-          stage%terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), &
-                                                  stage%bodies%x(:, b)), f)
+          f = solid%cell_alpha(m)*grid%volume*self%rho(i(1), i(2), i(3))/dt &
+              *(u(i(1), i(2), i(3), :) - self%u_before(i(1), i(2), i(3), :))
+          self%terms(n, 1:3) = f
+          self%terms(n, 4:6) = cross(nearest_arm(grid, solid%cell_centroid(:, m), &
+                                                  self%bodies%x(:, b)), f)
         end associate
       end do
-      call exact_add_columns(stage%terms(1:n, :), bins(:, 6*b - 5:6*b))
+      call exact_add_columns(self%terms(1:n, :), bins(:, 6*b - 5:6*b))
     end do
     call exact_totals(bins, total)
-    stage%from_pressure(:, :stage%bodies%n) = reshape(total, [6, stage%bodies%n])
+    self%from_pressure(:, :self%bodies%n) = reshape(total, [6, self%bodies%n])
   end subroutine momentum_gained
 
-  !> Give cells and faces the final rigid velocity by mass average; what divergence that leaves is
-  !! reported, since it is what the next step transports with.
-  subroutine overlay_bodies(grid, solid, flow, stage, report)
+  !> Stage 14: give cells and faces the final rigid velocity by mass average; what divergence that
+  !! leaves is reported, since it is what the next step transports with.
+  subroutine overlay_bodies(self, grid, solid, flow, blocks, report)
+    class(mass_average_t), intent(inout) :: self
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(inout) :: report
+    type(blocks_t), intent(inout) :: blocks
+    type(coupling_report_t), intent(inout) :: report
     integer :: b, d, m, i(3), low(3)
     real(wp) :: rigid(3), share
 
-    call average_cells(grid, solid, stage%bodies, flow, stage%rho_mixture)
-    do b = 1, stage%bodies%n
+    associate (unused => blocks)
+    end associate
+    call average_cells(grid, solid, self%bodies, flow, self%rho)
+    do b = 1, self%bodies%n
       do m = solid%body_face(b), solid%body_face(b + 1) - 1
         d = solid%face(4, m)
         i = solid%face(1:3, m)
         low = i - unit_step(:, d)
         if (any((i < 1 .or. low < 1 .or. i > grid%n) .and. .not. grid%periodic)) cycle
-        rigid = wall_velocity(stage%bodies%motion(:, b), &
-                              nearest_arm(grid, solid%face_centroid(:, m), stage%bodies%x(:, b)))
-        share = mass_share(solid%face_beta(m), body_density(stage%bodies, b), &
+        rigid = wall_velocity(self%bodies%motion(:, b), &
+                              nearest_arm(grid, solid%face_centroid(:, m), self%bodies%x(:, b)))
+        share = mass_share(solid%face_beta(m), body_density(self%bodies, b), &
                            face_mean(flow%rho(low(1), low(2), low(3)), flow%rho(i(1), i(2), i(3))))
         flow%uf(i(1), i(2), i(3), d) = flow%uf(i(1), i(2), i(3), d) + share*(rigid(d) &
             - flow%uf(i(1), i(2), i(3), d))
@@ -269,7 +397,7 @@ contains
       flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, &
           :, d)
     end do
-    associate (system => stage%pressure%system)
+    associate (system => self%pressure%system)
       call divergence(grid, solid%open, flow, system%active, system%solver%rhs, &
                       report%pressure%divergence)
     end associate

@@ -7,13 +7,14 @@
 !! 2 % of theory at steps of 0.25 to 4 ms (docs/decisions/coupling.md).
 module monolithic_m
   use kinds_m, only: wp
-  use swap_m, only: swap
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo
+  use scratch_m, only: scratch_t, take, give, take_faces, give_faces, clear
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, set_inertia, wall_velocity
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
+  use viscous_system_m, only: take_arrays, give_arrays
   use viscous_legs_m, only: build_viscous
   use wall_shear_m, only: find_wall_speeds
   use pressure_system_m, only: set_pressure_system
@@ -22,63 +23,177 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use mid_step_m, only: find_liquid, add_second_half, add_whole
+  use face_memory_m, only: note_deviation
+  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, find_liquid, add_second_half, &
+                        add_whole
   use buoyancy_m, only: displaced_force, uncounted_fluid
-  use linked_cells_m, only: linked_cells_t, link_cells, match_densities
+  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
-  use wall_balance_m, only: begin_balance, note_change, note_velocity, force_of_walls, &
-    force_of_mid_step
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
+                            note_velocity, force_of_walls, force_of_mid_step
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
-  use velocity_stage_m, only: stage_t, stage_report_t, push_bodies, accelerate_cells, &
-    predict_velocity, renew_acceleration, find_surface_force, return_surface_force
+  use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
+    accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
+  use rigid_body_m, only: blocks_t
   use boundary_m, only: fill_velocity_halo
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: monolithic_stage, start_flow, begin_motion
+  public :: monolithic_t, monolithic_init
+
+  type, extends(coupling_t) :: monolithic_t
+    real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
+    type(rigid_motion_t) :: foreseen               !! the motion at the end, by `trend`
+    real(wp), allocatable :: trend(:, :)
+      !! (6, n) change of the motion in this step if the acceleration of the last one goes on
+    type(linked_cells_t), allocatable :: links_before, links
+      !! of the surface at the start and at the end of the step
+    type(mid_step_t) :: mid_step
+    type(wall_balance_t) :: balance
+    real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
+    real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
+    real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
+    real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
+    real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
+    real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
+    real(wp), allocatable :: deviation(:, :, :, :)
+      !! of the faces at the start (`face_memory_m`), from `begin` to `predict_faces`
+  contains
+    procedure :: force_at_release
+    procedure :: begin
+    procedure :: merge_cells
+    procedure :: add_forces
+    procedure :: add_viscosity
+    procedure :: predict_faces
+    procedure :: project
+    procedure :: close => close_faces
+  end type monolithic_t
 
 contains
 
-  !> Pressure and rigid motions in one solve, after the implicit viscous stage.
-  subroutine monolithic_stage(case, grid, solid, dt, flow, stage, report)
+  !> Allocate for a grid and n bodies; work arrays go to the pool.
+  subroutine monolithic_init(grid, n, case, scratch, self)
+    type(grid_t), intent(in) :: grid
+    integer, intent(in) :: n
+    type(case_t), intent(in) :: case
+    type(scratch_t), intent(inout) :: scratch
+    type(monolithic_t), intent(out) :: self
+    integer :: a(3), b(3)
+
+    call coupling_init(grid, n, case, scratch, self)
+    a = grid%first
+    b = grid%last
+    call rigid_motion_init(n, self%foreseen)
+    allocate (self%links_before, self%links)
+    call linked_cells_init(grid, self%links_before)
+    call linked_cells_init(grid, self%links)
+    call mid_step_init(grid, self%mid_step)
+    call give(scratch, self%mid_step%given)
+    call clear(scratch)
+    call wall_balance_init(self%balance)
+    allocate (self%wall_speed(0))
+    allocate (self%lack(6, 3, n), source=0.0_wp)
+    allocate (self%dry_motion, self%from_mid_step, self%late, self%counted, self%trend, &
+              source=self%total)
+    allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+  end subroutine monolithic_init
+
+  !> Stage 3: the motion of the bodies as it goes on, the links at the start; for C-ISMAC the
+  !! acceleration of the cells, else how the faces at the surface differ from them, and the first
+  !! half of the old pressure.
+  subroutine begin(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
+    class(monolithic_t), intent(inout) :: self
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt   !! [s]
+    real(wp), intent(in) :: dt, dt_before
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(inout) :: report
+    type(blocks_t), intent(in) :: blocks
+    type(scratch_t), intent(inout) :: scratch
 
-    stage%dry_motion = stage%bodies%motion
-    call link_cells(grid, solid, stage%links)
-    call begin_balance(case%fluid, stage%links, flow, stage%balance)
-    call find_inertia(grid, stage%links, stage%balance%mass, flow, stage%rho)
-    call match_densities(grid, stage%rho, stage%links)
-    call find_slip(grid, solid, stage%at_start, flow%u, stage%links)
-    call note_velocity(grid, stage%links, flow%u, stage%balance%before)
-    call share_momentum(grid, stage%links, stage%balance%mass, stage%at_start, &
-                        stage%balance%before, flow%u, stage%balance%to_wall)
-    call find_wall_speeds(grid, solid, stage%at_start, flow%u, stage%wall_speed)
-    associate (system => stage%pressure%system)
-      call set_pressure_system(grid, solid%free, stage%rho, system, flow%sides)
-      call build_rigid_flux(grid, solid, stage%bodies, system%active, system%operator%flux)
+    call find_trend(case%fluid%gravity, dt, blocks, self)
+    self%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
+    call find_links_before(grid, solid, self)
+    if (self%implicit_momentum) then
+      call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+      call find_liquid(grid, flow, self%mid_step%takes_part)
+      call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, self)
+      call give(scratch, self%tension%force)
+    else
+      call take(scratch, self%deviation)
+      call take(scratch, self%mid_step%given)
+      call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
+      call to_mid_step(grid, case%fluid, solid, self%links_before, self%bodies, self%trend, dt, &
+                       flow, self%acceleration, self%mid_step)
+    end if
+  end subroutine begin
+
+  !> The links of the start of the step: those of the end of the last one, or new ones if blocks
+  !! have come.
+  subroutine find_links_before(grid, solid, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid   !! at the start
+    class(monolithic_t), intent(inout) :: self
+    type(linked_cells_t), allocatable :: keep
+
+    call move_alloc(self%links_before, keep)
+    call move_alloc(self%links, self%links_before)
+    call move_alloc(keep, self%links)
+    call link_cells(grid, solid, self%links_before)
+  end subroutine find_links_before
+
+  !> What the motion changes by in this step if the bodies accelerate as in the step before, like
+  !! the fluid that gets the old pressure.
+  subroutine find_trend(gravity, dt, blocks, self)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! [s]
+    type(blocks_t), intent(in) :: blocks
+    class(monolithic_t), intent(inout) :: self
+    integer :: b
+
+    self%trend = 0.0_wp
+    do b = 1, blocks%n
+      if (.not. self%bodies%free(b)) cycle
+      self%trend(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
+                                          /blocks%mass(b))
+      self%trend(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
+                                      blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
+    end do
+  end subroutine find_trend
+
+  !> Stage 9: films at the new places and their masters, one momentum for each group; inertia of
+  !! the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
+  !! flux of the unit motions of the bodies.
+  subroutine merge_cells(self, case, grid, solid, dt, flow, scratch)
+    class(monolithic_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(in) :: dt
+    type(flow_t), intent(inout) :: flow
+    type(scratch_t), intent(inout) :: scratch
+
+    associate (unused => dt, unused_too => scratch)
     end associate
-    call find_surface_force(case%fluid, grid, solid, flow%c, stage)
-    call accelerate_fluid(case, grid, solid, dt, flow, stage)
-    call push_by_known_forces(case, grid, solid, dt, flow, stage)
-    call return_surface_force(stage)
-    call add_viscosity(grid, solid, dt, flow, stage)
-    call predict_faces(grid, solid, dt, flow, stage)
-    call find_pressure(grid, solid, dt, flow, stage, report)
-    call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
-                         stage%pressure%system%active, stage%pressure%known, &
-                         stage%pressure%closed, flow%p)
-    call sum_forces(dt, stage)
-    report%viscous_converged = stage%viscous%converged
-  end subroutine monolithic_stage
+    self%dry_motion = self%bodies%motion
+    call link_cells(grid, solid, self%links)
+    call begin_balance(case%fluid, self%links, flow, self%balance)
+    call find_inertia(grid, self%links, self%balance%mass, flow, self%rho)
+    call match_densities(grid, self%rho, self%links)
+    call find_slip(grid, solid, self%at_start, flow%u, self%links)
+    call note_velocity(grid, self%links, flow%u, self%balance%before)
+    call share_momentum(grid, self%links, self%balance%mass, self%at_start, self%balance%before, &
+                        flow%u, self%balance%to_wall)
+    call find_wall_speeds(grid, solid, self%at_start, flow%u, self%wall_speed)
+    associate (system => self%pressure%system)
+      call take_faces(scratch, system%operator%cf)
+      call set_pressure_system(grid, solid%free, self%rho, system, flow%sides)
+      call build_rigid_flux(grid, solid, self%bodies, system%active, system%operator%flux)
+    end associate
+  end subroutine merge_cells
 
   !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
   !! cell lies, bodies thought away, so that still water stays still; inertia in a cut cell that of
@@ -105,177 +220,216 @@ contains
     end do
   end subroutine find_inertia
 
-  !> Weight, old pressure, surface tension and surface stress into the velocity of the cells in
-  !! liquid; those at the surface and in gas get the first three after the faces.
-  subroutine accelerate_fluid(case, grid, solid, dt, flow, stage)
+  !> Stage 10: weight, old pressure, surface tension and surface stress, on cells and bodies. Cells
+  !! at the surface and in gas get the first three after the faces.
+  subroutine add_forces(self, case, grid, solid, dt, flow, scratch)
+    class(monolithic_t), intent(inout) :: self
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    type(scratch_t), intent(inout) :: scratch
+    real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
 
-    ! `y` is free until the viscous stage.
-    associate (a => stage%acceleration, by_stress => stage%viscous%y)
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, stage%rho, flow%p, a%face, &
+    call take(scratch, by_stress)
+    call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+    associate (a => self%acceleration)
+      call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
-      call add_tension(grid, stage%rho, stage%tension, a%face)
-      stage%counted = stage%at_start%motion + stage%trend
-      call accelerations_of_groups(grid, solid, dt, stage%trend, stage)
-      if (stage%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
-      call surface_stress(grid, solid%alpha, stage%rho, flow%mu, flow%u, by_stress)
-      if (stage%implicit_momentum) then
-        call accelerate_cells(grid, dt, flow, stage)
+      call add_tension(grid, self%rho, self%tension, a%face)
+      self%counted = self%at_start%motion + self%trend
+      call accelerations_of_groups(grid, solid, dt, self%trend, self)
+      if (self%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
+      call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
+      if (self%implicit_momentum) then
+        call accelerate_cells(grid, dt, flow, self)
       else
-        call add_second_half(grid, dt, a%cell, stage%mid_step, flow%u)
+        call add_second_half(grid, dt, a%cell, self%mid_step, flow%u)
+        call force_of_mid_step(grid, case%fluid, self%links_before, self%links, self%bodies, dt, &
+                               flow, a%cell, self%mid_step, self%from_mid_step)
+        call give(scratch, self%mid_step%given)
       end if
       call add_product(grid, dt, by_stress, flow%u)
-      if (.not. allocated(stage%mid_step%given)) return   ! nothing has been given before
-      call force_of_mid_step(grid, case%fluid, stage%links_before, stage%links, stage%bodies, dt, &
-                             flow, a%cell, stage%mid_step, stage%from_mid_step)
-      call swap(stage%viscous%leg, stage%mid_step%given)
     end associate
-  end subroutine accelerate_fluid
+    call push_by_known_forces(case, grid, solid, dt, flow, self)
+    call give(scratch, self%tension%force)
+    call give(scratch, by_stress)
+  end subroutine add_forces
 
   !> Accelerations of the cells from those of the faces, and what groups make of them.
-  subroutine accelerations_of_groups(grid, solid, dt, change, stage)
+  subroutine accelerations_of_groups(grid, solid, dt, change, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     real(wp), intent(in) :: change(:, :)   !! (6, bodies) of their motion that held fluid gets
-    type(stage_t), intent(inout) :: stage
+    class(monolithic_t), intent(inout) :: self
 
-    associate (a => stage%acceleration, balance => stage%balance)
+    associate (a => self%acceleration, balance => self%balance)
       call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
-      call hold_in_cells(grid, solid, stage%bodies, change/dt, a%face, a%cell)
-      call note_change(grid, stage%links, dt, a%cell, balance%pushed)
+      call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
+      call note_change(grid, self%links, dt, a%cell, balance%pushed)
       call halo_exchange(a%cell, n_halo)
-      call share_acceleration(grid, solid%open, stage%rho, stage%links, a%cell)
-      call note_change(grid, stage%links, dt, a%cell, balance%gained)
+      call share_acceleration(grid, solid%open, self%rho, self%links, a%cell)
+      call note_change(grid, self%links, dt, a%cell, balance%gained)
     end associate
   end subroutine accelerations_of_groups
 
   !> The same forces on the bodies.
-  subroutine push_by_known_forces(case, grid, solid, dt, flow, stage)
+  subroutine push_by_known_forces(case, grid, solid, dt, flow, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(in) :: flow
-    type(stage_t), intent(inout) :: stage
+    class(monolithic_t), intent(inout) :: self
 
-    associate (bodies => stage%bodies, flux => stage%pressure%system%operator%flux)
-      call force_from_faces(grid, bodies, flux, flow%p, stage%from_pressure, flow%sides)
-      call force_from_tension(grid, bodies, flux, stage%tension, stage%from_pressure)
-      stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
-      call count_fluid(case%fluid%gravity, dt, stage)
-      stage%from_level = stage%from_level + stage%from_mid_step + stage%late
-      call push_bodies(dt, stage%from_pressure + stage%from_level, bodies)
+    associate (bodies => self%bodies, flux => self%pressure%system%operator%flux)
+      call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
+      call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
+      self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
+      call count_fluid(case%fluid%gravity, dt, self)
+      self%from_level = self%from_level + self%from_mid_step + self%late
+      call push_bodies(dt, self%from_pressure + self%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
 
-  !> Viscosity, in cells and bodies at once.
-  subroutine add_viscosity(grid, solid, dt, flow, stage)
+  !> Stage 11: viscosity, in cells and bodies at once; with C-ISMAC advection, too.
+  subroutine add_viscosity(self, case, grid, solid, dt, flow, scratch)
+    class(monolithic_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    type(scratch_t), intent(inout) :: scratch
 
-    associate (bodies => stage%bodies, viscous => stage%viscous, links => stage%links, &
-               balance => stage%balance)
+    associate (unused => case)
+    end associate
+    call take_arrays(scratch, self%viscous)
+    associate (bodies => self%bodies, viscous => self%viscous, links => self%links, &
+               balance => self%balance)
       call fill_velocity_halo(grid, flow%u)
       call note_velocity(grid, links, flow%u, balance%before)
-      if (.not. stage%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, stage%at_start, flow%u, links)
-        call to_centres(grid, links, stage%at_start, flow%u)
+      if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
+        call find_centres(grid, solid, self%at_start, flow%u, links)
+        call to_centres(grid, links, self%at_start, flow%u)
       end if
-      call build_viscous(grid, solid, bodies, stage%rho, flow%mu, dt, viscous, links, &
-                         stage%wall_speed)
-      call predict_velocity(grid, stage%rho, flow, stage)
-      call to_means(grid, links, stage%at_start, flow%u)
+      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, links, &
+                         self%wall_speed)
+      call predict_velocity(grid, self%rho, flow, self)
+      call to_means(grid, links, self%at_start, flow%u)
       call fill_velocity_halo(grid, flow%u, layers=1)
       call follow_masters(grid, links, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
-      bodies%motion = stage%dry_motion
-      call push_bodies(dt, stage%from_pressure + stage%from_level + viscous%force, bodies)
+      bodies%motion = self%dry_motion
+      call push_bodies(dt, self%from_pressure + self%from_level + viscous%force, bodies)
       call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
     end associate
+    call give_arrays(scratch, self%viscous)
   end subroutine add_viscosity
 
-  !> Velocity of the faces before the pressure stage.
-  subroutine predict_faces(grid, solid, dt, flow, stage)
+  !> Stage 12: velocity of the faces before the pressure.
+  subroutine predict_faces(self, case, grid, solid, dt, flow, scratch)
+    class(monolithic_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    type(scratch_t), intent(inout) :: scratch
 
-    stage%foreseen%x = stage%bodies%x
-    stage%foreseen%motion = stage%at_start%motion + stage%trend
+    associate (unused => case)
+    end associate
+    self%foreseen%x = self%bodies%x
+    self%foreseen%motion = self%at_start%motion + self%trend
     call fill_velocity_halo(grid, flow%u, layers=1)
-    call halo_exchange(stage%acceleration%cell, n_halo, layers=1)
-    associate (a => stage%acceleration, links => stage%links, &
-               given => stage%mid_step%takes_part, in_liquid => stage%mid_step%in_liquid)
+    call halo_exchange(self%acceleration%cell, n_halo, layers=1)
+    associate (a => self%acceleration, links => self%links, &
+               given => self%mid_step%takes_part, in_liquid => self%mid_step%in_liquid)
       call find_liquid(grid, flow, in_liquid, among=given)   ! the surface may have come
-      if (stage%implicit_momentum) then
-        call predict_face_velocity(grid, dt, stage%rho, a, flow)
+      if (self%implicit_momentum) then
+        call predict_face_velocity(grid, dt, self%rho, a, flow)
       else
-        call predict_face_velocity(grid, dt, stage%rho, a, flow, stage%deviation, given, in_liquid)
-        if (allocated(stage%deviation)) call swap(flow%solid_flux, stage%deviation)
-        call shorten_at_walls(grid, dt, stage%bodies, links%cell(:, :links%n), links%body, &
-                              links%number, in_liquid, stage%rho, a, flow)
+        call predict_face_velocity(grid, dt, self%rho, a, flow, self%deviation, given, in_liquid)
+        call give(scratch, self%deviation)
+        call shorten_at_walls(grid, dt, self%bodies, links%cell(:, :links%n), links%body, &
+                              links%number, in_liquid, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, stage%at_start, stage%foreseen, links%slip, dt, &
-                                  stage%implicit_momentum, given, in_liquid, stage%rho, a, flow)
-      if (stage%implicit_momentum) then
-        call renew_acceleration(dt, flow, stage)
+      call face_velocity_at_walls(grid, solid, self%at_start, self%foreseen, links%slip, dt, &
+                                  self%implicit_momentum, given, in_liquid, self%rho, a, flow)
+      if (self%implicit_momentum) then
+        call renew_acceleration(dt, flow, self)
       else
-        call add_whole(grid, dt, a%cell, stage%mid_step, flow%u)
+        call add_whole(grid, dt, a%cell, self%mid_step, flow%u)
       end if
     end associate
   end subroutine predict_faces
 
-  !> Pressure and motion of the bodies in one solve. What the fluid at the walls owes the bodies
-  !! (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure follows in a
-  !! second solve; the little that this one changes of it is left to the next step.
-  subroutine find_pressure(grid, solid, dt, flow, stage, report)
+  !> Stage 13: pressure and motion of the bodies in one solve. What the fluid at the walls owes the
+  !! bodies (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure
+  !! follows in a second solve; the little that this one changes of it is left to the next step.
+  subroutine project(self, case, grid, solid, dt, flow, scratch, report)
+    class(monolithic_t), intent(inout) :: self
+    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-    type(stage_report_t), intent(inout) :: report
-    real(wp) :: from_faces(6, stage%bodies%n), from_walls(6, stage%bodies%n)
+    type(scratch_t), intent(inout) :: scratch
+    type(coupling_report_t), intent(inout) :: report
+    real(wp) :: from_faces(6, self%bodies%n), from_walls(6, self%bodies%n)
     integer :: solve, b
 
-    stage%total = 0.0_wp
-    associate (bodies => stage%bodies, links => stage%links, balance => stage%balance, &
-               pressure => stage%pressure)
+    self%total = 0.0_wp
+    associate (bodies => self%bodies, links => self%links, balance => self%balance, &
+               pressure => self%pressure)
       do solve = 1, 2
         pressure%rough = solve == 1 .and. any(bodies%free)
-        call solve_pressure(grid, solid, stage%rho, dt, flow, bodies, pressure)
+        call solve_pressure(grid, solid, self%rho, dt, flow, bodies, pressure)
         report%pressure = added(report%pressure, pressure%report)
-        call correct_cells(grid, solid, dt, flow, stage)
+        call correct_cells(grid, solid, dt, flow, self)
         call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
                               from_faces)
-        stage%total = stage%total + from_faces
-        call force_of_walls(grid, solid, links, bodies, stage%at_start, dt, stage%rho, balance, &
+        self%total = self%total + from_faces
+        call force_of_walls(grid, solid, links, bodies, self%at_start, dt, self%rho, balance, &
                             from_walls)
         if (solve == 1) then
-          stage%late = from_walls
+          self%late = from_walls
           if (.not. any(bodies%free)) exit
-          call push_bodies(dt, stage%late, bodies)
+          call push_bodies(dt, self%late, bodies)
         end if
       end do
-      stage%total = stage%total + stage%late
+      self%total = self%total + self%late
       do b = 1, bodies%n
-        stage%late(:, b) = merge(from_walls(:, b) - stage%late(:, b), 0.0_wp, bodies%free(b))
+        self%late(:, b) = merge(from_walls(:, b) - self%late(:, b), 0.0_wp, bodies%free(b))
       end do
       call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
+      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
+                           pressure%system%active, pressure%known, pressure%closed, flow%p)
+      call give_faces(scratch, pressure%system%operator%cf)
     end associate
-  end subroutine find_pressure
+    call sum_forces(dt, self)
+    report%viscous_converged = self%viscous%converged
+  end subroutine project
+
+  !> Stage 14: the velocity of all the fluid in a face, held fluid included, and the flux of the
+  !! solids; what the walls owe the bodies is left to the next step.
+  subroutine close_faces(self, grid, solid, flow, blocks, report)
+    class(monolithic_t), intent(inout) :: self
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(flow_t), intent(inout) :: flow
+    type(blocks_t), intent(inout) :: blocks
+    type(coupling_report_t), intent(inout) :: report
+
+    associate (unused => report)
+    end associate
+    blocks%late_force = self%late(:, :blocks%n)
+    call all_fluid_of_faces(grid, solid, self%bodies, self%pressure%system%operator%flux, &
+                            flow%uf, flow%solid_flux)
+  end subroutine close_faces
 
   !> Report of two solves of a step.
   pure function added(first, second) result(both)
@@ -288,110 +442,72 @@ contains
   end function added
 
   !> What the new pressure does to the cells.
-  subroutine correct_cells(grid, solid, dt, flow, stage)
+  subroutine correct_cells(grid, solid, dt, flow, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
+    class(monolithic_t), intent(inout) :: self
     real(wp), parameter :: weightless(3) = 0.0_wp
 
-    associate (a => stage%acceleration)
-      call face_acceleration(grid, weightless, stage%rho, stage%rho, stage%pressure%phi_total, &
+    associate (a => self%acceleration)
+      call face_acceleration(grid, weightless, self%rho, self%rho, self%pressure%phi_total, &
                              a%face, flow%sides)
-      call accelerations_of_groups(grid, solid, dt, stage%bodies%motion - stage%counted, stage)
-      stage%counted = stage%bodies%motion
+      call accelerations_of_groups(grid, solid, dt, self%bodies%motion - self%counted, self)
+      self%counted = self%bodies%motion
       call add_product(grid, dt, a%cell, flow%u)
     end associate
   end subroutine correct_cells
 
   !> Force and torque of the step on each body, the inertia of the fluid that no face counts
   !! included, by the acceleration that the solve has found.
-  subroutine sum_forces(dt, stage)
+  subroutine sum_forces(dt, self)
     real(wp), intent(in) :: dt
-    type(stage_t), intent(inout) :: stage
+    class(monolithic_t), intent(inout) :: self
     integer :: b
 
-    associate (bodies => stage%bodies)
-      stage%total = stage%total + stage%from_pressure + stage%from_level + stage%viscous%force
+    associate (bodies => self%bodies)
+      self%total = self%total + self%from_pressure + self%from_level + self%viscous%force
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
-        stage%total(:, b) = stage%total(:, b) + &
-          matmul(bodies%lack(:, :, b), bodies%motion(:, b) - stage%dry_motion(:, b))/dt
+        self%total(:, b) = self%total(:, b) + &
+          matmul(bodies%lack(:, :, b), bodies%motion(:, b) - self%dry_motion(:, b))/dt
       end do
     end associate
   end subroutine sum_forces
 
   !> Give the bodies the inertia of the fluid that the faces do not count, and `from_level` its
   !! force as far as it is known before the solve: -lack (g - a), a by weight and contact.
-  subroutine count_fluid(gravity, dt, stage)
+  subroutine count_fluid(gravity, dt, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
-    type(stage_t), intent(inout) :: stage
+    class(monolithic_t), intent(inout) :: self
     real(wp) :: lack(6, 6)
     integer :: b
 
-    do b = 1, size(stage%lack, 3)
-      stage%from_level(:, b) = -matmul(stage%lack(:, :, b), gravity)
-      if (.not. stage%bodies%free(b)) cycle
+    do b = 1, size(self%lack, 3)
+      self%from_level(:, b) = -matmul(self%lack(:, :, b), gravity)
+      if (.not. self%bodies%free(b)) cycle
       lack = 0.0_wp
-      lack(:, 1:3) = stage%lack(:, :, b)
+      lack(:, 1:3) = self%lack(:, :, b)
       lack(1:3, 4:6) = transpose(lack(4:6, 1:3))
-      call set_inertia(b, stage%bodies, lack)
-      stage%from_level(:, b) = stage%from_level(:, b) + &
-        matmul(stage%bodies%lack(:, :, b), &
-               stage%bodies%motion(:, b) - stage%at_start%motion(:, b))/dt
+      call set_inertia(b, self%bodies, lack)
+      self%from_level(:, b) = self%from_level(:, b) + &
+        matmul(self%bodies%lack(:, :, b), &
+               self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
     end do
   end subroutine count_fluid
 
-  !> Face velocity of the start made free of divergence, and the pressure of the fluid under gravity
-  !! around bodies held in place, so that the first step starts from a balance.
-  subroutine start_flow(case, grid, solid, flow, stage, converged)
-    type(case_t), intent(in) :: case
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    type(flow_t), intent(inout) :: flow
-    type(stage_t), intent(inout) :: stage
-    logical, intent(out) :: converged
-    type(rigid_motion_t) :: held
-    real(wp), allocatable :: uf(:, :, :, :)
-
-    held = stage%bodies
-    held%free = .false.
-    associate (p => stage%pressure, system => stage%pressure%system, a => stage%acceleration, &
-               dt => case%run%dt)
-      call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
-      call build_rigid_flux(grid, solid, held, system%active, system%operator%flux)
-      call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
-      converged = p%report%converged
-      allocate (uf, source=flow%uf)
-      held%motion = 0.0_wp
-      flow%p = 0.0_wp
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, flow%rho, flow%p, a%face, &
-                             flow%sides)
-      call find_surface_force(case%fluid, grid, solid, flow%c, stage)
-      call add_tension(grid, flow%rho, stage%tension, a%face)
-      call return_surface_force(stage)
-      flow%uf = dt*a%face
-      call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
-      converged = converged .and. p%report%converged
-      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
-                           p%known, p%closed, flow%p)
-      flow%uf = uf
-      call all_fluid_of_faces(grid, solid, stage%bodies, system%operator%flux, flow%uf, &
-                              flow%solid_flux)
-    end associate
-  end subroutine start_flow
-
   !> Force and torque of the fluid on bodies that are let go, with the pressure by which they
   !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.
-  subroutine begin_motion(case, grid, solid, begins, flow, stage, force)
+  subroutine force_at_release(self, case, grid, solid, begins, flow, scratch, force)
+    class(monolithic_t), intent(inout) :: self   !! its bodies in place
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     logical, intent(in) :: begins(:)         !! (blocks) those let go; all others are held
     type(flow_t), intent(inout) :: flow      !! only its pressure changes
-    type(stage_t), intent(inout) :: stage    !! its bodies in place
+    type(scratch_t), intent(inout) :: scratch
     real(wp), intent(out) :: force(:, :)     !! (6, bodies), of those let go [N, N m]
     real(wp), parameter :: weightless(3) = 0.0_wp
     real(wp), allocatable :: uf(:, :, :, :), solid_flux(:, :, :, :)
@@ -399,38 +515,40 @@ contains
     real(wp) :: a(6)
     integer :: b
 
-    moving = stage%bodies
+    moving = self%bodies
     allocate (uf, source=flow%uf)
     allocate (solid_flux, source=flow%solid_flux)
-    call displaced_force(grid, case%fluid, solid, stage%bodies, flow%c, force)
-    associate (bodies => stage%bodies, system => stage%pressure%system, dt => case%run%dt)
+    call displaced_force(grid, case%fluid, solid, self%bodies, flow%c, force)
+    associate (bodies => self%bodies, system => self%pressure%system, dt => case%run%dt)
       bodies%motion = 0.0_wp
       do b = 1, bodies%n
         bodies%free(b) = .false.
         if (b <= size(begins)) bodies%free(b) = moving%free(b) .and. begins(b)
         force(1:3, b) = force(1:3, b) + bodies%mass(b)*case%fluid%gravity
       end do
-      stage%at_start = bodies
+      self%at_start = bodies
+      call take_faces(scratch, system%operator%cf)
       call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
-      stage%lack = uncounted_fluid(grid, case%fluid, solid, bodies, system%operator%flux, flow)
-      call count_fluid(weightless, dt, stage)
+      self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, system%operator%flux, flow)
+      call count_fluid(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
-      stage%pressure%rough = .false.
-      call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, stage%pressure)
+      self%pressure%rough = .false.
+      call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, self%pressure)
       do b = 1, bodies%n
         a = bodies%motion(:, b)/dt
         force(1:3, b) = bodies%mass(b)*(a(1:3) - case%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
       end do
       call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
-                           stage%pressure%known, stage%pressure%closed, flow%p)
+                           self%pressure%known, self%pressure%closed, flow%p)
+      call give_faces(scratch, system%operator%cf)
     end associate
-    stage%bodies = moving
+    self%bodies = moving
     call move_alloc(uf, flow%uf)
     call move_alloc(solid_flux, flow%solid_flux)
-  end subroutine begin_motion
+  end subroutine force_at_release
 
   !> Cells in a body that hold no film move with it.
   subroutine impose_rigid_velocity(grid, solid, links, bodies, u)

@@ -11,12 +11,12 @@
 !! volume.
 module liquid_transport_m
   use kinds_m, only: wp
-  use swap_m, only: swap
   use grid_m, only: grid_t
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
   use solid_geometry_m, only: solid_geometry_t
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
+  use elliptic_solver_m, only: elliptic_solver_t
   use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
@@ -26,7 +26,7 @@ module liquid_transport_m
   implicit none
   private
   public :: liquid_transport_t, liquid_transport_init
-  public :: transport_liquid, begin_transport, begin_part, sweep, small_cells, finish_transport
+  public :: begin_transport, begin_part, sweep, small_cells, finish_transport
 
   !> The six orders of the directions.
   integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 1, 3, 2, &
@@ -56,7 +56,6 @@ contains
 
     call open_flux_init(grid, self%flux)
     call carried_volumes_init(grid, self%volumes)
-    deallocate (self%volumes%w, self%volumes%v, self%volumes%c)   ! those of the flow
     call liquid_sweep_init(grid, gravity, self%sweeps)
     call small_cells_init(grid, self%small)
     call extended_fraction_init(gravity, self%extension)
@@ -64,59 +63,29 @@ contains
     allocate (self%side(2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))), source=0.0_wp)
   end subroutine liquid_transport_init
 
-  !> The whole transport of one step, for callers that carry nothing else.
-  subroutine transport_liquid(grid, old, new, dt, step, self, flow)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old, new   !! bodies at the begin and the end of the step
-    real(wp), intent(in) :: dt     !! [s]
-    integer, intent(in) :: step    !! number of the step; it picks the order of the directions
-    type(liquid_transport_t), intent(inout) :: self
-    type(flow_t), intent(inout) :: flow
-    integer :: n, part
-
-    call begin_transport(grid, old, new, dt, self, flow)
-    do part = 1, self%parts
-      call begin_part(grid, old, part, step, self)
-      do n = 1, 3
-        call sweep(grid, old, self%order(n), self)
-      end do
-      call small_cells(grid, self)
-    end do
-    call finish_transport(grid, new, self, flow)
-  end subroutine transport_liquid
-
   !> Volumes through the faces in a part of the step, running values.
-  subroutine begin_transport(grid, old, new, dt, self, flow)
+  subroutine begin_transport(grid, old, new, dt, solver, self, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
     real(wp), intent(in) :: dt
+    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances
     type(liquid_transport_t), intent(inout) :: self
-    type(flow_t), intent(inout) :: flow   !! liquid, room, c (halo filled) and uf of the begin;
-                                          !! the first three are taken until the transport is over
+    type(flow_t), intent(in) :: flow   !! liquid, room, c (halo filled) and uf of the begin
     integer :: k
 
-    call find_open_flux(grid, old, new, dt, flow, self%flux, self%volumes%q)
-    call swap_fields(flow, self%volumes)
-    if (self%parts > 1) then
-      !$omp parallel do schedule(static)
-      do k = grid%first(3), grid%last(3)
-        self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :)/real(self%parts, wp)
-      end do
-    end if
+    call find_open_flux(grid, old, new, dt, flow, solver, self%flux, self%volumes%q)
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      self%volumes%w(:, :, k) = flow%liquid(:, :, k)
+      self%volumes%v(:, :, k) = flow%room(:, :, k)
+      self%volumes%c(:, :, k) = flow%c(:, :, k)
+      if (self%parts > 1) self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :) &
+                                                       /real(self%parts, wp)
+    end do
     self%sweeps%clamped = 0.0_wp
     self%small%converged = .true.
     self%inflow = 0.0_wp
   end subroutine begin_transport
-
-  !> Liquid, open volume and C^ of the flow run in its own arrays; called once more, they are back.
-  subroutine swap_fields(flow, volumes)
-    type(flow_t), intent(inout) :: flow
-    type(carried_volumes_t), intent(inout) :: volumes
-
-    call swap(flow%liquid, volumes%w)
-    call swap(flow%room, volumes%v)
-    call swap(flow%c, volumes%c)
-  end subroutine swap_fields
 
   !> The order of the directions and the small cells of an equal part of the step.
   !!
@@ -186,8 +155,14 @@ contains
     type(solid_geometry_t), intent(in) :: new   !! bodies at the end of the step
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
+    integer :: k
 
-    call swap_fields(flow, self%volumes)
+    !$omp parallel do schedule(static)
+    do k = grid%first(3), grid%last(3)
+      flow%liquid(:, :, k) = self%volumes%w(:, :, k)
+      flow%room(:, :, k) = self%volumes%v(:, :, k)
+      flow%c(:, :, k) = self%volumes%c(:, :, k)
+    end do
     call fill_scalar_halo(grid, flow%liquid)
     call fill_scalar_halo(grid, flow%room)
     call extend_fraction(grid, new, self%extension, flow)

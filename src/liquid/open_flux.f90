@@ -24,7 +24,7 @@ module open_flux_m
                          find_parts, sum_by_part, drop_part, find_open_lines
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
-  use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
+  use elliptic_solver_m, only: elliptic_solver_t
   use solve_control_m, only: solve_control_t, solve_report_t
   use parallel_m, only: halo_exchange, global_max
   implicit none
@@ -43,7 +43,6 @@ module open_flux_m
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
     type(flux_band_t) :: band
-    type(elliptic_solver_t), allocatable :: solver   !! of the potential for the rests r [V]
   end type open_flux_t
 
 contains
@@ -54,16 +53,15 @@ contains
     type(open_flux_t), intent(out) :: self
 
     call flux_band_init(grid, self%band)
-    allocate (self%solver)
-    call elliptic_solver_init(grid, self%solver)
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
-  subroutine find_open_flux(grid, old, new, dt, flow, self, q)
+  subroutine find_open_flux(grid, old, new, dt, flow, solver, self, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies before and after the step
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(in) :: flow   !! carried open volume `room`, velocity `uf` of the open part
+    type(elliptic_solver_t), intent(inout) :: solver   !! of the potential for the rests r [V]
     type(open_flux_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m3]
@@ -84,12 +82,12 @@ contains
     end if
     call balance_parts(self, balanced)
     if (balanced) return
-    call solve_potential(self)
-    call correct_flux(grid, self%band, self%solver%x, q)
+    call solve_potential(solver, self)
+    call correct_flux(grid, self%band, solver%x, q)
   end subroutine find_open_flux
 
   !> The band, its conductances and parts; no parts without solids. If the bodies are where they
-  !! were in the last step only the conductances are found again, whose array is borrowed.
+  !! were in the last step only the conductances are found again, which stand in a work array.
   subroutine find_band(grid, old, new, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
@@ -378,19 +376,18 @@ contains
   end subroutine balance_parts
 
   !> Solve `sum_f k_f (phi_c - phi_nb) = r_c` on the band; the potential is zero elsewhere.
-  subroutine solve_potential(self)
+  subroutine solve_potential(s, self)
+    type(elliptic_solver_t), intent(inout) :: s
     type(open_flux_t), intent(inout) :: self
     type(solve_report_t) :: report   ! the next step makes good what is left
 
-    associate (s => self%solver)
-      call put_balances(self%band, lbound(s%rhs), s%rhs, s%x)
-      call find_open_lines(self%band%k, self%band%line)
-      s%work%line = self%band%line
-      s%work%singular = .false.   ! parts without an open side have been balanced
-      call s%multigrid%setup(self%band%k)
-      call conjugate_gradient(self%band, s%multigrid, s%rhs, s%x, self%control, report, s%work)
-      call halo_exchange(s%x, 1)
-    end associate
+    call put_balances(self%band, lbound(s%rhs), s%rhs, s%x)
+    call find_open_lines(self%band%k, self%band%line)
+    s%work%line = self%band%line
+    s%work%singular = .false.   ! parts without an open side have been balanced
+    call s%multigrid%setup(self%band%k)
+    call conjugate_gradient(self%band, s%multigrid, s%rhs, s%x, self%control, report, s%work)
+    call halo_exchange(s%x, 1)
     self%iterations = report%iterations
     self%residual = report%residual
   end subroutine solve_potential

@@ -1,22 +1,20 @@
 !> Liquid and momentum through the faces that the moving bodies leave open, in one step.
 module fluid_transport_m
   use kinds_m, only: wp
-  use swap_m, only: swap
   use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t
+  use scratch_m, only: scratch_t, take, give, take_faces, give_faces, clear
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use mixture_m, only: mix_fluid
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    begin_part, finish_transport, transport_liquid
+                                begin_part, sweep, small_cells, finish_transport
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_late
-  use viscous_system_m, only: viscous_t
   use elliptic_solver_m, only: elliptic_solver_t
-  use pressure_m, only: pressure_t
   implicit none
   private
-  public :: fluid_transport_t, fluid_transport_init, span_t, carry_fluid
+  public :: fluid_transport_t, fluid_transport_init, span_t, fit_fluxes, carry_fluid, &
+            finish_carrying, fluxes_of_step
 
   real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: a cell gives less than it has
   integer, parameter :: max_parts = 100        !! of one step
@@ -24,6 +22,7 @@ module fluid_transport_m
   type :: fluid_transport_t
     type(liquid_transport_t) :: liquid
     type(momentum_t) :: momentum
+    logical :: carries_momentum = .true.   !! with the liquid; C-ISMAC does it in its predictor
   end type fluid_transport_t
 
   !> The step at hand.
@@ -35,10 +34,11 @@ module fluid_transport_m
 
 contains
 
-  !> Allocate what the transport does not borrow, and tell what enters through the sides.
-  subroutine fluid_transport_init(case, grid, self)
+  !> Allocate, and tell what enters through the sides; work arrays go to the pool.
+  subroutine fluid_transport_init(case, grid, scratch, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
+    type(scratch_t), intent(inout) :: scratch
     type(fluid_transport_t), intent(out) :: self
 
     call liquid_transport_init(grid, case%fluid%gravity, self%liquid)
@@ -47,82 +47,114 @@ contains
     else
       self%liquid%sweeps%level = case%fluid%water_level
     end if
-    deallocate (self%liquid%flux%solver, self%liquid%flux%band%k)
-    deallocate (self%liquid%volumes%w_before, self%liquid%volumes%v_before)
-    if (case%numerics%momentum == 'c_ismac') return
-    call momentum_init(grid, self%momentum, case%numerics%advection)
-    deallocate (self%liquid%volumes%q, self%liquid%volumes%g, self%momentum%momentum)
+    self%carries_momentum = case%numerics%momentum /= 'c_ismac'
+    if (self%carries_momentum) call momentum_init(grid, self%momentum, case%numerics%advection)
+    call give_arrays(scratch, self)
+    call clear(scratch)
   end subroutine fluid_transport_init
 
-  !> Borrow solver and coefficients of the pressure and arrays of the viscous stage, which need them
-  !! later in the step and keep nothing there; called once more, give them back. Nothing is copied.
-  subroutine borrow(viscous, pressure, self)
-    type(viscous_t), intent(inout) :: viscous
-    type(pressure_t), intent(inout) :: pressure
+  !> Arrays over the cells from the pool, which nobody needs after the transport.
+  subroutine take_arrays(scratch, self)
+    type(scratch_t), intent(inout) :: scratch
     type(fluid_transport_t), intent(inout) :: self
-    type(elliptic_solver_t), allocatable :: other
 
-    associate (system => pressure%system, flux => self%liquid%flux, volumes => self%liquid%volumes)
-      call move_alloc(system%solver, other)
-      call move_alloc(flux%solver, system%solver)
-      call move_alloc(other, flux%solver)
-      call swap(system%operator%cf, flux%band%k)
-      call swap(pressure%phi_total, volumes%w_before)
-      call swap(viscous%mass, volumes%v_before)
+    associate (volumes => self%liquid%volumes)
+      call take(scratch, volumes%w)
+      call take(scratch, volumes%v)
+      call take(scratch, volumes%c)
+      call take(scratch, volumes%w_before)
+      call take(scratch, volumes%v_before)
+      call take(scratch, volumes%q)
+      call take(scratch, volumes%g)
     end associate
-    if (allocated(self%momentum%mixed_near)) then
-      call swap(viscous%r, self%liquid%volumes%q)
-      call swap(viscous%s, self%liquid%volumes%g)
-      call swap(viscous%y, self%momentum%momentum)
-    end if
-  end subroutine borrow
+    call take_faces(scratch, self%liquid%flux%band%k)
+    if (self%carries_momentum) call take(scratch, self%momentum%momentum)
+  end subroutine take_arrays
 
-  !> Carry liquid and momentum, direction by direction; new density and viscosity. With C-ISMAC
-  !! momentum waits for the predictor, which uses the volumes of the same parts.
-  subroutine carry_fluid(case, grid, before, after, span, flow, viscous, pressure, self)
-    type(case_t), intent(in) :: case
+  !> And give them back.
+  subroutine give_arrays(scratch, self)
+    type(scratch_t), intent(inout) :: scratch
+    type(fluid_transport_t), intent(inout) :: self
+
+    associate (volumes => self%liquid%volumes)
+      call give(scratch, volumes%w)
+      call give(scratch, volumes%v)
+      call give(scratch, volumes%c)
+      call give(scratch, volumes%w_before)
+      call give(scratch, volumes%v_before)
+      call give(scratch, volumes%q)
+      call give(scratch, volumes%g)
+    end associate
+    call give_faces(scratch, self%liquid%flux%band%k)
+    if (self%carries_momentum) call give(scratch, self%momentum%momentum)
+  end subroutine give_arrays
+
+  !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
+  subroutine fit_fluxes(grid, before, after, span, flow, scratch, solver, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
     type(span_t), intent(in) :: span
-    type(flow_t), intent(inout) :: flow   !! halos filled on entry and return
-    type(viscous_t), intent(inout) :: viscous            !! lends arrays
-    type(pressure_t), intent(inout) :: pressure          !! lends its solver and arrays
+    type(flow_t), intent(in) :: flow   !! halos filled
+    type(scratch_t), intent(inout) :: scratch
+    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
     type(fluid_transport_t), intent(inout) :: self
 
     self%liquid%parts = parts_of_step(span%courant)
-    call borrow(viscous, pressure, self)
-    if (case%numerics%momentum == 'c_ismac') then
-      call transport_liquid(grid, before, after, span%dt, span%number, self%liquid, flow)
-    else
-      call carry_all(case%fluid, grid, before, after, span, flow, self%liquid, self%momentum)
-    end if
-    call borrow(viscous, pressure, self)
-    call mix_fluid(case%fluid, flow)
-  end subroutine carry_fluid
+    call take_arrays(scratch, self)
+    call begin_transport(grid, before, after, span%dt, solver, self%liquid, flow)
+  end subroutine fit_fluxes
 
-  !> Liquid and momentum together.
-  subroutine carry_all(fluid, grid, before, after, span, flow, liquid, momentum)
+  !> Stage 7: liquid and momentum pass the faces, direction by direction, small cells last. With
+  !! C-ISMAC momentum waits for the predictor, which uses the volumes of the same parts.
+  subroutine carry_fluid(fluid, grid, before, span, flow, self)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: before, after
+    type(solid_geometry_t), intent(in) :: before   !! bodies at the start of the step
     type(span_t), intent(in) :: span
-    type(flow_t), intent(inout) :: flow
-    type(liquid_transport_t), intent(inout) :: liquid
-    type(momentum_t), intent(inout) :: momentum
+    type(flow_t), intent(inout) :: flow            !! its velocity
+    type(fluid_transport_t), intent(inout) :: self
     integer :: n, part
 
-    call begin_transport(grid, before, after, span%dt, liquid, flow)
-    do part = 1, liquid%parts
-      call begin_part(grid, before, part, span%number, liquid)
-      call momentum_begin(grid, fluid, liquid%volumes%w, liquid%volumes%v, liquid%volumes%c, &
-                          flow%u, momentum)
-      do n = 1, 3
-        call momentum_sweep(grid, fluid, before, liquid%order(n), liquid, flow%u, momentum)
+    associate (liquid => self%liquid, volumes => self%liquid%volumes, momentum => self%momentum)
+      do part = 1, liquid%parts
+        call begin_part(grid, before, part, span%number, liquid)
+        if (self%carries_momentum) then
+          call momentum_begin(grid, fluid, volumes%w, volumes%v, volumes%c, flow%u, momentum)
+          do n = 1, 3
+            call momentum_sweep(grid, fluid, before, liquid%order(n), liquid, flow%u, momentum)
+          end do
+          call momentum_late(grid, fluid, liquid, flow%u, momentum)
+        else
+          do n = 1, 3
+            call sweep(grid, before, liquid%order(n), liquid)
+          end do
+          call small_cells(grid, liquid)
+        end if
       end do
-      call momentum_late(grid, fluid, liquid, flow%u, momentum)
-    end do
-    call finish_transport(grid, after, liquid, flow)
-  end subroutine carry_all
+    end associate
+  end subroutine carry_fluid
+
+  !> Volumes that passed the lower faces in the whole step.
+  subroutine fluxes_of_step(grid, self, q)
+    type(grid_t), intent(in) :: grid
+    type(fluid_transport_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m3]
+
+    q = self%liquid%parts*self%liquid%volumes%q
+  end subroutine fluxes_of_step
+
+  !> The liquid in the cells and its share C, at the end of the step.
+  subroutine finish_carrying(grid, after, flow, scratch, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: after   !! bodies at the end of the step
+    type(flow_t), intent(inout) :: flow           !! halos filled on return
+    type(scratch_t), intent(inout) :: scratch
+    type(fluid_transport_t), intent(inout) :: self
+
+    call finish_transport(grid, after, self%liquid, flow)
+    call give_arrays(scratch, self)
+  end subroutine finish_carrying
 
   !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
   !! number that the sweeps can follow.

@@ -101,8 +101,7 @@ contains
     call fill_velocity_halo(grid, flow%u)
   end subroutine to_mid_step
 
-  !> Weight and old pressure in the cells that take part: the second half, or all where nothing was
-  !! given before.
+  !> The second half of weight and old pressure in the cells that take part.
   subroutine add_second_half(grid, dt, a, self, u)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
@@ -111,8 +110,7 @@ contains
     type(mid_step_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call add_where(grid, merge(0.5_wp, 1.0_wp, allocated(self%given))*dt, a, self%takes_part, &
-                   .true., u)
+    call add_where(grid, 0.5_wp*dt, a, self%takes_part, .true., u)
   end subroutine add_second_half
 
   !> Weight and old pressure in all other cells.

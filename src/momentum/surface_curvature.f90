@@ -32,20 +32,15 @@ module surface_curvature_m
 
 contains
 
-  !> Room for the fields that are neither there nor lent.
+  !> Allocate what stays from step to step; `place` and `curvature` are work arrays of the caller.
   subroutine surface_curvature_init(grid, self)
     type(grid_t), intent(in) :: grid
-    type(surface_curvature_t), intent(inout) :: self
+    type(surface_curvature_t), intent(out) :: self
     integer, parameter :: first_size = 1024
     integer :: a(3), b(3)
 
     a = grid%first
     b = grid%last
-    if (.not. allocated(self%curvature)) then
-      allocate (self%curvature(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    end if
-    if (.not. allocated(self%place)) allocate (self%place(a(1):b(1), a(2):b(2), a(3):b(3), 3))
-    if (allocated(self%state)) return
     allocate (self%state(a(1):b(1), a(2):b(2), a(3):b(3)), source=no_surface)
     allocate (self%cell(3, first_size), self%value(first_size))
   end subroutine surface_curvature_init

@@ -24,7 +24,7 @@ module surface_tension_m
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
-  public :: surface_tension_t, find_tension, add_tension, force_from_tension
+  public :: surface_tension_t, surface_tension_init, find_tension, add_tension, force_from_tension
 
   integer, parameter :: worth_threads = 1000   !! fewer faces of bodies are the work of one thread
 
@@ -36,6 +36,18 @@ module surface_tension_m
 
 contains
 
+  !> What stays from step to step: nothing in one fluid, which has no surface, little without
+  !! tension. Force, places and curvature are work arrays of the caller.
+  subroutine surface_tension_init(grid, fluid, self)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(surface_tension_t), intent(out) :: self
+
+    self%acts = .not. fluid%single_phase
+    if (.not. self%acts .or. fluid%surface_tension <= 0.0_wp) return
+    call surface_curvature_init(grid, self%surface)
+  end subroutine surface_tension_init
+
   !> Curvature of the surface and its force at all faces of own cells.
   subroutine find_tension(grid, fluid, solid, c, self)
     type(grid_t), intent(in) :: grid
@@ -46,9 +58,7 @@ contains
     type(surface_tension_t), intent(inout) :: self
     integer :: k
 
-    self%acts = .not. fluid%single_phase
     if (.not. self%acts) return
-    call allocate_tension(grid, fluid%surface_tension, self)
     !$omp parallel do schedule(static)
     do k = lbound(self%force, 3), ubound(self%force, 3)
       self%force(:, :, k, :) = 0.0_wp
@@ -58,19 +68,6 @@ contains
     call find_curvature(grid, solid, c, self%surface)
     call force_at_faces(grid, fluid%surface_tension, c, self)
   end subroutine find_tension
-
-  !> Room for the fields that are neither there nor lent.
-  subroutine allocate_tension(grid, sigma, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: sigma   !! [N/m]
-    type(surface_tension_t), intent(inout) :: self
-    integer :: a(3), b(3)
-
-    a = grid%first
-    b = grid%last
-    if (.not. allocated(self%force)) allocate (self%force(a(1):b(1), a(2):b(2), a(3):b(3), 3))
-    if (sigma > 0.0_wp) call surface_curvature_init(grid, self%surface)
-  end subroutine allocate_tension
 
   !> Force at the lower faces: the curvature of a face is the mean of its cells that have one. None
   !! on the sides of the domain.

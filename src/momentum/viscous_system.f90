@@ -6,10 +6,11 @@ module viscous_system_m
   use vectors_m, only: cross
   use growing_m, only: ensure_room
   use grid_m, only: grid_t
+  use scratch_m, only: scratch_t, take, give
   implicit none
   private
   public :: viscous_t, wall_legs_t, viscous_init, add_wall, room_for_walls, set_wall, add_side
-  public :: wrench
+  public :: wrench, take_arrays, give_arrays
 
   !> Legs between cells and bodies, grouped by body.
   type :: wall_legs_t
@@ -96,6 +97,32 @@ contains
                 walls%found_arm(3, 0))
     end associate
   end subroutine viscous_init
+
+  !> Take the arrays over the cells, whose content is undefined, for a stage.
+  subroutine take_arrays(scratch, self)
+    type(scratch_t), intent(inout) :: scratch
+    type(viscous_t), intent(inout) :: self
+
+    call take(scratch, self%mass)
+    call take(scratch, self%leg)
+    call take(scratch, self%diagonal)
+    call take(scratch, self%r)
+    call take(scratch, self%s)
+    call take(scratch, self%y)
+  end subroutine take_arrays
+
+  !> And give them back.
+  subroutine give_arrays(scratch, self)
+    type(scratch_t), intent(inout) :: scratch
+    type(viscous_t), intent(inout) :: self
+
+    call give(scratch, self%mass)
+    call give(scratch, self%leg)
+    call give(scratch, self%diagonal)
+    call give(scratch, self%r)
+    call give(scratch, self%s)
+    call give(scratch, self%y)
+  end subroutine give_arrays
 
   !> Note a wall leg of conductance k between a cell and a body.
   subroutine add_wall(self, c, body, k, arm)

@@ -47,7 +47,7 @@ module pressure_system_m
 
   type :: pressure_system_t
     type(pressure_operator_t) :: operator
-    type(elliptic_solver_t), allocatable :: solver   !! lent to the transport while it runs
+    type(elliptic_solver_t) :: solver   !! keeps nothing from one system to the next
     type(jacobi_t) :: jacobi
     type(identity_t) :: identity
     logical, allocatable :: active(:, :, :)   !! the cell has an open face
@@ -77,7 +77,6 @@ contains
     call rigid_flux_init(grid, n_bodies, self%operator%flux)
     self%operator%lo = grid%lo
     self%operator%hi = grid%hi
-    allocate (self%solver)
     call elliptic_solver_init(grid, self%solver)
   end subroutine pressure_system_init
 

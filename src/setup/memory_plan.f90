@@ -1,7 +1,7 @@
 !> How much memory a run will take, and whether it can have that.
 !!
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
-!! and both couplings (gfortran 12): 460 to 734 B for a cell, those of the halo counted, 1200 B
+!! and both couplings (gfortran 12): 510 to 780 B for a cell, those of the halo counted, 1200 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
 !! cells come on top (`make_room_for_all` in `flux_band_m`): 36 B for a cell.
 module memory_plan_m

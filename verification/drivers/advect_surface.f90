@@ -11,7 +11,8 @@ program advect_surface
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use boundary_m, only: fill_scalar_halo
   use extended_fraction_m, only: extend_fraction
-  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, transport_liquid
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init
+  use liquid_alone_m, only: transport_liquid
   use liquid_fill_m, only: liquid_volume
   use box_solid_m, only: simple_grid
   implicit none

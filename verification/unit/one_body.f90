@@ -10,7 +10,7 @@ module one_body_m
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
-  use velocity_stage_m, only: copy_motion
+  use coupling_m, only: copy_motion
   implicit none
   private
   public :: one_body_t, describe, place, wall_at, layer, random_numbers

@@ -2,11 +2,12 @@
 program test_coupling
   use kinds_m, only: wp
   use vectors_m, only: quaternion_from_axis
-  use rigid_body_m, only: begin_step, set_velocity_after_fluid
-  use monolithic_m, only: monolithic_stage, start_flow, begin_motion
-  use velocity_stage_m, only: stage_t, stage_report_t, stage_init, copy_motion
+  use rigid_body_m, only: begin_step
+  use scratch_m, only: scratch_t, scratch_init, take
+  use monolithic_m, only: monolithic_t, monolithic_init
+  use flow_start_m, only: start_flow
   use rigid_motion_m, only: set_inertia
-  use coupling_m, only: advance_velocity, note_start
+  use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
   use boundary_m, only: fill_velocity_halo
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -15,8 +16,9 @@ program test_coupling
     'slip', 'slip', 'slip', 'slip', 'slip', 'open'], [2, 3])
   real(wp), parameter :: dt = 1.0e-3_wp, g = 9.81_wp
   type(one_body_t) :: block
-  type(stage_t) :: stage
-  type(stage_report_t) :: report
+  type(monolithic_t) :: coupling
+  type(coupling_report_t) :: report
+  type(scratch_t) :: scratch
 
   call released_sphere(2.3_wp)
   call released_sphere(1.1_wp)
@@ -45,10 +47,8 @@ contains
     character(*), intent(in) :: kind
     real(wp), intent(in) :: size(3), density
     type(one_body_t) :: fresh
-    type(stage_t) :: fresh_stage
 
     block = fresh
-    stage = fresh_stage
     call describe(spread(cells, 1, 3), spread(0.01_wp*cells, 1, 3), tank, kind, size, &
                   spread(0.005_wp*cells, 1, 3) + [0.0013_wp, -0.0007_wp, 0.0021_wp], block%case)
     block%case%run%dt = dt
@@ -65,12 +65,41 @@ contains
     call place(block)
     block%flow%room = (1.0_wp - block%solid%alpha)*block%grid%volume
     block%flow%liquid = block%flow%room
-    call stage_init(block%grid, 1, block%case%numerics, stage)
-    call copy_motion(block%blocks, stage%bodies)
-    call start_flow(block%case, block%grid, block%solid, block%flow, stage, converged)
+    call scratch_init(block%grid, scratch)
+    call monolithic_init(block%grid, 1, block%case, scratch, coupling)
+    call copy_motion(block%blocks, coupling%bodies)
+    call start_flow(block%case, block%grid, block%solid, block%flow, scratch, coupling, &
+                    converged)
     call check('the start converged', converged)
     call fill_velocity_halo(block%grid, block%flow%u)
   end subroutine ready
+
+  !> Nothing has been given before the transport, and the faces are as their cells.
+  subroutine begin_without_past()
+    call take(scratch, coupling%deviation)
+    call take(scratch, coupling%mid_step%given)
+    coupling%deviation = 0.0_wp
+    coupling%mid_step%given = 0.0_wp
+  end subroutine begin_without_past
+
+  !> The stages of a step after the transport, of which `begin` may have gone before.
+  subroutine advance()
+    if (.not. allocated(coupling%deviation)) call begin_without_past()
+    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call stages()
+    call motion_after_fluid(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call coupling%close(block%grid, block%solid, block%flow, block%blocks, report)
+  end subroutine advance
+
+  !> Those between two looks at the motion of the block.
+  subroutine stages()
+    report = coupling_report_t()
+    call coupling%merge_cells(block%case, block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_forces(block%case, block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_viscosity(block%case, block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%predict_faces(block%case, block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%project(block%case, block%grid, block%solid, dt, block%flow, scratch, report)
+  end subroutine stages
 
   !> Before its first step the sphere has the force of that fall, and the fluid the pressure of it,
   !! at which its next step starts; nothing moves yet.
@@ -85,12 +114,13 @@ contains
     call ready()
     allocate (p, source=block%flow%p)
     allocate (uf, source=block%flow%uf)
-    call begin_motion(block%case, block%grid, block%solid, [.true.], block%flow, stage, force)
+    call coupling%force_at_release(block%case, block%grid, block%solid, [.true.], block%flow, &
+                                   scratch, force)
     a(1:3) = force(1:3, 1)/block%blocks%mass(1) - [0.0_wp, 0.0_wp, g]
     expected = (s - 1.0_wp)/(s + 0.5_wp)
     call check('let go: acceleration', -a(3)/g, expected, 0.02_wp*abs(expected))
     call check('let go: no velocity yet', maxval(abs(block%flow%uf - uf)) &
-               + maxval(abs(stage%bodies%motion)), 0.0_wp, 0.0_wp)
+               + maxval(abs(coupling%bodies%motion)), 0.0_wp, 0.0_wp)
     p = block%flow%p - p
     print '(a, 2f8.4)', 'let go: acceleration over theory, pressure over that of a dipole ', &
       -a(3)/(g*expected), (p(8, 8, 4) - p(8, 8, 13))/(-1000.0_wp*a(3)*dipole)
@@ -100,10 +130,9 @@ contains
     block%blocks%fluid_force(:, 1) = force(1:3, 1)
     block%blocks%fluid_torque(:, 1) = force(4:6, 1)
     call begin_step(block%blocks)
-    call note_start(block%case, block%grid, block%solid, dt, 0.0_wp, block%flow, block%blocks, &
-                    stage)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call coupling%begin(block%case, block%grid, block%solid, dt, 0.0_wp, block%flow, &
+                        block%blocks, scratch)
+    call advance()
     call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
                0.02_wp*abs(expected))
   end subroutine let_go
@@ -117,8 +146,7 @@ contains
     call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
     call ready()
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     a = block%blocks%v(:, 1)/dt
     force = block%blocks%fluid_force(:, 1) - block%blocks%mass(1)*[0.0_wp, 0.0_wp, g]
     call check('sphere: converged', report%pressure%converged .and. report%viscous_converged)
@@ -140,27 +168,26 @@ contains
     block%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
     call ready()
     call begin_step(block%blocks)
-    stage%total = 0.0_wp
-    call set_velocity_after_fluid(block%case%fluid%gravity, dt, stage%total(1:3, :), &
-                                  stage%total(4:6, :), block%blocks)
-    call copy_motion(block%blocks, stage%bodies)
-    motion = stage%bodies%motion(:, 1)
-    stage%at_start = stage%bodies
-    call monolithic_stage(block%case, block%grid, block%solid, dt, block%flow, stage, report)
-    gain(1:3) = block%blocks%mass(1)*(stage%bodies%motion(1:3, 1) - motion(1:3))
-    gain(4:6) = matmul(stage%bodies%inertia(:, :, 1), stage%bodies%motion(4:6, 1) - motion(4:6))
+    call begin_without_past()
+    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    motion = coupling%bodies%motion(:, 1)
+    coupling%at_start = coupling%bodies
+    call stages()
+    gain(1:3) = block%blocks%mass(1)*(coupling%bodies%motion(1:3, 1) - motion(1:3))
+    gain(4:6) = matmul(coupling%bodies%inertia(:, :, 1), &
+                       coupling%bodies%motion(4:6, 1) - motion(4:6))
     call check('box: converged', report%pressure%converged .and. report%viscous_converged)
     call check('box: divergence', report%pressure%divergence < 1.0e-8_wp)
     ! To the tolerance of the viscous solver.
     call check('box: momentum by the solve is that of the force', gain(1:3), &
-               dt*stage%total(1:3, 1), 1.0e-9_wp*norm2(gain(1:3)))
-    call check('box: spin by the solve is that of the torque', gain(4:6), dt*stage%total(4:6, 1), &
-               1.0e-7_wp*norm2(gain(4:6)))
+               dt*coupling%total(1:3, 1), 1.0e-9_wp*norm2(gain(1:3)))
+    call check('box: spin by the solve is that of the torque', gain(4:6), &
+               dt*coupling%total(4:6, 1), 1.0e-7_wp*norm2(gain(4:6)))
     call check('box: torque acts', norm2(gain(4:6)) > 1.0e-8_wp)
     arm = block%grid%centre(6, [1, 2, 3]) - block%blocks%x(:, 1)
     call check('box: closed cells move with it', block%flow%u(6, 6, 6, 1), &
-               stage%bodies%motion(1, 1) + stage%bodies%motion(5, 1)*arm(3) &
-               - stage%bodies%motion(6, 1)*arm(2), 1.0e-14_wp)
+               coupling%bodies%motion(1, 1) + coupling%bodies%motion(5, 1)*arm(3) &
+               - coupling%bodies%motion(6, 1)*arm(2), 1.0e-14_wp)
   end subroutine moving_box
 
   !> Around a held box still water stays still, and carries it by Archimedes' force.
@@ -171,8 +198,7 @@ contains
     block%case%body(1)%fixed = .true.
     call ready()
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     weight = 1000.0_wp*g*product([0.043_wp, 0.031_wp, 0.037_wp])
     call check('held box: buoyancy', block%blocks%fluid_force(:, 1), [0.0_wp, 0.0_wp, weight], &
                1.0e-6_wp*weight)
@@ -188,8 +214,7 @@ contains
     call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 1000.0_wp)
     call ready()
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     call check('block of water: hovers', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
     call check('block of water: does not turn', maxval(abs(block%blocks%omega)), 0.0_wp, 1.0e-7_wp)
   end subroutine block_of_water
@@ -200,9 +225,8 @@ contains
     block%case%fluid%liquid_viscosity = 10.0_wp
     call ready()
     call begin_step(block%blocks)
-    block%blocks%contact_force(3, 1) = 1300.0_wp*stage%bodies%volume(1)*g
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    block%blocks%contact_force(3, 1) = 1300.0_wp*coupling%bodies%volume(1)*g
+    call advance()
     call check('block at rest: stays', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
     call check('block at rest: the water too', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :))), &
                0.0_wp, 1.0e-8_wp)
@@ -223,10 +247,9 @@ contains
     block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
     call ready()
     block%flow%p = 0.0_wp
-    stage%trend(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
+    coupling%trend(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     associate (fall => dt*block%case%fluid%gravity)
       call check(kind//' in free fall: velocity', block%blocks%v(:, 1), fall, 1.0e-8_wp*norm2(fall))
       call check(kind//' in free fall: it does not turn', norm2(block%blocks%omega(:, 1)), 0.0_wp, &
@@ -251,8 +274,7 @@ contains
       block%case%body(1)%position = 0.08_wp + 0.01_wp*place(n)
       call ready()
       call begin_step(block%blocks)
-      call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                            stage, report)
+      call advance()
       a(n) = -block%blocks%v(3, 1)/dt
     end do
     print '(a, 3f8.4)', 'sphere between the cells: a/g ', a/g
@@ -278,8 +300,7 @@ contains
     call begin_step(block%blocks)
     motion = block%blocks%v(:, 1)
     before = momentum()
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     late = dt*norm2(block%blocks%late_force(2:3, 1))
     after = momentum() + dt*block%blocks%late_force(1:3, 1)
     motion = block%blocks%v(:, 1) - motion
@@ -293,8 +314,7 @@ contains
     call check('momentum '//name//': a ten-thousandth at most', &
                late < 1.0e-4_wp*block%blocks%mass(1)*norm2(motion))
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     after = momentum() + dt*block%blocks%late_force(1:3, 1)
     call check('momentum '//name//': what is late comes', after(2:3), before(2:3), &
                rest*block%blocks%mass(1)*norm2(motion))
@@ -317,10 +337,11 @@ contains
     block%blocks%fluid_torque(:, 1) = forces(:, 3)
     block%blocks%contact_torque(:, 1) = forces(:, 4)
     gain(1:3) = block%case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
-    gain(4:6) = matmul(stage%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
-    call note_start(block%case, block%grid, block%solid, dt, 0.5_wp*dt, block%flow, block%blocks, &
-                    stage)
-    call check('foreseen: dt times the last acceleration', stage%trend(:, 1), dt*gain, 1.0e-12_wp)
+    gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
+    call coupling%begin(block%case, block%grid, block%solid, dt, 0.5_wp*dt, block%flow, &
+                        block%blocks, scratch)
+    call check('foreseen: dt times the last acceleration', coupling%trend(:, 1), dt*gain, &
+               1.0e-12_wp)
   end subroutine goes_on_as_before
 
   !> A cut cell weighs by its level, but gas in its open part has the inertia of gas.
@@ -334,14 +355,13 @@ contains
                 .and. block%solid%alpha(1:12, 1:12, 1:12) < 0.7_wp, .true.)
     block%flow%liquid(c(1), c(2), c(3)) = 0.0_wp
     call begin_step(block%blocks)
-    call advance_velocity(block%case, block%grid, block%solid, dt, block%flow, block%blocks, &
-                          stage, report)
+    call advance()
     associate (fluid => block%case%fluid)
-      call check('inertia: of the gas that is there', stage%rho(c(1), c(2), c(3)), &
+      call check('inertia: of the gas that is there', coupling%rho(c(1), c(2), c(3)), &
                  fluid%gas_density, 1.0e-12_wp*fluid%gas_density)
-      stage%rho(c(1), c(2), c(3)) = fluid%liquid_density
+      coupling%rho(c(1), c(2), c(3)) = fluid%liquid_density
       call check('inertia: of the liquid elsewhere', &
-                 maxval(abs(stage%rho(1:12, 1:12, 1:12) - fluid%liquid_density)), 0.0_wp, &
+                 maxval(abs(coupling%rho(1:12, 1:12, 1:12) - fluid%liquid_density)), 0.0_wp, &
                  1.0e-9_wp*fluid%liquid_density)
     end associate
   end subroutine gas_in_a_cut_cell

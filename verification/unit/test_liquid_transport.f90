@@ -7,7 +7,8 @@ program test_liquid_transport
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
-  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, transport_liquid
+  use liquid_transport_m, only: liquid_transport_t, liquid_transport_init
+  use liquid_alone_m, only: transport_liquid
   use liquid_fill_m, only: fill_liquid, liquid_volume
   use vectors_m, only: quaternion_from_axis
   use tet_mesh_m, only: shape_t

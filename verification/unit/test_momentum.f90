@@ -7,6 +7,8 @@ program test_momentum
   use boundary_m, only: fill_velocity_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use extended_fraction_m, only: extend_fraction
+  use elliptic_solver_m, only: elliptic_solver_t
+  use liquid_alone_m, only: balance_solver
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
     begin_part, finish_transport
   use liquid_fill_m, only: fill_liquid
@@ -62,11 +64,13 @@ contains
     real(wp), intent(in) :: dt
     integer, intent(in) :: step
     integer, intent(in), optional :: parts   !! of the step, else 1
+    type(elliptic_solver_t) :: solver
     integer :: n, part
 
     transport%parts = 1
     if (present(parts)) transport%parts = parts
-    call begin_transport(grid, old, new, dt, transport, flow)
+    solver = balance_solver(grid)
+    call begin_transport(grid, old, new, dt, solver, transport, flow)
     do part = 1, transport%parts
       call begin_part(grid, old, part, step, transport)
       call momentum_begin(grid, fluid, transport%volumes%w, transport%volumes%v, &

@@ -8,7 +8,8 @@ program test_surface_tension
   use boundary_m, only: fill_scalar_halo
   use parallel_m, only: parallel_init, parallel_final, global_max
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
-  use surface_tension_m, only: surface_tension_t, find_tension, add_tension, force_from_tension
+  use surface_tension_m, only: surface_tension_t, surface_tension_init, find_tension, add_tension, &
+                               force_from_tension
   use wave_step_m, only: gravity_step, capillary_step
   use box_solid_m, only: simple_grid, set_boxes
   use one_body_m, only: one_body_t, describe, place
@@ -131,6 +132,7 @@ contains
     call start(cells)
     bow = [0.013_wp, 0.21_wp, -0.13_wp, 0.31_wp, -0.23_wp, 0.17_wp]
     call fill_bowed(d, way)
+    call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     call worst_error(tension, d, way, worst, cases)
     call check('there is a surface', cases > 0.0_wp)
@@ -149,6 +151,17 @@ contains
     call check('a plane has none [1/m]', worst, 0.0_wp, 1.0e-11_wp)
   end subroutine known_curvature
 
+  !> What a force needs, its work arrays, too.
+  subroutine ready(liquid, tension)
+    type(fluid_t), intent(in) :: liquid
+    type(surface_tension_t), intent(out) :: tension
+
+    call surface_tension_init(grid, liquid, tension)
+    allocate (tension%force, source=solid%open)
+    allocate (tension%surface%place, source=solid%open)
+    allocate (tension%surface%curvature, source=c)
+  end subroutine ready
+
   !> Columns that end at the floor before a full cell are whole.
   subroutine film_on_the_floor()
     type(surface_tension_t) :: tension
@@ -157,6 +170,7 @@ contains
     call start(cells)
     bow = [-0.47_wp, 0.0_wp, 0.0_wp, 0.02_wp, 0.03_wp, 0.0_wp]   ! half a cell above the floor
     call fill_bowed(3, 1)
+    call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     call worst_error(tension, 3, 1, worst, cases)
     call check('a film of half a cell: curvature [1/m]', worst, 0.0_wp, 1.0e-11_wp)
@@ -172,6 +186,7 @@ contains
     call start(cells)
     if (all(grid%lo <= [8, 7, 9]) .and. all(grid%hi >= [8, 7, 9])) c(8, 7, 9) = 0.5_wp
     call fill_scalar_halo(grid, c)
+    call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     found = -huge(1.0_wp)
     if (all(grid%lo <= [8, 7, 9]) .and. all(grid%hi >= [8, 7, 9])) then
@@ -196,6 +211,7 @@ contains
       c(8:, :, k) = min(max((0.47_wp - grid%face(k, 3))/grid%h(3), 0.0_wp), 1.0_wp)
     end do
     call fill_scalar_halo(grid, c)
+    call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     largest = 0.0_wp
     associate (a => grid%lo, b => grid%hi, curvature => tension%surface%curvature)
@@ -218,6 +234,7 @@ contains
     call start(cells)
     bow = [0.013_wp, 0.0_wp, 0.0_wp, -0.31_wp, -0.23_wp, 0.0_wp]
     call fill_bowed(3, 1)
+    call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     allocate (a, source=solid%open)
     allocate (rho, source=c)
@@ -282,6 +299,7 @@ contains
       call fill_scalar_halo(grid, c)
       heavy = fluid_t()
       heavy%gravity = [0.0_wp, 0.0_wp, merge(-9.81_wp, 9.81_wp, way == 1)]
+      call ready(heavy, tension)
       call find_tension(grid, heavy, solid, c, tension)
       allocate (a, source=solid%open)
       allocate (one, source=c)

@@ -1,5 +1,5 @@
 !> Whole steps: still water, length of the step, a release, noise in gas, a fall without fluid.
-program test_time_step
+program test_step
   use kinds_m, only: wp
   use case_types_m, only: case_t, water_t
   use tet_mesh_m, only: shape_t
@@ -7,7 +7,8 @@ program test_time_step
   use shapes_builtin_m, only: make_shape
   use liquid_fill_m, only: liquid_volume
   use diagnostics_m, only: step_report_t
-  use time_step_m, only: simulation_t, simulation_init, resume, take_step
+  use simulation_m, only: simulation_t, simulation_init, resume
+  use step_m, only: take_step
   use boundary_m, only: fill_scalar_halo
   use one_body_m, only: random_numbers
   use check_m, only: check, finish_checks
@@ -398,4 +399,4 @@ contains
     end do
   end subroutine four_steps
 
-end program test_time_step
+end program test_step

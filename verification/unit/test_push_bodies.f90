@@ -1,6 +1,6 @@
 !> What the flow knows of the blocks: inertia turned into space, who is moved, and how far a force
 !! moves them.
-program test_velocity_stage
+program test_push_bodies
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: case_t
@@ -9,7 +9,7 @@ program test_velocity_stage
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
-  use velocity_stage_m, only: copy_motion, push_bodies
+  use coupling_m, only: copy_motion, push_bodies
   implicit none
 
   real(wp), parameter :: edge(3) = [0.1_wp, 0.2_wp, 0.3_wp]      !! of the box [m]
@@ -122,4 +122,4 @@ contains
       0.0_wp, 0.0_wp)
   end subroutine check_push
 
-end program test_velocity_stage
+end program test_push_bodies

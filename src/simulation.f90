@@ -1,0 +1,175 @@
+!> Everything that lives as long as the run, and how it begins.
+module simulation_m
+  use kinds_m, only: wp
+  use case_types_m, only: case_t
+  use grid_m, only: grid_init
+  use scratch_m, only: scratch_t, scratch_init
+  use fields_m, only: flow_init
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use liquid_fill_m, only: fill_liquid
+  use initial_state_m, only: read_initial_liquid, read_initial_velocity
+  use extended_fraction_m, only: extend_fraction
+  use fluid_transport_m, only: fluid_transport_t, fluid_transport_init
+  use mixture_m, only: mix_fluid
+  use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
+  use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_init, turn_with_fluid, kinetic_energy, potential_energy
+  use walls_m, only: walls_t, walls_init
+  use bed_m, only: bed_t
+  use contacts_m, only: contacts_init
+  use lubrication_m, only: lubrication_init
+  use overlap_m, only: overlap_t, overlap_init
+  use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
+  use energy_m, only: energy_parts_t, energy_init, begin_energy, energy_excess
+  use coupling_m, only: coupling_t, copy_motion
+  use monolithic_m, only: monolithic_t, monolithic_init
+  use mass_average_m, only: mass_average_t, mass_average_init
+  use flow_start_m, only: start_flow
+  use clock_m, only: clock_init
+  use run_state_m, only: run_state_t
+  use timers_m, only: timer
+  implicit none
+  private
+  public :: simulation_t, simulation_init, resume, measure, energies
+
+  !> The state, what is made of the case, and the work of the stages.
+  type, extends(run_state_t) :: simulation_t
+    type(case_t) :: case
+    type(solid_geometry_t), allocatable :: before    !! solids at the start of the step
+    type(solid_fraction_t) :: fraction
+    type(scratch_t) :: scratch                       !! work arrays of the stages
+    type(fluid_transport_t) :: transport
+    class(coupling_t), allocatable :: coupling
+    type(walls_t) :: walls
+    type(overlap_t) :: overlap
+    logical :: wet = .true.                !! there is a fluid
+    logical :: start_converged = .true.    !! velocity and pressure at t = 0
+    logical, allocatable :: felt(:)        !! blocks that have felt the fluid
+    logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
+    integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
+  end type simulation_t
+
+contains
+
+  !> State at t = 0: bodies in place, liquid filled in, everything at rest or at its given velocity.
+  subroutine simulation_init(case, shapes, bed, sim)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
+    type(simulation_t), intent(inout) :: sim
+    integer :: d, n_solids
+
+    sim%case = case
+    sim%wet = case%run%physics /= 'dry'
+    sim%timer_blocks = timer('blocks')
+    sim%timer_solid = timer('solid shares')
+    sim%timer_transport = timer('transport')
+    sim%timer_velocity = timer('velocity and pressure')
+    call clock_init(case%run, sim%clock)
+    call grid_init(case%grid, case%boundary, sim%grid)
+    call walls_init(case%grid, case%boundary, sim%walls)
+    sim%walls%bed = bed
+    call blocks_init(case, shapes, sim%blocks)
+    call contacts_init(case%contact, sim%blocks, sim%contacts)
+    call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
+    allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
+    allocate (sim%solid, sim%before)
+    if (.not. sim%wet) return
+    call energy_init(case, sim%grid, sim%blocks, sim%energy)
+    call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
+    if (case%contact%lubrication) call lubrication_init(case%fluid%liquid_viscosity, &
+      sim%grid%h, sim%blocks, sim%contacts%lubrication)
+    call flow_init(sim%grid, sim%flow)
+    n_solids = sim%blocks%n
+    if (bed%there) n_solids = n_solids + 1
+    call solid_geometry_init(sim%grid, sim%solid, n_solids)
+    call solid_geometry_init(sim%grid, sim%before, n_solids)
+    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, &
+                             merge(case%numerics%subcells, 0, &
+                                   case%numerics%solid_fraction == 'subcell'), bed)
+    call scratch_init(sim%grid, sim%scratch)
+    call fluid_transport_init(case, sim%grid, sim%scratch, sim%transport)
+    call choose_coupling(case, n_solids, sim)
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+    call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
+    call read_initial_liquid(case%fluid, sim%grid, sim%flow)
+    call extend_fraction(sim%grid, sim%solid, sim%transport%liquid%extension, sim%flow)
+    call mix_fluid(case%fluid, sim%flow)
+    do d = 1, 3
+      sim%flow%u(:, :, :, d) = case%fluid%velocity(d)
+      sim%flow%uf(:, :, :, d) = case%fluid%velocity(d)
+    end do
+    call fill_velocity_halo(sim%grid, sim%flow%u)
+    call read_initial_velocity(case%fluid, sim%grid, sim%flow)
+    call set_side_velocity(sim%grid, sim%flow%uf)
+    call outflow_init(sim%grid, case%fluid, sim%flow%sides)
+    call update_outflow(sim%grid, case%fluid, 0.0_wp, sim%flow%c, sim%flow%uf, sim%flow%sides)
+    call copy_motion(sim%blocks, sim%coupling%bodies)
+    call start_flow(case, sim%grid, sim%solid, sim%flow, sim%scratch, sim%coupling, &
+                    sim%start_converged)
+    call start_outflow(sim%grid, sim%flow%c, sim%flow%uf, sim%flow%sides)
+  end subroutine simulation_init
+
+  !> The coupling of the case, with its work arrays.
+  subroutine choose_coupling(case, n_solids, sim)
+    type(case_t), intent(in) :: case
+    integer, intent(in) :: n_solids
+    type(simulation_t), intent(inout) :: sim
+
+    select case (trim(case%numerics%coupling))
+    case ('monolithic'); allocate (monolithic_t :: sim%coupling)
+    case ('mics'); allocate (mass_average_t :: sim%coupling)
+    case default; error stop 'simulation: unknown coupling'
+    end select
+    select type (coupling => sim%coupling)
+    type is (monolithic_t); call monolithic_init(sim%grid, n_solids, case, sim%scratch, coupling)
+    type is (mass_average_t)
+      call mass_average_init(sim%grid, n_solids, case, sim%scratch, coupling)
+    end select
+  end subroutine choose_coupling
+
+  !> What follows from the state after it was read: solids in the grid, density, halos, outflows.
+  subroutine resume(sim)
+    type(simulation_t), intent(inout) :: sim
+
+    if (.not. sim%wet) return
+    if (sim%clock%step > 0) sim%felt = sim%blocks%present
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+    call fill_velocity_halo(sim%grid, sim%flow%u)
+    call fill_scalar_halo(sim%grid, sim%flow%p)
+    call fill_scalar_halo(sim%grid, sim%flow%liquid)
+    call fill_scalar_halo(sim%grid, sim%flow%room)
+    call fill_scalar_halo(sim%grid, sim%flow%c)
+    call mix_fluid(sim%case%fluid, sim%flow)
+    call resume_outflow(sim%grid, sim%case%fluid, sim%clock%dt, sim%flow%c, sim%flow%uf, &
+                        sim%flow%sides)
+  end subroutine resume
+
+  !> Sums over the fluid before the first step of a run, or after a restart; of a run that begins,
+  !! the energy that it has, too.
+  subroutine measure(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+
+    if (.not. sim%wet) return
+    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    if (sim%clock%step == 0) call begin_energy(energies(sim, report%fluid, 0.0_wp), &
+      report%fluid%potential - energy_of_level(sim%case%fluid, sim%grid, sim%flow%c), sim%energy)
+    report%energy_excess = energy_excess(sim%energy)
+  end subroutine measure
+
+  !> Energies of fluid and blocks.
+  function energies(sim, fluid, contact) result(parts)
+    type(simulation_t), intent(in) :: sim
+    type(fluid_sums_t), intent(in) :: fluid
+    real(wp), intent(in) :: contact   !! elastic energy [J]
+    type(energy_parts_t) :: parts
+
+    parts%kinetic = fluid%kinetic + kinetic_energy(sim%blocks)
+    parts%contact = contact
+    parts%potential = fluid%potential + potential_energy(sim%case%fluid%gravity, sim%blocks)
+  end function energies
+
+end module simulation_m

@@ -1,0 +1,255 @@
+!> One time step of fluid and blocks, stage by stage.
+!!
+!! Stage, what it does, what it keeps to round-off or to the tolerance of a solver:
+!!
+!!     1  release      blocks whose time has come enter where there is room; the surface rises by
+!!                     the volume that they displace                       [volume of the liquid]
+!!     2  time step    dt = min(C h/|u|, C h/|U|, waves, 2 dt_before), to the next release
+!!     3  half kick    u += dt/2 (g - grad p/rho), in the liquid, on the bodies of the start
+!!     4  bodies       m dv/dt = F_fluid + F_contact + m g, dL/dt = T, in substeps
+!!                                                    [momentum; the energy of contact never grows]
+!!     5  voxelise     alpha of the cells, open shares w of the faces at the new poses
+!!                                                                  [sum alpha V = volume of bodies]
+!!     6  fluxes       Q = dt w A u_f, fitted: sum Q = V_f - V (1 - alpha) in every cell
+!!     7  advection    W -= sum G, V_f -= sum Q, m u -= sum (rho_l G + rho_g (Q - G)) u~
+!!                                         [0 <= W <= V_f; liquid; momentum; a uniform velocity]
+!!     8  mixture      C of W and V_f; rho = C rho_l + (1 - C) rho_g, mu likewise
+!!     9  merging      one momentum for a small cut cell and the cells beside it
+!!                                                                  [momentum of fluid and bodies]
+!!     10 forces       a_f = (rho g - grad p + sigma kappa grad C)/rho at the faces; u += dt/2 a in
+!!                     the liquid; the same forces push the bodies                   [still water]
+!!     11 viscosity    (m/dt) (u* - u) = div mu grad u*, cells and bodies in one system
+!!     12 faces        u_f = mean(u*) + dt (a_f - mean(a)): Rhie-Chow
+!!     13 projection   div (w u_f - dt w grad phi/rho) + flux of the bodies = 0 with
+!!                     dv = dt M^-1 int phi n dA, p += phi            [divergence below tolerance]
+!!     14 closing      motion of the blocks by the sum of the forces, u_f of the next step
+!!                                                                      [m dv/dt = sum of forces]
+!!
+!! With `momentum = 'c_ismac'` momentum waits in 7 and is carried in 11, and 3 only notes the
+!! acceleration. With `coupling = 'mics'` an object of its own does 9 to 14 (`mass_average_m`).
+!! docs/architecture.md has the files of each stage.
+module step_m
+  use kinds_m, only: wp
+  use solid_geometry_m, only: solid_geometry_t, hand_over_faces
+  use solid_fraction_m, only: update_solid
+  use liquid_fill_m, only: raise_surface
+  use fluid_transport_m, only: fit_fluxes, carry_fluid, finish_carrying, fluxes_of_step, &
+                               span_t
+  use mixture_m, only: mix_fluid
+  use outflow_m, only: update_outflow
+  use rigid_body_m, only: fastest_point
+  use contacts_m, only: contact_report_t, move_blocks
+  use overlap_m, only: max_overlap
+  use release_m, only: release_due_blocks, next_release, none_to_come
+  use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
+  use energy_m, only: note_energy, note_release, energy_excess
+  use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
+  use added_mass_m, only: know_added_mass
+  use courant_m, only: courant_rate_t, courant_rate
+  use simulation_m, only: simulation_t, energies
+  use wave_step_m, only: gravity_step, capillary_step
+  use timers_m, only: tic, toc
+  implicit none
+  private
+  public :: take_step
+
+  real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
+
+contains
+
+  !> Advance by one step.
+  subroutine take_step(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(out) :: report
+    type(contact_report_t) :: contact
+    type(coupling_report_t) :: coupling_report
+    type(span_t) :: span
+    real(wp) :: dt_before   !! of the last step [s]
+
+    dt_before = sim%clock%dt
+    ! 1 release
+    call release(sim, report)
+    ! 2 time step
+    call choose_step(sim, report)
+    associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
+               coupling => sim%coupling, dt => sim%clock%dt, scratch => sim%scratch)
+      ! 3 half kick
+      if (sim%wet) call begin(sim, dt_before)
+      ! 4 bodies
+      call tic(sim%timer_blocks)
+      call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
+      call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
+      call toc(sim%timer_blocks)
+      if (sim%wet) then
+        ! 5 voxelise
+        call tic(sim%timer_solid)
+        call voxelise(sim)
+        call toc(sim%timer_solid)
+        ! 6 fluxes
+        call tic(sim%timer_transport)
+        span = span_t(dt, report%cfl_carried, sim%clock%step)
+        call fit_fluxes(grid, sim%before, sim%solid, span, flow, scratch, &
+                        coupling%pressure%system%solver, sim%transport)
+        ! 7 advection
+        call carry_fluid(case%fluid, grid, sim%before, span, flow, sim%transport)
+        if (coupling%implicit_momentum) call fluxes_of_step(grid, sim%transport, coupling%c_ismac%q)
+        call finish_carrying(grid, sim%solid, flow, scratch, sim%transport)
+        ! 8 mixture
+        call mix_fluid(case%fluid, flow)
+        call toc(sim%timer_transport)
+        call tic(sim%timer_velocity)
+        call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
+        call start_of_stages(case%fluid%gravity, dt, blocks, coupling)
+        ! 9 merging
+        call coupling%merge_cells(case, grid, sim%solid, dt, flow, scratch)
+        ! 10 forces
+        call coupling%add_forces(case, grid, sim%solid, dt, flow, scratch)
+        ! 11 viscosity
+        call coupling%add_viscosity(case, grid, sim%solid, dt, flow, scratch)
+        ! 12 faces
+        call coupling%predict_faces(case, grid, sim%solid, dt, flow, scratch)
+        ! 13 projection
+        call coupling%project(case, grid, sim%solid, dt, flow, scratch, coupling_report)
+        ! 14 closing
+        call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
+        call coupling%close(grid, sim%solid, flow, blocks, coupling_report)
+        call toc(sim%timer_velocity)
+      end if
+    end associate
+    call sim%clock%advance()
+    call describe(sim, contact, coupling_report, report)
+  end subroutine take_step
+
+  !> What the parts of the step found out, in one report.
+  subroutine describe(sim, contact, stage, report)
+    type(simulation_t), intent(inout) :: sim
+    type(contact_report_t), intent(in) :: contact
+    type(coupling_report_t), intent(in) :: stage
+    type(step_report_t), intent(inout) :: report
+    real(wp) :: speed
+    logical :: any_free
+    integer :: b
+
+    report%contact_energy = contact%energy
+    report%contact_courant_max = contact%courant_max
+    report%substeps = contact%substeps
+    report%contacts_solved = contact%info == 0
+    speed = 0.0_wp
+    any_free = .false.
+    do b = 1, sim%blocks%n
+      if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
+      any_free = .true.
+      speed = max(speed, fastest_point(sim%blocks, b))
+    end do
+    call sim%clock%note_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
+    if (.not. sim%wet) return
+    report%divergence_max = stage%pressure%divergence
+    report%pressure_passes = stage%pressure%passes
+    report%solver_iterations = stage%pressure%iterations
+    report%pressure_converged = stage%pressure%converged
+    report%viscous_converged = stage%viscous_converged
+    report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    call note_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
+    report%energy_excess = energy_excess(sim%energy)
+    report%transport_parts = sim%transport%liquid%parts
+    report%transport_converged = sim%transport%liquid%small%converged
+    report%sealed_cells = sim%solid%n_sealed
+    report%curvature_fallback = sim%coupling%tension%surface%fallback
+  end subroutine describe
+
+  !> Blocks whose time has come, with the force and the pressure with which they begin to move.
+  subroutine release(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+    logical :: released
+
+    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
+                            report%warnings, released)
+    if (.not. sim%wet) return
+    if (released) call make_room(sim)
+    call first_force(sim)
+  end subroutine release
+
+  !> The liquid in the place of blocks that have come raises the free surface.
+  subroutine make_room(sim)
+    type(simulation_t), intent(inout) :: sim
+    type(fluid_sums_t) :: fluid
+
+    call voxelise(sim)
+    call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
+    call mix_fluid(sim%case%fluid, sim%flow)
+    fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
+    call note_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
+  end subroutine make_room
+
+  !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
+  !! each step the fluid force of that step takes over.
+  subroutine first_force(sim)
+    type(simulation_t), intent(inout) :: sim
+    real(wp) :: force(6, size(sim%coupling%total, 2))
+    logical :: begins(sim%blocks%n)
+    integer :: b
+
+    begins = sim%blocks%present .and. .not. sim%felt
+    if (.not. any(begins)) return
+    call copy_motion(sim%blocks, sim%coupling%bodies)
+    call sim%coupling%force_at_release(sim%case, sim%grid, sim%solid, begins, sim%flow, &
+                                       sim%scratch, force)
+    do b = 1, sim%blocks%n
+      if (.not. begins(b)) cycle
+      sim%blocks%fluid_force(:, b) = force(1:3, b)
+      sim%blocks%fluid_torque(:, b) = force(4:6, b)
+      sim%felt(b) = .true.
+    end do
+  end subroutine first_force
+
+  !> What acts before the transport, and what the later stages need of the start of the step.
+  subroutine begin(sim, dt_before)
+    type(simulation_t), intent(inout) :: sim
+    real(wp), intent(in) :: dt_before   !! [s]
+
+    call copy_motion(sim%blocks, sim%coupling%bodies)
+    call know_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
+                         sim%blocks)
+    call sim%coupling%begin(sim%case, sim%grid, sim%solid, sim%clock%dt, dt_before, sim%flow, &
+                            sim%blocks, sim%scratch)
+  end subroutine begin
+
+  !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which
+  !! nobody asks for the legs and the free share.
+  subroutine voxelise(sim)
+    type(simulation_t), intent(inout) :: sim
+    type(solid_geometry_t), allocatable :: keep
+
+    call move_alloc(sim%solid, keep)
+    call move_alloc(sim%before, sim%solid)
+    call move_alloc(keep, sim%before)
+    call hand_over_faces(sim%before, sim%solid)
+    call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
+  end subroutine voxelise
+
+  !> Length of the step: `cfl_max` of liquid and blocks, `&run dt` and surface tension, or less to
+  !! land on a release or on the end. With fluid at most `growth_max` times the step before, whose
+  !! pressure and acceleration this one begins with.
+  subroutine choose_step(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+    type(courant_rate_t) :: rate
+    real(wp) :: allowed, h
+
+    allowed = sim%case%run%dt
+    if (sim%wet .and. sim%clock%step > 0) allowed = min(allowed, growth_max*sim%clock%dt)
+    if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
+    if (sim%case%run%cfl_max > 0.0_wp) then
+      if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
+      if (rate%has_surface) then
+        h = sim%grid%least_spacing()
+        allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
+      end if
+    end if
+    call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
+    report%cfl = sim%clock%dt*rate%followed
+    report%cfl_carried = sim%clock%dt*rate%carried
+  end subroutine choose_step
+
+end module step_m
