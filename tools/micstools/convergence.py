@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _ORDERS = (0.05, 12.0)  # between which an order is looked for
+_EQUAL = 1e-12  # of the largest value: what rounding leaves between equal numbers
 
 
 @dataclass(frozen=True)
@@ -19,18 +20,20 @@ class Convergence:
     order: float  # observed on the three finest grids
     limit: float  # the value on endlessly fine cells
     error: float  # of the value on the finest grid: value - limit
-    words: str  # why there is no order; empty where there is one
+    words: str  # why there is no order, or none is needed; empty where there is one
 
 
 def converge(fineness: Sequence[float], values: Sequence[float]) -> Convergence:
     """From values on rising `fineness`, cells per length: v = limit + c fineness^-order."""
+    if len(values) > 1 and _equal(values):
+        return _converged("all grids", values[-1])
     if len(values) < 3:
         return _nothing("three grids are needed")
     f, (a, b, c) = [float(v) for v in fineness[-3:]], values[-3:]
     if not np.isfinite([a, b, c]).all():
         return _nothing("not known on all grids")
-    if b == c:
-        return Convergence(float("nan"), c, 0.0, "the same on both finest grids")
+    if _equal([b, c]):
+        return _converged("the two finest grids", c)
     if (a - b) * (b - c) <= 0:
         return _nothing("not monotone")
     order = _order(f, (a - b) / (b - c))
@@ -39,6 +42,15 @@ def converge(fineness: Sequence[float], values: Sequence[float]) -> Convergence:
     steps = [value**-order for value in f]
     error = (b - c) * steps[2] / (steps[1] - steps[2])
     return Convergence(order, c - error, error, "")
+
+
+def _equal(values: Sequence[float]) -> bool:
+    """Are all values one but for rounding? Unknown ones are not."""
+    return bool(np.ptp(values) <= _EQUAL * np.abs(values).max())
+
+
+def _converged(grids: str, value: float) -> Convergence:
+    return Convergence(float("nan"), value, 0.0, f"converged: equal on {grids}")
 
 
 def _nothing(words: str) -> Convergence:

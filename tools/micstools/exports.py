@@ -1,5 +1,6 @@
 """A run in the formats of other programs: a named object per block, SI units, z up."""
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -18,6 +19,18 @@ Writer = Callable[[Run, int, Path], Path]
 def to_csv(run: Run, _row: int, folder: Path) -> Path:
     """Place, attitude, velocity and forces of every block at every row."""
     return run.to_csv(folder / "blocks.csv")
+
+
+def to_final_csv(run: Run, row: int, folder: Path) -> Path:
+    """Place and attitude of every released block at a row; blocks count from 1."""
+    b, path = run.bodies, folder / "final.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"])
+        for k in np.flatnonzero(b.present(row)):
+            pose = [*b.position[row, k].tolist(), *b.quaternion[row, k].tolist()]
+            writer.writerow([int(k) + 1, b.shape[k], int(b.fixed[k]), *pose])
+    return path
 
 
 def to_stl(run: Run, row: int, folder: Path) -> Path:

@@ -10,19 +10,34 @@ from micstools import case_copy, settings
 from micstools.reader import BadRun
 
 CASE_HELP = "case file"
+VARIABLE = "MICS"
+"""Environment variable that names the program."""
+BUILT = Path(__file__).parents[2] / "mics"
+"""The program that make builds, where the tools run from the folder of its sources."""
 
 
-def find(given: Path | None = None) -> Path:
-    """The program asked for; else that of this folder of sources, else the one on the path."""
+def find(given: Path | None = None, case: Path | None = None) -> Path:
+    """The program: `given`, else that of the environment variable MICS, of the folder of sources,
+    on the PATH, beside a case or in the folder above it. Raises BadRun where there is none."""
     if given is not None:
-        if not os.access(given, os.X_OK) or given.is_dir():
-            raise BadRun(f"{given}: is no program")
-        return given.resolve()
-    built = Path(__file__).parents[2] / "mics"
-    found = built if os.access(built, os.X_OK) else shutil.which("mics")
+        return _named(str(given), str(given))
+    if named := os.environ.get(VARIABLE):
+        return _named(named, f"{VARIABLE} = {named}")
+    folders = [case.resolve().parent, case.resolve().parent.parent] if case else []
+    path = os.environ.get("PATH", os.defpath)
+    for folder in (str(BUILT.parent), path, *map(str, folders)):
+        if found := shutil.which("mics", path=folder):
+            return Path(found).resolve()
+    raise BadRun("the program mics is not found: run make, set MICS, put it on the PATH or beside "
+                 "the case, or name it with --program")  # fmt: skip
+
+
+def _named(name: str, words: str) -> Path:
+    """A program by its path, or by its name on the PATH."""
+    found = shutil.which(name)
     if found is None:
-        raise BadRun("the program mics is not built: run make, or name it with --program")
-    return Path(found)
+        raise BadRun(f"{words}: is no program")
+    return Path(found).resolve()
 
 
 def add_case(parser: argparse.ArgumentParser) -> None:
@@ -34,9 +49,12 @@ def add_case(parser: argparse.ArgumentParser) -> None:
         default=[],
         dest="settings",
         metavar="GROUP.VARIABLE=VALUE",
-        help="set a variable of the case, as often as wanted; in each group of a repeated name",
+        help="set a variable of the case, as often as wanted; in each group of a repeated name; "
+        "with several &drop, drop.seed=7 gives them the seeds 7, 8, ...",
     )
-    parser.add_argument("--program", type=Path, help="default: the mics that make has built")
+    where = "default: that of the environment variable MICS, else the mics that make has built, "
+    where += "on the PATH, beside the case or in the folder above it"
+    parser.add_argument("--program", type=Path, help=where)
 
 
 def case_text(case: Path, words: list[str]) -> str:

@@ -1,6 +1,7 @@
 """Variables of a case set from outside, `group.variable=value`, on a copy of its text."""
 
 import re
+import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -94,12 +95,20 @@ def groups(text: str) -> list[tuple[str, int, int]]:
 
 
 def set_variables(text: str, settings: Iterable[Setting]) -> str:
-    """The case with all settings; one of a group that is repeated holds for each occurrence."""
+    """The case with all settings; one of a group that is repeated holds for each occurrence, but
+    seeds of several &drop count up from the one that is set, or all would draw the same numbers."""
     wanted: dict[str, dict[str, Any]] = {}
     for setting in settings:
         wanted.setdefault(setting.group, {})[setting.variable] = setting.value
     for name, variables in wanted.items():
         text = set_group(text, name, variables)
+    seed = wanted.get("drop", {}).get("seed")
+    drops = sum(name == "drop" for name, _, _ in groups(text))
+    if isinstance(seed, int) and not isinstance(seed, bool) and drops > 1:
+        for n in range(1, drops):
+            text = set_group(text, "drop", {"seed": seed + n}, n)
+        told = ", ".join(str(seed + n) for n in range(min(drops, 3))) + (", ..." * (drops > 3))
+        print(f"&drop seed = {told}: one for each of the {drops} groups", file=sys.stderr)
     return text
 
 

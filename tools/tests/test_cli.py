@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from micstools import cli, settings
+from micstools import program as program_of_tools
 from micstools.reader import BadRun
 
 ROOT = Path(__file__).parents[2]
@@ -86,9 +87,21 @@ def test_settings_keep_the_rest_of_a_case() -> None:
     assert [name for name, _, _ in settings.groups(text)] == [
         "run", "grid", "drop", "drop", "contact",
     ]  # fmt: skip
-    assert text.count("seed = 9") == 2 and "seed = 3" not in text
+    assert [settings.value(text, "drop", "seed", n) for n in (0, 1)] == [9, 10]
     assert "cells = 2, 3, 4 length" in text and "friction = 0.4" in text
     assert "! first / of two" in text and '"it\'s"' in text and "x = .true." in text
+
+
+def test_every_drop_gets_a_seed_of_its_own(capsys) -> None:
+    """With one seed two groups of drops would draw the same numbers."""
+    three = CASE + "&drop shape = 'c' position = 0,0,0 seed = 3 /\n"
+    text = settings.set_variables(three, [settings.parse("drop.seed=7")])
+    assert [settings.value(text, "drop", "seed", n) for n in range(3)] == [7, 8, 9]
+    assert "&drop seed = 7, 8, 9: one for each of the 3 groups" in capsys.readouterr().err
+    text = settings.set_variables(three, [settings.parse("drop.count=5")])
+    assert [settings.value(text, "drop", "count", n) for n in range(3)] == [5, 5, 5]
+    one = settings.set_variables(CASE.rsplit("&drop", 1)[0], [settings.parse("drop.seed=7")])
+    assert settings.value(one, "drop", "seed") == 7 and capsys.readouterr().err == ""
 
 
 def test_one_group_of_several_is_set() -> None:
@@ -137,3 +150,42 @@ def test_the_program_gets_the_case_as_set(tmp_path: Path, program: Path) -> None
     assert (done.returncode, done.stdout) == (0, "--check: ! A case with a / and a & in a remark\n")
     done = call(*words, "contact.friction=9")
     assert (done.returncode, done.stderr) == (2, "mics: &contact friction = 9: too much\n")
+
+
+def test_a_run_goes_on_and_keeps_its_time(tmp_path: Path, program: Path) -> None:
+    case = tmp_path / "case.nml"
+    case.write_text(CASE)
+    more = ("--restart", "mics-out/restart-a.h5", "--max-wall", "01:30", "--quiet")
+    for settings_words in ((), ("--set", "grid.cells=2,3,4")):
+        done = call("run", case, "--program", program, *more, *settings_words)
+        said = done.stdout.split(":", 1)[0] if settings_words else done.stdout
+        assert done.returncode == 0
+        assert said.startswith("--restart mics-out/restart-a.h5 --max-wall 01"), done.stdout
+
+
+def place_program(path: Path) -> Path:
+    """A program at a path."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("#!/bin/sh\nexit 0\n")
+    path.chmod(0o755)
+    return path
+
+
+def test_the_program_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Named, in MICS, that of the sources, on the path, beside the case or one folder above."""
+    monkeypatch.setattr(program_of_tools, "BUILT", tmp_path / "nowhere" / "mics")
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.delenv("MICS", raising=False)
+    case = tmp_path / "work" / "input" / "case.nml"
+    with pytest.raises(BadRun, match="run make, set MICS, put it on the PATH"):
+        program_of_tools.find(None, case)
+    places = ("work/mics", "work/input/mics", "bin/mics", "nowhere/mics", "mine")
+    for place in places[:4]:
+        found = place_program(tmp_path / place)
+        assert program_of_tools.find(None, case) == found, place
+    monkeypatch.setenv("MICS", str(place_program(tmp_path / "mine")))
+    assert program_of_tools.find(None, case) == tmp_path / "mine"
+    assert program_of_tools.find(tmp_path / "bin/mics", case) == tmp_path / "bin/mics"
+    monkeypatch.setenv("MICS", str(tmp_path / "gone"))
+    with pytest.raises(BadRun, match=r"MICS = .*gone: is no program"):
+        program_of_tools.find(None, case)

@@ -83,11 +83,23 @@ def test_order_and_error_of_a_known_law(order: float, grids: tuple[float, ...]) 
 @pytest.mark.parametrize(
     ("values", "words"),
     [((1, 2), "three grids"), ((1, 2, 1.5), "not monotone"), ((1, 2, 9), "no order fits"),
-     ((1, float("nan"), 2), "not known"), ((1, 2, 2), "the same")],
+     ((1, float("nan"), 2), "not known")],
 )  # fmt: skip
 def test_what_does_not_converge_says_so(values: tuple[float, ...], words: str) -> None:
     found = converge((1, 2, 4), values)
     assert words in found.words and np.isnan(found.order)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [((6, 6, 6), "converged: equal on all grids"), ((5, 6, 6), "converged: equal on the two"),
+     ((0, 0, 0), "converged: equal on all grids"), ((7, 5, 6, 6), "converged: equal on the two"),
+     ((0.1 + 0.2, 0.3, 0.3), "converged: equal on all grids")],
+)  # fmt: skip
+def test_equal_numbers_are_converged(values: tuple[float, ...], words: str) -> None:
+    found = converge((1, 2, 4, 8)[: len(values)], values)
+    assert words in found.words and np.isnan(found.order)
+    assert (found.limit, found.error) == (values[-1], 0.0)
 
 
 @pytest.mark.parametrize("cells", ["30", "'a'", "30, 'a', 4"])

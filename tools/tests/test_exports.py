@@ -12,6 +12,7 @@ import trimesh
 
 from micstools import cli, exports, scene
 from micstools.reader import Run
+from synthetic import Motion
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())
 
@@ -27,6 +28,28 @@ def test_the_table_holds_every_row(loose_pile: Run, tmp_path: Path) -> None:
         b.time[150], b.position[150, 4, 0], b.quaternion[150, 4, 3], b.velocity[150, 4, 2]
     ]  # fmt: skip
     assert table[9 * 10 + 8]["released"] == "0"
+
+
+def test_the_final_table_holds_places_and_attitudes(make_run, capsys) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0))  # too late for the third and later ones
+    b = run.bodies
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export", str(run.folder), "--to", "csv", "--final"])
+    said = capsys.readouterr()
+    path = run.folder / "export" / "final.csv"
+    assert end.value.code == 0 and said.out == f"{path}\n"
+    assert "left out, not released by the end: 6, 7, 8, 9" in said.err
+    assert not (run.folder / "export" / "blocks.csv").exists()
+    with path.open() as file:
+        table = list(csv.DictReader(file))
+    heads = ["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"]
+    assert list(table[0]) == heads
+    assert [line["block"] for line in table] == ["1", "2", "3", "4", "5"]
+    for k, line in enumerate(table):
+        assert [float(line[name]) for name in ("x", "y", "z")] == b.position[-1, k].tolist()
+        turn = [float(line[name]) for name in ("qw", "qx", "qy", "qz")]
+        assert turn == b.quaternion[-1, k].tolist()
+        assert line["fixed"] == str(int(k < 3))
 
 
 @pytest.mark.parametrize("kind", ["stl", "obj"])
@@ -118,7 +141,8 @@ def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("words", "said"),
     [(["--to", "png"], "'png' is none of glb, stl, obj, csv, pvd"),
-     (["--to", "stl", "--time", "99"], "the run goes from 0 to 8 s")],
+     (["--to", "stl", "--time", "99"], "the run goes from 0 to 8 s"),
+     (["--to", "stl", "--final"], "--final is of csv")],
 )  # fmt: skip
 def test_wrong_wishes_are_one_line(loose_pile: Run, words: list[str], said: str, capsys) -> None:
     with pytest.raises(SystemExit) as end:

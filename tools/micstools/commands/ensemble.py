@@ -165,7 +165,7 @@ def _engine(given: argparse.Namespace) -> Engine:
     queue = ensemble_queue.parse(given.cluster) if given.cluster else None
     if queue and given.slurm is not None:
         raise BadRun(f"{ensemble_queue.OPTION} runs, --slurm only writes a script: give one")
-    return Engine(program.find(given.program), given.jobs, queue)
+    return Engine(program.find(given.program, given.case), given.jobs, queue)
 
 
 def _kept(

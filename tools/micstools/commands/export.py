@@ -1,11 +1,14 @@
 """A run in the formats of other programs."""
 
 import argparse
+import sys
 from pathlib import Path
+
+import numpy as np
 
 from micstools import command, exports
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.reader import BadRun, Run
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -13,11 +16,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("run", type=Path, help=command.RUN_HELP)
     add("--to", required=True, metavar="FORMATS", help="of " + ",".join(exports.FORMATS))
     add("--time", type=float, help="of stl and obj [s], default the end")
+    add("--final", action="store_true", help="csv: only places and attitudes at the end, final.csv")
     add("--out", type=Path, help="folder for the files, default RUN/export")
 
 
 def _export(given: argparse.Namespace) -> int:
     formats = exports.parse_formats(given.to)
+    if given.final and "csv" not in formats:
+        raise BadRun(f"--final is of csv, which --to {given.to} does not ask for")
     run = command.open_run(given.run)
     if not run.bodies.n:
         raise BadRun(f"{run.folder} holds no blocks: there is nothing to export")
@@ -28,8 +34,19 @@ def _export(given: argparse.Namespace) -> int:
     folder = given.out or run.folder / "export"
     folder.mkdir(parents=True, exist_ok=True)
     for name in formats:
-        print(exports.FORMATS[name](run, row, folder))
+        if given.final and name == "csv":
+            print(exports.to_final_csv(run, len(time) - 1, folder))
+            _tell_left_out(run)
+        else:
+            print(exports.FORMATS[name](run, row, folder))
     return 0
+
+
+def _tell_left_out(run: Run) -> None:
+    """Which blocks the table of the end does not hold."""
+    missing = [str(k + 1) for k in np.flatnonzero(~run.bodies.present(-1))]
+    if missing:
+        print(f"left out, not released by the end: {', '.join(missing)}", file=sys.stderr)
 
 
 EXPORT = Command(
@@ -38,6 +55,7 @@ EXPORT = Command(
     "one time (stl, obj), places and attitudes (csv), files for ParaView before 5.12 (pvd).",
     (
         "export mics-coarse --to glb,csv",
+        "export mics-coarse --to csv --final",
         "export mics-coarse --to stl,obj --time 3 --out /tmp/pile",
     ),
     _arguments,

@@ -13,13 +13,16 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
     program.add_case(parser)
     parser.add_argument("--output", type=Path, help="folder for the results")
     parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--restart", type=Path, metavar="FILE", help="go on from a restart file")
+    limit = "stop in good order, with a restart file, before so much time has passed"
+    parser.add_argument("--max-wall", metavar="HH:MM", help=limit)
     parser.add_argument("--quiet", action="store_true", help="no table")
 
 
 def _call(given: argparse.Namespace, options: list[str]) -> int:
     """The program on the case; it reads the case as it is where nothing was set."""
-    path = program.find(given.program)
     text = program.case_text(given.case, given.settings)
+    path = program.find(given.program, given.case)
     if not given.settings:
         return _code(subprocess.Popen([path, *options, given.case], text=True))
     with subprocess.Popen([path, *options], stdin=subprocess.PIPE, text=True) as process:
@@ -42,6 +45,8 @@ def _code(process: subprocess.Popen[str]) -> int:
 def _run(given: argparse.Namespace) -> int:
     options = ["--output", str(given.output)] if given.output else []
     options += ["--threads", str(given.threads)] if given.threads is not None else []
+    options += ["--restart", str(given.restart)] if given.restart else []
+    options += ["--max-wall", given.max_wall] if given.max_wall is not None else []
     return _call(given, options + (["--quiet"] if given.quiet else []))
 
 
@@ -51,6 +56,8 @@ RUN = Command(
     (
         "run input/blocks_coarse.nml",
         "run input/blocks_coarse.nml --set drop.seed=7 --set contact.friction=0.3 --output mics-7",
+        "run input/blocks.nml --max-wall 08:00",
+        "run input/blocks.nml --restart mics-out/restart-a.h5 --set run.t_end=12",
     ),
     _run_arguments,
     _run,

@@ -66,8 +66,8 @@ def _code(result: Path) -> int:
 
 
 def _study(given: argparse.Namespace) -> int:
-    factors, path = _factors(given.cells), program.find(given.program)
-    text = program.case_text(given.case, given.settings)
+    factors, text = _factors(given.cells), program.case_text(given.case, given.settings)
+    path = program.find(given.program, given.case)
     folder = given.out or Path(f"mics-study-{given.case.stem}")
     cases = [finer(text, factor) for factor in factors]
     for each in cases:
