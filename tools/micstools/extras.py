@@ -12,7 +12,9 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
     "ensemble": ("dask", "dask_jobqueue", "distributed"),
+    "pictures": ("pyvista", "vtk"),
 }
+_OF_A_FIRST_RUN = "pictures"  # `make deps` installs them, whatever it is asked for
 
 
 def need(extra: str) -> None:
@@ -25,6 +27,7 @@ def need(extra: str) -> None:
     if not script.is_file() or Path(sys.prefix) != ROOT / ".venv":
         raise BadRun(f"{', '.join(missing)} missing: pip install 'micstools[{extra}]'")
     print(f"first call: installing {', '.join(missing)}", file=sys.stderr, flush=True)
-    if subprocess.run([script, extra], stdout=sys.stderr).returncode:
+    words = [script] if extra == _OF_A_FIRST_RUN else [script, extra]
+    if subprocess.run(words, stdout=sys.stderr).returncode:
         raise BadRun(f"{', '.join(missing)} could not be installed; the reason stands above")
     importlib.invalidate_caches()

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from micstools import labels
+from micstools import extras, labels
 from micstools.geometry import Array, IntArray
 from micstools.overlap import present_bodies
 from micstools.reader import Fields, Run
@@ -76,7 +76,9 @@ def missing_libraries() -> str:
 
 
 def require_libraries() -> None:
-    """End the program with exit code 1 and the command to run where nothing can be drawn."""
+    """Refuse to draw without pyvista; end the program with exit code 1 and the command to run
+    where the system's libraries are missing."""
+    extras.need("pictures")
     problem = missing_libraries()
     if problem:
         print(problem, file=sys.stderr)

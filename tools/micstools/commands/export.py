@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import command, exports
+from micstools import command, exports, extras
 from micstools.commands.base import Command
 from micstools.reader import BadRun, Run
 
@@ -24,6 +24,8 @@ def _export(given: argparse.Namespace) -> int:
     formats = exports.parse_formats(given.to)
     if given.final and "csv" not in formats:
         raise BadRun(f"--final is of csv, which --to {given.to} does not ask for")
+    if "pvd" in formats:
+        extras.need("pictures")
     run = command.open_run(given.run)
     if not run.bodies.n:
         raise BadRun(f"{run.folder} holds no blocks: there is nothing to export")

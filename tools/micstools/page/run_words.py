@@ -1,6 +1,7 @@
 """The case and the end of a run in words."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -149,8 +150,7 @@ def differing(run: Run) -> list[tuple[str, str, str]]:
 
 def _defaults() -> dict[str, dict[str, Any]]:
     """Default of each variable of each group, from the schema that is made of the program."""
-    path = Path(__file__).parents[3] / "docs" / "mics-case.schema.json"
-    kinds = json.loads(path.read_text())["$defs"]
+    kinds = json.loads((files("micstools") / "mics-case.schema.json").read_text())["$defs"]
     return {
         group: {name: entry.get("default") for name, entry in kind.get("properties", {}).items()}
         for group, kind in kinds.items()
