@@ -27,7 +27,7 @@ def need(extra: str) -> None:
     if not script.is_file() or Path(sys.prefix) != ROOT / ".venv":
         raise BadRun(f"{', '.join(missing)} missing: pip install 'micstools[{extra}]'")
     print(f"first call: installing {', '.join(missing)}", file=sys.stderr, flush=True)
-    words = [script] if extra == _OF_A_FIRST_RUN else [script, extra]
+    words = [str(script), *([] if extra == _OF_A_FIRST_RUN else [extra])]
     if subprocess.run(words, stdout=sys.stderr).returncode:
         raise BadRun(f"{', '.join(missing)} could not be installed; the reason stands above")
     importlib.invalidate_caches()

@@ -22,6 +22,7 @@ from micstools.vtk_data import shares_at_points, triangles_of, water_surface
 
 Plotter = Any  # pyvista.Plotter, which is imported late
 WATER = "#7fb8e6"
+WATER_PARTS = ("surface of the water", "body of the water")
 BED = "#b7a78c"
 FIXED = ("#8d8d8d", "#a3a3a3", "#777777")
 DROPPED = ("#d1495b", "#edae49", "#00798c", "#6a4c93", "#66a182", "#f28482", "#2e4057", "#b5838d")
@@ -113,7 +114,7 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     speed = style.speed if arrows.velocity.size and style.speed else usual_speed(arrows.velocity)
     height = float(run.grid.high[2] - run.grid.low[2])
     _add_arrows(plotter, arrows, speed, ARROW * height)
-    _look(plotter, camera)
+    look(plotter, camera)
     image = Image.fromarray(plotter.screenshot(return_img=True)).convert("RGB")
     if style.label:
         labels.number_blocks(image, _block_numbers(plotter, run, row, camera))
@@ -124,23 +125,14 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     return path
 
 
-def frame(run: Run, row: int, fields: Fields | None, width: int, camera: Camera) -> Image.Image:
-    """Blocks at a row in the water of some fields, without words, `width` pixels wide."""
-    plotter = _stage(run, row, fields, width, camera)
-    _look(plotter, camera)
-    image = Image.fromarray(plotter.screenshot(return_img=True)).convert("RGB")
-    plotter.close()
-    return image
-
-
 def _stage(run: Run, row: int, fields: Fields | None, width: int, camera: Camera) -> Plotter:
     """Tank, bed, blocks at a row and the water of some fields."""
-    plotter = _plotter(width, int(width * camera.aspect))
+    plotter = new_plotter(width, int(width * camera.aspect))
     _add_blocks(plotter, run, row)
-    _add_tank(plotter, run.grid.low, run.grid.high)
-    _add_bed(plotter, run)
+    add_tank(plotter, run.grid.low, run.grid.high)
+    add_bed(plotter, run)
     if fields is not None:
-        _add_water(plotter, run, fields)
+        add_water(plotter, run, fields)
     return plotter
 
 
@@ -195,14 +187,15 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
     for k, body in present_bodies(run, row).items():
         colour = [(k + 1) % 256, (k + 1) // 256 % 256, (k + 1) // 65536]
         plotter.add_mesh(triangles_of(body.points, body.shape.triangles), color=colour, **flat)
-    _add_bed(plotter, run, color="white", **flat)
-    _look(plotter, camera)
+    add_bed(plotter, run, color="white", **flat)
+    look(plotter, camera)
     seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
     ids = seen @ np.array([1, 256, 65536])
     return np.where(ids <= run.bodies.n, ids, 0)
 
 
-def _plotter(width: int, height: int) -> Plotter:
+def new_plotter(width: int, height: int) -> Plotter:
+    """A plotter without a window, its picture so large [pixels]."""
     import pyvista as pv
     import vtk
 
@@ -214,24 +207,34 @@ def _plotter(width: int, height: int) -> Plotter:
     return plotter
 
 
-def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
+def block_colours(run: Run) -> list[str]:
+    """Colour of each block: greys where it is fixed, else by its turn."""
     order = {int(k): n for n, k in enumerate(run.bodies.dropped)}
-    still = 0
+    still = [int(k) for k in np.flatnonzero(run.bodies.fixed)]
+    return [
+        DROPPED[order[k] % len(DROPPED)] if k in order else FIXED[still.index(k) % len(FIXED)]
+        for k in range(run.bodies.n)
+    ]
+
+
+def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
+    colours = block_colours(run)
     for k, body in present_bodies(run, row).items():
-        if k in order:
-            colour = DROPPED[order[k] % len(DROPPED)]
-        else:
-            colour = FIXED[still % len(FIXED)]
-            still += 1
-        plotter.add_mesh(
-            triangles_of(body.points, body.shape.triangles),
-            color=colour,
-            smooth_shading=False,
-            ambient=0.35,
-            diffuse=0.75,
-            specular=0.1,
-        )
-        plotter.add_mesh(_edges(body.points, body.shape), color="#303030", line_width=1.5)
+        add_block(plotter, body.points, body.shape, colours[k])
+
+
+def add_block(plotter: Plotter, points: Array, shape: Shape, colour: str) -> tuple[Any, Any]:
+    """Add the faces and the edges of a block whose corners are at `points` (n, 3) [m]; returns
+    both actors."""
+    faces = plotter.add_mesh(
+        triangles_of(points, shape.triangles),
+        color=colour,
+        smooth_shading=False,
+        ambient=0.35,
+        diffuse=0.75,
+        specular=0.1,
+    )
+    return faces, plotter.add_mesh(_edges(points, shape), color="#303030", line_width=1.5)
 
 
 def _edges(points: Array, shape: Shape) -> Any:
@@ -244,7 +247,8 @@ def _lines(points: Array, edges: IntArray) -> Any:
     return pv.PolyData(points, lines=np.hstack([np.full((len(edges), 1), 2), edges]).ravel())
 
 
-def _add_tank(plotter: Plotter, low: Array, high: Array) -> None:
+def add_tank(plotter: Plotter, low: Array, high: Array) -> None:
+    """Add the edges of the tank and its floor."""
     import pyvista as pv
 
     bounds = np.stack([low, high], axis=1).ravel()
@@ -254,7 +258,7 @@ def _add_tank(plotter: Plotter, low: Array, high: Array) -> None:
     plotter.add_mesh(floor, color="#e8e4dc", ambient=0.4)
 
 
-def _add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
+def add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
     """The surface of the bed in the tank, and below its border the sides of the tank."""
     import pyvista as pv
 
@@ -287,15 +291,19 @@ def _add_bed(plotter: Plotter, run: Run, **look: Any) -> None:
     plotter.add_mesh(walls, **look)
 
 
-def _add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
-    """The water surface where no solid is, and the body of water as a faint tint."""
+def add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
+    """Add the water surface where no solid is, and the body of water as a faint tint, in place of
+    those of another time."""
     grid = shares_at_points(run, fields)
+    for name in WATER_PARTS:
+        plotter.remove_actor(name, render=False)
     if not fields.liquid.min() < 0.5 < fields.liquid.max():
         return
     surface = water_surface(grid)
     if surface.n_points:
         plotter.add_mesh(
             surface,
+            name=WATER_PARTS[0],
             color=WATER,
             opacity=0.6,
             smooth_shading=True,
@@ -305,7 +313,8 @@ def _add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
     water = grid.clip_scalar(scalars="liquid", value=0.5, invert=False).extract_surface(
         algorithm="dataset_surface"
     )
-    plotter.add_mesh(water, color=WATER, opacity=0.12, lighting=False)
+    look = {"color": WATER, "opacity": 0.12, "lighting": False}
+    plotter.add_mesh(water, name=WATER_PARTS[1], **look)
 
 
 @dataclass(frozen=True)
@@ -390,7 +399,8 @@ def camera_for(low: Array, high: Array, view: str) -> Camera:
     return Camera(focus, focus + distance * towards, float(angle), float(half_height / half_width))
 
 
-def _look(plotter: Plotter, camera: Camera) -> None:
+def look(plotter: Plotter, camera: Camera) -> None:
+    """See what there is from a camera."""
     plotter.camera.focal_point = camera.focus
     plotter.camera.position = camera.position
     plotter.camera.up = (0, 0, 1)

@@ -47,7 +47,7 @@ def test_blocks_not_yet_released_are_not_drawn(loose_pile: Run, tmp_path: Path) 
 def test_blocks_are_found_by_their_numbers_from_one(loose_pile: Run) -> None:
     camera = scene.camera_for(loose_pile.grid.low, loose_pile.grid.high, "front")
     for t, seen in ((0.0, {1, 2, 3, 4}), (2.5, {1, 2, 3, 4, 5, 6})):
-        plotter = scene._plotter(300, int(300 * camera.aspect))
+        plotter = scene.new_plotter(300, int(300 * camera.aspect))
         ids = scene._block_numbers(plotter, loose_pile, loose_pile.bodies.row(t), camera)
         plotter.close()
         assert set(np.unique(ids[ids > 0])) == seen

@@ -1,7 +1,9 @@
 """A film of a run."""
 
 import argparse
+import signal
 from pathlib import Path
+from typing import NoReturn
 
 from micstools import command, movie, scene
 from micstools.commands.base import Command
@@ -31,14 +33,20 @@ def _movie(given: argparse.Namespace) -> int:
     path = given.out or run.folder / f"{given.view}.mp4"
     movie.require(path)
     film = movie.Film(given.view, given.begin, given.until, given.slow, given.rate, given.width)
+    signal.signal(signal.SIGTERM, _terminated)
     print(f"{len(film.times(run))} pictures", flush=True)
     print(movie.write(run, film, path))
     return 0
 
 
+def _terminated(_signum: int, _frame: object) -> NoReturn:
+    """End as after Ctrl-C, so that nothing unfinished is left."""
+    raise SystemExit(128 + signal.SIGTERM)
+
+
 MOVIE = Command(
     "movie",
-    "Make a film of a run: mp4 (needs ffmpeg) or gif. The water is that of the nearest written\n"
+    "Make a film of a run, mp4 or gif. The water is that of the nearest written\n"
     "field: a small &run field_interval makes it flow.",
     (
         "movie mics-coarse",
