@@ -6,21 +6,26 @@ from pathlib import Path
 from micstools import command, pile_ensemble
 from micstools.commands.base import Command
 from micstools.page import ensemble_page, run_page
+from micstools.reader import BadRun
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
+    add("--north", type=float, metavar="DEGREES", help="direction of north in the plan, from +y "
+        "towards +x; default: +y is taken as north, and the page says so")  # fmt: skip
     add("--out", type=Path, help="the file, default report.html in the folder")
 
 
 def _report(given: argparse.Namespace) -> int:
+    if given.north is not None and not abs(given.north) <= 360:
+        raise BadRun(f"--north {given.north}: must be degrees from -360 to 360")
     if pile_ensemble.is_ensemble(given.run):
         folder = given.run
-        text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
+        text = ensemble_page.page(pile_ensemble.open_ensemble(folder), given.north)
     else:
         run = command.open_run(given.run)
-        folder, text = run.folder, run_page.page(run)
+        folder, text = run.folder, run_page.page(run, given.north)
     path = given.out or folder / "report.html"
     path.write_text(text, encoding="utf-8")
     print(f"{path} ({path.stat().st_size / 1e3:.0f} kB)")

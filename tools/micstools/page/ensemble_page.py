@@ -70,8 +70,9 @@ _QUANTITIES = (
 )
 
 
-def page(ensemble: Ensemble) -> str:
-    """The page of an ensemble as text."""
+def page(ensemble: Ensemble, north: float | None = None) -> str:
+    """The page of an ensemble as text. `north`: its direction in the plan, degrees from +y towards
+    +x."""
     run = ensemble.example.run
     title = f"{run_words.title(run, ensemble.folder)}: {count(len(ensemble.piles), 'run')}"
     return document(
@@ -82,11 +83,12 @@ def page(ensemble: Ensemble) -> str:
         _patterns(ensemble),
         *([_plan(ensemble), _histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
+        tag("p", run_page.NORTH_IS_Y, class_="note no-print") if north is None else None,
         _running(ensemble),
         _health(ensemble),
         _case(ensemble, run),
         _table(ensemble),
-        data("piles", _scenes(ensemble)),
+        data("piles", _scenes(ensemble, north)),
         script=_START,
     )
 
@@ -289,14 +291,14 @@ def _thumbnail(p: Pile, marks: list[str]) -> Markup:
     return tag("li", button)
 
 
-def _scenes(ensemble: Ensemble) -> dict[str, Any]:
+def _scenes(ensemble: Ensemble, north: float | None) -> dict[str, Any]:
     """The last row of every run for the player; the tank and the shapes once, or for each choice
     where they are varied."""
     varied = {name.split(".")[0] for choice in ensemble.choices for name in choice}
     parts = ensemble.parts if varied & {"shape", "grid", "bed"} else [ensemble]
     parts = [part for part in parts if part.piles]
     return {
-        "tanks": [motion.tank(part.example.run) for part in parts],
+        "tanks": [motion.tank(part.example.run, north) for part in parts],
         "runs": {
             p.number: _shown(p) | {"tank": n} for n, part in enumerate(parts) for p in part.piles
         },

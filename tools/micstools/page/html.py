@@ -8,6 +8,7 @@ from typing import Any
 
 # The page may load nothing at all; the browser itself refuses what this does not allow.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_SCRIPTS = ("vectors", "water", "stage", "overlay", "hands", "player")  # each uses those before
 _EMPTY = ("img", "input", "meta")  # have no end
 
 
@@ -79,7 +80,7 @@ def data(name: str, content: Any) -> Markup:
 def document(title: str, *content: object, script: str = "") -> str:
     """The whole page with its style and scripts, `script` the one that starts them."""
     style = (files("micstools.page") / "page.css").read_text()
-    player = (files("micstools.page") / "player.js").read_text()
+    player = "".join((files("micstools.page") / f"{name}.js").read_text() for name in _SCRIPTS)
     head = tag(
         "head",
         tag("meta", charset="utf-8"),

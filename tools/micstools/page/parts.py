@@ -4,7 +4,11 @@ from micstools.page.html import Markup, markup, tag
 
 _COLOURINGS = (("block", "block"), ("speed", "speed"), ("contacts", "contacts"))
 _VIEWS = ("corner", "front", "side", "top")
-_PACES = (("0.1", "1/10"), ("0.25", "1/4"), ("0.5", "1/2"), ("1", "1"), ("2", "2"))
+_WATERS = (("clear", "clear"), ("speed", "by speed"), ("none", "none"))
+_HINT = (
+    "Front, side and top are to scale: drag to measure, with Shift to move. In the corner view "
+    "drag to turn. Bed and walls are see-through before a block."
+)
 
 
 def player(name: str, label: str) -> Markup:
@@ -14,7 +18,7 @@ def player(name: str, label: str) -> Markup:
         tag("button", "Play", class_="play", type="button"),
         tag("input", class_="slider", type="range", min=0, max=1, value=0, aria_label="time"),
         tag("output", "0.00 s", class_="clock"),
-        tag("label", "pace", _select("pace", _PACES, "0.5")),
+        tag("label", "pace", _select("pace", (("0.5", "1/2"),), "0.5")),
         class_="row moving",
     )
     views = tag("span", *(
@@ -26,20 +30,25 @@ def player(name: str, label: str) -> Markup:
         tag("button", "−", type="button", data_zoom=1.25, aria_label="farther"),
         class_="group",
     )
-    water = tag("label", tag("input", type="checkbox", class_="wet", checked=True), "water")
+    numbers = tag("input", type="checkbox", class_="numbers", checked=True)
+    paths = tag("input", type="checkbox", class_="paths")
     settings = tag(
         "div",
         views,
         zoom,
         tag("label", "colour by", _select("colouring", _COLOURINGS, "block")),
         tag("label", "follow", _select("follow", (("", "whole tank"),), ""), class_="moving"),
-        water,
+        tag("label", "water", _select("wet", _WATERS, "clear")),
+        tag("label", numbers, "numbers"),
+        tag("label", paths, "path", class_="moving"),
         class_="row",
     )
     canvas = tag("canvas", class_="stage", tabindex=0, role="img", aria_label=label)
-    legend = tag("ul", class_="legend")
+    picture = tag("div", canvas, tag("canvas", class_="over"), class_="picture")
+    legend, hint = tag("ul", class_="legend"), tag("p", _HINT, class_="hint")
     sorry = tag("p", "This browser has no WebGL: the pictures below stand for it.", class_="sorry")
-    return tag("div", canvas, moving, settings, legend, sorry, class_="player", id=name)
+    parts = (picture, moving, settings, legend, hint, sorry)
+    return tag("div", *parts, class_="player", id=name)
 
 
 def _select(name: str, options: tuple[tuple[str, str], ...], chosen: str) -> Markup:

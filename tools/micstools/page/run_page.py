@@ -31,6 +31,7 @@ _OVERLAP = 0.01  # of a block's length
 _MADE = 3e-3  # of a block's weight times its length
 
 
+NORTH_IS_Y = "North is taken as the y direction; mics-tools report --north gives another."
 Row = tuple[str, str, str, bool | None]
 """Of the health: what, found, wanted, and whether it is as wanted (None: not known)."""
 
@@ -45,8 +46,9 @@ class Found:
     step: float  # of the plan area [m]
 
 
-def page(run: Run) -> str:
-    """The page of a run as text; without blocks it tells of the case and of the numbers only."""
+def page(run: Run, north: float | None = None) -> str:
+    """The page of a run as text; without blocks it tells of the case and of the numbers only.
+    `north`: its direction in the plan, degrees from +y towards +x."""
     title = run_words.title(run)
     case = section("case", "The case", *(tag("p", words) for words in run_words.case(run)))
     last = (_settings(run), _provenance(run))
@@ -63,13 +65,14 @@ def page(run: Run) -> str:
         tag("h1", title),
         tag("p", outcome(run, found), class_="lead"),
         player("player", "the fall of the blocks; arrow keys turn it, + and - zoom, space plays"),
+        tag("p", NORTH_IS_Y, class_="note no-print") if north is None else None,
         _facts(run, found),
         case,
         _pile(run),
         _blocks(run, found),
         _health(run, found),
         *last,
-        data("scene", motion.scene(run)),
+        data("scene", motion.scene(run, north)),
         script=_START,
     )
 

@@ -1,0 +1,356 @@
+"""The player of a page: flat views to measure in, blocks that nothing hides, no flicker, numbers,
+paths, paces, and the speed of the water."""
+
+import base64
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from browser import MISSING, Browser
+from micstools import cli
+from micstools.geometry import Array
+from micstools.page import motion, run_page
+from micstools.reader import Run
+from synthetic import UPRIGHT, Motion, write_run
+
+in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+FLAT = {"front": (0, 2), "side": (1, 2), "top": (0, 1)}
+
+
+def with_bed(folder: Path, height: Callable[[Array, Array], Array]) -> Run:
+    """Gives a synthetic run a bed of a height over its plan, a little larger than the tank."""
+    x, y = np.meshgrid(np.linspace(-0.03, 0.33, 13), np.linspace(-0.02, 0.12, 8), indexing="ij")
+    points = np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3)
+    n = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (k.ravel() for k in (n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        h5["bed/points"], h5["bed/triangles"] = points, triangles.astype(np.int32)
+        about = h5["provenance"].attrs
+        about["parameters"] = str(about["parameters"]) + "&bed file = 'bed.txt' /\n"
+    return Run(folder)
+
+
+def save(run: Run, path: Path, north: float | None = None) -> Path:
+    """The page of a run in a file."""
+    path.write_text(run_page.page(run, north))
+    return path
+
+
+def unpacked(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+def test_a_bed_has_sides_down_to_the_floor(tmp_path: Path) -> None:
+    """A slope that rises to 0.1 m at the far end of the tank in x: of its sides the front and the
+    back are triangles, the far one is a rectangle."""
+    folder = write_run(tmp_path / "run", Motion(t_end=0.1))
+    run = with_bed(folder, lambda x, y: np.clip(x, 0, None) / 3)
+    points, triangles = motion.bed(run)
+    corners = points[triangles[len(run.bed[1]) :]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    area = {
+        (d, side): np.abs(normal[normal[:, d] * side > 1e-9][:, d]).sum()
+        for d in (0, 1)
+        for side in (-1, 1)
+    }
+    assert area[1, -1] == pytest.approx(0.015, rel=1e-3)
+    assert area[1, 1] == pytest.approx(0.015, rel=1e-3)
+    assert area[0, 1] == pytest.approx(0.01, rel=1e-3) and area[0, -1] < 1e-6
+    inside = (corners >= -1e-6) & (corners <= [0.3 + 1e-6, 0.1 + 1e-6, 0.1 + 1e-6])
+    assert inside.all()
+
+
+def test_the_speed_of_the_water_is_that_of_the_fields(loose_pile: Run) -> None:
+    water = motion.water(loose_pile)
+    assert water is not None
+    found, fields = water["speed"], loose_pile.fields(2.0)
+    frame = list(unpacked(found["times"], "<f4")).index(2.0)
+    speed = np.linalg.norm(fields.velocity, axis=3)
+    speed[(fields.liquid <= 0.5) | (fields.solid >= 0.5)] = 0.0
+    for name, wanted in (("front", speed.max(axis=1)), ("side", speed.max(axis=2))):
+        part = found[name]
+        share = unpacked(part["values"], "u1").reshape(-1, part["ny"], part["nx"])[frame] / 255
+        assert share.shape == wanted.shape
+        got = found["fastest"] * share**2
+        assert got == pytest.approx(wanted.clip(0, found["fastest"]), abs=0.01 * found["fastest"])
+    plan = found["plan"]
+    assert (plan["nx"], plan["ny"]) == (60, 20)
+    assert motion.water(Run(loose_pile.folder))["speed"]["fastest"] > 0.05
+
+
+def test_long_fixed_bodies_are_walls(make_run) -> None:
+    run = make_run(Motion(t_end=0.1))
+    assert motion.walls_of(run) == set()
+    shape = run.shapes["hexapod"]
+    long = replace(shape, points=5 * shape.points)
+    run.shapes["quay"] = long
+    run.bodies.shape[1] = "quay"
+    assert motion.walls_of(run) == {1}
+    assert [body["wall"] for body in motion.scene(run)["bodies"][:3]] == [False, True, False]
+
+
+def test_contacts_that_come_and_go_stay() -> None:
+    time = np.arange(0, 1, 0.01)
+    contacts = (np.arange(100)[:, None] % 4 == 0).astype(int)
+    assert (motion._steady(time, contacts, np.arange(10, 90, 3)) == 1).all()
+    contacts[50:] = 0
+    assert motion._steady(time, contacts, np.array([40, 60, 70]))[:, 0].tolist() == [1, 0, 0]
+
+
+def test_north_is_given_or_said_to_be_y(make_run, capsys) -> None:
+    run = make_run(Motion(t_end=0.1))
+    assert run_page.NORTH_IS_Y in run_page.page(run)
+    page = run_page.page(run, 30.0)
+    assert run_page.NORTH_IS_Y not in page and '"north":30.0' in page
+    with pytest.raises(SystemExit) as end:
+        cli.main(["report", str(run.folder), "--north", "400"])
+    assert end.value.code == 2
+    assert "--north 400.0: must be degrees" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def page(loose_pile: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return save(loose_pile, tmp_path_factory.mktemp("player") / "page.html", north=90.0)
+
+
+def settled(browser: Browser) -> None:
+    """Until what was asked for is drawn."""
+    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def view(browser: Browser, name: str) -> None:
+    browser.run(f"document.querySelector('[data-view={name}]').click()")
+    settled(browser)
+
+
+def choose(browser: Browser, name: str, value: object) -> None:
+    browser.run(
+        f"(s => {{ s.value = '{value}'; s.dispatchEvent(new Event('change')); }})"
+        f"(document.querySelector('.{name}'))"
+    )
+    settled(browser)
+
+
+def at(browser: Browser, point: list[float]) -> tuple[float, float]:
+    """Where a point is seen, in pixels of the picture from its upper left."""
+    found = browser.run(
+        f"(p => [p.x, p.y])(runPlayer.stage.overlay.at({[float(v) for v in point]}))"
+    )
+    return found[0], found[1]
+
+
+PIXEL = """(() => {{
+  const s = runPlayer.stage, gl = s.gl, found = new Uint8Array(4);
+  s.paint();
+  gl.readPixels({0}, s.canvas.height - 1 - {1}, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, found);
+  return [...found.slice(0, 3)];
+}})()"""
+
+
+def pixel(browser: Browser, x: float, y: float) -> np.ndarray:
+    """The colour drawn at a place of the picture."""
+    return np.array(browser.run(PIXEL.format(round(x), round(y))))
+
+
+@in_browser
+@pytest.mark.parametrize("name", FLAT)
+def test_flat_views_are_to_scale(browser: Browser, page: Path, name: str) -> None:
+    browser.open(page)
+    view(browser, name)
+    across, up = FLAT[name]
+    one, step = np.array([0.1, 0.03, 0.05]), np.zeros(3)
+    step[across], step[up] = 0.03, 0.04
+    behind = np.array([0.0, 0.0, 0.0])
+    behind[3 - across - up] = 0.05
+    p, q, r = (at(browser, list(point)) for point in (one, one + step, one + behind))
+    assert r == pytest.approx(p, abs=1e-3)  # no perspective
+    length, pixels = browser.run(
+        "[runPlayer.stage.overlay.bar.length, runPlayer.stage.overlay.bar.pixels]"
+    )
+    scale = pixels / length
+    assert q[0] - p[0] == pytest.approx(0.03 * scale, rel=1e-4)
+    assert p[1] - q[1] == pytest.approx(0.04 * scale, rel=1e-4)
+    assert browser.errors == []
+
+
+@in_browser
+def test_a_length_is_measured(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    view(browser, "top")
+    box = browser.run("(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())")
+    p, q = (
+        [place + edge for place, edge in zip(at(browser, point), box, strict=True)]
+        for point in ([0.05, 0.02, 0.0], [0.20, 0.08, 0.0])
+    )
+    yaw = browser.run("runPlayer.stage.yaw")
+    browser.mouse("mousePressed", *p, button="left", buttons=1, clickCount=1)
+    browser.mouse("mouseMoved", *q, button="left", buttons=1)
+    browser.mouse("mouseReleased", *q, button="left")
+    settled(browser)
+    told = browser.run("runPlayer.stage.overlay.told")
+    length = float(told.split(" mm")[0])
+    assert length == pytest.approx(161.6, abs=1.0) and "Δx" in told and "Δy" in told
+    assert browser.run("runPlayer.stage.yaw") == yaw
+    view(browser, "corner")
+    assert browser.run("runPlayer.stage.measured") is None
+    browser.mouse("mouseMoved", *p)
+    settled(browser)
+    assert browser.errors == []
+
+
+@in_browser
+@pytest.mark.parametrize("name", ["corner", *FLAT])
+def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> None:
+    """The block lies in a hole of the bed, and a roof of the bed is over it."""
+    place = [(np.array([0.15, 0.05, 0.05]), UPRIGHT)]
+    folder = write_run(tmp_path / "run", Motion(places=place, t_end=2.0, field_step=2.0))
+    deep = with_bed(folder, lambda x, y: 0.09 + 0.02 * np.sin(50 * x))
+    browser.open(save(deep, tmp_path / "page.html"))
+    browser.run("runPlayer.show(2)")
+    choose(browser, "wet", "none")
+    browser.run("document.querySelector('.numbers').click()")
+    view(browser, name)
+    x, y = at(browser, [0.15, 0.05, 0.05])
+    seen = []
+    for colour in ("#ff0000", "#00ff00"):
+        browser.run(f"runPlayer.stage.scene.bodies[3].colour = '{colour}'")
+        seen.append(pixel(browser, x, y))
+    assert seen[0][0] > seen[0][1] + 40 and seen[1][1] > seen[1][0] + 40, seen
+    assert browser.errors == []
+
+
+@in_browser
+def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) -> None:
+    """A bed at the height of the floor is drawn whole from wherever one looks."""
+    folder = write_run(tmp_path / "run", Motion(t_end=0.1))
+    flat = with_bed(folder, lambda x, y: 0 * x)
+    browser.open(save(flat, tmp_path / "page.html"))
+    choose(browser, "wet", "none")
+    for yaw in (-0.5, -0.493, -0.31, 0.2, 0.7):
+        browser.run(f"runPlayer.stage.yaw = {yaw}; runPlayer.stage.pitch = 0.4")
+        browser.run("runPlayer.stage.scene.bodies.forEach(body => { body.release = null; })")
+        pixel(browser, 0, 0)
+        places = [at(browser, [x, 0.01, 0.0]) for x in np.linspace(0.02, 0.28, 40)]
+        colours = np.array([pixel(browser, *place) for place in places])
+        assert np.ptp(colours, axis=0).max() <= 2, yaw
+    assert browser.errors == []
+
+
+@in_browser
+def test_a_block_crosses_a_periodic_side(browser: Browser, page: Path) -> None:
+    """Between two frames it does not fly back through the tank."""
+    browser.open(page)
+    found = browser.run(
+        "(s => { s.scene.period = [0.3, 0, 0]; s.place[3 * 3] = 0.29;"
+        "s.place[3 * s.scene.bodies.length + 3 * 3] = 0.02;"
+        "return [0.25, 0.5, 0.75].map(share => s.pose(3, [0, 1, share]).place[0]); })"
+        "(runPlayer.stage)"
+    )
+    assert found == pytest.approx([0.2975, 0.005, 0.0125], abs=1e-6)
+
+
+@in_browser
+def test_numbers_stand_on_their_blocks(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    browser.run("runPlayer.show(8)")
+    for name in ("corner", *FLAT):
+        view(browser, name)
+        labels = browser.run("runPlayer.stage.overlay.labels")
+        assert len(labels) >= 6
+        assert len({number for number, _, _ in labels}) == len(labels)
+        for number, x, y in labels:
+            on = browser.run(
+                "((s, x, y) => s.seen.at(Math.min(s.seen.w - 1, Math.floor(x / s.overlay.wide"
+                " * s.seen.w)), s.seen.h - 1 - Math.floor(y / s.overlay.high * s.seen.h)))"
+                f"(runPlayer.stage, {x}, {y})"
+            )
+            assert on == number
+    browser.run("document.querySelector('.numbers').click()")
+    settled(browser)
+    assert browser.run("runPlayer.stage.seen") is None
+    assert browser.errors == []
+
+
+INK = """(() => {
+  const c = document.querySelector('.over'), copy = document.createElement('canvas');
+  [copy.width, copy.height] = [c.width, c.height];
+  const pen = copy.getContext('2d', { willReadFrequently: true });
+  pen.drawImage(c, 0, 0);
+  return pen.getImageData(0, 0, c.width, c.height).data.filter((v, i) => i % 4 == 3 && v).length;
+})()"""
+
+
+@in_browser
+def test_a_path_is_drawn(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    browser.run("runPlayer.show(6)")
+    choose(browser, "follow", 5)
+    browser.run("document.querySelector('.numbers').click()")
+    settled(browser)
+    bare = browser.run(INK)
+    browser.run("document.querySelector('.paths').click()")
+    settled(browser)
+    one = browser.run(INK)
+    choose(browser, "follow", "")
+    assert one > bare + 50 and browser.run(INK) > bare + 50
+    assert browser.errors == []
+
+
+@in_browser
+def test_the_whole_run_passes_in_ten_seconds(browser: Browser, page: Path, tmp_path: Path) -> None:
+    paces = "[...document.querySelector('.pace').options].map(o => +o.value)"
+    browser.open(page)
+    assert browser.run(paces) == [0.1, 0.25, 0.5, 1]
+    assert browser.run("document.querySelector('.pace').value") == "0.5"
+    slow = Motion(t_end=110.0, history_step=0.5, field_step=110.0)
+    browser.open(save(Run(write_run(tmp_path / "run", slow)), tmp_path / "page.html"))
+    assert browser.run(paces) == pytest.approx([0.1, 0.25, 0.5, 1, 2, 5, 10, 11])
+    assert "all in 10 s" in browser.run("document.querySelector('.pace').textContent")
+
+
+@in_browser
+def test_the_water_is_coloured_by_its_speed(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    browser.run("runPlayer.show(2.1)")
+    seen = {}
+    for water in ("none", "clear", "speed"):
+        choose(browser, "wet", water)
+        for name in FLAT:
+            view(browser, name)
+            seen[water, name] = pixel(browser, *at(browser, [0.05, 0.05, 0.14]))
+        legend = browser.run("document.querySelector('.legend').textContent")
+        assert ("water:" in legend and "m/s" in legend) is (water == "speed")
+    for name in FLAT:
+        assert np.abs(seen["none", name] - seen["clear", name]).max() > 10
+        assert np.abs(seen["speed", name] - seen["clear", name]).max() > 10, name
+    assert browser.errors == []
+
+
+@in_browser
+def test_north_is_where_it_was_said_to_be(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    assert browser.run("runPlayer.stage.overlay.north") == pytest.approx([1, 0, 0], abs=1e-12)
+
+
+@in_browser
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("name", ["corner", *FLAT])
+def test_it_fits_a_phone(browser: Browser, page: Path, name: str, dark: bool) -> None:
+    browser.open(page, 360, 740, dark)
+    view(browser, name)
+    assert browser.run("document.documentElement.scrollWidth") <= 360
+    assert browser.run("runPlayer.stage.overlay.canvas.width") == browser.run(
+        "runPlayer.stage.canvas.width"
+    )
+    assert browser.errors == []
