@@ -230,6 +230,29 @@ def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> No
     assert browser.errors == []
 
 
+SUMS = """(() => {
+  const s = runPlayer.stage, gl = s.gl, sums = new Set();
+  for (let k = 0; k < 12; k++) {
+    s.paint();
+    const [w, h] = [s.canvas.width, s.canvas.height], found = new Uint8Array(4 * w * h);
+    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, found);
+    sums.add(found.reduce((sum, v) => (31 * sum + v) % 1000000007, 0));
+  }
+  return sums.size;
+})()"""
+
+
+@in_browser
+@pytest.mark.parametrize("name", ["corner", *FLAT])
+def test_a_moment_always_looks_the_same(browser: Browser, page: Path, name: str) -> None:
+    """Edges of blocks and tank neither come and go nor move."""
+    browser.open(page)
+    browser.run("runPlayer.show(3.3)")
+    view(browser, name)
+    assert browser.run(SUMS) == 1
+    assert browser.errors == []
+
+
 @in_browser
 def test_a_floor_under_a_bed_does_not_flicker(browser: Browser, tmp_path: Path) -> None:
     """A bed at the height of the floor is drawn whole from wherever one looks."""

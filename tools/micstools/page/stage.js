@@ -27,8 +27,36 @@ void main() {
   float sun = max(dot(n, normalize(vec3(-0.45, -0.6, 0.75))), 0.0);
   gl_FragColor = vec4(colour.rgb * mix(1.0, 0.42 + 0.28 * sky + 0.36 * sun, lit), colour.a);
 }`;
+// An edge is a strip of a width in pixels: lines of WebGL come out otherwise each time, or not at all.
+const EDGE_VERTEX = `
+attribute vec3 place, normal;
+attribute float side;
+uniform mat4 camera;
+uniform vec3 shift;
+uniform vec4 turn;
+uniform vec2 picture;
+uniform float width;
+vec3 turned(vec3 v) { return v + 2.0 * cross(turn.yzw, cross(turn.yzw, v) + turn.x * v); }
+vec4 seen(vec3 v) { return camera * vec4(turned(v) + shift, 1.0); }
+vec4 before(vec4 p, vec4 q) {
+  float least = 0.01 * max(p.w, q.w);
+  return p.w < least ? mix(q, p, (q.w - least) / (q.w - p.w)) : p;
+}
+void main() {
+  vec4 p = seen(place), q = seen(normal);
+  vec4 from = before(p, q), to = before(q, p);
+  vec2 way = (to.xy / to.w - from.xy / from.w) * picture;
+  way = length(way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
+  from.xy += side * width * vec2(-way.y, way.x) / picture * from.w;
+  gl_Position = from;
+}`;
+const EDGE_FRAGMENT = `
+precision mediump float;
+uniform vec4 colour;
+void main() { gl_FragColor = colour; }`;
+const EDGE = 1.2; // pixels of the page
 const BED = rgb('#b7a78c');
-const VEIL = 0.2; // how much of a bed or wall is seen before a block
+const VEIL = 0.3; // how much of a bed or wall is seen before a block
 const COARSE = 4; // pixels of the picture along one of the map of blocks
 
 // A program of two shaders and where its uniforms are.
@@ -42,6 +70,7 @@ function compile(gl, vertex, fragment, uniforms) {
   }
   gl.bindAttribLocation(program, 0, 'place');
   gl.bindAttribLocation(program, 1, 'normal');
+  gl.bindAttribLocation(program, 2, 'side');
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error('shaders fail');
   for (const name of uniforms) at[name] = gl.getUniformLocation(program, name);
@@ -53,10 +82,10 @@ class Stage {
     this.canvas = canvas;
     this.gl = canvas.getContext('webgl', { alpha: false, antialias: true, stencil: true });
     if (!this.gl) throw new Error('no WebGL');
-    const { program, at } = compile(this.gl, BLOCK_VERTEX, BLOCK_FRAGMENT,
+    this.faces = compile(this.gl, BLOCK_VERTEX, BLOCK_FRAGMENT,
       ['camera', 'shift', 'turn', 'colour', 'low', 'high', 'lit', 'cut']);
-    this.program = program;
-    this.at = at;
+    this.edges = compile(this.gl, EDGE_VERTEX, EDGE_FRAGMENT,
+      ['camera', 'shift', 'turn', 'colour', 'picture', 'width']);
     this.colouring = 'block';
     this.wet = 'clear'; // or 'speed', 'none'
     this.followed = null;
@@ -101,27 +130,38 @@ class Stage {
   // Faces with a normal each, and the edges at which they bend.
   mesh(shape) {
     const points = unpack(shape.points, Float32Array), corners = unpack(shape.triangles, Uint32Array);
-    const edges = unpack(shape.edges, Uint32Array), faces = [], lines = [];
+    const edges = unpack(shape.edges, Uint32Array), faces = [], ends = [];
     const point = k => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
     for (let t = 0; t < corners.length; t += 3) {
       const [a, b, c] = [0, 1, 2].map(k => point(corners[t + k]));
       const n = unit(cross(b.map((v, i) => v - a[i]), c.map((v, i) => v - a[i])));
       for (const p of [a, b, c]) faces.push(...p, ...n);
     }
-    for (const k of edges) lines.push(...point(k), 0, 0, 1);
-    return { faces: this.buffer(faces, corners.length), lines: this.buffer(lines, edges.length) };
+    for (const k of edges) ends.push(point(k));
+    return { faces: this.buffer(faces, corners.length), lines: this.strips(ends) };
+  }
+
+  // Two triangles along each line, whose ends are one after another.
+  strips(ends) {
+    const values = [];
+    for (let k = 0; k < ends.length; k += 2) {
+      const [a, b] = [ends[k], ends[k + 1]], corner = (p, q, side) => values.push(...p, ...q, side);
+      corner(a, b, 1); corner(a, b, -1); corner(b, a, -1);
+      corner(a, b, -1); corner(b, a, 1); corner(b, a, -1);
+    }
+    return this.buffer(values, 3 * ends.length);
   }
 
   buildTank() {
-    const [x0, y0, z0] = this.scene.low, [x1, y1, z1] = this.scene.high, up = [0, 0, 1], lines = [];
-    const line = (a, b) => lines.push(...a, ...up, ...b, ...up);
+    const [x0, y0, z0] = this.scene.low, [x1, y1, z1] = this.scene.high, up = [0, 0, 1], ends = [];
+    const line = (a, b) => ends.push(a, b);
     for (const z of [z0, z1]) {
       line([x0, y0, z], [x1, y0, z]); line([x1, y0, z], [x1, y1, z]);
       line([x1, y1, z], [x0, y1, z]); line([x0, y1, z], [x0, y0, z]);
     }
     for (const [x, y] of [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) line([x, y, z0], [x, y, z1]);
     const floor = [[x0, y0], [x1, y0], [x1, y1], [x0, y0], [x1, y1], [x0, y1]];
-    this.frame = { lines: this.buffer(lines, lines.length / 6) };
+    this.frame = { lines: this.strips(ends) };
     this.floor = { faces: this.buffer(floor.flatMap(([x, y]) => [x, y, z0, ...up]), 6) };
   }
 
@@ -213,18 +253,18 @@ class Stage {
     if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
     const style = getComputedStyle(canvas), colour = name => rgb(style.getPropertyValue(name).trim());
     this.matrix = this.camera();
-    gl.useProgram(this.program);
+    this.picture = [wide, high];
+    this.edge = EDGE * scale;
     this.mapBlocks(wide, high);
     gl.viewport(0, 0, wide, high);
     gl.clearColor(...colour('--stage'), 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     this.put([0, 0, 0], [1, 0, 0, 0]);
     gl.disable(gl.DEPTH_TEST); // the floor is behind all that stands on it, and hides nothing from below
-    this.fill(this.floor.faces, gl.TRIANGLES, colour('--stage-floor'));
+    this.fill(this.floor.faces, colour('--stage-floor'));
     gl.enable(gl.DEPTH_TEST);
-    gl.enable(gl.POLYGON_OFFSET_FILL);
     gl.polygonOffset(2, 2);
-    this.fill(this.frame.lines, gl.LINES, colour('--stage-line'));
+    this.draft(this.frame.lines, colour('--stage-line'));
     gl.enable(gl.STENCIL_TEST); // 1 where a block is seen
     gl.stencilFunc(gl.ALWAYS, 1, 255);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.REPLACE);
@@ -233,6 +273,7 @@ class Stage {
     gl.stencilFunc(gl.EQUAL, 0, 255);
     this.paintWalls(1);
     gl.stencilFunc(gl.EQUAL, 1, 255);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR); // one veil, whatever the layers
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
@@ -240,7 +281,6 @@ class Stage {
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     gl.disable(gl.STENCIL_TEST);
-    gl.disable(gl.POLYGON_OFFSET_FILL);
     if (this.water.shown && this.wet !== 'none') this.water.paint(this.matrix, this.wet === 'speed');
     this.overlay.paint(this.matrix, wide / scale, high / scale, scale, style);
   }
@@ -254,13 +294,13 @@ class Stage {
     const gl = this.gl, mesh = this.meshes[this.scene.bodies[k].shape], colour = this.colourOf(k);
     const { place, turn } = this.pose(k);
     this.put(place, turn);
-    this.fill(mesh.faces, gl.TRIANGLES, colour, opacity, 1);
-    this.fill(mesh.lines, gl.LINES, colour.map(c => 0.35 * c), opacity);
+    this.fill(mesh.faces, colour, opacity, 1);
+    this.draft(mesh.lines, colour.map(c => 0.35 * c), opacity);
   }
 
   paintWalls(opacity) {
     this.put([0, 0, 0], [1, 0, 0, 0]);
-    if (this.bed) this.fill(this.bed.faces, this.gl.TRIANGLES, BED, opacity, 1, 1);
+    if (this.bed) this.fill(this.bed.faces, BED, opacity, 1, 1);
     this.each(true, k => this.paintBlock(k, opacity));
   }
 
@@ -278,8 +318,7 @@ class Stage {
     this.each(false, k => {
       const { place, turn } = this.pose(k), n = k + 1;
       this.put(place, turn);
-      this.fill(this.meshes[this.scene.bodies[k].shape].faces, gl.TRIANGLES,
-        [n & 255, n >> 8 & 255, n >> 16].map(v => v / 255));
+      this.fill(this.meshes[this.scene.bodies[k].shape].faces, [n & 255, n >> 8 & 255, n >> 16].map(v => v / 255));
     });
     const pixels = new Uint8Array(4 * w * h);
     gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -307,9 +346,10 @@ class Stage {
     this.target = { w, h, buffer, picture, depth };
   }
 
+  // Where what is drawn next stands.
   put(shift, turn) {
-    this.gl.uniform3fv(this.at.shift, shift);
-    this.gl.uniform4fv(this.at.turn, turn);
+    this.shift = shift;
+    this.turned = turn;
   }
 
   // Place and normal of the bound buffer.
@@ -319,20 +359,44 @@ class Stage {
       gl.enableVertexAttribArray(k);
       gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 24, 12 * k);
     }
+    gl.disableVertexAttribArray(2);
   }
 
-  // `cut`: what stands out of the plan of the tank is left out.
-  fill(part, kind, colour, opacity = 1, lit = 0, cut = 0) {
-    const gl = this.gl, at = this.at;
+  begin({ program, at }, part, colour, opacity) {
+    const gl = this.gl;
+    gl.useProgram(program);
     gl.bindBuffer(gl.ARRAY_BUFFER, part.buffer);
-    this.point();
     gl.uniformMatrix4fv(at.camera, false, this.matrix);
+    gl.uniform3fv(at.shift, this.shift);
+    gl.uniform4fv(at.turn, this.turned);
+    gl.uniform4f(at.colour, ...colour, opacity);
+    return at;
+  }
+
+  // Draws faces, a little farther away than their edges. `cut`: what stands out of the plan of the
+  // tank is left out.
+  fill(part, colour, opacity = 1, lit = 0, cut = 0) {
+    const gl = this.gl, at = this.begin(this.faces, part, colour, opacity);
+    this.point();
     gl.uniform3fv(at.low, this.scene.low);
     gl.uniform3fv(at.high, this.scene.high);
-    gl.uniform4f(at.colour, ...colour, opacity);
     gl.uniform1f(at.lit, lit);
     gl.uniform1f(at.cut, cut);
-    gl.drawArrays(kind, 0, part.count);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.drawArrays(gl.TRIANGLES, 0, part.count);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+  }
+
+  // Draws lines.
+  draft(part, colour, opacity = 1) {
+    const gl = this.gl, at = this.begin(this.edges, part, colour, opacity);
+    for (const [k, size, offset] of [[0, 3, 0], [1, 3, 12], [2, 1, 24]]) {
+      gl.enableVertexAttribArray(k);
+      gl.vertexAttribPointer(k, size, gl.FLOAT, false, 28, offset);
+    }
+    gl.uniform2fv(at.picture, this.picture);
+    gl.uniform1f(at.width, this.edge);
+    gl.drawArrays(gl.TRIANGLES, 0, part.count);
   }
 
   // The view is turned, and no longer flat.
