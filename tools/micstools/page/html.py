@@ -8,7 +8,15 @@ from typing import Any
 
 # The page may load nothing at all; the browser itself refuses what this does not allow.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-_SCRIPTS = ("vectors", "water", "stage", "overlay", "hands", "player")  # each uses those before
+_SCRIPTS = (
+    "vectors",
+    "water",
+    "block_map",
+    "stage",
+    "overlay",
+    "hands",
+    "player",
+)  # each uses those before
 _EMPTY = ("img", "input", "meta")  # have no end
 
 

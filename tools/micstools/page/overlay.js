@@ -3,7 +3,7 @@
 // flat views rulers and a length that was measured.
 
 const AXES = [['x', '#d1495b'], ['y', '#3f9b5b'], ['z', '#4a8fd9']];
-const LEAST = 5; // pixels of the map of blocks that a number needs
+const LEAST = 5; // squares of the map of blocks that a number needs
 const MOST = 20000; // points of all paths
 const FONT = '12px system-ui, "Liberation Sans", sans-serif';
 
@@ -83,7 +83,7 @@ class Overlay {
       let x = sum.x / sum.n, y = sum.y / sum.n;
       if (seen.at(Math.round(x), Math.round(y)) !== k) [x, y] = this.nearest(k, x, y);
       const number = scene.bodies[k - 1].number;
-      const place = [(x + 0.5) / seen.w * this.wide, (1 - (y + 0.5) / seen.h) * this.high];
+      const place = [(x + 0.5) / seen.w * this.wide, (y + 0.5) / seen.h * this.high];
       this.labels.push([number, ...place]);
       this.pen.lineWidth = 3;
       this.pen.textAlign = 'center';

@@ -57,7 +57,6 @@ void main() { gl_FragColor = colour; }`;
 const EDGE = 1.2; // pixels of the page
 const BED = rgb('#b7a78c');
 const VEIL = 0.3; // how much of a bed or wall is seen before a block
-const COARSE = 4; // pixels of the picture along one of the map of blocks
 
 // A program of two shaders and where its uniforms are.
 function compile(gl, vertex, fragment, uniforms) {
@@ -138,7 +137,9 @@ class Stage {
       for (const p of [a, b, c]) faces.push(...p, ...n);
     }
     for (const k of edges) ends.push(point(k));
-    return { faces: this.buffer(faces, corners.length), lines: this.strips(ends) };
+    let radius = 0;
+    for (let k = 0; k < points.length; k += 3) radius = Math.max(radius, Math.hypot(...point(k / 3)));
+    return { points, corners, radius, faces: this.buffer(faces, corners.length), lines: this.strips(ends) };
   }
 
   // Two triangles along each line, whose ends are one after another.
@@ -255,7 +256,7 @@ class Stage {
     this.matrix = this.camera();
     this.picture = [wide, high];
     this.edge = EDGE * scale;
-    this.mapBlocks(wide, high);
+    this.seen = this.overlay.numbers ? new BlockMap(this, canvas.clientWidth, canvas.clientHeight) : null;
     gl.viewport(0, 0, wide, high);
     gl.clearColor(...colour('--stage'), 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
@@ -302,48 +303,6 @@ class Stage {
     this.put([0, 0, 0], [1, 0, 0, 0]);
     if (this.bed) this.fill(this.bed.faces, BED, opacity, 1, 1);
     this.each(true, k => this.paintBlock(k, opacity));
-  }
-
-  // Which block is seen where, in a small picture whose colours are their numbers from 1.
-  mapBlocks(wide, high) {
-    const gl = this.gl, w = Math.ceil(wide / COARSE), h = Math.ceil(high / COARSE);
-    this.seen = null;
-    if (!this.overlay.numbers) return;
-    if (!this.target || this.target.w !== w || this.target.h !== h) this.makeTarget(w, h);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.buffer);
-    gl.viewport(0, 0, w, h);
-    gl.clearColor(0, 0, 0, 1);
-    gl.enable(gl.DEPTH_TEST);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    this.each(false, k => {
-      const { place, turn } = this.pose(k), n = k + 1;
-      this.put(place, turn);
-      this.fill(this.meshes[this.scene.bodies[k].shape].faces, [n & 255, n >> 8 & 255, n >> 16].map(v => v / 255));
-    });
-    const pixels = new Uint8Array(4 * w * h);
-    gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    this.seen = { w, h, at: (x, y) => {
-      const i = 4 * (y * w + x);
-      return pixels[i] + 256 * pixels[i + 1] + 65536 * pixels[i + 2];
-    } };
-  }
-
-  makeTarget(w, h) {
-    const gl = this.gl, old = this.target;
-    if (old) { gl.deleteFramebuffer(old.buffer); gl.deleteTexture(old.picture); gl.deleteRenderbuffer(old.depth); }
-    const buffer = gl.createFramebuffer(), picture = gl.createTexture(), depth = gl.createRenderbuffer();
-    gl.bindTexture(gl.TEXTURE_2D, picture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, w, h, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
-      gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
-    gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
-    gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT16, w, h);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, picture, 0);
-    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-    this.target = { w, h, buffer, picture, depth };
   }
 
   // Where what is drawn next stands.
