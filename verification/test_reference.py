@@ -2,8 +2,10 @@
 
 import json
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import f90nml
@@ -305,6 +307,23 @@ def as_json(text: str) -> dict[str, Any]:
 def test_good_cases_fit_the_schema(case: Path, schema: dict[str, Any]) -> None:
     """Every case of the project is good by the schema, too."""
     assert faults(as_json(case.read_text()), schema, schema, "") == []
+
+
+def test_the_page_shows_how_to_check_a_case() -> None:
+    """Its lines in Python run as they stand, with a validator in place of jsonschema's."""
+    (shown,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    found: list[str] = []
+    stand_in = ModuleType("jsonschema")
+    stand_in.validate = lambda case, schema: found.extend(faults(case, schema, schema, ""))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        patch.setitem(sys.modules, "jsonschema", stand_in)
+        exec(shown, {})
+        assert found == []
+        exec(
+            shown.replace("jsonschema.validate", "case['run']['dt'] = 0.0; jsonschema.validate"), {}
+        )
+    assert found == ["run dt: 0.0"]
 
 
 def test_examples_and_defaults_fit_the_schema(schema: dict[str, Any]) -> None:

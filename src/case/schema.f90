@@ -1,4 +1,5 @@
-!> The groups of a case as a JSON schema, for editors that know JSON or read a namelist as JSON.
+!> The groups of a case as a JSON schema, for programs: reports take the defaults from it, and a
+!! case that is read as JSON can be checked by it.
 !!
 !! A case is an object of groups, a group an object of variables; several groups of one name are
 !! an array of objects, a list of values is an array.

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from micstools import cli, extras
+from micstools.page import run_words
 from micstools.reader import Run
 
 ROOT = Path(__file__).parents[2]
@@ -127,6 +128,15 @@ def test_an_installed_tool_makes_the_page(installed: Path, loose_pile: Run, tmp_
     done = call(installed, "report", loose_pile.folder, "--out", path)
     assert done.returncode == 0, done.stderr
     assert "What differs from the defaults" in path.read_text()
+
+
+def test_defaults_are_those_of_the_schema(wheel: Path) -> None:
+    """Of which there is one: the package carries the file that `make reference` writes."""
+    with zipfile.ZipFile(wheel) as file:
+        carried = file.read("micstools/mics-case.schema.json")
+    assert carried == (ROOT / "docs" / "mics-case.schema.json").read_bytes()
+    known = run_words._defaults()
+    assert (known["contact"]["friction"], known["run"]["restart_interval"]) == (0.6, 1.0)
 
 
 @pytest.mark.parametrize("words", [["plot"], ["movie"], ["export", "--to", "pvd"]])
