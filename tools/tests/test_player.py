@@ -15,7 +15,7 @@ from PIL import Image
 from browser import MISSING, Browser
 from micstools import cli
 from micstools.geometry import Array
-from micstools.page import motion, run_page
+from micstools.page import motion, parts, run_page
 from micstools.reader import Run
 from synthetic import UPRIGHT, Motion, write_run
 
@@ -106,9 +106,9 @@ def test_contacts_that_come_and_go_stay() -> None:
 
 def test_north_is_given_or_said_to_be_y(make_run, capsys) -> None:
     run = make_run(Motion(t_end=0.1))
-    assert run_page.NORTH_IS_Y in run_page.page(run)
+    assert parts.NORTH_IS_Y in run_page.page(run)
     page = run_page.page(run, 30.0)
-    assert run_page.NORTH_IS_Y not in page and '"north":30.0' in page
+    assert parts.NORTH_IS_Y not in page and '"north":30.0' in page
     with pytest.raises(SystemExit) as end:
         cli.main(["report", str(run.folder), "--north", "400"])
     assert end.value.code == 2

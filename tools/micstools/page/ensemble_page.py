@@ -25,7 +25,7 @@ from micstools.page.html import (
     table,
     tag,
 )
-from micstools.page.parts import number, player
+from micstools.page.parts import north_note, number, player
 from micstools.page.run_words import count, millimetres
 from micstools.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
 from micstools.reader import Run
@@ -83,7 +83,7 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
         _patterns(ensemble),
         *([_plan(ensemble), _histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
-        tag("p", run_page.NORTH_IS_Y, class_="note no-print") if north is None else None,
+        north_note(north),
         _running(ensemble),
         _health(ensemble),
         _case(ensemble, run),

@@ -73,15 +73,16 @@ class Overlay {
     for (let y = 0; y < seen.h; y++) for (let x = 0; x < seen.w; x++) {
       const k = seen.at(x, y);
       if (!k) continue;
-      const sum = sums.get(k) || sums.set(k, { n: 0, x: 0, y: 0 }).get(k);
+      const sum = sums.get(k) || sums.set(k, { n: 0, x: 0, y: 0, low: x, high: x, first: y }).get(k);
       sum.n++; sum.x += x; sum.y += y;
+      [sum.low, sum.high, sum.last] = [Math.min(sum.low, x), Math.max(sum.high, x), y];
     }
     this.labels = [];
     this.pen.font = `bold ${FONT}`;
     for (const [k, sum] of sums) {
       if (sum.n < LEAST) continue;
       let x = sum.x / sum.n, y = sum.y / sum.n;
-      if (seen.at(Math.round(x), Math.round(y)) !== k) [x, y] = this.nearest(k, x, y);
+      if (seen.at(Math.round(x), Math.round(y)) !== k) [x, y] = this.nearest(k, sum);
       const number = scene.bodies[k - 1].number;
       const place = [(x + 0.5) / seen.w * this.wide, (y + 0.5) / seen.h * this.high];
       this.labels.push([number, ...place]);
@@ -96,12 +97,12 @@ class Overlay {
     this.pen.font = FONT;
   }
 
-  // The place at which a block is seen that is nearest to another place.
-  nearest(k, x, y) {
+  // The place at which a block is seen that is nearest to the middle of all of them.
+  nearest(k, { n, x, y, low, high, first, last }) {
     const { seen } = this.stage;
-    let found = [x, y], least = Infinity;
-    for (let j = 0; j < seen.h; j++) for (let i = 0; i < seen.w; i++) {
-      const far = (i - x) ** 2 + (j - y) ** 2;
+    let found, least = Infinity;
+    for (let j = first; j <= last; j++) for (let i = low; i <= high; i++) {
+      const far = (i - x / n) ** 2 + (j - y / n) ** 2;
       if (far < least && seen.at(i, j) === k) [found, least] = [[i, j], far];
     }
     return found;

@@ -11,6 +11,14 @@ _HINT = (
 )
 
 
+NORTH_IS_Y = "North is taken as the y direction; mics-tools report --north gives another."
+
+
+def north_note(north: float | None) -> Markup | None:
+    """What is assumed of north where nobody has given it."""
+    return tag("p", NORTH_IS_Y, class_="note no-print") if north is None else None
+
+
 def player(name: str, label: str) -> Markup:
     """A stage and its buttons; `name` is that of the element."""
     moving = tag(

@@ -14,7 +14,7 @@ from micstools.overlap import Overlap, Placed, overlap, present_bodies
 from micstools.page import charts, motion, run_words
 from micstools.page.charts import Curve
 from micstools.page.html import Markup, data, document, download, facts, markup, section, table, tag
-from micstools.page.parts import number, player, swatch
+from micstools.page.parts import north_note, number, player, swatch
 from micstools.page.run_words import count, millimetres
 from micstools.page.views import Sheet, bed_of, block_colours
 from micstools.pile_numbers import PileNumbers
@@ -31,7 +31,6 @@ _OVERLAP = 0.01  # of a block's length
 _MADE = 3e-3  # of a block's weight times its length
 
 
-NORTH_IS_Y = "North is taken as the y direction; mics-tools report --north gives another."
 Row = tuple[str, str, str, bool | None]
 """Of the health: what, found, wanted, and whether it is as wanted (None: not known)."""
 
@@ -65,7 +64,7 @@ def page(run: Run, north: float | None = None) -> str:
         tag("h1", title),
         tag("p", outcome(run, found), class_="lead"),
         player("player", "the fall of the blocks; arrow keys turn it, + and - zoom, space plays"),
-        tag("p", NORTH_IS_Y, class_="note no-print") if north is None else None,
+        north_note(north),
         _facts(run, found),
         case,
         _pile(run),
