@@ -115,15 +115,15 @@ contains
       //'check a case; do not edit.')
     call lines%add_line('`./mics --help GROUP` prints the same. `docs/mics-case.schema.json` ' &
       //'holds it as a JSON schema: the')
-    call lines%add_line('page of `mics-tools report` takes the defaults from it, and Python checks ' &
-      //'a case by it with the')
+    call lines%add_line('page of `mics-tools report` takes the defaults from it, and ' &
+      //'Python checks a case by it with the')
     call lines%add_line('packages f90nml and jsonschema:')
     call lines%add_line('')
     call lines%add_line('```python')
     call lines%add_line('import json, f90nml, jsonschema')
     call lines%add_line("case = f90nml.read('input/blocks.nml')")
-    call lines%add_line('case = {k: list(map(dict, v)) if isinstance(v, list) else dict(v) ' &
-      //'for k, v in case.items()}')
+    call lines%add_line('case = {k: [dict(g) for g in v] if isinstance(v, list) else dict(v)')
+    call lines%add_line('        for k, v in case.items()}')
     call lines%add_line("jsonschema.validate(case, json.load(open('docs/mics-case.schema.json')))")
     call lines%add_line('```')
     call lines%add_line('')
