@@ -4,6 +4,7 @@ import argparse
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 from micstools import case_copy, settings
@@ -62,8 +63,19 @@ def case_text(case: Path, words: list[str]) -> str:
     program does not see where a text comes from."""
     text = settings.read(case)
     if words:
-        text = settings.set_variables(text, map(settings.parse, words))
+        wanted = [settings.parse(word) for word in words]
+        text = settings.set_variables(text, wanted)
+        if any(setting.name == "drop.seed" for setting in wanted):
+            _tell_seeds(text)
     return case_copy.from_here(text, case.parent)
+
+
+def _tell_seeds(text: str) -> None:
+    """Name the seeds of several &drop on standard error."""
+    drops = sum(name == "drop" for name, _, _ in settings.groups(text))
+    if drops > 1:
+        seeds = ", ".join(str(settings.value(text, "drop", "seed", n)) for n in range(drops))
+        print(f"&drop seed = {seeds}: one for each of the {drops} groups", file=sys.stderr)
 
 
 def check(program: Path, text: str) -> str:

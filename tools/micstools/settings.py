@@ -1,7 +1,6 @@
 """Variables of a case set from outside, `group.variable=value`, on a copy of its text."""
 
 import re
-import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -107,8 +106,6 @@ def set_variables(text: str, settings: Iterable[Setting]) -> str:
     if isinstance(seed, int) and not isinstance(seed, bool) and drops > 1:
         for n in range(1, drops):
             text = set_group(text, "drop", {"seed": seed + n}, n)
-        told = ", ".join(str(seed + n) for n in range(min(drops, 3))) + (", ..." * (drops > 3))
-        print(f"&drop seed = {told}: one for each of the {drops} groups", file=sys.stderr)
     return text
 
 

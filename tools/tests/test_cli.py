@@ -92,15 +92,18 @@ def test_settings_keep_the_rest_of_a_case() -> None:
     assert "! first / of two" in text and '"it\'s"' in text and "x = .true." in text
 
 
-def test_every_drop_gets_a_seed_of_its_own(capsys) -> None:
+def test_every_drop_gets_a_seed_of_its_own(tmp_path: Path, capsys) -> None:
     """With one seed two groups of drops would draw the same numbers."""
     three = CASE + "&drop shape = 'c' position = 0,0,0 seed = 3 /\n"
-    text = settings.set_variables(three, [settings.parse("drop.seed=7")])
+    case = tmp_path / "case.nml"
+    case.write_text(three)
+    text = program_of_tools.case_text(case, ["drop.seed=7"])
     assert [settings.value(text, "drop", "seed", n) for n in range(3)] == [7, 8, 9]
     assert "&drop seed = 7, 8, 9: one for each of the 3 groups" in capsys.readouterr().err
-    text = settings.set_variables(three, [settings.parse("drop.count=5")])
+    text = program_of_tools.case_text(case, ["drop.count=5"])
     assert [settings.value(text, "drop", "count", n) for n in range(3)] == [5, 5, 5]
-    one = settings.set_variables(CASE.rsplit("&drop", 1)[0], [settings.parse("drop.seed=7")])
+    case.write_text(CASE.rsplit("&drop", 1)[0])
+    one = program_of_tools.case_text(case, ["drop.seed=7"])
     assert settings.value(one, "drop", "seed") == 7 and capsys.readouterr().err == ""
 
 
