@@ -232,6 +232,27 @@ def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> No
 
 
 @in_browser
+@pytest.mark.parametrize("wall", [False, True])
+def test_no_wall_hides_a_block(browser: Browser, tmp_path: Path, wall: bool) -> None:
+    """A fixed body before a block hides it, unless it is a wall."""
+    place = [(np.array([0.09, 0.08, 0.0288675]), UPRIGHT)]
+    folder = write_run(tmp_path / "run", Motion(places=place, t_end=2.0, field_step=2.0))
+    browser.open(save(Run(folder), tmp_path / "page.html"))
+    browser.run(f"runPlayer.stage.scene.bodies[0].wall = {str(wall).lower()}; runPlayer.show(2)")
+    choose(browser, "wet", "none")
+    browser.run("document.querySelector('.numbers').click()")
+    view(browser, "front")
+    seen = []
+    for colour in ("#ff0000", "#00ff00"):
+        browser.run(f"runPlayer.stage.scene.bodies[3].colour = '{colour}'")
+        browser.run("runPlayer.stage.draw()")
+        settled(browser)
+        seen.append(pixels(browser, at(browser, [0.093, 0.08, 0.033]))[0])
+    assert bool(np.abs(seen[0] - seen[1]).max() > 60) is wall
+    assert browser.errors == []
+
+
+@in_browser
 @pytest.mark.parametrize("name", ["corner", *FLAT])
 def test_a_moment_always_looks_the_same(browser: Browser, page: Path, name: str) -> None:
     """Edges of blocks and tank neither come and go nor move."""
