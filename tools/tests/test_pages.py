@@ -16,6 +16,8 @@ FOLDERS = ("src", "docs", "tools", "input", "verification")
 FROM_TOP = re.compile(rf"(?<![\w/.-])(?:{'|'.join(FOLDERS)})/[\w./*-]*\w")
 FROM_SRC = re.compile(rf"(?<![\w/.-])(?:{'|'.join(sorted(HEIGHT.keys() - {TOP}))})/[\w*]+\.f90")
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
+WORDS = {"README.md": 1800}
+"""The most words of a text."""
 MADE = ("verification/report",)  # by a run, not in the repository
 
 
@@ -37,6 +39,12 @@ def test_a_file_that_is_gone_is_found() -> None:
     text = "`src/grid/gone.f90`, `grid/lost.f90`, `src/base/kinds.f90`, src/top*/a, cases/NAME"
     assert missing("README.md", text) == ["src/grid/gone.f90", "src/grid/lost.f90", "src/top*/a"]
     assert missing("docs/theory.md", "[a](no.md) [b](figures/pile.png)") == ["no.md"]
+
+
+@pytest.mark.parametrize(("pattern", "most"), WORDS.items())
+def test_texts_are_short(pattern: str, most: int) -> None:
+    for page in ROOT.glob(pattern):
+        assert len(page.read_text().split()) <= most, page
 
 
 def test_the_version_to_cite_is_that_of_the_program() -> None:
