@@ -5,7 +5,7 @@ ifeq ($(MAKELEVEL),0)
 MAKEFLAGS += -j$(shell getconf _NPROCESSORS_ONLN)
 endif
 
-VERSION := 0.1.0
+VERSION := 0.2.0
 
 FC_SERIAL := h5fc
 FC_MPI := h5pfc

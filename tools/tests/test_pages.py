@@ -23,6 +23,13 @@ WORDS = {
     "docs/decisions/*.md": 1300,
 }
 """The most words of a text."""
+VERSIONS = {
+    "Makefile": r"^VERSION := (.*)$",
+    "CITATION.cff": r"^version: (.*)$",
+    "pyproject.toml": r'^version = "(.*)"$',
+    "CHANGELOG.md": r"^## \[(\d.*)\]",
+}
+"""Where the version stands; in the changelog that of the newest release."""
 MADE = ("verification/report",)  # by a run, not in the repository
 
 
@@ -52,7 +59,10 @@ def test_texts_are_short(pattern: str, most: int) -> None:
         assert len(page.read_text().split()) <= most, page
 
 
-def test_the_version_to_cite_is_that_of_the_program() -> None:
-    built = re.search(r"^VERSION := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
-    assert built and cited and built[1] == cited[1]
+def test_one_version_is_built_cited_packed_and_described() -> None:
+    found = {}
+    for name, pattern in VERSIONS.items():
+        line = re.search(pattern, (ROOT / name).read_text(), re.MULTILINE)
+        assert line, name
+        found[name] = line[1]
+    assert len(set(found.values())) == 1, found
