@@ -10,6 +10,7 @@ from micstools.rooms import HEIGHT, TOP
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", "CONTRIBUTING.md", "CITATION.cff", "verification/README.md"]
 PAGES += sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").rglob("*.md"))
+PAGES += sorted(str(page.relative_to(ROOT)) for page in ROOT.glob("verification/cases/*/README.md"))
 FOLDERS = ("src", "docs", "tools", "input", "verification")
 
 # A path from the top, as `src/grid/grid.f90`, or, for Fortran, from src, as `grid/grid.f90`.
