@@ -3,7 +3,7 @@
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
 !! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
-!! that of its group (`linked_cells_m`). A film without a master hangs on the walls alone.
+!! that of its group (`linked_cells_m`). A film without a master keeps its velocity.
 !! Where the cells are too coarse for the boundary layer, wall legs pull with the stress of a rough
 !! one instead (`wall_shear_m`).
 module viscous_legs_m
@@ -15,7 +15,6 @@ module viscous_legs_m
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_legs_t, room_for_walls, set_wall, add_side
-  use film_legs_m, only: film_legs
   use wall_shear_m, only: distance_of_legs, rough_viscosity
   use linked_cells_m, only: linked_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
@@ -50,7 +49,6 @@ contains
     do k = lbound(self%diagonal, 3), ubound(self%diagonal, 3)
       self%diagonal(:, :, k, :) = 0.0_wp
     end do
-    self%lone_films = .false.
     call unknown_masses(grid, solid, rho, dt, self)
     if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
     do d = 1, 3
@@ -58,7 +56,6 @@ contains
       call legs_to_sides(grid, solid, mu, d, self)
     end do
     call legs_to_bodies(grid, solid, bodies, rho, mu, self, links, wall_speed)
-    call film_legs(grid, solid, bodies, mu, self)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
     call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%spread)
@@ -146,7 +143,6 @@ contains
           self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/links%centre(m)
         else if (is_alone(links, m)) then
           self%mass(c(1), c(2), c(3)) = film_mass(c)
-          self%lone_films = .true.
         end if
       end associate
     end do

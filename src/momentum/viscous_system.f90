@@ -1,6 +1,6 @@
 !> The system of the viscous stage as data: masses, legs between cells, legs to walls.
 !!
-!! `viscous_legs_m` and `film_legs_m` fill it, `viscous_m` and `momentum_c_ismac_m` solve it.
+!! `viscous_legs_m` fills it, `viscous_m` and `momentum_c_ismac_m` solve it.
 module viscous_system_m
   use kinds_m, only: wp
   use vectors_m, only: cross
@@ -31,16 +31,6 @@ module viscous_system_m
     real(wp), allocatable :: pull(:, :)    !! (3, *) conductance times velocity [kg m/s2]
   end type side_legs_t
 
-  !> Walls around film cells.
-  type :: film_walls_t
-    real(wp), allocatable :: sum(:, :)
-      !! (7, cut cells) wall of one body, sum over the walls, as vectors; sum of their sizes [m2]
-    integer, allocatable :: body(:)       !! (cut cells) last body that is a wall of the cell
-    integer :: n = 0                      !! walls
-    integer, allocatable :: wall(:, :)    !! (2, *) number of the cut cell, body
-    real(wp), allocatable :: area(:, :)   !! (3, *) of each wall as a vector [m2]
-  end type film_walls_t
-
   !> The system, what solves it, and what came out.
   type :: viscous_t
     real(wp) :: dt = 0.0_wp   !! [s]
@@ -53,8 +43,6 @@ module viscous_system_m
       !! largest share of the diagonal that legs to other cells have, of all processes [-]
     type(wall_legs_t) :: walls
     type(side_legs_t) :: sides
-    type(film_walls_t) :: films
-    logical :: lone_films = .false.   !! there are own films without a master
     real(wp), allocatable :: body_matrix(:, :, :)
       !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
     real(wp), allocatable :: spin_drag(:)
@@ -88,8 +76,6 @@ contains
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%force(6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)
-    allocate (self%films%sum(7, 0), self%films%body(0))
-    allocate (self%films%wall(2, 0), self%films%area(3, 0))
     associate (walls => self%walls)
       allocate (walls%first(n_bodies + 1), source=1)
       allocate (walls%cell(3, 0), walls%k(0), walls%arm(3, 0))
