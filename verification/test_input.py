@@ -40,7 +40,7 @@ BAD = {
     ),
     "out of range": (
         TANK + "&contact\n restitution = 1.5 /",
-        "&contact restitution = 1.5: must be above 0 and at most 1 (line 5)",
+        "&contact restitution = 1.5: must lie between 0 and 1 (line 5)",
     ),
     "bed file": (
         TANK + "&bed file = 'sand.stl' /",

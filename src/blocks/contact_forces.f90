@@ -32,7 +32,7 @@ module contact_forces_m
   type :: push_t
     real(wp) :: force = 0.0_wp          !! sum [N]
     real(wp) :: eta = 0.0_wp            !! largest damping [N s/m]
-    real(wp) :: implicit = 1.0_wp       !! 1 + eta dt/(2 m): damping acts in mid-substep
+    real(wp) :: slowing = 1.0_wp        !! of force by damping within the substep, `slowing_of`
   end type push_t
 
 contains
@@ -108,7 +108,7 @@ contains
   !> Contact forces and torques of this substep on all bodies.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
-  !! F = (k d - eta v_n)/(1 + eta dt/(2 m)), the implicit midpoint rule.
+  !! F = (k d - eta v_n)/s, see `slowing_of`.
   pure subroutine sum_forces(dt, touching, springs, loads, report)
     real(wp), intent(in) :: dt   !! [s]
     type(touching_t), intent(in) :: touching
@@ -163,7 +163,8 @@ contains
           part = 1.0_wp
           if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
           opening = opening_speed(touch, law%gamma_n, motion)
-          force_n = normal_force(r%elastic(t), part*r%eta(t), opening)/(1.0_wp + part*r%decay(t)*dt)
+          force_n = normal_force(r%elastic(t), part*r%eta(t), opening) &
+            /slowing_of(part*r%decay(t)*dt)
           call push_apart(touch, law%gamma_n, force_n, wrench)
           report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
           report%overlap_max = max(report%overlap_max, touch%depth)
@@ -173,9 +174,21 @@ contains
         push%eta = max(push%eta, r%eta(t))
       end do
     end associate
-    push%implicit = 1.0_wp + decay*dt
+    push%slowing = slowing_of(decay*dt)
     call rub(g, push, motion, touching, springs, wrench)
   end subroutine push_group
+
+  !> Force of a dashpot at the velocity of the start of a substep over that which acts.
+  !!
+  !! With D = eta dt/(2 m) this is 1 + D, the implicit midpoint rule, as long as the motion goes on
+  !! in its direction. A stronger dashpot (D > 1) stops it within the substep and does not turn it
+  !! round.
+  elemental function slowing_of(d) result(s)
+    real(wp), intent(in) :: d   !! >= 0 [-]
+    real(wp) :: s
+
+    s = max(1.0_wp + d, 2*d)
+  end function slowing_of
 
   !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
   !!
@@ -212,7 +225,7 @@ contains
       bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
-      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/push%implicit
+      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/push%slowing
       size_f = norm(f)
       if (size_f > bound) then
         f = f*(bound/size_f)

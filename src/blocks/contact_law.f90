@@ -7,7 +7,7 @@ module contact_law_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: contact_law_t, spring_t
+  public :: contact_law_t, spring_t, load_t
   public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip, power
 
   !> A contact law. Forces are those of springs k d^gamma, along the normal (n) and across (t).
@@ -34,14 +34,22 @@ module contact_law_m
     real(wp) :: steepness = 1.0_wp         !! [m^(gamma-1)]
   end type spring_t
 
+  !> What a touch may have to carry.
+  type :: load_t
+    real(wp) :: mass = 0.0_wp              !! [kg]
+    real(wp) :: weight = 0.0_wp            !! of that mass [N]
+  end type load_t
+
   abstract interface
     !> Constant k_n of a touch of weight one: the same whatever else touches, so that the elastic
     !! energy is a function of position only.
-    elemental function normal_constant_i(law, reduced_mass) result(k)
-      import :: contact_law_t, wp
+    elemental function normal_constant_i(law, reduced_mass, load, give) result(k)
+      import :: contact_law_t, load_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]
+      type(load_t), intent(in) :: load       !! on the touch
+      real(wp), intent(in) :: give           !! overlap that it may make at rest, > 0 [m]
       real(wp) :: k                          !! [N/m^gamma_n]
     end function normal_constant_i
 

@@ -2,10 +2,11 @@
 module contact_partners_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
-  use mass_properties_m, only: surface_area
   use rigid_body_m, only: blocks_t, space_tensor
   use walls_m, only: walls_t
   use bed_m, only: bed_partner
+  use contact_law_m, only: load_t
+  use contact_load_m, only: load_of, hard_depth, give_share
   implicit none
   private
   public :: partners_t, inertia_t, motion_t, wrench_t
@@ -18,6 +19,8 @@ module contact_partners_m
     real(wp) :: gravity = 0.0_wp                       !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, partners) [m/s], [rad/s]
     real(wp), allocatable :: hard(:)                   !! (partners) depth where touches harden [m]
+    real(wp), allocatable :: give(:)                   !! (partners) largest overlap at rest [m]
+    type(load_t) :: load                               !! of a touch under the heaviest free body
     real(wp), allocatable :: inverse_mass(:)           !! (partners) 0: walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)  !! (3, 3, partners) likewise [1/(kg m2)]
   end type partners_t
@@ -42,8 +45,8 @@ module contact_partners_m
 
 contains
 
-  !> Room for the walls and the bodies, and the depth at which touches of each harden: a quarter of
-  !! its mean thickness, twice the volume over the surface.
+  !> Room for the walls and the bodies, the depth at which touches of each harden, and the overlap
+  !! that each may have at rest, a share of its smallest edge.
   pure subroutine partners_init(blocks, partners)
     type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(out) :: partners
@@ -51,9 +54,11 @@ contains
 
     n = blocks%n
     allocate (partners%hard(bed_partner:n), source=huge(1.0_wp))
+    allocate (partners%give(bed_partner:n), source=huge(1.0_wp))
     do b = 1, n
       associate (shape => blocks%shapes(blocks%shape(b)))
-        partners%hard(b) = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
+        partners%hard(b) = hard_depth(shape)
+        partners%give(b) = give_share*shape%smallest_edge
       end associate
     end do
     allocate (partners%v(3, bed_partner:n), partners%omega(3, bed_partner:n), source=0.0_wp)
@@ -70,6 +75,9 @@ contains
     integer :: w, b
 
     partners%gravity = norm(gravity)
+    partners%load = load_t()
+    if (.not. all(blocks%fixed)) partners%load = load_of(maxval(blocks%mass, .not. blocks%fixed), &
+      partners%gravity)
     do w = 1, walls%n
       partners%v(:, walls%number(w)) = walls%velocity(:, w)
     end do

@@ -12,7 +12,8 @@ module contact_response_m
   implicit none
   private
   public :: response_t, respond, add_frequencies, highest_frequency2, opening_speed, push_apart
-  public :: impact_turn
+  public :: bound_by_sums
+  public :: impact_turn, pile_turn
 
   !> Frequency times substep (2 is the bound of stability) of a pair of bodies in an impact, of a
   !! pair too slow for one, and of a pile.
@@ -23,10 +24,15 @@ module contact_response_m
     real(wp), allocatable :: k(:)                !! k_n of the touch [N/m^gamma]
     real(wp), allocatable :: elastic(:)          !! force of the spring [N]
     real(wp), allocatable :: energy(:)           !! of the spring [J]
+    real(wp), allocatable :: stiff(:)            !! k_n times the hardness of the touch [N/m^gamma]
     real(wp), allocatable :: eta(:)              !! eta_n of the touch [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
     real(wp), allocatable :: frequency2(:)       !! (partners) sum over pairs of a free body [1/s2]
+    !> Sums over the touches of a pair, and over all touches of a body: stiffness and damping over
+    !! the mass that the bodies, or the body, set against a force there, rotation included.
+    real(wp), allocatable :: pair_damping(:)                !! (touches) [1/s]
+    real(wp), allocatable :: stiffness(:), damping(:)       !! (partners) [1/s2], [1/s]
   end type response_t
 
   !> Two partners that touch.
@@ -45,9 +51,13 @@ contains
     integer :: first, last
 
     response%frequency2 = 0.0_wp
+    response%stiffness = 0.0_wp
+    response%damping = 0.0_wp
     call ensure_room(touches%n, response%k)
+    call ensure_room(touches%n, response%pair_damping)
     call ensure_room(touches%n, response%elastic)
     call ensure_room(touches%n, response%energy)
+    call ensure_room(touches%n, response%stiff)
     call ensure_room(touches%n, response%eta)
     call ensure_room(touches%n, response%decay)
     call ensure_room(touches%n, response%pair_frequency2)
@@ -101,7 +111,8 @@ contains
     points = 0.0_wp
     load = 0.0_wp
     steep = 0.0_wp
-    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass))
+    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), partners%load, &
+      min(partners%give(a), partners%give(b)))
     hard = min(partners%hard(a), partners%hard(b))
     do t = first, last
       associate (touch => touches%item(t))
@@ -110,6 +121,7 @@ contains
         response%elastic(t) = spring%force
         response%energy(t) = spring%energy
         response%eta(t) = touch%weight*spring%hardness
+        response%stiff(t) = k*response%eta(t)
         steep = max(steep, spring%steepness)
         load = load + spring%force*touch%normal
         nn = response%eta(t)*square(touch%normal)
@@ -139,6 +151,7 @@ contains
     end do
     if (law%damping_ratio > 0.0_wp) call damp_as_one(touches, first, last, law, of, response, &
                                                      highest)
+    call sum_up(touches, first, last, steep, of, response)
     highest = steep*highest
     calm = max(partners%gravity, calm_share*norm(load)*(of%a%inverse_mass + of%b%inverse_mass))
     speed = largest_speed(motion_between(partners, a, b), touches%item(first)%arm_a, &
@@ -148,6 +161,36 @@ contains
     if (of%a%inverse_mass > 0.0_wp) response%frequency2(a) = response%frequency2(a) + highest
     if (of%b%inverse_mass > 0.0_wp) response%frequency2(b) = response%frequency2(b) + highest
   end subroutine respond_pair
+
+  !> Add the stiffness and damping of a pair, over the mass that each body sets against a force at
+  !! each touch, to the sums of its bodies.
+  pure subroutine sum_up(touches, first, last, steep, of, response)
+    type(touches_t), intent(in) :: touches
+    integer, intent(in) :: first, last
+    real(wp), intent(in) :: steep   !! largest `steepness` of the springs
+    type(couple_t), intent(in) :: of
+    type(response_t), intent(inout) :: response
+    real(wp) :: inverse(2), stiffness(2), damping(2)   ! of a and b
+    integer :: t
+
+    stiffness = 0.0_wp
+    damping = 0.0_wp
+    do t = first, last
+      associate (touch => touches%item(t))
+        inverse = [inverse_effective_mass(of%a, touch%arm_a, touch%normal), &
+                   inverse_effective_mass(of%b, touch%arm_b, touch%normal)]
+        stiffness = stiffness + steep*response%stiff(t)*inverse
+        damping = damping + response%eta(t)*inverse
+      end associate
+    end do
+    response%pair_damping(first:last) = sum(damping)
+    associate (a => touches%item(first)%a, b => touches%item(first)%b)
+      response%stiffness(a) = response%stiffness(a) + stiffness(1)
+      response%stiffness(b) = response%stiffness(b) + stiffness(2)
+      response%damping(a) = response%damping(a) + damping(1)
+      response%damping(b) = response%damping(b) + damping(2)
+    end associate
+  end subroutine sum_up
 
   !> Damping of a touch whose weight changes with position: no more than it needs alone.
   !!
@@ -288,6 +331,32 @@ contains
         + max(0.0_wp, response%frequency2(touches%item(t)%b) - pair)))
     end do
   end function highest_frequency2
+
+  !> Frequency and rate that bound a substep by the springs and dashpots of all touches of two
+  !! bodies that touch, rotation included.
+  !!
+  !! No motion is faster than the sums over both bodies; most are slower by half, as the sums count
+  !! shifts and turns together. Each pair damps by itself, so that together dashpots could turn the
+  !! motion round and drive it; one pair takes no more than its motion, so that it counts as much
+  !! as all others at most.
+  pure subroutine bound_by_sums(touches, response, frequency2, rate)
+    type(touches_t), intent(in) :: touches
+    type(response_t), intent(in) :: response
+    real(wp), intent(out) :: frequency2   !! its square [1/s2]
+    real(wp), intent(out) :: rate         !! [1/s]
+    real(wp) :: others
+    integer :: t
+
+    frequency2 = 0.0_wp
+    rate = 0.0_wp
+    do t = 1, touches%n
+      associate (a => touches%item(t)%a, b => touches%item(t)%b)
+        frequency2 = max(frequency2, response%stiffness(a) + response%stiffness(b))
+        others = max(0.0_wp, response%damping(a) + response%damping(b) - response%pair_damping(t))
+        rate = max(rate, others + min(others, response%pair_damping(t)))
+      end associate
+    end do
+  end subroutine bound_by_sums
 
   !> Speed at which a touch lets its elastic energy E go, -(dE/dt)/(dE/dd): that of the depth and,
   !! where the weight changes with position, of the weight [m/s].

@@ -2,7 +2,7 @@
 module law_constants_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t, energy_of_force, power
+  use contact_law_m, only: contact_law_t, spring_t, load_t, energy_of_force, power
   implicit none
   private
   public :: law_constants_t, law_constants
@@ -33,12 +33,14 @@ contains
     law%eta_t = input%eta_t
   end function law_constants
 
-  elemental function normal_constant(law, reduced_mass) result(k)
+  elemental function normal_constant(law, reduced_mass, load, give) result(k)
     class(law_constants_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass
+    type(load_t), intent(in) :: load
+    real(wp), intent(in) :: give
     real(wp) :: k
 
-    associate (unused => reduced_mass)
+    associate (unused => reduced_mass, unused_too => load, unused_as_well => give)
     end associate
     k = law%k_n
   end function normal_constant

@@ -3,13 +3,18 @@
 module law_restitution_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t
+  use contact_law_m, only: contact_law_t, spring_t, load_t
   implicit none
   private
   public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
+  public :: least_restitution
+
+  !> Smaller values act as this: contact ends at zero force, so a block comes out of its support
+  !! with some speed, and the less, the longer it takes.
+  real(wp), parameter :: least_restitution = 5.0e-3_wp   !! [-]
 
   type, extends(contact_law_t) :: law_restitution_t
-    real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) of the impact [1/s]
+    real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) [1/s]
   contains
     procedure :: normal_constant
     procedure :: tangential_constant
@@ -24,12 +29,17 @@ module law_restitution_m
 contains
 
   !> The law of a case.
+  !!
+  !! The stiffness is that with which an impact lasts the contact time, up to critical damping
+  !! (e = exp(-2)). Beyond, the spring stays that of critical damping: a smaller restitution makes
+  !! the dashpot stronger and the impact shorter, and blocks at rest give way no more.
   pure function law_restitution(input) result(law)
     type(contact_input_t), intent(in) :: input
     type(law_restitution_t) :: law
+    real(wp), parameter :: critical = 1.0_wp   ! damping ratio [-]
 
-    law%damping_ratio = damping_ratio_of(input%restitution)
-    law%frequency = impact_duration(law%damping_ratio)/input%contact_time
+    law%damping_ratio = damping_ratio_of(max(input%restitution, least_restitution))
+    law%frequency = impact_duration(min(law%damping_ratio, critical))/input%contact_time
   end function law_restitution
 
   !> Restitution of an impact on a linear spring and dashpot that never pulls.
@@ -85,13 +95,18 @@ contains
     if (e >= 1.0_wp) zeta = 0.0_wp
   end function damping_ratio_of
 
-  !> Spring on which an impact takes the contact time.
-  elemental function normal_constant(law, reduced_mass) result(k)
+  !> Spring on which an impact takes the contact time; stiffer where it has to carry a load that
+  !! would press it in by more than `give`, but no stiffer than the contact time makes the spring of
+  !! the mass of the load.
+  elemental function normal_constant(law, reduced_mass, load, give) result(k)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass
+    type(load_t), intent(in) :: load
+    real(wp), intent(in) :: give
     real(wp) :: k
 
     k = reduced_mass*law%frequency**2
+    if (load%mass > reduced_mass) k = max(k, min(load%mass*law%frequency**2, load%weight/give))
   end function normal_constant
 
   elemental function tangential_constant(law, k_n, weight) result(k)

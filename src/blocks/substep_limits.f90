@@ -8,7 +8,7 @@ module substep_limits_m
   use bed_m, only: bed_is_near, bed_place
   use neighbours_m, only: pair_list_t
   use touching_m, only: touching_t
-  use contact_response_m, only: impact_turn
+  use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
   public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_part
@@ -133,13 +133,19 @@ contains
   !> Longest substep the present touches allow [s].
   !!
   !! For one pair of bodies a sixth of the bound of stability, which keeps the restitution within
-  !! 0.01, or a third where they are slow; for all pairs together little more than half of it.
+  !! 0.01, or a third where they are slow; for all pairs together little more than half of it, also
+  !! where bodies turn, and for the dashpots of several pairs.
   pure function stiffness_limit(touching) result(limit)
     type(touching_t), intent(in) :: touching
     real(wp) :: limit
+    real(wp), parameter :: damping_turn = 4.0_wp   ! the sums are twice too large, 2 is stable
 
     limit = huge(1.0_wp)
     if (touching%frequency2 > 0.0_wp) limit = impact_turn/sqrt(touching%frequency2)
+    associate (frequency2 => touching%sum_frequency2, damping => touching%damping)
+      if (frequency2 > 0.0_wp) limit = min(limit, pile_turn/sqrt(frequency2))
+      if (damping > 0.0_wp) limit = min(limit, damping_turn/damping)
+    end associate
   end function stiffness_limit
 
   !> An equal part of the time left, no longer than allowed [s].

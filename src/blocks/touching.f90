@@ -12,7 +12,8 @@ module touching_m
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, partners_init, know_motion, know_inertia
-  use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2
+  use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
+    bound_by_sums
   implicit none
   private
   public :: touching_t, touching_init, find_touches
@@ -28,6 +29,8 @@ module touching_m
     type(groups_t) :: groups
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
+    real(wp) :: sum_frequency2 = 0.0_wp          !! by `bound_by_sums` [1/s2]
+    real(wp) :: damping = 0.0_wp                 !! rate of the dashpots, likewise [1/s]
   end type touching_t
 
 contains
@@ -49,6 +52,10 @@ contains
     call partners_init(blocks, self%partners)
     allocate (self%response%frequency2(bed_partner:blocks%n))
     allocate (self%response_soon%frequency2(bed_partner:blocks%n))
+    allocate (self%response%stiffness(bed_partner:blocks%n))
+    allocate (self%response%damping(bed_partner:blocks%n))
+    allocate (self%response_soon%stiffness, mold=self%response%stiffness)
+    allocate (self%response_soon%damping, mold=self%response%damping)
     call ensure_touches(1, self%touches)
     call ensure_touches(1, self%soon)
   end subroutine touching_init
@@ -69,6 +76,8 @@ contains
     call set_apart(self%touches, self%soon)
     call form_groups(self%touches, self%groups)
     self%frequency2 = 0.0_wp
+    self%sum_frequency2 = 0.0_wp
+    self%damping = 0.0_wp
     call know_motion(blocks, self%partners)
     if (self%touches%n + self%soon%n == 0) return
     call know_inertia(blocks, self%partners)
@@ -79,6 +88,7 @@ contains
       self%frequency2 = highest_frequency2(self%soon, self%response_soon)
     end if
     self%frequency2 = max(self%frequency2, highest_frequency2(self%touches, self%response))
+    call bound_by_sums(self%touches, self%response, self%sum_frequency2, self%damping)
   end subroutine find_touches
 
 end module touching_m

@@ -107,7 +107,8 @@ contains
     if (self%low > 0.0_wp .and. .not. self%whole .and. any(x <= 0.0_wp)) then
       text = 'must be positive ['//self%unit//']'
     else if (self%bounded_above() .and. self%with_low) then
-      text = trim('must lie '//self%words()//' '//self%unit)
+      text = 'must lie '//self%words()
+      if (self%unit /= '-') text = trim(text//' '//self%unit)
     else if (self%bounded_above() .or. self%whole) then
       text = 'must be '//self%words()
       if (size(x) > 1) text = text//' in each direction'

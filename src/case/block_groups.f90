@@ -36,11 +36,13 @@ contains
       call v%without_meaning(contact%law == 'constants', 'restitution', 'law = ''constants''', &
         'only law = ''restitution'' has it')
     end if
-    call v%real('restitution', contact%restitution, share(), &
-      'speed after over speed before a central impact without friction', example='0.5')
+    call v%real('restitution', contact%restitution, between(0.0_wp, 1.0_wp, '-'), &
+      'speed after over speed before a central impact without friction; below 0.005 as 0.005', &
+      example='0.5')
     call v%real('contact_time', contact%contact_time, positive('s'), &
-      'how long such an impact lasts; shorter makes blocks stiffer. With any law a step of the ' &
-      //'blocks is a twentieth of it at most', example='0.001')
+      'how long such an impact lasts, less where restitution is below 0.135; shorter makes ' &
+      //'blocks stiffer. With any law a step of the blocks is a twentieth of it at most', &
+      example='0.001')
     call v%real('k_n', contact%k_n, positive('N/m^gamma_n'), 'stiffness normal to the surface, ' &
       //'with law = ''constants'', of each pair of spheres', &
       example='law = ''constants''  k_n = 2e5')

@@ -7,6 +7,7 @@ module case_oddities_m
   use rigid_body_m, only: turning_share
   use tet_mesh_m, only: shape_t
   use wave_step_m, only: gravity_step
+  use rest_depth_m, only: look_at_rest
   implicit none
   private
   public :: find_oddities
@@ -33,6 +34,7 @@ contains
       call look_at_inflows(case, oddities)
     end if
     call look_at_seeds(case, oddities)
+    call look_at_rest(case, shapes, oddities)
     do s = 1, size(shapes)
       call look_at_shape(case, case%shape(s), shapes(s), oddities)
     end do

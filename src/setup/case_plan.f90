@@ -4,8 +4,10 @@ module case_plan_m
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
   use named_files_m, only: told_file
-  use contact_law_m, only: contact_law_t
+  use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
+  use contact_load_m, only: load_of, give_share
+  use rest_depth_m, only: heaviest_mass
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
   use wave_step_m, only: gravity_step, capillary_step
@@ -272,6 +274,7 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     class(contact_law_t), allocatable :: law
+    type(load_t) :: heaviest
     real(wp) :: ratio_step, time_step, courant_step, mass, k
     integer :: s
 
@@ -285,9 +288,10 @@ contains
     call entry(unit, '  contact Courant', brief(courant_step)//' s at '//brief(speed) &
                //' m/s, C_s = '//brief(case%contact%courant_max))
     call choose_law(case%contact, law)
+    heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
     do s = 1, size(shapes)
       mass = shapes(s)%density*shapes(s)%volume
-      k = law%normal_constant(mass)
+      k = law%normal_constant(mass, heaviest, give_share*shapes(s)%smallest_edge)
       call entry(unit, 'stiffness on a wall', brief(k)//' N/m for '//trim(shapes(s)%name))
       if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) cycle
       call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &

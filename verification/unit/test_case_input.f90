@@ -392,10 +392,12 @@ contains
   subroutine test_contact()
     character(*), parameter :: idle = ': has no meaning with law = ''restitution''; only law = ' &
       //'''constants'' has them (line 3)|'
-    character(*), parameter :: share = 'must be above 0 and at most 1 (line 3)'
+    character(*), parameter :: share = 'must be above 0 and at most 1 (line 3)', &
+      from_0 = 'must lie between 0 and 1 (line 3)'
 
-    call expect(base//'&contact restitution=0/', '&contact restitution = 0: '//share)
-    call expect(base//'&contact restitution=1.01/', '&contact restitution = 1.01: '//share)
+    call expect(base//'&contact restitution=0/', '')
+    call expect(base//'&contact restitution=-1e-9/', '&contact restitution = -1e-9: '//from_0)
+    call expect(base//'&contact restitution=1.01/', '&contact restitution = 1.01: '//from_0)
     call expect(base//'&contact contact_time=1 law=''constants''/', '')
     call expect(base//'&contact restitution=1 law=''constants''/', '&contact restitution = 1: ' &
       //'has no meaning with law = ''constants''; only law = ''restitution'' has it (line 3)')

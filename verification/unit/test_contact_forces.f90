@@ -56,6 +56,7 @@ contains
     associate (partners => touching%partners)
       allocate (partners%v(3, bed_partner:3), partners%omega(3, bed_partner:3), source=0.0_wp)
       allocate (partners%hard(bed_partner:3), source=1.0_wp)
+      allocate (partners%give(bed_partner:3), source=1.0_wp)
       allocate (partners%inverse_mass(bed_partner:3), source=0.0_wp)
       allocate (partners%inverse_inertia(3, 3, bed_partner:3), source=0.0_wp)
       partners%inverse_mass(1:3) = 1/mass
@@ -64,6 +65,7 @@ contains
       end do
     end associate
     allocate (touching%response%frequency2(bed_partner:3))
+    allocate (touching%response%stiffness(bed_partner:3), touching%response%damping(bed_partner:3))
   end subroutine begin
 
   !> Touches and springs as a substep finds them.

@@ -3,7 +3,7 @@ program test_contact_law
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t, stored_energy, normal_force, &
+  use contact_law_m, only: contact_law_t, spring_t, load_t, stored_energy, normal_force, &
     tangential_force, tangential_slip
   use law_restitution_m, only: law_restitution_t, restitution_of, impact_duration, &
     damping_ratio_of
@@ -118,11 +118,11 @@ contains
     input%restitution = 1.0_wp
     input%contact_time = 1.0e-3_wp
     call choose_law(input, law)
-    k = law%normal_constant(0.25_wp)
+    k = law%normal_constant(0.25_wp, load_t(), 1.0_wp)
     call check('half a period is the contact time', pi*sqrt(0.25_wp/k), 1.0e-3_wp, 1.0e-15_wp)
     input%restitution = 0.3_wp
     call choose_law(input, law)
-    k = law%normal_constant(0.25_wp)
+    k = law%normal_constant(0.25_wp, load_t(), 1.0_wp)
     call check('with damping too', impact_duration(law%damping_ratio)*sqrt(0.25_wp/k), 1.0e-3_wp, &
       1.0e-15_wp)
     call law%damping(1.0_wp, k, 1.0_wp, 4.0_wp, eta, decay)
@@ -137,7 +137,7 @@ contains
     input%eta_n = 3.0_wp
     input%eta_t = 5.0_wp
     call choose_law(input, law)
-    call check('given k_n', law%normal_constant(0.25_wp), input%k_n, 0.0_wp)
+    call check('given k_n', law%normal_constant(0.25_wp, load_t(), 1.0_wp), input%k_n, 0.0_wp)
     call check('given k_t', law%tangential_constant(5.0_wp, 0.5_wp), 0.5_wp*input%k_t, 0.0_wp)
     call law%damping(0.5_wp, 1.0_wp, 2.0_wp, 4.0_wp, eta, decay)
     call check('given eta_n', eta, 1.5_wp, 0.0_wp)

@@ -6,7 +6,7 @@ program test_contact_response
   use random_counter_m, only: uniform
   use bed_m, only: bed_partner
   use touches_m, only: touch_t, touches_t, add_touch
-  use contact_law_m, only: contact_law_t
+  use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, motion_t, wrench_t, act
   use contact_response_m, only: response_t, respond, highest_frequency2, opening_speed, &
@@ -35,6 +35,7 @@ contains
     call choose_law(input, law)
     allocate (partners%v(3, bed_partner:3), partners%omega(3, bed_partner:3), source=0.0_wp)
     allocate (partners%hard(bed_partner:3), source=1.0_wp)
+    allocate (partners%give(bed_partner:3), source=1.0_wp)
     allocate (partners%inverse_mass(bed_partner:3), source=0.0_wp)
     allocate (partners%inverse_inertia(3, 3, bed_partner:3), source=0.0_wp)
     partners%inverse_mass(1:3) = 1/mass
@@ -61,8 +62,9 @@ contains
     real(wp) :: reduced, k, eta
 
     allocate (response%frequency2(bed_partner:3))
+    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
     reduced = 1/(1/mass(1) + 1/mass(2))
-    k = law%normal_constant(reduced)
+    k = law%normal_constant(reduced, load_t(), 1.0_wp)
     call touch_balls(2, 1, [1.0_wp], one)
     call respond(one, law, partners, response)
     eta = 2*law%damping_ratio*sqrt(k*reduced)
@@ -85,6 +87,7 @@ contains
     real(wp) :: lever   ! change of depth that stands for a shift [-]
 
     allocate (response%frequency2(bed_partner:3))
+    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
     call touch_balls(2, 1, [1.0_wp], touches)
     call add_touch(touch_t(2, 1, 2, normal=[1.0_wp, 0.0_wp, 0.0_wp], depth=depth, weight=weight, &
                            weight_shift=[0.0_wp, growth, 0.0_wp]), touches)
@@ -102,10 +105,11 @@ contains
     real(wp) :: pair(2), together
 
     allocate (response%frequency2(bed_partner:3))
+    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
     call touch_balls(2, 1, [1.0_wp], touches)
     call touch_balls(3, 2, [1.0_wp], touches)
     call respond(touches, law, partners, response)
-    pair = law%normal_constant(1.0_wp)   ! k/m* does not depend on the mass
+    pair = law%normal_constant(1.0_wp, load_t(), 1.0_wp)   ! k/m* does not depend on the mass
     call check('frequency of a pair', response%pair_frequency2(:2), pair, 1.0e-6_wp*pair(1))
     call check('of the ball between two', response%frequency2(2), sum(pair), 1.0e-6_wp*sum(pair))
     call check('a wall has none', response%frequency2(-1), 0.0_wp, 0.0_wp)

@@ -1,0 +1,105 @@
+!> How far blocks give way at rest: a warning of `--check`.
+module rest_depth_m
+  use kinds_m, only: wp
+  use errors_m, only: problems_t, brief
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use contact_law_m, only: contact_law_t, load_t
+  use contact_laws_m, only: choose_law
+  use contact_load_m, only: load_of, hard_depth, depth_at_rest, give_share
+  use law_restitution_m, only: least_restitution
+  implicit none
+  private
+  public :: look_at_rest, heaviest_mass
+
+contains
+
+  !> Blocks that give way at rest by more than a share of their size, under their own weight or,
+  !! as supports, under the heaviest block; and a restitution below the least one.
+  subroutine look_at_rest(case, shapes, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(problems_t), intent(inout) :: oddities
+    class(contact_law_t), allocatable :: law
+    type(load_t) :: heaviest
+    real(wp) :: depth, give
+    integer :: s
+
+    if (size(case%body) + size(case%drop) == 0) return
+    if (case%contact%law == 'restitution' .and. case%contact%restitution < least_restitution) then
+      call oddities%add('&contact restitution', case%contact%restitution, 'acts as ' &
+        //brief(least_restitution)//': blocks leave their supports with that share of the speed ' &
+        //'of an impact at least')
+    end if
+    call choose_law(case%contact, law)
+    heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
+    do s = 1, size(shapes)
+      if (n_free(case, shapes(s)) == 0) cycle
+      depth = rest_depth(case, shapes(s), law, heaviest)
+      give = give_share*shapes(s)%smallest_edge
+      if (.not. depth > 1.000001_wp*give) cycle   ! the law itself may aim at it
+      if (case%contact%law == 'restitution') then
+        call oddities%add('&contact contact_time', case%contact%contact_time, sinks(s) &
+          //'; a shorter one makes blocks stiffer')
+      else
+        call oddities%add('&contact k_n', case%contact%k_n, sinks(s)//'; should be larger')
+      end if
+    end do
+  contains
+    function sinks(s) result(text)
+      integer, intent(in) :: s
+      character(:), allocatable :: text
+
+      text = 'blocks '//trim(shapes(s)%name)//' give way by '//brief(depth, 2)//' m at rest, ' &
+        //brief(100.0_wp*depth/shapes(s)%smallest_edge, 2)//' % of their size, above ' &
+        //brief(100.0_wp*give_share)//' %'
+    end function sinks
+  end subroutine look_at_rest
+
+  !> Overlap of a block of a shape at rest, the larger of that under its own weight, on the floor or
+  !! on another one of its kind, and that with the share of the heaviest block on it [m].
+  function rest_depth(case, shape, law, heaviest) result(depth)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shape
+    class(contact_law_t), intent(in) :: law
+    type(load_t), intent(in) :: heaviest
+    real(wp) :: depth
+    type(load_t) :: own
+    real(wp) :: mass, reduced, give, k
+
+    mass = shape%density*shape%volume
+    own = load_of(mass, norm2(case%fluid%gravity))
+    if (shape%kind == 'sphere') own%weight = mass*norm2(case%fluid%gravity)   ! touches once
+    give = give_share*shape%smallest_edge
+    reduced = mass
+    if (n_free(case, shape) > 1) reduced = 0.5_wp*mass
+    k = law%normal_constant(reduced, heaviest, give)
+    depth = depth_at_rest(law, k, hard_depth(shape), own%weight)
+    k = law%normal_constant(mass, heaviest, give)
+    depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest%weight))
+  end function rest_depth
+
+  !> Mass of the heaviest block that moves freely; 0 if none does [kg].
+  pure function heaviest_mass(case, shapes) result(mass)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    real(wp) :: mass
+    integer :: s
+
+    mass = 0.0_wp
+    do s = 1, size(shapes)
+      if (n_free(case, shapes(s)) > 0) mass = max(mass, shapes(s)%density*shapes(s)%volume)
+    end do
+  end function heaviest_mass
+
+  !> How many blocks of a shape move freely.
+  pure function n_free(case, shape) result(n)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shape
+    integer :: n
+
+    n = count(case%body%shape == shape%name .and. .not. case%body%fixed) &
+      + sum(case%drop%count, case%drop%shape == shape%name)
+  end function n_free
+
+end module rest_depth_m
