@@ -12,15 +12,14 @@ module contact_load_m
 
 contains
 
-  !> Load of a touch under a block: a third of it, as a block at rest has three supports or more.
+  !> Load of a touch that carries a block.
   elemental function load_of(mass, gravity) result(load)
     real(wp), intent(in) :: mass      !! of the block [kg]
     real(wp), intent(in) :: gravity   !! >= 0 [m/s2]
     type(load_t) :: load
-    real(wp), parameter :: supports = 3.0_wp
 
-    load%mass = mass/supports
-    load%weight = load%mass*gravity
+    load%mass = mass
+    load%weight = mass*gravity
   end function load_of
 
   !> Depth at which touches of a block harden: a quarter of its mean thickness, twice the volume

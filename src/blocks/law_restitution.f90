@@ -11,7 +11,7 @@ module law_restitution_m
 
   !> Smaller values act as this: contact ends at zero force, so a block comes out of its support
   !! with some speed, and the less, the longer it takes.
-  real(wp), parameter :: least_restitution = 5.0e-3_wp   !! [-]
+  real(wp), parameter :: least_restitution = 1.0e-2_wp   !! [-]
 
   type, extends(contact_law_t) :: law_restitution_t
     real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) [1/s]

@@ -37,7 +37,7 @@ contains
         'only law = ''restitution'' has it')
     end if
     call v%real('restitution', contact%restitution, between(0.0_wp, 1.0_wp, '-'), &
-      'speed after over speed before a central impact without friction; below 0.005 as 0.005', &
+      'speed after over speed before a central impact without friction; below 0.01 as 0.01', &
       example='0.5')
     call v%real('contact_time', contact%contact_time, positive('s'), &
       'how long such an impact lasts, less where restitution is below 0.135; shorter makes ' &

@@ -57,24 +57,24 @@ contains
   end subroutine look_at_rest
 
   !> Overlap of a block of a shape at rest, the larger of that under its own weight, on the floor or
-  !! on another one of its kind, and that with the share of the heaviest block on it [m].
+  !! on another one of its kind, and that with the heaviest block on one of its touches [m].
   function rest_depth(case, shape, law, heaviest) result(depth)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
     class(contact_law_t), intent(in) :: law
     type(load_t), intent(in) :: heaviest
     real(wp) :: depth
-    type(load_t) :: own
-    real(wp) :: mass, reduced, give, k
+    real(wp), parameter :: supports = 3.0_wp   ! of a block at rest, at least; of a sphere one
+    real(wp) :: mass, reduced, own, give, k
 
     mass = shape%density*shape%volume
-    own = load_of(mass, norm2(case%fluid%gravity))
-    if (shape%kind == 'sphere') own%weight = mass*norm2(case%fluid%gravity)   ! touches once
+    own = mass*norm2(case%fluid%gravity)
+    if (shape%kind /= 'sphere') own = own/supports
     give = give_share*shape%smallest_edge
     reduced = mass
     if (n_free(case, shape) > 1) reduced = 0.5_wp*mass
     k = law%normal_constant(reduced, heaviest, give)
-    depth = depth_at_rest(law, k, hard_depth(shape), own%weight)
+    depth = depth_at_rest(law, k, hard_depth(shape), own)
     k = law%normal_constant(mass, heaviest, give)
     depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest%weight))
   end function rest_depth
