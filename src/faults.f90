@@ -9,6 +9,7 @@ module faults_m
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
   use release_m, only: n_waiting
+  use deep_overlaps_m, only: overlap_fault
   implicit none
   private
   public :: fault_t, note_places, find_fault, find_final_fault
@@ -42,6 +43,7 @@ contains
     type(simulation_t), intent(in) :: sim
     type(step_report_t), intent(in) :: report
     type(fault_t), intent(inout) :: fault
+    character(:), allocatable :: overlap
 
     if (.not. sim%start_converged) call set(sim, 'the flow of the start did not converge', fault)
     if (.not. report%contacts_solved) call set(sim, 'a step would need more than a million body ' &
@@ -57,6 +59,8 @@ contains
     if (report%energy_excess > excess_max) call set(sim, 'fluid and blocks have ' &
       //brief(100.0_wp*report%energy_excess, 3)//' % more energy than was put in, of what was set' &
       //' free: &run dt or cfl_max is too long for this flow', fault)
+    overlap = overlap_fault(sim%deep)
+    if (len(overlap) > 0) call set(sim, overlap, fault)
     call look_at_blocks(sim, fault)
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)

@@ -21,6 +21,7 @@ module simulation_m
   use contacts_m, only: contacts_init
   use lubrication_m, only: lubrication_init
   use overlap_m, only: overlap_t, overlap_init
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
   use energy_m, only: energy_parts_t, energy_init, begin_energy, energy_excess
   use coupling_m, only: coupling_t, copy_motion
@@ -44,6 +45,7 @@ module simulation_m
     class(coupling_t), allocatable :: coupling
     type(walls_t) :: walls
     type(overlap_t) :: overlap
+    type(deep_overlaps_t) :: deep
     logical :: wet = .true.                !! there is a fluid
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
     logical, allocatable :: felt(:)        !! blocks that have felt the fluid
@@ -74,6 +76,7 @@ contains
     call blocks_init(case, shapes, sim%blocks)
     call contacts_init(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
+    call deep_overlaps_init(sim%blocks, sim%deep)
     allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (.not. sim%wet) return

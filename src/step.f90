@@ -40,6 +40,7 @@ module step_m
   use rigid_body_m, only: fastest_point
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
+  use deep_overlaps_m, only: note_touches, warn_of_overlaps
   use release_m, only: release_due_blocks, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: note_energy, note_release, energy_excess
@@ -78,7 +79,10 @@ contains
       ! 4 bodies
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
-      call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap)
+      call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap, sim%deep)
+      associate (touching => sim%contacts%touching)
+        if (.not. touching%exact) call note_touches(touching%touches, sim%deep)
+      end associate
       call toc(sim%timer_blocks)
       if (sim%wet) then
         ! 5 voxelise
@@ -117,6 +121,7 @@ contains
       end if
     end associate
     call sim%clock%advance()
+    call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
     call describe(sim, contact, coupling_report, report)
   end subroutine take_step
 

@@ -19,8 +19,8 @@ module case_check_m
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for, &
-    expected_samples
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
+  use overlap_solid_m, only: expected_samples
   implicit none
   private
   public :: make_shapes, check_case

@@ -10,6 +10,7 @@ program test_overlap
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for
   implicit none
 
@@ -144,6 +145,7 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(overlap_t) :: overlap
+    type(deep_overlaps_t) :: deep
     real(wp) :: depth, expected, x(3)
     integer :: a, b
 
@@ -160,6 +162,7 @@ contains
     call blocks_init(case, shapes, blocks)
     call walls_init(case%grid, case%boundary, walls)
     call overlap_init(shapes, blocks%n, overlap)
+    call deep_overlaps_init(blocks, deep)
     expected = 0.0_wp
     do a = 1, n
       expected = max(expected, wall_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), &
@@ -171,7 +174,7 @@ contains
           shapes(blocks%shape(b)), x, blocks%q(:, b)))
       end do
     end do
-    call max_overlap(walls, blocks, overlap, depth)
+    call max_overlap(walls, blocks, overlap, depth, deep)
     call check('some overlap', expected > 1.0e-3_wp)
     call check('largest overlap', depth, expected, 1.0e-15_wp)
     blocks%present = .false.

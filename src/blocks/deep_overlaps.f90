@@ -1,0 +1,148 @@
+!> Which bodies reach deep into one another, into a wall or the bed, and what is told of it: where a
+!! body is pressed harder than contact can hold, it goes through.
+module deep_overlaps_m
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use kinds_m, only: wp
+  use errors_m, only: to_text, brief
+  use parallel_m, only: is_root
+  use touches_m, only: touches_t
+  use rigid_body_m, only: blocks_t
+  implicit none
+  private
+  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, note_overlap, note_touches
+  public :: size_of_pair, warn_of_overlaps, overlap_fault, noted_share
+
+  real(wp), parameter :: noted_share = 0.05_wp   !! overlap over size from which a body is told
+  real(wp), parameter :: fault_share = 0.2_wp    !! likewise, from which the run ends
+
+  !> The deepest overlap of each body, (n), where it is above `noted_share`.
+  type :: deep_overlaps_t
+    real(wp), allocatable :: size(:)     !! smallest edge [m]
+    real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
+    real(wp), allocatable :: share(:)    !! of the size of the smaller of the two [-]
+    integer, allocatable :: partner(:)   !! body, or below 1: wall or bed
+    logical, allocatable :: told(:)      !! has been warned of
+  end type deep_overlaps_t
+
+contains
+
+  !> No overlap is known yet.
+  pure subroutine deep_overlaps_init(blocks, deep)
+    type(blocks_t), intent(in) :: blocks
+    type(deep_overlaps_t), intent(out) :: deep
+    integer :: b
+
+    allocate (deep%depth(blocks%n), deep%share(blocks%n), source=0.0_wp)
+    allocate (deep%partner(blocks%n), source=0)
+    allocate (deep%told(blocks%n), source=.false.)
+    deep%size = [(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)]
+  end subroutine deep_overlaps_init
+
+  !> Forget the overlaps of the step before.
+  pure subroutine forget_overlaps(deep)
+    type(deep_overlaps_t), intent(inout) :: deep
+
+    deep%depth = 0.0_wp
+    deep%share = 0.0_wp
+  end subroutine forget_overlaps
+
+  !> Size of the smaller of a body and its partner; walls and the bed have none [m].
+  pure function size_of_pair(a, b, deep) result(size)
+    integer, intent(in) :: a, b   !! body; body, or below 1: wall or bed
+    type(deep_overlaps_t), intent(in) :: deep
+    real(wp) :: size
+
+    size = deep%size(a)
+    if (b > 0) size = min(size, deep%size(b))
+  end function size_of_pair
+
+  !> Note an overlap of body a and its partner b with both, where it is the deepest of either.
+  pure subroutine note_overlap(a, b, depth, deep)
+    integer, intent(in) :: a, b         !! body; body, or below 1: wall or bed
+    real(wp), intent(in) :: depth       !! [m]
+    type(deep_overlaps_t), intent(inout) :: deep
+    real(wp) :: share
+
+    share = depth/size_of_pair(a, b, deep)
+    if (.not. share > noted_share) return
+    call keep_deepest(a, b, depth, share, deep)
+    if (b > 0) call keep_deepest(b, a, depth, share, deep)
+  end subroutine note_overlap
+
+  !> Note an overlap with one body, where it is its deepest.
+  pure subroutine keep_deepest(body, partner, depth, share, deep)
+    integer, intent(in) :: body, partner
+    real(wp), intent(in) :: depth, share   !! [m], of the size of the smaller [-]
+    type(deep_overlaps_t), intent(inout) :: deep
+
+    if (share <= deep%share(body)) return
+    deep%share(body) = share
+    deep%depth(body) = depth
+    deep%partner(body) = partner
+  end subroutine keep_deepest
+
+  !> Note the overlaps of touches: of contact spheres, where the true shapes overlap at rest.
+  pure subroutine note_touches(touches, deep)
+    type(touches_t), intent(in) :: touches
+    type(deep_overlaps_t), intent(inout) :: deep
+    integer :: t
+
+    call forget_overlaps(deep)
+    do t = 1, touches%n
+      call note_overlap(touches%item(t)%a, touches%item(t)%b, touches%item(t)%depth, deep)
+    end do
+  end subroutine note_touches
+
+  !> Warn once of each body that reaches deep into another one, a wall or the bed, or into which one
+  !! reaches.
+  subroutine warn_of_overlaps(time, deep, warnings)
+    real(wp), intent(in) :: time           !! [s]
+    type(deep_overlaps_t), intent(inout) :: deep
+    integer, intent(inout) :: warnings     !! counted up
+    integer :: b
+
+    do b = 1, size(deep%told)
+      if (.not. deep%share(b) > 0.0_wp .or. deep%told(b)) cycle
+      deep%told(b) = .true.
+      if (deep%partner(b) > 0) deep%told(deep%partner(b)) = .true.
+      warnings = warnings + 1
+      if (.not. is_root()) cycle
+      write (error_unit, '(5a)') 'mics: warning: ', overlap_text(b, deep), ', t = ', &
+        to_text(time), ' s'
+      flush (error_unit)
+    end do
+  end subroutine warn_of_overlaps
+
+  !> What is wrong where bodies reach so deep into one another that their contact has failed; empty
+  !! if none do.
+  function overlap_fault(deep) result(text)
+    type(deep_overlaps_t), intent(in) :: deep
+    character(:), allocatable :: text
+    integer :: b
+
+    text = ''
+    if (size(deep%share) == 0) return
+    b = maxloc(deep%share, 1)
+    if (.not. deep%share(b) > fault_share) return
+    text = overlap_text(b, deep)//', above '//brief(100.0_wp*fault_share)//' %: something drives ' &
+      //'or presses them harder than their contact holds, or they are too fast for it; a shorter ' &
+      //'contact_time (or larger k_n) makes blocks stiffer'
+  end function overlap_fault
+
+  !> The deepest overlap of body b in words.
+  function overlap_text(b, deep) result(text)
+    integer, intent(in) :: b
+    type(deep_overlaps_t), intent(in) :: deep
+    character(:), allocatable :: text
+
+    text = 'body '//to_text(b)//' and '
+    if (deep%partner(b) > 0) then
+      text = text//'body '//to_text(deep%partner(b))
+    else
+      text = text//'a wall or the bed'
+    end if
+    text = text//' reach '//brief(deep%depth(b), 3)//' m into one another, ' &
+      //brief(100.0_wp*deep%share(b), 3)//' % of the size of the smaller'
+  end function overlap_text
+
+end module deep_overlaps_m
