@@ -96,8 +96,8 @@ contains
   end function damping_ratio_of
 
   !> Spring on which an impact takes the contact time; stiffer where it has to carry a load that
-  !! would press it in by more than `give`, but no stiffer than the contact time makes the spring of
-  !! the mass of the load.
+  !! would press it in by more than `give`, but no stiffer than that of two blocks as heavy as the
+  !! load.
   elemental function normal_constant(law, reduced_mass, load, give) result(k)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: reduced_mass
@@ -105,8 +105,8 @@ contains
     real(wp), intent(in) :: give
     real(wp) :: k
 
-    k = reduced_mass*law%frequency**2
-    if (load%mass > reduced_mass) k = max(k, min(load%mass*law%frequency**2, load%weight/give))
+    k = max(reduced_mass*law%frequency**2, &
+            min(0.5_wp*load%mass*law%frequency**2, load%weight/give))
   end function normal_constant
 
   elemental function tangential_constant(law, k_n, weight) result(k)

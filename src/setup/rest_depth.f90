@@ -56,8 +56,8 @@ contains
     end function sinks
   end subroutine look_at_rest
 
-  !> Overlap of a block of a shape at rest, the larger of that under its own weight, on the floor or
-  !! on another one of its kind, and that with the heaviest block on one of its touches [m].
+  !> Overlap of a block of a shape at rest: the larger of that under its own weight, on the floor or
+  !! on another one of its kind, and that of a touch under a heaviest block that is another one [m].
   function rest_depth(case, shape, law, heaviest) result(depth)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
@@ -75,6 +75,7 @@ contains
     if (n_free(case, shape) > 1) reduced = 0.5_wp*mass
     k = law%normal_constant(reduced, heaviest, give)
     depth = depth_at_rest(law, k, hard_depth(shape), own)
+    if (.not. heaviest%mass > mass) return
     k = law%normal_constant(mass, heaviest, give)
     depth = max(depth, depth_at_rest(law, k, hard_depth(shape), heaviest%weight))
   end function rest_depth

@@ -30,6 +30,7 @@ program test_contact_forces
   call check_energy()
   call check_friction()
   call check_damping()
+  call check_strong_damping()
   call check_new_touch()
   call check_memory()
   call finish_checks()
@@ -207,6 +208,27 @@ contains
     call sum_forces(dt, touching, springs, loads, report)
     call check('never pulls', loads%force(3, 2), 0.0_wp, 0.0_wp)
   end subroutine check_damping
+
+  !> However strong a dashpot is, it stops the motion within a substep and does not turn it round.
+  subroutine check_strong_damping()
+    real(wp), parameter :: d = 1.0e-6_wp, dt = 0.02_wp, closing = 0.8_wp
+    real(wp), parameter :: eta(3) = mass(2)*[1.0e2_wp, 2.0e2_wp, 1.0e5_wp]   ! from D = 1 on
+    type(touching_t) :: touching
+    type(springs_t) :: springs
+    type(touch_t) :: touch
+    integer :: i
+
+    touch = touch_t(2, floor, 1, normal=-z, depth=d, length=0.5_wp)
+    do i = 1, size(eta)
+      call begin(1.0_wp, eta(i), touching)
+      call touch_anew([touch], touching, springs)
+      call touch_anew([touch], touching, springs)   ! it is not new any more
+      touching%partners%v(3, 2) = -closing
+      call sum_forces(dt, touching, springs, loads, report)
+      call check('a strong dashpot stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), &
+        1.0e-12_wp)
+    end do
+  end subroutine check_strong_damping
 
   !> A new touch damps for the time since it began: from where the bodies met up to the end of the
   !! substep, a substep and a half at most.

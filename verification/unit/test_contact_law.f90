@@ -15,6 +15,8 @@ program test_contact_law
   call check_integrated_impact()
   call check_hardening()
   call check_constants()
+  call check_overdamped()
+  call check_load()
   call check_forces()
   call finish_checks()
 
@@ -145,6 +147,55 @@ contains
     call check('given eta_t', law%tangential_damping(0.5_wp, 9.0_wp, 9.0_wp, 9.0_wp), 2.5_wp, &
       0.0_wp)
   end subroutine check_constants
+
+  !> Beyond critical damping the spring stays and the dashpot grows, to that of the least
+  !! restitution.
+  subroutine check_overdamped()
+    real(wp), parameter :: e(5) = [0.0_wp, 1.0e-6_wp, 1.0e-3_wp, 0.05_wp, 0.1_wp], &
+      time = 1.0e-3_wp, mass = 0.25_wp
+    type(contact_input_t) :: input
+    class(contact_law_t), allocatable :: law
+    integer :: m
+
+    input%contact_time = time
+    do m = 1, size(e)
+      input%restitution = e(m)
+      call choose_law(input, law)
+      call check('spring of critical damping', law%normal_constant(mass, load_t(), 1.0_wp), &
+        mass*(2.0_wp/time)**2, 1.0e-9_wp*mass/time**2)
+      call check('dashpot of the restitution', restitution_of(law%damping_ratio), &
+        max(e(m), 0.01_wp), 1.0e-12_wp)
+    end do
+    input%restitution = 0.2_wp
+    call choose_law(input, law)
+    call check('below critical damping: the contact time', &
+      impact_duration(law%damping_ratio)*sqrt(mass/law%normal_constant(mass, load_t(), 1.0_wp)), &
+      time, 1.0e-15_wp)
+  end subroutine check_overdamped
+
+  !> A touch carries a load within what it may give way, but is no stiffer than that of two blocks
+  !! of that mass.
+  subroutine check_load()
+    real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, g = 9.81_wp, time = 1.0e-2_wp
+    type(contact_input_t) :: input
+    class(contact_law_t), allocatable :: law
+    real(wp) :: k
+
+    input%restitution = 1.0_wp
+    input%contact_time = time
+    call choose_law(input, law)
+    k = (pi/time)**2   ! of 1 kg
+    call check('a light load changes nothing', law%normal_constant(mass, load_t(mass, mass*g), &
+      1.0e-3_wp), mass*k, 1.0e-9_wp)
+    call check('a heavy one gives way by 1 mm', law%normal_constant(mass, load_t(heavy, heavy*g), &
+      1.0e-3_wp), heavy*g/1.0e-3_wp, 1.0e-9_wp)
+    call check('no stiffer than two such', law%normal_constant(mass, load_t(heavy, heavy*g), &
+      1.0e-6_wp), 0.5_wp*heavy*k, 1.0e-9_wp*heavy*k)
+    input%law = 'constants'
+    call choose_law(input, law)
+    call check('constants stay', law%normal_constant(mass, load_t(heavy, heavy*g), 1.0e-6_wp), &
+      input%k_n, 0.0_wp)
+  end subroutine check_load
 
   !> Equations (1) and (2) for one touch.
   subroutine check_forces()

@@ -9,8 +9,8 @@ program test_contact_response
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, motion_t, wrench_t, act
-  use contact_response_m, only: response_t, respond, highest_frequency2, opening_speed, &
-    push_apart, impact_turn
+  use contact_response_m, only: response_t, respond, highest_frequency2, bound_by_sums, &
+    opening_speed, push_apart, impact_turn
   implicit none
 
   real(wp), parameter :: mass(3) = [2.0_wp, 3.0_wp, 6.0_wp]   !! of three balls [kg]
@@ -22,6 +22,8 @@ program test_contact_response
   call check_damping()
   call check_beginning()
   call check_frequencies()
+  call check_sums()
+  call check_load()
   call check_power()
   call finish_checks()
 
@@ -121,6 +123,56 @@ contains
     response%pair_frequency2(:2) = pair(2)
     call check('of a pile', highest_frequency2(touches, response), together, 1.0e-6_wp*together)
   end subroutine check_frequencies
+
+  !> What bounds a substep: stiffness and damping of all touches of two bodies over what each sets
+  !! against a force, rotation included; dashpots only of several pairs.
+  subroutine check_sums()
+    real(wp), parameter :: arm(3) = [0.5_wp, 0.0_wp, 0.0_wp], inverse_inertia = 4.0_wp
+    type(touches_t) :: touches
+    type(response_t) :: response
+    real(wp) :: frequency2, rate, k, at_2, eta, pair(2)
+    integer :: i
+
+    allocate (response%frequency2(bed_partner:3))
+    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    do i = 1, 3
+      partners%inverse_inertia(i, i, 2) = inverse_inertia
+    end do
+    call add_touch(touch_t(2, 1, 1, arm_a=arm, normal=-z, depth=1.0e-6_wp), touches)
+    call respond(touches, law, partners, response)
+    call bound_by_sums(touches, response, frequency2, rate)
+    k = response%k(1)
+    at_2 = 1/mass(2) + inverse_inertia*arm(1)**2
+    call check('one pair: stiffness', frequency2, k*(1/mass(1) + at_2), 1.0e-6_wp*frequency2)
+    call check('one pair: dashpots bound nothing', rate, 0.0_wp, 1.0e-9_wp)
+    call add_touch(touch_t(3, 2, 1, arm_b=arm, normal=-z, depth=1.0e-6_wp), touches)
+    call respond(touches, law, partners, response)
+    call bound_by_sums(touches, response, frequency2, rate)
+    k = response%k(1)*(1/mass(1) + at_2)
+    k = max(k + response%k(2)*at_2, response%k(2)*(1/mass(3) + at_2) + response%k(1)*at_2)
+    call check('two pairs: stiffness', frequency2, k, 1.0e-6_wp*frequency2)
+    pair = [response%eta(1)*(1/mass(1) + at_2), response%eta(2)*(1/mass(3) + at_2)]
+    eta = min(response%eta(2)*at_2, pair(1)) + response%eta(2)*at_2
+    eta = max(eta, min(response%eta(1)*at_2, pair(2)) + response%eta(1)*at_2)
+    call check('two pairs: dashpots', rate, eta, 1.0e-6_wp*rate)
+    partners%inverse_inertia = 0.0_wp
+  end subroutine check_sums
+
+  !> A pair carries the heaviest body within what the smaller of the two may give way.
+  subroutine check_load()
+    type(touches_t) :: touches
+    type(response_t) :: response
+
+    allocate (response%frequency2(bed_partner:3))
+    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    partners%load = load_t(1.0e9_wp, 1.0e10_wp)
+    partners%give(1) = 1.0e-2_wp
+    call touch_balls(2, 1, [1.0_wp, 0.5_wp], touches)
+    call respond(touches, law, partners, response)
+    call check('stiffness under a load', response%k(:2), 1.0e12_wp*[1.0_wp, 0.5_wp], 1.0_wp)
+    partners%load = load_t()
+    partners%give = 1.0_wp
+  end subroutine check_load
 
   !> What the force of a touch does to its partners is what its spring gives: F times the speed at
   !! which it lets its energy go, also where its weight changes with position.

@@ -177,6 +177,8 @@ contains
     call max_overlap(walls, blocks, overlap, depth, deep)
     call check('some overlap', expected > 1.0e-3_wp)
     call check('largest overlap', depth, expected, 1.0e-15_wp)
+    call check('that of the body with the deepest', maxval(deep%depth), expected, 1.0e-15_wp)
+    call check('what was noted is deep', all(deep%share > 0.05_wp .or. deep%depth <= 0.0_wp))
     blocks%present = .false.
     blocks%present(1) = .true.
     blocks%q = spread(upright, 2, n + 1)

@@ -1,0 +1,71 @@
+!> Deep overlaps: noted with both bodies, told once, a fault where contact has failed.
+program test_deep_overlaps
+  use kinds_m, only: wp
+  use check_m, only: check, finish_checks
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init
+  use touches_m, only: touch_t, touches_t, add_touch
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, note_overlap, note_touches, &
+    warn_of_overlaps, overlap_fault, size_of_pair
+  implicit none
+
+  real(wp), parameter :: size(2) = [0.02_wp, 0.3_wp]
+  integer, parameter :: floor = -5
+  type(deep_overlaps_t) :: deep
+  type(touches_t) :: touches
+  integer :: warnings
+
+  call make_cubes()
+  call check('the smaller counts', size_of_pair(2, 1, deep), size(1), 0.0_wp)
+  call check('a wall has no size', size_of_pair(2, floor, deep), size(2), 0.0_wp)
+  call note_overlap(2, 1, 0.0009_wp, deep)
+  call check('4.5 % are not noted', maxval(deep%share), 0.0_wp, 0.0_wp)
+  call note_overlap(2, 1, 0.0011_wp, deep)
+  call note_overlap(2, floor, 0.024_wp, deep)
+  call check('shares of both', deep%share(:3), [0.055_wp, 0.08_wp, 0.0_wp], 1.0e-12_wp)
+  call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp], 0.0_wp)
+  call check('with whom', deep%partner(1) == 2 .and. deep%partner(2) == floor)
+  call check('no fault yet', len(overlap_fault(deep)) == 0)
+  warnings = 3
+  call warn_of_overlaps(0.5_wp, deep, warnings)
+  call check('told of one with the other, and of the floor', warnings, 4)
+  call check('both are told', deep%told(1) .and. deep%told(2) .and. .not. deep%told(3))
+  call warn_of_overlaps(0.6_wp, deep, warnings)
+  call check('told once', warnings, 4)
+  call add_touch(touch_t(3, 2, 1, depth=0.0039_wp), touches)
+  call add_touch(touch_t(3, 2, 2, depth=0.0041_wp), touches)
+  call note_touches(touches, deep)
+  call check('touches, those before forgotten', deep%share(:3), [0.0_wp, 0.205_wp, 0.205_wp], &
+    1.0e-12_wp)
+  call check('a fault from a fifth on', index(overlap_fault(deep), &
+    'body 2 and body 3 reach 0.0041 m into one another, 20.5 % of the size of the smaller') == 1)
+  call finish_checks()
+
+contains
+
+  !> Three cubes, small, large, small.
+  subroutine make_cubes()
+    character(:), allocatable :: message
+    type(shape_t) :: shapes(2)
+    type(blocks_t) :: blocks
+    type(case_t) :: case
+    integer :: s
+
+    allocate (case%shape(2), case%body(3), case%drop(0))
+    case%shape%name = [character(5) :: 'small', 'large']
+    case%shape%kind = 'cube'
+    do s = 1, 2
+      case%shape(s)%size = size(s)
+      call make_shape(case%shape(s), shapes(s), message)
+    end do
+    case%body%shape = [character(5) :: 'small', 'large', 'small']
+    do s = 1, 3
+      case%body(s)%position = real(s, wp)
+    end do
+    call blocks_init(case, shapes, blocks)
+    call deep_overlaps_init(blocks, deep)
+  end subroutine make_cubes
+
+end program test_deep_overlaps
