@@ -18,7 +18,9 @@ module overlap_m
     noted_share
   implicit none
   private
-  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for
+  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for, exclude
+
+  real(wp), parameter :: room_share = 0.01_wp   !! overlap over smallest edge that a release allows
 
   !> The shapes of a run made ready, and the lists of the search.
   type :: overlap_t
@@ -84,11 +86,34 @@ contains
     integer, intent(in) :: c
     type(overlap_t), intent(in) :: overlap
     logical :: free
-    real(wp), parameter :: share = 0.01_wp   !! of the smallest edge
 
     free = body_overlap(overlap, walls, blocks, c) &
-      <= share*blocks%shapes(blocks%shape(c))%smallest_edge
+      <= room_share*blocks%shapes(blocks%shape(c))%smallest_edge
   end function room_for
+
+  !> Whether the places of two bodies exclude one another: they reach deeper into one another than a
+  !! release allows the smaller.
+  pure function exclude(walls, blocks, a, b, overlap) result(yes)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, b
+    type(overlap_t), intent(in) :: overlap
+    logical :: yes
+    real(wp) :: d(3), depth, allowed
+
+    d = blocks%x(:, a) - blocks%x(:, b)
+    d = d - nearest_shift(walls%period, -d)
+    associate (one => overlap%solid(blocks%shape(a)), two => overlap%solid(blocks%shape(b)))
+      yes = .false.
+      if (norm(d) >= one%radius + two%radius) return
+      allowed = room_share*min(blocks%shapes(blocks%shape(a))%smallest_edge, &
+        blocks%shapes(blocks%shape(b))%smallest_edge)
+      depth = allowed
+      call deepen_pair(one, rotation_matrix(blocks%q(:, a)), two, rotation_matrix(blocks%q(:, b)), &
+        d, depth)
+    end associate
+    yes = depth > allowed
+  end function exclude
 
   !> Largest depth of body c in the other present bodies, the walls and the bed [m].
   function body_overlap(overlap, walls, blocks, c) result(depth)

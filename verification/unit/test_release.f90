@@ -83,9 +83,46 @@ program test_release
   call check('no release to come', next_release(0.8_wp, blocks) > 1.0e300_wp)
   call try(0.9_wp)
   call check('nothing more to release', .not. released)
+  call check_together()
   call finish_checks()
 
 contains
+
+  !> A row of blocks is due at once: a long one, named first, lies across three others, of which the
+  !! last two touch, or overlap by less than a release allows; two more exclude one another.
+  subroutine check_together()
+    type(case_t) :: row
+    type(shape_t) :: two(2)
+    logical :: gone(6), waits(6)
+    integer :: k
+
+    allocate (row%shape(2), row%body(0), row%drop(6))
+    row%shape%name = [character(4) :: 'cube', 'long']
+    row%shape%kind = [character(4) :: 'cube', 'box']
+    row%shape(1)%size = 0.1_wp
+    row%shape(2)%size = [0.6_wp, 0.1_wp, 0.1_wp]
+    do k = 1, 2
+      call make_shape(row%shape(k), two(k), message)
+    end do
+    row%drop%shape = [character(4) :: 'long', 'cube', 'cube', 'cube', 'cube', 'cube']
+    row%drop(1)%position = [0.5_wp, 0.45_wp, 0.5_wp]
+    row%drop(2)%position = [0.3_wp, 0.5_wp, 0.5_wp]
+    row%drop(3)%position = [0.5_wp, 0.5_wp, 0.5_wp]
+    row%drop(4)%position = [0.5991_wp, 0.5_wp, 0.5_wp]
+    row%drop(5)%position = [0.5_wp, 0.8_wp, 0.5_wp]
+    row%drop(6)%position = [0.59_wp, 0.8_wp, 0.5_wp]
+    row%drop%first_time = 1.0_wp
+    call blocks_init(row, two, blocks)
+    call overlap_init(blocks%shapes, blocks%n, overlap)
+    waits = .false.
+    call release_due_blocks(walls, 1.0_wp, overlap, blocks, waits, warnings, released)
+    gone = [.false., .true., .true., .true., .true., .false.]
+    call check('those that fit go together', all(blocks%present .eqv. gone))
+    call check('the others wait', all(waits .eqv. .not. gone))
+    blocks%x(3, 2:4) = 0.2_wp
+    call release_due_blocks(walls, 1.1_wp, overlap, blocks, waits, warnings, released)
+    call check('the long one when they have left', blocks%present(1) .and. .not. blocks%present(6))
+  end subroutine check_together
 
   subroutine try(time)
     real(wp), intent(in) :: time   !! [s]
