@@ -323,7 +323,7 @@ def test_the_page_shows_how_to_check_a_case() -> None:
         exec(
             shown.replace("jsonschema.validate", "case['run']['dt'] = 0.0; jsonschema.validate"), {}
         )
-    assert found == ["run dt: 0.0"]
+    assert found == [" run dt: 0.0"]
 
 
 def test_examples_and_defaults_fit_the_schema(schema: dict[str, Any]) -> None:
