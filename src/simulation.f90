@@ -6,7 +6,7 @@ module simulation_m
   use scratch_m, only: scratch_t, scratch_init
   use fields_m, only: flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use solid_fraction_m, only: solid_fraction_t, subcells_of, solid_fraction_init, update_solid
   use liquid_fill_m, only: fill_liquid
   use initial_state_m, only: read_initial_liquid, read_initial_velocity
   use extended_fraction_m, only: extend_fraction
@@ -64,7 +64,11 @@ contains
     integer :: d, n_solids
 
     sim%case = case
-    sim%wet = case%run%physics /= 'dry'
+    select case (case%run%physics)
+    case ('coupled', 'fluid'); sim%wet = .true.
+    case ('dry'); sim%wet = .false.
+    case default; error stop 'simulation_init: no such physics'
+    end select
     sim%timer_blocks = timer('blocks')
     sim%timer_solid = timer('solid shares')
     sim%timer_transport = timer('transport')
@@ -89,9 +93,7 @@ contains
     if (bed%there) n_solids = n_solids + 1
     call solid_geometry_init(sim%grid, sim%solid, n_solids)
     call solid_geometry_init(sim%grid, sim%before, n_solids)
-    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, &
-                             merge(case%numerics%subcells, 0, &
-                                   case%numerics%solid_fraction == 'subcell'), bed)
+    call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, subcells_of(case%numerics), bed)
     call scratch_init(sim%grid, sim%scratch)
     call fluid_transport_init(case, sim%grid, sim%scratch, sim%transport)
     call choose_coupling(case, n_solids, sim)

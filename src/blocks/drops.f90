@@ -17,7 +17,7 @@ module drops_m
 contains
 
   !> Starting pose of block number `index` of a drop.
-  pure subroutine draw_drop(drop, index, x, q)
+  subroutine draw_drop(drop, index, x, q)
     type(drop_input_t), intent(in) :: drop
     integer, intent(in) :: index       !! 1 .. drop%count
     real(wp), intent(out) :: x(3)      !! centre of mass [m]
@@ -29,13 +29,15 @@ contains
       x(d) = drop%position(d) + drop%spread(d)*(2*uniform(drop%seed, index, k_shift + d - 1) &
         - 1.0_wp)
     end do
-    if (drop%orientation == 'random') then
+    select case (drop%orientation)
+    case ('random')
       q = random_rotation(drop%seed, index)
-    else
+    case ('given')
       angle = uniform(drop%seed, index, k_tilt)*drop%tilt_deg*pi/180.0_wp
       q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), &
         normalised(drop%quaternion))
-    end if
+    case default; error stop 'draw_drop: no such orientation'
+    end select
   end subroutine draw_drop
 
   !> A unit vector, uniform over the sphere: the height is uniform and so is the azimuth.

@@ -43,7 +43,11 @@ contains
     type(touching_t), intent(out) :: self
 
     call choose_law(input, self%law)
-    self%exact = input%model == 'surface'
+    select case (input%model)
+    case ('surface'); self%exact = .true.
+    case ('spheres'); self%exact = .false.
+    case default; error stop 'touching_init: no such model'
+    end select
     if (self%exact) then
       call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)
     else

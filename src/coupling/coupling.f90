@@ -140,7 +140,11 @@ contains
     call viscous_init(grid, n, self%viscous)
     call give_arrays(scratch, self%viscous)
     call clear(scratch)
-    self%implicit_momentum = case%numerics%momentum == 'c_ismac'
+    select case (case%numerics%momentum)
+    case ('c_ismac'); self%implicit_momentum = .true.
+    case ('conservative'); self%implicit_momentum = .false.
+    case default; error stop 'coupling_init: no such momentum'
+    end select
     if (self%implicit_momentum) call c_ismac_init(grid, n, case%numerics%advection, self%c_ismac)
     call pressure_init(grid, n, case%numerics, self%pressure)
     call give_faces(scratch, self%pressure%system%operator%cf)

@@ -25,18 +25,16 @@ module tvd_m
 
 contains
 
-  !> Scheme of a name of the case file.
-  pure function scheme_of(name) result(scheme)
+  !> Scheme of a name of the case file; an unknown one ends the program.
+  function scheme_of(name) result(scheme)
     character(*), intent(in) :: name   !! 'mp5' | 'tvd5' | 'upwind'
     integer :: scheme
 
-    select case (trim(name))
-    case ('upwind')
-      scheme = upwind_scheme
-    case ('tvd5')
-      scheme = tvd_scheme
-    case default
-      scheme = mp_scheme
+    select case (name)
+    case ('upwind'); scheme = upwind_scheme
+    case ('tvd5'); scheme = tvd_scheme
+    case ('mp5'); scheme = mp_scheme
+    case default; error stop 'scheme_of: no such scheme'
     end select
   end function scheme_of
 

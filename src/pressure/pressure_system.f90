@@ -64,6 +64,7 @@ contains
     type(pressure_system_t), intent(out) :: self
     integer :: a(3), b(3)
 
+    call require_names(numerics)
     self%method = numerics%pressure_solver
     self%preconditioner = numerics%preconditioner
     a = grid%lo - 1
@@ -79,6 +80,20 @@ contains
     self%operator%hi = grid%hi
     call elliptic_solver_init(grid, self%solver)
   end subroutine pressure_system_init
+
+  !> Names of the solver and the preconditioner that nothing below handles end the program.
+  subroutine require_names(numerics)
+    type(numerics_t), intent(in) :: numerics
+
+    select case (numerics%pressure_solver)
+    case ('cg', 'bicgstab')
+    case default; error stop 'pressure_system_init: no such solver'
+    end select
+    select case (numerics%preconditioner)
+    case ('multigrid', 'jacobi', 'none')
+    case default; error stop 'pressure_system_init: no such preconditioner'
+    end select
+  end subroutine require_names
 
   !> Coefficients of the system for the open shares and densities at hand, and of its
   !! preconditioner.
@@ -242,7 +257,7 @@ contains
     select case (trim(self%preconditioner))
     case ('multigrid'); call solve_with(self%solver%multigrid)
     case ('jacobi'); call solve_with(self%jacobi)
-    case default; call solve_with(self%identity)
+    case default; call solve_with(self%identity)   ! 'none', as `require_names` has made sure
     end select
   contains
     subroutine solve_with(preconditioner)

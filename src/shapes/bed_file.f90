@@ -57,14 +57,18 @@ contains
     if (len(words%problem) == 0) then
       call checksum%add_text(words%text)
       form%checksum = checksum%text()
-      if (kind == 'heightmap') then
+      select case (kind)
+      case ('heightmap')
         call read_heights(words, form)
-      else if (is_binary_stl(words%text)) then
-        call read_binary_stl(words, form)
-      else
-        call read_ascii_stl(words, form)
-      end if
-      if (kind == 'stl') call check_rounding(words, form)
+      case ('stl')
+        if (is_binary_stl(words%text)) then
+          call read_binary_stl(words, form)
+        else
+          call read_ascii_stl(words, form)
+        end if
+        call check_rounding(words, form)
+      case default; error stop 'read_bed_file: no such kind'
+      end select
     end if
     message = place_of(words)//words%problem
   end subroutine read_bed_file

@@ -105,8 +105,9 @@ contains
         //': no contact sphere finds room, it must be smaller'
     case ('inscribed')
       call place_inscribed(shape)
-    case default
+    case ('centroid')
       call place_at_centroids(shape)
+    case default; error stop 'place_spheres: no such contact spheres'
     end select
   end subroutine place_spheres
 
