@@ -6,8 +6,9 @@
 !! Adding whole numbers is exact, so any order, blocking, thread or process count gives the same
 !! three numbers. They hold at least 73 digits below the largest term, far more than a plain sum.
 !!
-!! A set of bins is a plain `integer(i8) :: bins(bin_size)`: the index of the highest bin, then the
-!! three counts from high to low. Valid for up to 2**28 terms.
+!! A set of bins is a plain `integer(i8) :: bins(bin_size)`: the index of the highest bin, the lower
+!! 32 digits of the three counts from high to low, then what is above these. A term adds up to 2**35
+!! to a count, so one word would hold 2**28 terms; two hold 2**50, more than any grid has cells.
 !!
 !! Source: the pre-rounded sums of Demmel and Nguyen, IEEE Trans. Comput. 64 (2015), with whole
 !! numbers as accumulators so that no carry is ever needed.
@@ -18,15 +19,17 @@ module exact_bins_m
   private
   public :: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
 
-  integer, parameter :: bin_size = 4         !! index of the highest bin and three counts
+  integer, parameter :: bin_size = 7         !! index of the highest bin, three counts of two words
   integer, parameter :: chunk_size = 4096    !! most terms in one call of `add_terms`
   integer, parameter :: bin_digits = 36
+  integer, parameter :: low_digits = 32      !! of a count, in its lower word
   integer, parameter :: lowest = -24         !! smallest index, so that no unit is subnormal
   integer, parameter :: highest = 26         !! largest index, so that nothing overflows
   integer, parameter :: not_a_number = highest + 1
 
   !> Bins of an empty sum.
-  integer(i8), parameter :: no_terms(bin_size) = [int(lowest, i8), 0_i8, 0_i8, 0_i8]
+  integer(i8), parameter :: no_terms(bin_size) = [int(lowest, i8), 0_i8, 0_i8, 0_i8, 0_i8, 0_i8, &
+    0_i8]
 
 contains
 
@@ -128,24 +131,39 @@ contains
   pure subroutine merge_bins(part, bins)
     integer(i8), intent(in) :: part(bin_size)
     integer(i8), intent(inout) :: bins(bin_size)
+    integer(i8) :: carry(3)
     integer :: down
 
     if (part(1) > bins(1)) then
       down = int(min(part(1) - bins(1), 3_i8))
-      bins(2 + down:) = bins(2:bin_size - down)
-      bins(2:1 + down) = 0_i8
+      call move_down(down, bins(2:4))
+      call move_down(down, bins(5:7))
       bins(1) = part(1)
     end if
     down = int(min(bins(1) - part(1), 3_i8))
-    bins(2 + down:) = bins(2 + down:) + part(2:bin_size - down)
+    bins(2 + down:4) = bins(2 + down:4) + part(2:4 - down)
+    bins(5 + down:7) = bins(5 + down:7) + part(5:7 - down)
+    carry = shifta(bins(2:4), low_digits)
+    bins(2:4) = bins(2:4) - shiftl(carry, low_digits)
+    bins(5:7) = bins(5:7) + carry
   end subroutine merge_bins
+
+  !> Words of three counts become those of lower bins; the lowest are dropped.
+  pure subroutine move_down(down, word)
+    integer, intent(in) :: down   !! bins, 1 to 3
+    integer(i8), intent(inout) :: word(3)
+
+    word(1 + down:) = word(:3 - down)
+    word(:down) = 0_i8
+  end subroutine move_down
 
   !> Value of a sum; NaN when a term was not a number or above 1e292.
   pure function bins_value(bins) result(value)
     integer(i8), intent(in) :: bins(bin_size)
     real(wp) :: value
+    integer, parameter :: between = bin_digits - low_digits   ! digits of the upper word in a bin
     integer(i8), parameter :: radix = 2_i8**bin_digits
-    integer(i8) :: held(3), carry
+    integer(i8) :: low(3), high(3), carry
     real(wp) :: unit
     integer :: b
 
@@ -153,15 +171,18 @@ contains
       value = ieee_value(value, ieee_quiet_nan)
       return
     end if
-    held = bins(2:)
+    low = bins(2:4)
+    high = bins(5:7)
     do b = 3, 2, -1   ! leave at most half a unit of the next bin, so that nothing cancels below
-      carry = shifta(held(b) + radix/2, bin_digits)
-      held(b) = held(b) - carry*radix
-      held(b - 1) = held(b - 1) + carry
+      low(b) = low(b) + shiftl(iand(high(b), 2_i8**between - 1_i8), low_digits)
+      carry = shifta(low(b) + radix/2, bin_digits)
+      low(b) = low(b) - carry*radix
+      low(b - 1) = low(b - 1) + carry + shifta(high(b), between)
     end do
     unit = scale(1.0_wp, bin_digits*(int(bins(1)) - 2))
-    value = real(held(2), wp)*scale(unit, bin_digits) + real(held(3), wp)*unit
-    value = real(held(1), wp)*scale(unit, 2*bin_digits) + value
+    value = real(low(2), wp)*scale(unit, bin_digits) + real(low(3), wp)*unit
+    value = (scale(real(high(1), wp), low_digits) + real(low(1), wp))*scale(unit, 2*bin_digits) &
+            + value
   end function bins_value
 
 end module exact_bins_m

@@ -18,6 +18,7 @@ program test_exact_sum
   call test_orders()
   call test_blocks()
   call test_exact_cases()
+  call test_many_terms()
   call test_columns()
   call test_dots()
   call test_not_a_number()
@@ -108,6 +109,31 @@ contains
         2.0_wp**(i + 1), 0.0_wp)
     end do
   end subroutine test_exact_cases
+
+  !> As many terms as the largest grid has cells, 2**31, and more: the sums of two halves are merged
+  !! until there are so many. Counts of all bins grow as fast as they can, up and down.
+  subroutine test_many_terms()
+    integer, parameter :: first = 4096, doublings(2) = [19, 28]
+    real(wp), parameter :: terms(4) = [1.0_wp, 0.7_wp, -1.0_wp/3.0_wp, &
+      (1.0_wp - epsilon(1.0_wp))*2.0_wp**35]
+    integer(i8) :: bins(bin_size, 1), half(bin_size)
+    real(wp) :: s(1), expected
+    integer :: t, d, m
+
+    do t = 1, size(terms)
+      do m = 1, size(doublings)
+        bins(:, 1) = no_terms
+        call exact_add(spread(terms(t), 1, first), bins(:, 1))
+        do d = 1, doublings(m)
+          half = bins(:, 1)
+          call merge_bins(half, bins(:, 1))
+        end do
+        call exact_totals(bins, s)
+        expected = scale(first*terms(t), doublings(m))
+        call check('a sum of very many terms', s(1), expected, abs(expected)*epsilon(1.0_wp))
+      end do
+    end do
+  end subroutine test_many_terms
 
   subroutine test_columns()
     real(wp) :: c(500, 3), s(3), by_blocks(3)
