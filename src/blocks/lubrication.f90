@@ -9,7 +9,7 @@ module lubrication_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_partner
-  use neighbours_m, only: nearest_shift
+  use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   implicit none
   private
   public :: lubrication_t, lubrication_init, lubricate, film_resistance, film_impulse, film_pull
@@ -23,6 +23,7 @@ module lubrication_m
     real(wp) :: viscosity = 0.0_wp       !! of the liquid [Pa s]
     real(wp) :: h(3) = 0.0_wp            !! edges of a cell [m]
     real(wp), allocatable :: radius(:)   !! (n) of a sphere; 0: no sphere, no film [m]
+    type(pair_list_t), private :: near   !! spheres with a film between them
   end type lubrication_t
 
 contains
@@ -49,44 +50,80 @@ contains
   !> Add the forces of the films of all spheres in the middle of a substep.
   !!
   !! Normal approach only: the resistance to sliding grows with the logarithm of the gap and is left
-  !! out. A slip wall is a mirror: behind it comes a second sphere, as fast, at twice the gap.
+  !! out.
   subroutine lubricate(walls, blocks, dt, lubrication, force)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
-    type(lubrication_t), intent(in) :: lubrication
+    type(lubrication_t), intent(inout) :: lubrication
     real(wp), intent(inout) :: force(:, bed_partner:) !! (3, partners) of all partners [N]
-    real(wp) :: d(3), n(3), f(3), gap, distance, radius, sides
-    integer :: a, b, w
+    real(wp), parameter :: round_off = 1.0e-9_wp
+    logical :: active(blocks%n)
+    integer :: a, p
 
-    do a = 1, blocks%n
-      if (lubrication%radius(a) <= 0.0_wp .or. .not. blocks%present(a)) cycle
-      do w = 1, walls%n
-        n = walls%normal(:, w)
-        gap = walls%offset(w) - dot_product(n, blocks%x(:, a)) - lubrication%radius(a)
-        sides = merge(2.0_wp, 1.0_wp, walls%slip(w))
-        f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap, &
-                 -sides*dot_product(n, blocks%v(:, a)), sides*inverse_mass(blocks, a), dt)*n
-        force(:, a) = force(:, a) - f
-        force(:, walls%number(w)) = force(:, walls%number(w)) + f
+    active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
+    associate (near => lubrication%near)
+      call near_pairs(blocks%x(:, :blocks%n), lubrication%radius, active, walls%period, &
+                      (1.0_wp + round_off)*reach*maxval(lubrication%h), near)
+      p = 1
+      do a = 1, blocks%n
+        if (.not. active(a)) cycle
+        do while (p <= near%n)
+          if (near%a(p) /= a) exit
+          call film_of_pair(walls%period, blocks, near%b(p), a, dt, lubrication, force)
+          p = p + 1
+        end do
+        call films_at_walls(walls, blocks, a, dt, lubrication, force)
       end do
-      do b = a + 1, blocks%n
-        if (lubrication%radius(b) <= 0.0_wp .or. .not. blocks%present(b)) cycle
-        d = blocks%x(:, b) - blocks%x(:, a)
-        d = d + nearest_shift(walls%period, d)
-        distance = norm(d)
-        if (distance <= 0.0_wp) cycle
-        gap = distance - lubrication%radius(a) - lubrication%radius(b)
-        n = d/distance
-        radius = lubrication%radius(a)*lubrication%radius(b) &
-          /(lubrication%radius(a) + lubrication%radius(b))
-        f = push(lubrication, radius, n, gap, dot_product(n, blocks%v(:, b) - blocks%v(:, a)), &
-                 inverse_mass(blocks, a) + inverse_mass(blocks, b), dt)*n
-        force(:, a) = force(:, a) - f
-        force(:, b) = force(:, b) + f
-      end do
-    end do
+    end associate
   end subroutine lubricate
+
+  !> Films between sphere a and the walls. A slip wall is a mirror: behind it comes a second sphere,
+  !! as fast, at twice the gap.
+  pure subroutine films_at_walls(walls, blocks, a, dt, lubrication, force)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a
+    real(wp), intent(in) :: dt                        !! [s]
+    type(lubrication_t), intent(in) :: lubrication
+    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp) :: n(3), f(3), gap, sides
+    integer :: w
+
+    do w = 1, walls%n
+      n = walls%normal(:, w)
+      gap = walls%offset(w) - dot_product(n, blocks%x(:, a)) - lubrication%radius(a)
+      sides = merge(2.0_wp, 1.0_wp, walls%slip(w))
+      f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap, &
+               -sides*dot_product(n, blocks%v(:, a)), sides*inverse_mass(blocks, a), dt)*n
+      force(:, a) = force(:, a) - f
+      force(:, walls%number(w)) = force(:, walls%number(w)) + f
+    end do
+  end subroutine films_at_walls
+
+  !> The film between spheres a and b.
+  pure subroutine film_of_pair(period, blocks, a, b, dt, lubrication, force)
+    real(wp), intent(in) :: period(3)                 !! 0 where not periodic [m]
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: a, b
+    real(wp), intent(in) :: dt                        !! [s]
+    type(lubrication_t), intent(in) :: lubrication
+    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp) :: d(3), n(3), f(3), gap, distance, radius
+
+    d = blocks%x(:, b) - blocks%x(:, a)
+    d = d + nearest_shift(period, d)
+    distance = norm(d)
+    if (distance <= 0.0_wp) return
+    gap = distance - lubrication%radius(a) - lubrication%radius(b)
+    n = d/distance
+    radius = lubrication%radius(a)*lubrication%radius(b) &
+      /(lubrication%radius(a) + lubrication%radius(b))
+    f = push(lubrication, radius, n, gap, dot_product(n, blocks%v(:, b) - blocks%v(:, a)), &
+             inverse_mass(blocks, a) + inverse_mass(blocks, b), dt)*n
+    force(:, a) = force(:, a) - f
+    force(:, b) = force(:, b) + f
+  end subroutine film_of_pair
 
   !> Force that drives the two sides of a film apart; negative where it holds them together [N].
   !!

@@ -7,7 +7,9 @@ program test_lubrication
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use lubrication_m, only: lubrication_t, lubrication_init, film_resistance, film_impulse, film_pull
+  use bed_m, only: bed_partner
+  use lubrication_m, only: lubrication_t, lubrication_init, lubricate, film_resistance, &
+    film_impulse, film_pull
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -23,6 +25,7 @@ program test_lubrication
   call check_fall('no_slip', 1)
   call check_fall('slip', 2)
   call check_pair()
+  call check_swarm()
   call check_cavitation()
   call finish_checks()
 
@@ -145,6 +148,48 @@ contains
     call check('contact force tells it', blocks%contact_force(:, 2)*dt/blocks%mass(2), &
                blocks%v(:, 2) - 0.1_wp*n, 1.0e-12_wp)
   end subroutine check_pair
+
+  !> In a swarm each sphere feels the films of all its neighbours, those across a period too, and of
+  !! nobody else: the forces are those of all pairs, each alone in the tank.
+  subroutine check_swarm()
+    integer, parameter :: n = 40
+    real(wp), parameter :: room = 4*d   ! of the swarm, astride the periodic side [m]
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contacts_t) :: contacts
+    real(wp) :: x(3, n), v(3, n), force(3, bed_partner:n), pair(3, bed_partner:2), expected(3, n)
+    integer :: i, j, felt
+
+    call random_number(x)
+    call random_number(v)
+    x = 0.5_wp + room*(x - 0.5_wp)
+    x(1, :) = modulo(x(1, :) - 0.5_wp, 1.0_wp)
+    v = v - 0.5_wp
+    expected = 0.0_wp
+    felt = 0
+    do i = 1, n
+      do j = i + 1, n
+        call start('no_slip', x(:, [i, j]), v(:, [i, j]), blocks, walls, contacts)
+        walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
+        walls%n = 0
+        pair = 0.0_wp
+        call lubricate(walls, blocks, dt, contacts%lubrication, pair)
+        expected(:, i) = expected(:, i) + pair(:, 1)
+        expected(:, j) = expected(:, j) + pair(:, 2)
+        if (norm2(pair(:, 1)) > 0.0_wp) felt = felt + 1
+      end do
+    end do
+    call start('no_slip', x, v, blocks, walls, contacts)
+    walls%period = [1.0_wp, 0.0_wp, 0.0_wp]
+    walls%n = 0
+    force = 0.0_wp
+    call lubricate(walls, blocks, dt, contacts%lubrication, force)
+    call check('some pairs have a film, most have none', felt > n/2 .and. felt < n*(n - 1)/4)
+    do i = 1, n
+      call check('force on a sphere of the swarm', force(:, i), expected(:, i), &
+                 1.0e-12_wp*maxval(abs(expected)))
+    end do
+  end subroutine check_swarm
 
   !> A film that opens pulls with its own resistance, or with the atmosphere where it is too thin:
   !! the suction, capped, summed over the film.
