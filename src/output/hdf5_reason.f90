@@ -39,9 +39,9 @@ module hdf5_reason_m
 
 contains
 
-  !> Start HDF5: without file locks, so that a run can be read while it goes on; without its own
-  !! messages; without a routine at exit, because we close our files ourselves. Further calls do
-  !! nothing: HDF5 would keep some 30 kB for each.
+  !> Start HDF5: without file locks, so that a run can be read while it goes on, unless the user has
+  !! set `HDF5_USE_FILE_LOCKING`; without its own messages; without a routine at exit, because we
+  !! close our files ourselves. Further calls do nothing: HDF5 would keep some 30 kB for each.
   subroutine hdf5_start(status)
     integer, intent(out) :: status   !! < 0: failed
     integer :: ignored
@@ -49,7 +49,7 @@ contains
     status = 0
     if (started) return
     status = -1
-    if (c_setenv('HDF5_USE_FILE_LOCKING'//c_null_char, 'FALSE'//c_null_char, 1_c_int) /= 0) return
+    if (c_setenv('HDF5_USE_FILE_LOCKING'//c_null_char, 'FALSE'//c_null_char, 0_c_int) /= 0) return
     call h5dont_atexit_f(ignored)   ! fails when HDF5 is already there
     call h5open_f(status)
     if (status >= 0) call h5eset_auto_f(0, status)
