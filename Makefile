@@ -118,9 +118,13 @@ $(B)/settings: FORCE
 $(C)/settings: $(B)/settings FORCE
 	$(call keep,$(shell $(compiler) --version | head -n 1) $(flags))
 
+# A shell that a signal ends tells its number, which is not the same everywhere: Linux 10, macOS 30.
+sigusr1 = $(shell sh -c 'kill -s USR1 $$$$' 2> /dev/null; expr $$? % 128)
+
 $(C)/build_info.f90: FORCE
 	@mkdir -p $(C)
-	@awk -v version='$(VERSION)' -v flags='$(flags)' \
+	$(if $(filter-out 0,$(sigusr1)),,$(error SIGUSR1 ends no shell here, so its number is unknown))
+	@awk -v version='$(VERSION)' -v flags='$(flags)' -v sigusr1=$(sigusr1) \
 	  -v revision="$$(git describe --always --dirty --abbrev=12 2>/dev/null || echo unknown)" \
 	  -f tools/build_info.awk < /dev/null > $@.new
 	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi

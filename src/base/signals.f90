@@ -7,18 +7,22 @@
 module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
   use kinds_m, only: wp
+  use build_info_m, only: signal_user
   use parallel_m, only: global_max
   implicit none
   private
   public :: catch_signals, signal_caught
   public :: signal_interrupt, signal_terminate
 
-  ! The numbers that Linux gives them.
+  ! The numbers that Linux, macOS and the BSDs give them; they differ in SIGUSR1 alone.
+  integer, parameter :: signal_hang_up = 1      !! SIGHUP
   integer, parameter :: signal_interrupt = 2    !! SIGINT
+  integer, parameter :: signal_pipe = 13        !! SIGPIPE
   integer, parameter :: signal_terminate = 15   !! SIGTERM
+  integer, parameter :: signal_cpu_time = 24    !! SIGXCPU
   integer, parameter :: signal_file_size = 25   !! SIGXFSZ
-  !> SIGHUP, SIGINT, SIGUSR1, SIGPIPE, SIGTERM and SIGXCPU end a run.
-  integer, parameter :: ends_a_run(6) = [1, signal_interrupt, 10, 13, signal_terminate, 24]
+  integer, parameter :: ends_a_run(6) = [signal_hang_up, signal_interrupt, signal_user, &
+    signal_pipe, signal_terminate, signal_cpu_time]
 
   integer(c_int), volatile :: caught = 0
 
