@@ -75,7 +75,7 @@ contains
     associate (case => sim%case, grid => sim%grid, flow => sim%flow, blocks => sim%blocks, &
                coupling => sim%coupling, dt => sim%clock%dt, scratch => sim%scratch)
       ! 3 half kick
-      if (sim%wet) call begin(sim, dt_before)
+      if (sim%wet) call begin(sim, dt_before, report%inertia_clips)
       ! 4 bodies
       call tic(sim%timer_blocks)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
@@ -158,6 +158,7 @@ contains
     report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%parts
     report%transport_converged = sim%transport%liquid%small%converged
+    report%inertia_clips = report%inertia_clips + count(sim%coupling%bodies%clipped)
     report%sealed_cells = sim%solid%n_sealed
     report%curvature_fallback = sim%coupling%tension%surface%fallback
   end subroutine describe
@@ -209,13 +210,14 @@ contains
   end subroutine first_force
 
   !> What acts before the transport, and what the later stages need of the start of the step.
-  subroutine begin(sim, dt_before)
+  subroutine begin(sim, dt_before, n_clipped)
     type(simulation_t), intent(inout) :: sim
     real(wp), intent(in) :: dt_before   !! [s]
+    integer, intent(out) :: n_clipped   !! bodies whose added mass in impacts a limit cuts
 
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call know_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
-                         sim%blocks)
+                         sim%blocks, n_clipped)
     call sim%coupling%begin(sim%case, sim%grid, sim%solid, sim%clock%dt, dt_before, sim%flow, &
                             sim%blocks, sim%scratch)
   end subroutine begin

@@ -1,6 +1,7 @@
 """The result files of real runs: names and units of the contract, values that fit together, what is
 left after faults, and that ParaView's reader sees them."""
 
+import fcntl
 import os
 import resource
 import shutil
@@ -61,6 +62,7 @@ SERIES = {
     "sleeping": "1",
     "curvature_fallback": "1",
     "transport_parts": "1",
+    "inertia_clips": "1",
     "wall_time": "s",
 }
 UNITS_OF_FIELDS = {"liquid": "1", "solid": "1", "pressure": "Pa", "velocity": "m/s"}
@@ -71,6 +73,7 @@ OF_THE_FLUID = {
     "solver_iterations",
     "curvature_fallback",
     "transport_parts",
+    "inertia_clips",
     "liquid_volume",
     "liquid_volume_drift",
     "volume_excess_max",
@@ -422,6 +425,51 @@ def test_signal(wet: Path, tmp_path: Path, number: int) -> None:
     again = subprocess.run(command, shell=True, capture_output=True, timeout=300, text=True)
     assert again.returncode == 0, again.stderr
     assert but_restarts(differences(wet, output)) == []
+
+
+LIGHT = """&run t_end = 0.03  dt = 0.01  field_interval = 0 /
+&grid cells = 10, 10, 10  length = 0.1, 0.1, 0.1 /
+&fluid water_level = 0.06 /
+&shape name = 'cork'  kind = 'cube'  size = 0.03  density = 200 /
+&body shape = 'cork'  position = 0.05, 0.05, 0.03 /
+"""
+
+
+def test_inertia_that_is_cut_is_counted(wet: Path, tmp_path: Path) -> None:
+    """One warning, with the time, the number and the name of the series; none for concrete."""
+    (tmp_path / "cork.nml").write_text(LIGHT)
+    code, said = run(tmp_path / "cork", case=tmp_path / "cork.nml")
+    assert code == 0, said
+    assert said.count("was cut at its limit") == said.count("warning") == 1
+    assert "with 1 light block(s)" in said
+    assert "/series/inertia_clips of run.h5" in said
+    with opened(tmp_path / "cork" / "run.h5") as h5:
+        clips = h5["series/inertia_clips"][:]
+    assert clips[0] == 0
+    assert (clips[1:] > 0).all()
+    with opened(wet / "run.h5") as h5:
+        assert not h5["series/inertia_clips"][:].any()
+
+
+@pytest.mark.parametrize(("chosen", "locked"), [(None, False), ("FALSE", False), ("TRUE", True)])
+def test_locks_of_files_as_the_user_wants(tmp_path: Path, chosen: str | None, locked: bool) -> None:
+    """Without a choice of the user HDF5 locks no file that a run writes."""
+    settings = {k: v for k, v in os.environ.items() if k != "HDF5_USE_FILE_LOCKING"}
+    if chosen:
+        settings["HDF5_USE_FILE_LOCKING"] = chosen
+    process = start(tmp_path / "run", case=LONG, env=settings)
+    while not has_rows(tmp_path / "run", 2) and process.poll() is None:
+        time.sleep(0.01)
+    with (tmp_path / "run" / "run.h5").open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            held = False
+        except BlockingIOError:
+            held = True
+    assert process.poll() is None
+    process.terminate()
+    process.communicate(timeout=60)
+    assert held == locked
 
 
 def test_stop_file(wet: Path, tmp_path: Path) -> None:

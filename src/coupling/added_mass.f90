@@ -18,7 +18,7 @@ contains
   !!
   !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
   !! no part. Too large a mass would swing from step to step, hence the limit.
-  subroutine know_added_mass(grid, fluid, solid, bodies, c, blocks)
+  subroutine know_added_mass(grid, fluid, solid, bodies, c, blocks, n_clipped)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
@@ -26,6 +26,7 @@ contains
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
       !! liquid share of the fluid [-]
     type(blocks_t), intent(inout) :: blocks
+    integer, intent(out) :: n_clipped   !! bodies whose added mass the limit cuts
     real(wp), parameter :: coefficient = 0.803_wp   !! Lamb, Hydrodynamics, art. 98 [-]
     real(wp), parameter :: largest = 0.35_wp        !! over the mass of the body [-]
     real(wp), parameter :: at_rest = 3.0_wp         !! contact force over weight [-]
@@ -42,8 +43,10 @@ contains
       moved(b) = blocks%present(b) .and. .not. (blocks%fixed(b) .or. rests)
     end do
     displaced = displaced_fluid(grid, fluid, solid, bodies, c, moved)
+    n_clipped = 0
     do b = 1, blocks%n
       blocks%added_mass(b) = min(coefficient*displaced(b)%mass, largest*blocks%mass(b))
+      if (coefficient*displaced(b)%mass > largest*blocks%mass(b)) n_clipped = n_clipped + 1
     end do
   end subroutine know_added_mass
 

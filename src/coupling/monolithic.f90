@@ -485,6 +485,7 @@ contains
     real(wp) :: lack(6, 6)
     integer :: b
 
+    self%bodies%clipped = .false.
     do b = 1, size(self%lack, 3)
       self%from_level(:, b) = -matmul(self%lack(:, :, b), gravity)
       if (.not. self%bodies%free(b)) cycle

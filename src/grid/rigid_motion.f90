@@ -14,6 +14,7 @@ module rigid_motion_m
     integer :: n = 0   !! bodies, and the bed if there is one: at rest, not free, not `present`
     logical, allocatable :: present(:)         !! (n) in the fluid
     logical, allocatable :: free(:)            !! (n) moved by the fluid
+    logical, allocatable :: clipped(:)         !! (n) `lack` was cut at its limit
     real(wp), allocatable :: x(:, :)           !! (3, n) centre of mass [m]
     real(wp), allocatable :: motion(:, :)      !! (6, n) velocity and angular velocity [m/s, rad/s]
     real(wp), allocatable :: mass(:)           !! (n) [kg]
@@ -36,7 +37,7 @@ contains
     type(rigid_motion_t), intent(out) :: bodies
 
     bodies%n = n
-    allocate (bodies%present(n), bodies%free(n), source=.false.)
+    allocate (bodies%present(n), bodies%free(n), bodies%clipped(n), source=.false.)
     allocate (bodies%x(3, n), bodies%motion(6, n), bodies%mass(n), bodies%volume(n), &
               bodies%radius(n))
     allocate (bodies%inertia(3, 3, n), bodies%inverse_inertia(3, 3, n))
@@ -52,7 +53,7 @@ contains
   end subroutine rigid_motion_init
 
   !> Inertia of body b and its inverse, with a part taken off if it is given; no more of it than
-  !! leaves the rest positive.
+  !! leaves the rest positive, and `clipped` tells whether that cut it.
   pure subroutine set_inertia(b, bodies, lack)
     integer, intent(in) :: b
     type(rigid_motion_t), intent(inout) :: bodies
@@ -71,14 +72,17 @@ contains
     bodies%mobility(4:6, 4:6, b) = bodies%inverse_inertia(:, :, b)
     if (.not. present(lack)) return
     part = lack
+    bodies%clipped(b) = .false.
     do d = 1, 3
       share = sqrt(largest_lack/max(largest_lack, part(d, d)/bodies%mass(b)))
+      bodies%clipped(b) = bodies%clipped(b) .or. share < 1.0_wp
       part(d, :) = share*part(d, :)
       part(:, d) = share*part(:, d)
     end do
     coupling = sqrt(sum(part(4:6, 1:3)*matmul(bodies%inverse_inertia(:, :, b), part(4:6, 1:3))) &
                     /bodies%mass(b))
     share = largest_lack/max(largest_lack, coupling)
+    bodies%clipped(b) = bodies%clipped(b) .or. share < 1.0_wp
     part(4:6, 1:3) = share*part(4:6, 1:3)
     part(1:3, 4:6) = share*part(1:3, 4:6)
     bodies%lack(:, :, b) = part

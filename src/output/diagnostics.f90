@@ -37,6 +37,7 @@ module diagnostics_m
     integer :: substeps = 0
     integer :: sealed_cells = 0               !! cells without any open face that held fluid
     integer :: curvature_fallback = 0         !! cells whose curvature does not come from heights
+    integer :: inertia_clips = 0              !! limits of added inertia that cut it
     integer :: warnings = 0                   !! printed in this step
     logical :: pressure_converged = .true., viscous_converged = .true., contacts_solved = .true.
     logical :: transport_converged = .true.
@@ -66,20 +67,21 @@ module diagnostics_m
     real(wp) :: sleeping = 0.0_wp             !! blocks asleep
     real(wp) :: curvature_fallback = 0.0_wp   !! cells whose curvature does not come from heights
     real(wp) :: transport_parts = 0.0_wp      !! in which the volumes of the step moved
+    real(wp) :: inertia_clips = 0.0_wp        !! limits of added inertia that cut it
     real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
   end type row_t
 
-  integer, parameter :: n_columns = 22
+  integer, parameter :: n_columns = 23
   character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
     'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
     'liquid_volume_drift', 'volume_excess_max', &
     'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_fluid', &
     'potential_energy_bodies', 'contact_energy', 'energy_excess', 'max_overlap', &
     'contact_courant_max', 'substeps', 'sleeping', &
-    'curvature_fallback', 'transport_parts', 'wall_time']
+    'curvature_fallback', 'transport_parts', 'inertia_clips', 'wall_time']
   character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
     '1/s', '1', '1', 'm3', '1', '1', 'J', 'J', 'J', 'J', 'J', '1', 'm', '1', '1', '1', &
-    '1', '1', 's']
+    '1', '1', '1', 's']
 
 contains
 
@@ -123,6 +125,7 @@ contains
       row%energy_excess = row%cfl
       row%curvature_fallback = row%cfl
       row%transport_parts = row%cfl
+      row%inertia_clips = row%cfl
       return
     end if
     row%cfl = report%cfl
@@ -131,6 +134,7 @@ contains
     row%solver_iterations = real(report%solver_iterations, wp)
     row%curvature_fallback = real(report%curvature_fallback, wp)
     row%transport_parts = real(report%transport_parts, wp)
+    row%inertia_clips = real(report%inertia_clips, wp)
     row%liquid_volume = report%fluid%liquid_volume
     row%volume_excess_max = report%fluid%excess_max
     row%kinetic_energy_fluid = report%fluid%kinetic
@@ -291,7 +295,8 @@ contains
          row%kinetic_energy_bodies, row%potential_energy_fluid, &
          row%potential_energy_bodies, row%contact_energy, row%energy_excess, row%max_overlap, &
          row%contact_courant_max, &
-         row%substeps, row%sleeping, row%curvature_fallback, row%transport_parts, row%wall_time]
+         row%substeps, row%sleeping, row%curvature_fallback, row%transport_parts, &
+         row%inertia_clips, row%wall_time]
   end function row_values
 
 end module diagnostics_m

@@ -1,6 +1,6 @@
 !> The table that a person follows on standard output while a run goes on, and its closing words.
 module progress_m
-  use, intrinsic :: iso_fortran_env, only: output_unit
+  use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use value_text_m, only: fixed_text
@@ -13,7 +13,7 @@ module progress_m
   use diagnostics_m, only: row_t
   implicit none
   private
-  public :: progress_t, progress_start, line_due, write_line, write_summary
+  public :: progress_t, progress_start, line_due, note_clips, write_line, write_summary
 
   integer, parameter :: lines_per_header = 25
   real(wp), parameter :: line_interval = 1.0_wp   !! of wall time [s]
@@ -24,6 +24,7 @@ module progress_m
     integer :: lines = 0
     integer :: last_step = -1             !! of the last line
     integer :: warnings = 0
+    integer(i8) :: clips = 0              !! limits of added inertia that cut it, in all steps
     integer :: first_step = 0             !! where this part of the run began
     real(wp) :: first_time = 0.0_wp       !! likewise [s]
     real(wp) :: began = 0.0_wp            !! wall clock at the start [s]
@@ -54,6 +55,24 @@ contains
     yes = wall_clock() - self%last_line >= line_interval
     yes = yes .and. self%shown
   end function line_due
+
+  !> Count what the limits of added inertia cut in a step, and warn of the first that do.
+  subroutine note_clips(time, clips, self)
+    real(wp), intent(in) :: time    !! [s]
+    integer, intent(in) :: clips    !! of the step
+    type(progress_t), intent(inout) :: self
+
+    if (clips > 0 .and. self%clips == 0) then
+      self%warnings = self%warnings + 1
+      if (is_root()) then
+        write (error_unit, '(a)') 'mics: warning: the inertia of the fluid that moves with ' &
+          //to_text(clips)//' light block(s) was cut at its limit, t = '//to_text(time) &
+          //' s; /series/inertia_clips of run.h5 counts it in each step'
+        flush (error_unit)
+      end if
+    end if
+    self%clips = self%clips + clips
+  end subroutine note_clips
 
   !> Write one line, if this step has none yet; the header first where it is time for it.
   subroutine write_line(self, clock, row, blocks)
@@ -167,6 +186,8 @@ contains
     call threads_used(mean, most)
     if (mean < 0.95_wp*most) line = line//', '//fixed_text(mean, 1)//' of '//to_text(most) &
       //' threads (other programs ran too)'
+    if (self%clips > 0) line = line//', inertia of fluid cut ' &
+      //to_text(int(min(self%clips, int(huge(1), i8))))//' times'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
     if (nproc() > 1 .and. traffic%known .and. steps > 0) call say(traffic_text(traffic), self)

@@ -144,6 +144,7 @@ class Series:
     sleeping: Array
     curvature_fallback: Array
     transport_parts: Array
+    inertia_clips: Array
     wall_time: Array
 
 

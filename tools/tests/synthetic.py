@@ -174,6 +174,7 @@ def _write_series(group: h5py.Group, time: Array, drops: int) -> None:
         "sleeping": np.zeros(len(time)),
         "curvature_fallback": np.zeros(len(time)),
         "transport_parts": np.ones(len(time)),
+        "inertia_clips": np.zeros(len(time)),
         "wall_time": 0.1 * np.arange(len(time)),
     }.items():
         group[name] = values

@@ -23,7 +23,7 @@ program test_added_mass
   call push('an impact', 3.1_wp, 0.803_wp*displaced)
   block%blocks%mass = 0.5_wp*block%blocks%mass
   weight = 0.5_wp*weight
-  call push('a light body', 3.1_wp, 0.35_wp*block%blocks%mass(1))
+  call push('a light body', 3.1_wp, 0.35_wp*block%blocks%mass(1), clips=1)
   block%flow%c = 0.0_wp
   call push('in air', 0.0_wp, 0.803_wp*block%case%fluid%gas_density*block%bodies%volume(1))
   block%blocks%present = .false.
@@ -33,16 +33,21 @@ program test_added_mass
 contains
 
   !> Added mass of a body under a contact force of some weights.
-  subroutine push(name, weights, expected, touched)
+  subroutine push(name, weights, expected, touched, clips)
     character(*), intent(in) :: name
     real(wp), intent(in) :: weights, expected   !! [-], [kg]
     integer, intent(in), optional :: touched    !! partners, default: one under a force
+    integer, intent(in), optional :: clips      !! bodies whose added mass is cut, default: none
+    integer :: n_clipped, n
 
     block%blocks%contacts = merge(1, 0, weights > 0.0_wp)
     if (present(touched)) block%blocks%contacts = touched
     block%blocks%contact_force(:, 1) = weights*weight*[0.6_wp, 0.0_wp, 0.8_wp]
     call know_added_mass(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
-                         block%blocks)
+                         block%blocks, n_clipped)
+    n = 0
+    if (present(clips)) n = clips
+    call check(name//': cut at the limit', n_clipped, n)
     call check(name, block%blocks%added_mass(1), expected, 1.0e-12_wp*displaced)
   end subroutine push
 

@@ -393,6 +393,10 @@ contains
       lack(4:6, d) = lack(d, 4:6)
     end do
     call set_inertia(1, block%bodies, lack)
+    call check('limited: counted', block%bodies%clipped(1))
+    call set_inertia(1, block%bodies, 0.01_wp*lack)
+    call check('a small part is not cut', .not. block%bodies%clipped(1))
+    call set_inertia(1, block%bodies, lack)
     associate (m => block%bodies%apparent(:, :, 1))
       z = matmul(m, [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp])
       call check('limited: symmetric', maxval(abs(m - transpose(m))), 0.0_wp, &
