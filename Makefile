@@ -149,6 +149,10 @@ deps = FC_SERIAL='$(FC_SERIAL)' FC_MPI='$(FC_MPI)' tools/deps.sh
 deps:
 	@$(deps)
 
+# How threads wait, and in which pages memory comes: measured in docs/performance.md.
+run bench: export GOMP_SPINCOUNT ?= 1000
+run bench: export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
+
 run: deps
 	@$(MAKE) --no-print-directory
 	./mics < $(CASE)

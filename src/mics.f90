@@ -8,11 +8,9 @@ program mics
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
-  use patience_m, only: choose_spin_and_pages, share_cores
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
-  use messages_m, only: count_from_here
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use checksum_m, only: checksum_t
   use case_file_m, only: read_text
@@ -46,7 +44,6 @@ program mics
   integer :: code, signal = 0
   real(wp) :: began   !! wall clock at the start [s]
 
-  call choose_spin_and_pages()
   call parallel_init()
   began = wall_clock()
   call read_options()
@@ -65,10 +62,8 @@ program mics
   end if
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
   call note_places(sim, fault)
-  call count_from_here()
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
-    call share_cores()
     call find_fault(sim, report, fault)
     signal = stop_asked(stop_requests)
     if (sim%clock%finished()) signal = 0   ! there is nothing left to stop

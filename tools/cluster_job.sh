@@ -13,6 +13,9 @@ if [ $# -ne 2 ]; then
   exit 2
 fi
 export OMP_NUM_THREADS="${SLURM_CPUS_PER_TASK:-1}"
+# Threads that wait spin for some 50 us, not 15 ms; memory comes in large pages (docs/performance.md).
+export GOMP_SPINCOUNT="${GOMP_SPINCOUNT-1000}"
+export GLIBC_TUNABLES="${GLIBC_TUNABLES-glibc.malloc.hugetlb=1}"
 case=$1
 folder=$2
 # Half an hour before the queue's limit the run writes a restart file and ends with code 143.

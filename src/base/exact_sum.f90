@@ -7,6 +7,7 @@ module exact_sum_m
   use kinds_m, only: wp, i8
   use exact_bins_m, only: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
   use parallel_m, only: global_sum_bins
+  use timers_m, only: timer, tic, toc
   implicit none
   private
   public :: exact_sum, exact_sums, exact_dot, exact_dots
@@ -113,9 +114,12 @@ contains
   subroutine exact_totals(bins, s)
     integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, sums); all processes after
     real(wp), intent(out) :: s(:)
-    integer :: m
+    integer :: m, phase
 
+    phase = timer('sums over processes')
+    call tic(phase)
     call global_sum_bins(bins)
+    call toc(phase)
     do m = 1, size(s)
       s(m) = bins_value(bins(:, m))
     end do

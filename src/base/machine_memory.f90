@@ -1,10 +1,9 @@
 !> How much memory there is: of the machine, of the group of processes, of this process.
 module machine_memory_m
-  use, intrinsic :: iso_fortran_env, only: int8
   use kinds_m, only: i8
   implicit none
   private
-  public :: available_memory, may_allocate
+  public :: available_memory, memory_limit
 
   character(*), parameter :: group_folder = '/sys/fs/cgroup'   !! where Linux keeps the limits
 
@@ -20,38 +19,73 @@ contains
     if (bytes > 0) bytes = min(bytes, group_limit())
   end function available_memory
 
-  !> Would the system give this process so much memory now? Limits of a process (`ulimit -v`) and
-  !! what no machine has are seen here; a system that lends more than it has may promise too much.
-  function may_allocate(bytes) result(yes)
-    integer(i8), intent(in) :: bytes
-    logical :: yes
-    integer(int8), allocatable :: room(:)
+  !> The most that this process can ever hold [B]: all memory of the machine, swap space included,
+  !! or the limit of its address space (`ulimit -v`) if that is lower; the largest number where the
+  !! system does not tell.
+  function memory_limit() result(bytes)
+    integer(i8) :: bytes
+    integer(i8) :: memory
+
+    bytes = address_limit()
+    memory = kilobytes_in('/proc/meminfo', 'MemTotal:')
+    if (memory > 0) bytes = min(bytes, 1024*(memory + kilobytes_in('/proc/meminfo', 'SwapTotal:')))
+  end function memory_limit
+
+  !> Limit of the address space of this process [B]; the largest number if there is none.
+  function address_limit() result(bytes)
+    integer(i8) :: bytes
+    character(*), parameter :: name = 'Max address space'
+    character(:), allocatable :: row
+    integer(i8) :: found
     integer :: status
 
-    allocate (room(bytes), stat=status)
-    yes = status == 0
-  end function may_allocate
+    bytes = huge(bytes)
+    row = row_of('/proc/self/limits', name)
+    if (len(row) == 0) return
+    read (row, *, iostat=status) found   ! `unlimited` is no number
+    if (status == 0) bytes = found
+  end function address_limit
 
   !> What the machine could give without pushing other programs out [B]; 0: unknown.
   function free_memory() result(bytes)
     integer(i8) :: bytes
+
+    bytes = 1024*kilobytes_in('/proc/meminfo', 'MemAvailable:')
+  end function free_memory
+
+  !> The number after a name at the beginning of a row of a file; 0 if there is none.
+  function kilobytes_in(file, name) result(kilobytes)
+    character(*), intent(in) :: file, name
     integer(i8) :: kilobytes
-    character(80) :: row
+    character(:), allocatable :: row
+    integer :: status
+
+    kilobytes = 0
+    row = row_of(file, name)
+    if (len(row) == 0) return
+    read (row, *, iostat=status) kilobytes
+    if (status /= 0) kilobytes = 0
+  end function kilobytes_in
+
+  !> What follows a name at the beginning of a row of a file; empty if there is none.
+  function row_of(file, name) result(text)
+    character(*), intent(in) :: file, name
+    character(:), allocatable :: text
+    character(120) :: row
     integer :: unit, status
 
-    bytes = 0
-    open (newunit=unit, file='/proc/meminfo', action='read', status='old', iostat=status)
+    text = ''
+    open (newunit=unit, file=file, action='read', status='old', iostat=status)
     if (status /= 0) return
     do
       read (unit, '(a)', iostat=status) row
       if (status /= 0) exit
-      if (index(row, 'MemAvailable:') /= 1) cycle
-      read (row(index(row, ':') + 1:), *, iostat=status) kilobytes
-      if (status == 0) bytes = 1024*kilobytes
+      if (index(row, name) /= 1) cycle
+      text = trim(row(len(name) + 1:))
       exit
     end do
     close (unit)
-  end function free_memory
+  end function row_of
 
   !> The lowest limit of the control groups around this process [B]; without any the largest number.
   !! Lines of /proc/self/cgroup are number:controllers:path, without controllers in version 2.

@@ -6,14 +6,13 @@ module parallel_m
   use, intrinsic :: iso_c_binding, only: c_int
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use kinds_m, only: wp, sp, i8
-  use messages_m, only: halo, note_asked, stop_counting, sent_so_far, traffic_t
   implicit none
   private
   public :: parallel_init, parallel_final, parallel_abort, parallel_pause
-  public :: is_root, nproc, my_rank, set_threads, get_threads
+  public :: is_root, nproc, my_rank, set_threads, get_threads, spins_for_long
   public :: decompose, halo_exchange, gather_all
   public :: global_max, global_min, global_sum, global_sum_bins, broadcast
-  public :: set_file_access, set_collective, share_trouble, total_traffic
+  public :: set_file_access, set_collective, share_trouble
 
   !> Fill the halos of a block with `width` halo cells on every side.
   !!
@@ -198,6 +197,16 @@ contains
     get_threads = omp_get_max_threads()
   end function get_threads
 
+  !> Do threads of this process wait as the OpenMP library likes, which is a spin of 15 ms with
+  !! libgomp? The environment alone can change that (docs/performance.md).
+  logical function spins_for_long()
+    integer :: policy, count
+
+    call get_environment_variable('OMP_WAIT_POLICY', status=policy)
+    call get_environment_variable('GOMP_SPINCOUNT', status=count)
+    spins_for_long = get_threads() > 1 .and. policy /= 0 .and. count /= 0
+  end function spins_for_long
+
   !> Is direction 1, 2, 3 asked for? All are when d is not given.
   pure function asked_for(d) result(chosen)
     integer, intent(in), optional :: d
@@ -216,62 +225,22 @@ contains
     if (present(layers)) asked_layers = min(layers, width)
   end function asked_layers
 
-  !> What passed between all processes in so many steps; counting ends. All processes call.
-  subroutine total_traffic(steps, traffic)
-    integer, intent(in) :: steps
-    type(traffic_t), intent(out) :: traffic
-    integer(i8) :: sent(5, 2), total(10)
-    real(wp) :: most(10)
-
-    call stop_counting()
-    sent = sent_so_far()
-    total = [sent]
-    most = real(total, wp)
-    call global_sum(total)
-    call global_max(most)
-    traffic%known = .true.
-    traffic%steps = steps
-    traffic%messages = real(total(:5), wp)
-    traffic%bytes = real(total(6:), wp)
-    traffic%messages_most = most(:5)
-    traffic%bytes_most = most(6:)
-  end subroutine total_traffic
-
-  !> The layers of a halo are wanted, direction by direction.
-  subroutine note_layers(cell, width, chosen)
-    integer, intent(in) :: cell   !! [bytes]
-    integer, intent(in) :: width
-    logical, intent(in) :: chosen(3)
-    integer :: d
-
-    do d = 1, 3
-      if (chosen(d)) call note_asked(halo, [cell, width, d])
-    end do
-  end subroutine note_layers
-
   subroutine halo_wp_3(a, width, d, layers)
     real(wp), intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d, layers
-    integer :: filled
 
-    filled = asked_layers(width, layers)
-    call note_layers(storage_size(a)/8, filled, asked_for(d))
-    call fill_wp(a, [shape(a), 1], width, filled, asked_for(d))
+    call fill_wp(a, [shape(a), 1], width, asked_layers(width, layers), asked_for(d))
   end subroutine halo_wp_3
 
   subroutine halo_wp_4(a, width, d, layers)
     real(wp), intent(inout), contiguous :: a(:, :, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d, layers
-    integer :: filled
 
-    filled = asked_layers(width, layers)
-    call note_layers(size(a, 4)*storage_size(a)/8, filled, asked_for(d))
-    call fill_wp(a, shape(a), width, filled, asked_for(d))
+    call fill_wp(a, shape(a), width, asked_layers(width, layers), asked_for(d))
   end subroutine halo_wp_4
 
-  !> For levels of the multigrid, whose cycles and set-ups tell what is asked.
   subroutine halo_sp_3(a, width, d)
     real(sp), intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
@@ -284,11 +253,8 @@ contains
     integer, intent(inout), contiguous :: a(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: d, layers
-    integer :: filled
 
-    filled = asked_layers(width, layers)
-    call note_layers(storage_size(a)/8, filled, asked_for(d))
-    call fill_integer(a, [shape(a), 1], width, filled, asked_for(d))
+    call fill_integer(a, [shape(a), 1], width, asked_layers(width, layers), asked_for(d))
   end subroutine halo_integer_3
 
 end module parallel_m

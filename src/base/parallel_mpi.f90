@@ -14,8 +14,6 @@ submodule (parallel_m) parallel_mpi_m
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use decomposition_m, only: best_pieces, last_cell, least_cells
   use exact_bins_m, only: bin_size, merge_bins
-  use messages_m, only: note_sent, gather, reduction, broadcasts
-  use patience_m, only: choose_messages
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
   implicit none
@@ -37,7 +35,6 @@ contains
   module procedure parallel_init
     integer :: provided
 
-    call choose_messages()
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
@@ -250,7 +247,6 @@ contains
     integer, intent(in) :: e, s, n
     integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
 
-    if (neighbour(s, e) /= MPI_PROC_NULL) call note_sent(halo, n)
     call c_f_pointer(going(s), bytes, [n])
     call MPI_Isend(bytes, n, MPI_BYTE, neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
   end subroutine send_layers
@@ -303,7 +299,6 @@ contains
 
     call gather_boxes(lo, hi, box, length, start)
     allocate (cells(size(whole)))
-    call note_sent(gather, size(local)*storage_size(local)/8)
     call MPI_Allgatherv(local, size(local), MPI_DOUBLE_PRECISION, cells, length, &
       start, MPI_DOUBLE_PRECISION, MPI_COMM_WORLD)
     do p = 1, n_processes
@@ -320,7 +315,6 @@ contains
 
     call gather_boxes(lo, hi, box, length, start)
     allocate (cells(size(whole)))
-    call note_sent(gather, size(local)*storage_size(local)/8)
     call MPI_Allgatherv(local, size(local), MPI_REAL, cells, length, start, MPI_REAL, &
       MPI_COMM_WORLD)
     do p = 1, n_processes
@@ -339,7 +333,6 @@ contains
 
     mine(:, 1) = lo
     mine(:, 2) = hi
-    call note_sent(gather, size(mine)*storage_size(mine)/8)
     call MPI_Allgather(mine, 6, MPI_INTEGER, box, 6, MPI_INTEGER, MPI_COMM_WORLD)
     do p = 1, n_processes
       length(p) = product(box(:, 2, p) - box(:, 1, p) + 1)
@@ -347,39 +340,19 @@ contains
     end do
   end subroutine gather_boxes
 
-  !> Every process takes part in a reduction with so many bytes.
-  subroutine note_reduction(length)
-    integer, intent(in) :: length
-
-    call note_asked(reduction, [length, 0, 0])
-    if (n_processes > 1) call note_sent(reduction, length)
-  end subroutine note_reduction
-
-  !> The root process alone gives so many bytes.
-  subroutine note_broadcast(length)
-    integer, intent(in) :: length
-
-    call note_asked(broadcasts, [length, 0, 0])
-    if (n_processes > 1 .and. rank == 0) call note_sent(broadcasts, length)
-  end subroutine note_broadcast
-
   module procedure global_max
-    call note_reduction(size(x)*storage_size(x)/8)
     call MPI_Allreduce(MPI_IN_PLACE, x, size(x), MPI_DOUBLE_PRECISION, MPI_MAX, MPI_COMM_WORLD)
   end procedure global_max
 
   module procedure global_min
-    call note_reduction(size(x)*storage_size(x)/8)
     call MPI_Allreduce(MPI_IN_PLACE, x, size(x), MPI_DOUBLE_PRECISION, MPI_MIN, MPI_COMM_WORLD)
   end procedure global_min
 
   module procedure global_sum
-    call note_reduction(size(n)*storage_size(n)/8)
     call MPI_Allreduce(MPI_IN_PLACE, n, size(n), MPI_INTEGER8, MPI_SUM, MPI_COMM_WORLD)
   end procedure global_sum
 
   module procedure global_sum_bins
-    call note_reduction(size(bins)*storage_size(bins)/8)
     call MPI_Allreduce(MPI_IN_PLACE, bins, size(bins, 2), bins_type, bins_sum, MPI_COMM_WORLD)
   end procedure global_sum_bins
 
@@ -412,22 +385,18 @@ contains
   end procedure broadcast_character
 
   module procedure broadcast_integer
-    call note_broadcast(storage_size(x)/8)
     call MPI_Bcast(x, 1, MPI_INTEGER, 0, MPI_COMM_WORLD)
   end procedure broadcast_integer
 
   module procedure broadcast_integers
-    call note_broadcast(size(x)*storage_size(x)/8)
     call MPI_Bcast(x, size(x), MPI_INTEGER, 0, MPI_COMM_WORLD)
   end procedure broadcast_integers
 
   module procedure broadcast_real
-    call note_broadcast(storage_size(x)/8)
     call MPI_Bcast(x, 1, MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
   end procedure broadcast_real
 
   module procedure broadcast_reals
-    call note_broadcast(size(x)*storage_size(x)/8)
     call MPI_Bcast(x, size(x), MPI_DOUBLE_PRECISION, 0, MPI_COMM_WORLD)
   end procedure broadcast_reals
 

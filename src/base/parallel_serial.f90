@@ -1,6 +1,5 @@
 !> The parallel layer of a run on one process: nothing to send, periodic halos wrap.
 submodule (parallel_m) parallel_serial_m
-  use messages_m, only: reduction, broadcasts
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   implicit none
 
@@ -83,22 +82,18 @@ contains
   end procedure gather_sp
 
   module procedure global_max
-    call note_asked(reduction, [size(x)*storage_size(x)/8, 0, 0])
     x = x   ! the only process holds the result
   end procedure global_max
 
   module procedure global_min
-    call note_asked(reduction, [size(x)*storage_size(x)/8, 0, 0])
     x = x   ! the only process holds the result
   end procedure global_min
 
   module procedure global_sum
-    call note_asked(reduction, [size(n)*storage_size(n)/8, 0, 0])
     n = n   ! the only process holds the result
   end procedure global_sum
 
   module procedure global_sum_bins
-    call note_asked(reduction, [size(bins)*storage_size(bins)/8, 0, 0])
     bins = bins   ! the only process holds the result
   end procedure global_sum_bins
 
@@ -107,22 +102,18 @@ contains
   end procedure broadcast_character
 
   module procedure broadcast_integer
-    call note_asked(broadcasts, [storage_size(x)/8, 0, 0])
     x = x
   end procedure broadcast_integer
 
   module procedure broadcast_integers
-    call note_asked(broadcasts, [size(x)*storage_size(x)/8, 0, 0])
     x = x
   end procedure broadcast_integers
 
   module procedure broadcast_real
-    call note_asked(broadcasts, [storage_size(x)/8, 0, 0])
     x = x
   end procedure broadcast_real
 
   module procedure broadcast_reals
-    call note_asked(broadcasts, [size(x)*storage_size(x)/8, 0, 0])
     x = x
   end procedure broadcast_reals
 

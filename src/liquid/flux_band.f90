@@ -13,7 +13,6 @@ module flux_band_m
   use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
   use linear_operator_m, only: linear_operator_t
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
-  use messages_m, only: begin_search, end_search
   implicit none
   private
   public :: flux_band_t, flux_band_init, make_room, make_room_for_all, find_parts, sum_by_part, &
@@ -191,10 +190,8 @@ contains
     integer :: l, c(3)
 
     call join_neighbours(self)
-    call begin_search()
     call join_processes(grid, self)
     call list_parts(grid, self)
-    call end_search()
     do l = 1, self%n
       c = self%cell(:, l)
       self%finder%part(l) = position(int(self%label(c(1), c(2), c(3)), i8), &

@@ -5,8 +5,7 @@
 module output_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, exit_ok, exit_files
-  use parallel_m, only: broadcast, is_root, total_traffic
-  use messages_m, only: traffic_t
+  use parallel_m, only: broadcast, is_root
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
   use case_types_m, only: case_t, fluid_t
@@ -332,12 +331,10 @@ contains
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
     type(row_t) :: row
-    type(traffic_t) :: traffic
     integer :: code
     logical :: row_wanted, frame_wanted
 
     if (output%code == exit_ok) then
-      call total_traffic(state%clock%step - output%progress%first_step, traffic)
       call make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
       row_wanted = output%row_step /= state%clock%step
@@ -353,13 +350,13 @@ contains
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
-    call close_run_file(output%run_file, code, traffic)
+    call close_run_file(output%run_file, code)
     call close_files(output)
     call output%lock%release()
     call look_for_trouble(output)
     if (output%code /= exit_ok) code = output%code
     call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
-                       traffic, output%folder)
+                       output%folder)
   end subroutine close_output
 
 end module output_m

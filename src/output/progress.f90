@@ -4,9 +4,7 @@ module progress_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
   use value_text_m, only: fixed_text
-  use parallel_m, only: is_root, nproc
-  use messages_m, only: traffic_t, sent_kinds
-  use patience_m, only: threads_used
+  use parallel_m, only: is_root, spins_for_long
   use timers_m, only: wall_clock
   use rigid_body_m, only: blocks_t
   use clock_m, only: clock_t
@@ -45,6 +43,8 @@ contains
     self%first_step = clock%step
     self%first_time = clock%t
     self%began = wall_clock()
+    if (spins_for_long()) call say('threads spin while they wait: where other programs want the ' &
+      //'cores, export GOMP_SPINCOUNT=1000 first, or take --threads 1', self)
   end subroutine progress_start
 
   !> Has enough time passed for another line?
@@ -162,16 +162,15 @@ contains
   end function time_left
 
   !> Say how the run went.
-  subroutine write_summary(self, clock, cells, exit_code, traffic, folder)
+  subroutine write_summary(self, clock, cells, exit_code, folder)
     type(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
     integer(i8), intent(in) :: cells   !! of the whole domain
     integer, intent(in) :: exit_code
-    type(traffic_t), intent(in) :: traffic
     character(*), intent(in) :: folder
     character(:), allocatable :: how, line
-    real(wp) :: seconds, mean
-    integer :: steps, most
+    real(wp) :: seconds
+    integer :: steps
 
     if (.not. self%shown) return
     seconds = wall_clock() - self%began
@@ -183,34 +182,11 @@ contains
       //fixed_text(seconds, 1)//' s'
     if (self%fluid .and. steps > 0) line = line//', ' &
       //fixed_text(1.0e6_wp*seconds/(real(steps, wp)*real(cells, wp)), 3)//' us per cell and step'
-    call threads_used(mean, most)
-    if (mean < 0.95_wp*most) line = line//', '//fixed_text(mean, 1)//' of '//to_text(most) &
-      //' threads (other programs ran too)'
     if (self%clips > 0) line = line//', inertia of fluid cut ' &
       //to_text(int(min(self%clips, int(huge(1), i8))))//' times'
     if (self%warnings > 0) line = line//', '//to_text(self%warnings)//' warnings'
     call say(line, self)
-    if (nproc() > 1 .and. traffic%known .and. steps > 0) call say(traffic_text(traffic), self)
     call say('results in '//folder, self)
   end subroutine write_summary
-
-  !> Messages of a step, those of the process that sends most.
-  pure function traffic_text(traffic) result(line)
-    type(traffic_t), intent(in) :: traffic
-    character(:), allocatable :: line
-    real(wp) :: messages, kilobytes
-    integer :: k
-
-    line = ''
-    do k = 1, size(sent_kinds)
-      if (.not. traffic%messages_most(k) > 0.0_wp) cycle
-      messages = traffic%messages_most(k)/real(traffic%steps, wp)
-      kilobytes = 1.0e-3_wp*traffic%bytes_most(k)/real(traffic%steps, wp)
-      if (len(line) > 0) line = line//', '
-      line = line//trim(sent_kinds(k))//' '//fixed_text(messages, 1)//' (' &
-        //fixed_text(kilobytes, 1)//' kB)'
-    end do
-    line = 'messages of one process per step: '//line
-  end function traffic_text
 
 end module progress_m

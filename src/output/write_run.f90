@@ -5,7 +5,6 @@
 module write_run_m
   use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root, nproc, get_threads
-  use messages_m, only: traffic_t, sent_kinds, asked_what, asked_detail, asked_calls
   use timers_m, only: timer_count, timer_name, timer_seconds, timer_calls
   use build_info_m, only: version, git_revision, compiler, flags
   use grid_m, only: grid_t
@@ -339,11 +338,10 @@ contains
     end do
   end subroutine follow_sign
 
-  !> Write the times of the phases, the messages, how the run ended and when; close the file.
-  subroutine close_run_file(self, exit_status, traffic)
+  !> Write the times of the phases, how the run ended and when; close the file.
+  subroutine close_run_file(self, exit_status)
     type(run_file_t), intent(inout) :: self
     integer, intent(in) :: exit_status
-    type(traffic_t), intent(in) :: traffic   !! what passed between the processes
     character(name_length), allocatable :: name(:)
     integer :: i
 
@@ -359,29 +357,11 @@ contains
       call file%store('/timers/name', '1', name)
       call file%store('/timers/seconds', 's', [(timer_seconds(i), i=1, timer_count())])
       call file%store('/timers/calls', '1', [(timer_calls(i), i=1, timer_count())])
-      if (traffic%known) call write_traffic(traffic, file)
       call file%attribute('/provenance', 'finished', time_now())
       call file%last_integer('/provenance', 'exit_status', merge(exit_status, exit_files, &
         file%info == 0))
       call file%close()
     end associate
   end subroutine close_run_file
-
-  !> What passed between the processes, and what would on more of them.
-  subroutine write_traffic(traffic, file)
-    type(traffic_t), intent(in) :: traffic
-    type(h5_file_t), intent(inout) :: file
-    character(*), parameter :: here = '/timers'
-
-    call file%attribute(here, 'steps', traffic%steps)
-    call file%store(here//'/message_kind', '1', sent_kinds)
-    call file%store(here//'/messages', '1', traffic%messages)
-    call file%store(here//'/message_bytes', 'B', traffic%bytes)
-    call file%store(here//'/messages_most', '1', traffic%messages_most)
-    call file%store(here//'/message_bytes_most', 'B', traffic%bytes_most)
-    call file%store(here//'/asked_what', '1', asked_what())
-    call file%store(here//'/asked_detail', '1', asked_detail())
-    call file%store(here//'/asked_calls', '1', asked_calls())
-  end subroutine write_traffic
 
 end module write_run_m

@@ -11,7 +11,7 @@ module memory_plan_m
   use parallel_m, only: nproc, is_root, global_max
   use case_types_m, only: case_t
   use tet_mesh_m, only: shape_t
-  use machine_memory_m, only: available_memory, may_allocate
+  use machine_memory_m, only: available_memory, memory_limit
   implicit none
   private
   public :: planned_memory, require_memory, require_memory_to_start, size_text
@@ -50,12 +50,13 @@ contains
 
   !> End with code 4 if there is not even memory to read a case.
   subroutine require_memory_to_start()
-    call insist(bytes_at_rest, 'the program takes '//size_text(real(bytes_at_rest, wp)) &
+    call require(bytes_at_rest, 'the program takes '//size_text(real(bytes_at_rest, wp)) &
       //' of memory')
   end subroutine require_memory_to_start
 
-  !> End with code 4 if this process, or another one, cannot have its share of the memory that the
-  !! run will take; warn if it is more than the machine has. Call it before anything is written.
+  !> End with code 4 if the share of this process, or of another one, in the memory that the run
+  !! will take is above its limit; warn if the run takes more than the machine has left. Call it
+  !! before anything is written.
   subroutine require_memory(case, shapes)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
@@ -65,23 +66,23 @@ contains
     planned = planned_memory(case, shapes)
     asked = 'the run takes about '//size_text(real(planned, wp))//' of memory'
     if (nproc() > 1) asked = asked//' in '//to_text(nproc())//' processes'
-    call insist(planned/nproc(), asked)
+    call require(planned/nproc(), asked)
     available = available_memory()
     if (planned <= available .or. available == 0 .or. .not. is_root()) return
     write (error_unit, '(a)') 'mics: warning: '//asked//what_is_left()//'; it may be killed'
   end subroutine require_memory
 
-  !> End with code 4 if this process or another one cannot have that many bytes.
-  subroutine insist(bytes, asked)
+  !> End with code 4 if the limit of this process or of another one is below so many bytes.
+  subroutine require(bytes, asked)
     integer(i8), intent(in) :: bytes
     character(*), intent(in) :: asked
-    real(wp) :: refused(1)
+    real(wp) :: beyond(1)
 
-    refused = merge(0.0_wp, 1.0_wp, may_allocate(bytes))
-    call global_max(refused)
-    if (refused(1) > 0.0_wp) call fatal(exit_files, asked//what_is_left() &
-      //'; the system refuses it, or a limit does (ulimit -v)')
-  end subroutine insist
+    beyond = merge(1.0_wp, 0.0_wp, bytes > memory_limit())
+    call global_max(beyond)
+    if (beyond(1) > 0.0_wp) call fatal(exit_files, asked//what_is_left() &
+      //'; the machine has less, or a limit is lower (ulimit -v)')
+  end subroutine require
 
   function what_is_left() result(text)
     character(:), allocatable :: text

@@ -18,7 +18,6 @@ module multigrid_m
   use multigrid_level_m, only: level_t, level_init, set_equations, coarsen_coefficients, &
     load_line, unload_line, relax_plane, restrict_plane, prolong_plane, fill_halo
   use parallel_m, only: nproc, global_max, global_min, gather_all
-  use messages_m, only: note_asked, cycle_of_levels, setup_of_levels
   implicit none
   private
   public :: multigrid_t
@@ -216,7 +215,6 @@ contains
     real(wp) :: largest(1)
     integer :: l
 
-    call note_asked(setup_of_levels, [0, 0, 0])
     largest = largest_coefficient(self%lo, self%hi, cf)
     call global_max(largest)
     self%unit_exponent = exponent(largest(1))
@@ -297,7 +295,6 @@ contains
     real(wp), intent(inout), contiguous :: z(:, :, :)
     type(team_t) :: team
 
-    call note_asked(cycle_of_levels, [0, 0, 0])
     !$omp parallel private(team) if (self%level(1)%many)
     team%me = omp_get_thread_num()
     team%n = omp_get_num_threads()

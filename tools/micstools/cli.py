@@ -23,7 +23,6 @@ COMMANDS = {
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
     "bed": ("bed", "BED", "make a bed from a map of measured ground"),
     "harbour": ("harbour", "HARBOUR", "write the case of a breakwater of many blocks"),
-    "scaling": ("scaling", "SCALING", "foretell what more processes give"),
 }
 _SUMMARY = "Run cases of mics, look at the results, make blocks and beds."
 

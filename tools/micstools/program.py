@@ -15,6 +15,9 @@ VARIABLE = "MICS"
 """Environment variable that names the program."""
 BUILT = Path(__file__).parents[2] / "mics"
 """The program that make builds, where the tools run from the folder of its sources."""
+ENVIRONMENT = {"GOMP_SPINCOUNT": "1000", "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
+"""How threads wait, and in which pages memory comes, unless the user has chosen: measured in
+docs/performance.md."""
 
 
 def find(given: Path | None = None, case: Path | None = None) -> Path:

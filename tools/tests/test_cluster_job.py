@@ -10,7 +10,7 @@ SCRIPT = Path(__file__).parents[1] / "cluster_job.sh"
 def call(work: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Call the script where `srun` only says how it was called."""
     srun = work / "srun"
-    srun.write_text('#!/bin/sh\necho "$OMP_NUM_THREADS: $*"\n')
+    srun.write_text('#!/bin/sh\necho "$OMP_NUM_THREADS: $GOMP_SPINCOUNT $GLIBC_TUNABLES $*"\n')
     srun.chmod(0o755)
     path = {"PATH": f"{work}:{os.environ['PATH']}", "SLURM_CPUS_PER_TASK": "2"}
     return subprocess.run(
@@ -21,7 +21,7 @@ def call(work: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_begins_and_goes_on(tmp_path: Path) -> None:
     begun = call(tmp_path, "my case.nml", "out").stdout
     assert begun.endswith("mics_mpi --quiet --max-wall 11:30 --output out my case.nml\n")
-    assert begun.startswith("2: ")
+    assert begun.startswith("2: 1000 glibc.malloc.hugetlb=1 ")
     (tmp_path / "out").mkdir()
     for name, age in (("restart-a.h5", 10), ("restart-b.h5", 5)):
         (tmp_path / "out" / name).touch()

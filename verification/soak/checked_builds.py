@@ -29,8 +29,6 @@ from run_cases import CASES, changed, prepare  # noqa: E402
 STEPS = 3
 SETTINGS = {
     "OMP_NUM_THREADS": "1",
-    "GOMP_SPINCOUNT": "20000",  # with the next: else the program begins again, which valgrind
-    "GLIBC_TUNABLES": "",  # does not let it
     "ASAN_OPTIONS": "detect_leaks=0",  # HDF5 keeps what it has until the end
     "UBSAN_OPTIONS": "print_stacktrace=1",
 }

@@ -1,6 +1,7 @@
 """Run a case, or check it."""
 
 import argparse
+import os
 import subprocess
 from contextlib import suppress
 from pathlib import Path
@@ -23,9 +24,11 @@ def _call(given: argparse.Namespace, options: list[str]) -> int:
     """The program on the case; it reads the case as it is where nothing was set."""
     text = program.case_text(given.case, given.settings)
     path = program.find(given.program, given.case)
+    settings = {**program.ENVIRONMENT, **os.environ}
     if not given.settings:
-        return _code(subprocess.Popen([path, *options, given.case], text=True))
-    with subprocess.Popen([path, *options], stdin=subprocess.PIPE, text=True) as process:
+        return _code(subprocess.Popen([path, *options, given.case], text=True, env=settings))
+    pipe = subprocess.PIPE
+    with subprocess.Popen([path, *options], stdin=pipe, text=True, env=settings) as process:
         # The program has the signal, too, and ends in good order.
         with suppress(KeyboardInterrupt, BrokenPipeError):
             process.communicate(text)
