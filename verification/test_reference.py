@@ -29,7 +29,7 @@ CONTRACT = {
     "fluid": "liquid_density liquid_viscosity gas_density gas_viscosity gravity water_level "
     "surface_tension single_phase velocity",
     "water": "min max",
-    "numerics": "coupling coupling_passes momentum advection interface solid_fraction subcells "
+    "numerics": "coupling coupling_passes momentum advection solid_fraction subcells "
     "pressure_solver preconditioner divergence_tolerance max_pressure_passes",
     "contact": "model law restitution contact_time k_n gamma_n eta_n k_t gamma_t eta_t friction "
     "wall_friction substep_ratio courant_max sleep",

@@ -66,7 +66,6 @@ module case_types_m
     integer :: coupling_passes = 1
     character(name_length) :: momentum = 'conservative'
     character(name_length) :: advection = 'mp5'
-    character(name_length) :: interface = 'plic'
     character(name_length) :: solid_fraction = 'exact'
     integer :: subcells = 4
     character(name_length) :: pressure_solver = 'cg'

@@ -80,8 +80,6 @@ contains
       'values carried through the faces: of fifth order, clipped where not monotone (mp5) or ' &
       //'with the limiter of the paper (tvd5), or of the cell upstream', &
       example='''upwind''')
-    call v%option('interface', numerics%interface, 'plic', &
-      'surface of the liquid: a plane in each cell', example='''plic''')
     call v%option('solid_fraction', numerics%solid_fraction, 'exact subcell', &
       'share of a cell that is block: from clipped tetrahedra, or counted in the sub-cells of ' &
       //'the paper', example='''subcell''')

@@ -54,7 +54,7 @@ contains
       [998.2_wp, 1.002e-3_wp, 1.204_wp, 1.82e-5_wp, 0.0_wp, 0.0_wp, -9.81_wp], 0.0_wp)
     call check('no level', .not. is_given(case%fluid%water_level))
     call check('numerics', case%numerics%momentum == 'conservative' &
-      .and. case%numerics%advection == 'mp5' .and. case%numerics%interface == 'plic' &
+      .and. case%numerics%advection == 'mp5' &
       .and. case%numerics%solid_fraction == 'exact' .and. case%numerics%pressure_solver == 'cg' &
       .and. case%numerics%preconditioner == 'multigrid')
     call check('contact', case%contact%model == 'surface' .and. case%contact%law == 'restitution' &
@@ -230,6 +230,8 @@ contains
       //'t_end (line 1)')
     call expect('&run t_end=1 cell=2,3,4/'//grid, &
       '&run cell = 2, 3, 4: unknown variable, nearest known: title (line 1)')
+    call expect(base//'&numerics interface=''plic''/', '&numerics interface = ''plic'': unknown ' &
+      //'variable, nearest known: momentum (line 3)')
     call expect('&run t_end=ten/'//grid, '&run t_end = ten: must be a number (line 1)')
     call expect('&run t_end=''10''/'//grid, '&run t_end = ''10'': must be a number, without ' &
       //'quotes (line 1)')
