@@ -81,7 +81,7 @@ contains
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
     call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
     call hold_in_cells(grid, solid, bodies, trend/dt, a%face, a%cell)
-    call leave_out(grid, self%takes_part, a%cell)
+    call change_where(grid, self%takes_part, .false., a%cell)
     call halo_exchange(a%cell, n_halo)
     call share_acceleration(grid, solid%open, flow%rho, links, a%cell)
     !$omp parallel do private(i, j, mass) schedule(static)
@@ -110,7 +110,7 @@ contains
     type(mid_step_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call add_where(grid, 0.5_wp*dt, a, self%takes_part, .true., u)
+    call change_where(grid, self%takes_part, .true., u, 0.5_wp*dt, a)
   end subroutine add_second_half
 
   !> Weight and old pressure in all other cells.
@@ -122,17 +122,18 @@ contains
     type(mid_step_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call add_where(grid, dt, a, self%takes_part, .false., u)
+    call change_where(grid, self%takes_part, .false., u, dt, a)
   end subroutine add_whole
 
-  !> u += time a in the own cells that take part, or in those that do not.
-  subroutine add_where(grid, time, a, takes_part, those, u)
+  !> u += time a, or u = 0 without a, in the own cells that take part or in those that do not.
+  subroutine change_where(grid, takes_part, those, u, time, a)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: time   !! [s]
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
     logical, intent(in) :: those
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), optional :: time   !! [s]
+    real(wp), intent(in), contiguous, optional :: &
+      a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d
 
     !$omp parallel do private(i, j, d) schedule(static)
@@ -140,31 +141,17 @@ contains
       do d = 1, 3
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            if (takes_part(i, j, k) .eqv. those) u(i, j, k, d) = u(i, j, k, d) + time*a(i, j, k, d)
+            if (takes_part(i, j, k) .neqv. those) cycle
+            if (present(a)) then
+              u(i, j, k, d) = u(i, j, k, d) + time*a(i, j, k, d)
+            else
+              u(i, j, k, d) = 0.0_wp
+            end if
           end do
         end do
       end do
     end do
-  end subroutine add_where
-
-  !> No acceleration of cells that do not take part.
-  subroutine leave_out(grid, takes_part, a)
-    type(grid_t), intent(in) :: grid
-    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer :: i, j, k, d
-
-    !$omp parallel do private(i, j, d) schedule(static)
-    do k = grid%lo(3), grid%hi(3)
-      do d = 1, 3
-        do j = grid%lo(2), grid%hi(2)
-          do i = grid%lo(1), grid%hi(1)
-            if (.not. takes_part(i, j, k)) a(i, j, k, d) = 0.0_wp
-          end do
-        end do
-      end do
-    end do
-  end subroutine leave_out
+  end subroutine change_where
 
   !> The cells in liquid, of all or `among` some: away from outflows, full of liquid with all cells
   !! around.
