@@ -20,6 +20,11 @@ module energy_m
   public :: energy_t, energy_parts_t, energy_init, begin_energy, note_energy, note_release, &
             energy_excess
 
+  !> What is not known of an energy: that of the surface in a cell so high, and of the fall of the
+  !! free blocks by so many radii.
+  real(wp), parameter :: floor_surface = 0.5_wp   !! [cells]
+  real(wp), parameter :: floor_fall = 0.5_wp      !! [radii], a quarter of a length
+
   !> Of a moment [J].
   type :: energy_parts_t
     real(wp) :: kinetic = 0.0_wp    !! of fluid and blocks
@@ -59,10 +64,10 @@ contains
     if (.not. self%known) return
     g = norm2(case%fluid%gravity)
     d = maxloc(abs(case%fluid%gravity), 1)
-    self%floor = 0.5_wp*(case%fluid%liquid_density - case%fluid%gas_density)*g*grid%h(d)**2 &
+    self%floor = floor_surface*(case%fluid%liquid_density - case%fluid%gas_density)*g*grid%h(d)**2 &
                  *product(grid%length)/grid%length(d)
     do b = 1, blocks%n
-      if (.not. blocks%fixed(b)) self%floor = self%floor + 0.5_wp*blocks%mass(b)*g &
+      if (.not. blocks%fixed(b)) self%floor = self%floor + floor_fall*blocks%mass(b)*g &
         *blocks%shapes(blocks%shape(b))%radius
     end do
   contains

@@ -65,9 +65,9 @@ contains
     if (clips > 0 .and. self%clips == 0) then
       self%warnings = self%warnings + 1
       if (is_root()) then
-        write (error_unit, '(a)') 'mics: warning: the inertia of the fluid that moves with ' &
-          //to_text(clips)//' light block(s) was cut at its limit, t = '//to_text(time) &
-          //' s; /series/inertia_clips of run.h5 counts it in each step'
+        write (error_unit, '(a)') 'mics: warning: the inertia of the fluid that moves with light ' &
+          //'blocks was cut at its limit, '//to_text(clips)//' time(s) in the step to t = ' &
+          //to_text(time)//' s; /series/inertia_clips of run.h5 counts it in each step'
         flush (error_unit)
       end if
     end if
