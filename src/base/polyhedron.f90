@@ -1,4 +1,4 @@
-!> Convex polyhedra cut by planes: volume, first moment and cross-section, without allocation.
+!> Convex polyhedra cut by planes: volume and first moment, without allocation.
 !!
 !! A polyhedron is kept as its corners and, for each corner, the three corners it is joined to.
 !! Cutting by a plane decides once per corner (`n.x <= d` is kept, so nothing is lost or counted
@@ -10,8 +10,8 @@ module polyhedron_m
   private
   public :: polyhedron_t, max_corners
   public :: polyhedron_of_tet, polyhedron_of_box, cut_polyhedron, cut_polyhedron_by_box
-  public :: polyhedron_moments, polyhedron_moments_below, polyhedron_section
-  public :: tet_volume, tet_volume_below, tet_moments_below, clip_tet_to_box, box_clip_moments_below
+  public :: polyhedron_moments, polyhedron_moments_below
+  public :: tet_volume, tet_moments_below, clip_tet_to_box, box_clip_moments_below
 
   integer, parameter :: max_corners = 64   !! a polyhedron of up to 30 faces can be cut safely
 
@@ -78,37 +78,6 @@ contains
 
     t = a/(a - b)
   end function share_below
-
-  !> Volume of the part of a tetrahedron with `n.x <= d`, as a sum of terms of one sign [m3].
-  pure function tet_volume_below(corner, n, d) result(volume)
-    real(wp), intent(in) :: corner(3, 4)   !! in any order [m]
-    real(wp), intent(in) :: n(3), d        !! plane; n need not be a unit vector
-    real(wp) :: volume
-    real(wp) :: s(4), p, q, r, t
-    integer :: order(4), n_below
-
-    call sort_by_side(corner, n, d, s, order, n_below)
-    volume = 0.0_wp
-    if (n_below == 0) return
-    volume = abs(tet_volume(corner))
-    select case (n_below)
-    case (1)
-      volume = volume*share_below(s(1), s(2))*share_below(s(1), s(3))*share_below(s(1), s(4))
-    case (2)
-      p = share_below(s(1), s(3))
-      q = share_below(s(1), s(4))
-      r = share_below(s(2), s(3))
-      t = share_below(s(2), s(4))
-      volume = volume*(p*q + p*(s(4)/(s(4) - s(1)))*t + (s(3)/(s(3) - s(1)))*r*t)
-    case (3)
-      p = s(4)/(s(4) - s(1))
-      q = s(4)/(s(4) - s(2))
-      volume = volume*(share_below(s(1), s(4)) + p*share_below(s(2), s(4)) + &
-                       p*q*share_below(s(3), s(4)))
-    case default
-      return   ! all below
-    end select
-  end function tet_volume_below
 
   !> Volume and first moment of the part of a tetrahedron with `n.x <= d`.
   pure subroutine tet_moments_below(corner, n, d, volume, moment)
@@ -381,45 +350,6 @@ contains
     to%x(:, 1:from%n) = from%x(:, 1:from%n)
     to%link(:, 1:from%n) = from%link(:, 1:from%n)
   end subroutine copy_polyhedron
-
-  !> Area and centroid of the cross-section with the plane `n.x = d`.
-  !!
-  !! Corners on the plane count as below: a face that lies in the plane is the cross-section if the
-  !! body stands above it (n points into the body), and there is none if the body hangs below.
-  pure subroutine polyhedron_section(p, n, d, area, centroid)
-    type(polyhedron_t), intent(in) :: p
-    real(wp), intent(in) :: n(3), d
-    real(wp), intent(out) :: area          !! [m2]
-    real(wp), intent(out) :: centroid(3)   !! of the cross-section, 0 where there is none [m]
-    type(polyhedron_t) :: part
-    real(wp) :: s(max_corners), a(3), b(3), moment(3), twice, length
-    integer :: v, n_kept, first, here
-
-    area = 0.0_wp
-    centroid = 0.0_wp
-    call copy_polyhedron(p, part)
-    do v = 1, p%n
-      s(v) = n(1)*p%x(1, v) + n(2)*p%x(2, v) + n(3)*p%x(3, v) - d
-    end do
-    n_kept = count(s(1:p%n) <= 0.0_wp)
-    if (n_kept == 0 .or. n_kept == p%n) return
-    call cut_at_heights(part, s)
-    length = sqrt(n(1)**2 + n(2)**2 + n(3)**2)
-    first = n_kept + 1
-    here = part%link(2, first)
-    moment = 0.0_wp
-    do v = n_kept + 2, part%n
-      if (part%link(2, here) == first) exit
-      a = part%x(:, here) - part%x(:, first)
-      b = part%x(:, part%link(2, here)) - part%x(:, first)
-      twice = triple(n, a, b)/length
-      area = area + twice
-      moment = moment + twice*(a + b)
-      here = part%link(2, here)
-    end do
-    if (abs(area) > 0.0_wp) centroid = part%x(:, first) + moment/(3.0_wp*area)
-    area = 0.5_wp*abs(area)
-  end subroutine polyhedron_section
 
   !> The part of a tetrahedron in a box; cut it again by planes with `polyhedron_moments_below`.
   pure subroutine clip_tet_to_box(corner, lo, hi, p)

@@ -1,11 +1,11 @@
-!> Vectors, rotations as quaternions (w, x, y, z) and small dense systems; all pure.
+!> Vectors, rotations as quaternions (w, x, y, z) and small matrices; all pure.
 module vectors_m
   use kinds_m, only: wp
   implicit none
   private
   public :: cross, norm, distance, normalised
-  public :: quaternion_product, quaternion_from_axis, quaternion_exp, rotation_matrix, rotate
-  public :: inverse3, solve6
+  public :: quaternion_product, quaternion_from_axis, quaternion_exp, rotation_matrix
+  public :: inverse3
 
 contains
 
@@ -97,16 +97,6 @@ contains
     r(:, 3) = [2*(x*z + w*y), 2*(y*z - w*x), 1 - 2*(x*x + y*y)]
   end function rotation_matrix
 
-  !> Vector v turned by the unit quaternion q, from body to space axes.
-  pure function rotate(q, v) result(r)
-    real(wp), intent(in) :: q(4), v(3)
-    real(wp) :: r(3)
-    real(wp) :: t(3)
-
-    t = 2*cross(q(2:4), v)
-    r = v + q(1)*t + cross(q(2:4), t)
-  end function rotate
-
   !> Inverse of a regular 3 x 3 matrix.
   pure function inverse3(a) result(b)
     real(wp), intent(in) :: a(3, 3)
@@ -119,34 +109,5 @@ contains
     determinant = dot_product(b(1, :), a(:, 1))
     b = b/determinant
   end function inverse3
-
-  !> Solution of a x = b for a symmetric 6 x 6 matrix, by elimination with row exchange.
-  !!
-  !! A pivot below round-off of the largest element means a singular direction: its unknown is zero.
-  pure function solve6(a, b) result(x)
-    real(wp), intent(in) :: a(6, 6), b(6)
-    real(wp) :: x(6)
-    real(wp) :: m(6, 7), row(7), tiny_pivot
-    integer :: i, j, best
-
-    m(:, :6) = a
-    m(:, 7) = b
-    tiny_pivot = 10*epsilon(1.0_wp)*maxval(abs(a))
-    do i = 1, 6
-      best = i - 1 + maxloc(abs(m(i:, i)), 1)
-      row = m(best, :)
-      m(best, :) = m(i, :)
-      m(i, :) = row
-      if (abs(row(i)) <= tiny_pivot) cycle
-      do j = i + 1, 6
-        m(j, i:) = m(j, i:) - (m(j, i)/row(i))*row(i:)
-      end do
-    end do
-    x = 0.0_wp
-    do i = 6, 1, -1
-      if (abs(m(i, i)) <= tiny_pivot) cycle
-      x(i) = (m(i, 7) - dot_product(m(i, i + 1:6), x(i + 1:)))/m(i, i)
-    end do
-  end function solve6
 
 end module vectors_m

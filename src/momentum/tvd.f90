@@ -9,7 +9,7 @@ module tvd_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: face_value, face_values, face_row, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
+  public :: face_values, face_row, scheme_of, tvd_scheme, mp_scheme, upwind_scheme
 
   integer, parameter :: tvd_scheme = 1      !! fifth-order TVD value
   integer, parameter :: upwind_scheme = 2   !! value of the donor cell
@@ -80,17 +80,6 @@ contains
       end if
     end associate
   end subroutine face_row
-
-  !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
-  pure function face_value(scheme, q) result(value)
-    integer, intent(in) :: scheme   !! `mp_scheme` | `tvd_scheme`
-    real(wp), intent(in) :: q(-2:2)
-    real(wp) :: value, face(1)
-
-    call fifth_order_row(1, scheme, [1.0_wp], q(-2:-2), q(-1:-1), q(0:0), q(1:1), q(2:2), q(2:2), &
-                         face)
-    value = face(1)
-  end function face_value
 
   !> Values on n faces, each between the cells u_3, u_2, u_1 below and v_1, v_2, v_3 above it.
   !! `mp5` is called here only: so the compiler puts it into the loop, which then is one over

@@ -2,7 +2,8 @@
 program test_armour_units
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
-  use vectors_m, only: cross, rotate, quaternion_from_axis
+  use vectors_m, only: cross, quaternion_from_axis
+  use rotations_m, only: rotate
   use tet_mesh_m, only: shape_t
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos
   implicit none

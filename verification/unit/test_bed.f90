@@ -4,7 +4,7 @@ program test_bed
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
   use errors_m, only: problems_t
-  use vectors_m, only: rotate
+  use rotations_m, only: rotate
   use case_types_m, only: case_t
   use grid_m, only: grid_t, grid_init, n_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init

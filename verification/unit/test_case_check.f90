@@ -3,7 +3,7 @@ program test_case_check
   use check_m, only: check, finish_checks
   use kinds_m, only: wp
   use errors_m, only: problems_t
-  use vectors_m, only: rotate
+  use rotations_m, only: rotate
   use case_types_m, only: case_t
   use case_input_m, only: read_case
   use case_check_m, only: make_shapes, check_case

@@ -339,7 +339,7 @@ contains
   !> Height of the centre at which the lowest contact sphere or corner of a shape stands on the
   !! floor [m].
   function lowest(shape, q) result(height)
-    use vectors_m, only: rotate
+    use rotations_m, only: rotate
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: q(4)
     real(wp) :: height

@@ -3,7 +3,8 @@ program test_drops
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: drop_input_t
-  use vectors_m, only: rotate, quaternion_from_axis, quaternion_product
+  use vectors_m, only: quaternion_from_axis, quaternion_product
+  use rotations_m, only: rotate
   use drops_m, only: draw_drop
   implicit none
 

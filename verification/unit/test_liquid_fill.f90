@@ -3,7 +3,7 @@ program test_liquid_fill
   use kinds_m, only: wp
   use case_types_m, only: case_t, fluid_t, water_t
   use vectors_m, only: quaternion_from_axis
-  use polyhedron_m, only: tet_volume_below
+  use polyhedron_m, only: tet_moments_below
   use grid_m, only: grid_t
   use fields_m, only: flow_t, flow_init
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
@@ -153,7 +153,7 @@ contains
     type(solid_fraction_t) :: fraction
     type(fluid_t) :: fluid
     character(:), allocatable :: message
-    real(wp) :: rest, volume, displaced
+    real(wp) :: rest, volume, displaced, part, moment(3)
     integer :: t
 
     allocate (case%shape(1), case%body(1), case%drop(0))
@@ -175,7 +175,8 @@ contains
     call fill_liquid(grid, fluid, [water_t ::], after, flow)
     displaced = 0.0_wp
     do t = 1, after%tets%n
-      displaced = displaced + tet_volume_below(after%tets%corner(:, :, t), up, 0.1413_wp)
+      call tet_moments_below(after%tets%corner(:, :, t), up, 0.1413_wp, part, moment)
+      displaced = displaced + part
     end do
     call check('hexapod: liquid around it', flow%liquid_initial, &
                tank(1)*tank(2)*0.1413_wp - displaced, 1.0e-13_wp*flow%liquid_initial)

@@ -5,7 +5,8 @@ program test_overlap
   use case_types_m, only: case_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use vectors_m, only: quaternion_from_axis, rotate
+  use vectors_m, only: quaternion_from_axis
+  use rotations_m, only: rotate
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init

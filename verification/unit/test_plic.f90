@@ -2,8 +2,7 @@
 !! exact.
 program test_plic
   use kinds_m, only: wp, pi
-  use plic_m, only: plane_constant, volume_below, liquid_in_slab, unit_constant, unit_volume, &
-                    unit_area, unit_slab, unit_normal
+  use plic_m, only: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
   use check_m, only: check, finish_checks
   implicit none
 
@@ -218,5 +217,39 @@ contains
       end do
     end do
   end function sphere_shares
+
+  !> Constant d of the plane `normal.x = d` that cuts the share `fraction` off the box (0,0,0)..h
+  !! [m].
+  pure function plane_constant(normal, fraction, h) result(d)
+    real(wp), intent(in) :: normal(3)   !! from liquid to gas
+    real(wp), intent(in) :: fraction    !! liquid share, 0..1 [-]
+    real(wp), intent(in) :: h(3)        !! edges of the cell [m]
+    real(wp) :: d
+
+    d = unit_constant(normal*h, fraction)
+  end function plane_constant
+
+  !> Volume of the box (0,0,0)..h below the plane `normal.x = d` [m3].
+  pure function volume_below(normal, d, h) result(volume)
+    real(wp), intent(in) :: normal(3)
+    real(wp), intent(in) :: d      !! [m]
+    real(wp), intent(in) :: h(3)   !! [m]
+    real(wp) :: volume
+
+    volume = unit_volume(normal*h, d)*(h(1)*h(2)*h(3))
+  end function volume_below
+
+  !> Liquid in the slab of given thickness beside the lower (side 1) or upper (side 2) face [m3].
+  pure function liquid_in_slab(normal, d, h, direction, side, thickness) result(volume)
+    real(wp), intent(in) :: normal(3)
+    real(wp), intent(in) :: d          !! [m]
+    real(wp), intent(in) :: h(3)       !! [m]
+    integer, intent(in) :: direction   !! of the normal of the face
+    integer, intent(in) :: side
+    real(wp), intent(in) :: thickness  !! 0..h(direction) [m]
+    real(wp) :: volume
+
+    volume = unit_slab(normal*h, d, direction, side, thickness/h(direction))*(h(1)*h(2)*h(3))
+  end function liquid_in_slab
 
 end program test_plic

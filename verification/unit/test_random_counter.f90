@@ -3,7 +3,8 @@ program test_random_counter
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
   use random_counter_m, only: uniform, random_rotation
-  use vectors_m, only: rotate, norm
+  use vectors_m, only: norm
+  use rotations_m, only: rotate
   implicit none
   integer, parameter :: n = 100000
   integer :: i

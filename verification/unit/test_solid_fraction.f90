@@ -7,8 +7,8 @@ program test_solid_fraction
   use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
   use boundary_kinds_m, only: side_no_slip, side_open, side_periodic
   use grid_m, only: grid_t, n_halo, unit_step
-  use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, &
-    polyhedron_moments, polyhedron_section
+  use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, polyhedron_moments
+  use polyhedron_sections_m, only: polyhedron_section
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init

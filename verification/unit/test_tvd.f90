@@ -1,7 +1,8 @@
 !> Fifth-order values: exact weights on smooth data, order, bounds, monotony of a step.
 program test_tvd
   use kinds_m, only: wp
-  use tvd_m, only: face_value, tvd_scheme, mp_scheme
+  use grid_m, only: grid_t
+  use tvd_m, only: face_row, tvd_scheme, mp_scheme
   use check_m, only: check, finish_checks
   implicit none
   real(wp) :: q(-2:2), value, error(2), exact
@@ -40,6 +41,24 @@ program test_tvd
   call clipped()
   call finish_checks()
 contains
+  !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
+  function face_value(scheme, q) result(value)
+    integer, intent(in) :: scheme   !! `mp_scheme` | `tvd_scheme`
+    real(wp), intent(in) :: q(-2:2)
+    real(wp) :: value
+    type(grid_t) :: grid
+    real(wp) :: flux(-2:4, 1, 1), u(-2:4, 1, 1), face(2)
+
+    grid%first = [-2, 1, 1]
+    grid%lo = 1
+    grid%hi = 1
+    flux = 1.0_wp
+    u = 0.0_wp
+    u(-1:3, 1, 1) = q
+    call face_row(grid, scheme, [1, 0, 0], 1, 1, flux, u, face)
+    value = face(2)
+  end function face_value
+
   !> The value that is clipped: the same on gentle data, of fifth order over an extremum too, and
   !! steps of monotone data stay monotone.
   subroutine clipped()

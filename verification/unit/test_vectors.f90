@@ -3,7 +3,8 @@ program test_vectors
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use vectors_m, only: cross, norm, normalised, quaternion_product, quaternion_from_axis, &
-    quaternion_exp, rotation_matrix, rotate, inverse3, solve6
+    quaternion_exp, rotation_matrix, inverse3
+  use rotations_m, only: rotate
   implicit none
   real(wp), parameter :: ex(3) = [1.0_wp, 0.0_wp, 0.0_wp], ey(3) = [0.0_wp, 1.0_wp, 0.0_wp]
   real(wp), parameter :: ez(3) = [0.0_wp, 0.0_wp, 1.0_wp], round_off = 16*epsilon(1.0_wp)
@@ -13,7 +14,6 @@ program test_vectors
   call test_quarter_turns()
   call test_random_rotations()
   call test_small_angles()
-  call test_solves()
   call finish_checks()
 
 contains
@@ -72,26 +72,5 @@ contains
     call check('no turn', quaternion_exp([0.0_wp, 0.0_wp, 0.0_wp]), &
       [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp)
   end subroutine test_small_angles
-
-  !> Solutions put back; a matrix that needs row exchange; one with an empty direction.
-  subroutine test_solves()
-    real(wp) :: a(6, 6), x(6), b(6)
-    integer :: i
-
-    do i = 1, 10
-      call random_number(a)
-      call random_number(x)
-      a = a + transpose(a)
-      a(1, 1) = 0.0_wp
-      b = matmul(a, x)
-      call check('symmetric indefinite', matmul(a, solve6(a, b)), b, 100*round_off)
-    end do
-    a = 0.0_wp
-    do i = 1, 5
-      a(i, i) = real(i, wp)
-    end do
-    call check('empty direction stays at rest', solve6(a, [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp, 5.0_wp, &
-      0.0_wp]), [1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], 0.0_wp)
-  end subroutine test_solves
 
 end program test_vectors
