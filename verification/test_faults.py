@@ -47,6 +47,15 @@ def test_light_bodies_go_on(density: float, height: float, tmp_path: Path) -> No
     assert said.count(cut) == said.count("\n") == (density < 1000.0), said
 
 
+def test_a_block_that_jumps_ends_the_run(tmp_path: Path) -> None:
+    """With the coupling of the paper the force on a block far lighter than air acts for a step."""
+    numerics = "&numerics coupling = 'mics'  max_pressure_passes = 50 /\n"
+    code, said = mics(tmp_path, numerics + LIGHT.format(density=0.01, height=0.3))
+    assert code == 3, said
+    assert "body 1 jumped" in said and "is too small for &run dt" in said
+    assert complete(tmp_path, 3)
+
+
 @pytest.mark.parametrize(("dt", "t_end"), [(50.0, 50.0), (50.0, 500.0), (1.0, 3.0)])
 def test_fixed_step_too_long(dt: float, t_end: float, tmp_path: Path) -> None:
     """A dam break in steps of seconds: the flow would be hundreds of metres a second fast."""
