@@ -3,11 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from micstools.geometry import Array
+from micstools.geometry import Array, turns
+from micstools.overlap import WALL_KINDS
 from micstools.reader import Run
 
 ENERGY_LIMIT = 0.01  # of the energy set free: more than was put in is to be looked at
+_SAME = 1e-6  # relative, of a step and the distance of two rows
 
 
 @dataclass(frozen=True)
@@ -35,21 +38,73 @@ def largest_excess(run: Run) -> Excess | None:
     return Excess(float(values[row]), float(run.series.time[row]))
 
 
-def made_by_contact(run: Run) -> Array:
-    """In each row what the blocks have more as motion, height and springs than the fluid has given
-    them since the row before [J] (T); negative where contact takes energy, as it should.
+@dataclass(frozen=True)
+class Made:
+    """The largest energy that contact gave to the blocks in a step."""
 
-    Forces are means over the step, so their work on velocity and spin in the middle of it is exact;
-    what is left to rounding and to the substeps is some 1e-4 of weight times length of a block."""
+    energy: float  # [J]; nan: not known
+    time: float  # at the end of the step [s]
+    block: int  # number, from 1, of the one that got most
+    reason: str  # why it is not known; empty where it is
+
+
+def largest_made(run: Run) -> Made:
+    """The largest energy that contact gave in a step; known where each row is a step and no wall
+    moves, which may give energy."""
+    unknown = float("nan")
+    if _walls_move(run):
+        return Made(unknown, unknown, 0, "a wall moves and gives energy by friction")
+    made = made_by_contact(run)
+    if not np.isfinite(made).all():
+        return Made(unknown, unknown, 0, "needs a row every step: &run history_interval = 0")
+    row = int(made.argmax())
+    block = int(_gains(run)[row].argmax()) + 1
+    return Made(float(made[row]), float(run.bodies.time[row]), block, "")
+
+
+def made_by_contact(run: Run) -> Array:
+    """Energy that contact gave to the blocks and to its springs in the step that ends at each row
+    [J] (T); negative where contact takes energy, as it should; nan in a row of several steps."""
     b, s = run.bodies, run.series
-    own = s.kinetic_energy_bodies + s.potential_energy_bodies + np.nan_to_num(s.contact_energy)
-    work = sum(
-        (np.nan_to_num(push[1:]) * (speed[1:] + speed[:-1]) / 2).sum(axis=(1, 2))
-        for push, speed in (
-            (b.fluid_force, b.velocity),
-            (b.fluid_torque, b.angular_velocity),
+    made, n = _gains(run).sum(axis=1), min(b.time.size, s.time.size)  # of a run that goes on
+    made[1:n] += np.diff(np.nan_to_num(s.contact_energy[:n]))
+    return np.where(_single_steps(run), made, np.nan)
+
+
+def _gains(run: Run) -> Array:
+    """What the mean contact force and torque of a step gave to each block [J] (T, N).
+
+    Their work is that on the mean of the velocities before and after the step if contact is an
+    impact in the middle of it, and that on the way of the block if it lasts for the step. Weight
+    and water change the velocity, too, so the two differ in large steps; the smaller one counts,
+    and energy that was made shows in both.
+    """
+    b = run.bodies
+    found = np.zeros(b.contact_force.shape[:2])
+    dt = np.diff(b.time)[:, None]
+    for k in np.flatnonzero(np.any(b.contact_force, axis=(0, 2))):
+        force, torque = b.contact_force[1:, k], b.contact_torque[1:, k]
+        speed, spin = (dt * (v[1:, k] + v[:-1, k]) / 2 for v in (b.velocity, b.angular_velocity))
+        way, turn = np.diff(b.position[:, k], axis=0), turns(b.quaternion[:, k])
+        found[1:, k] = np.minimum(
+            (force * speed + torque * spin).sum(axis=1), (force * way + torque * turn).sum(axis=1)
         )
+    return found
+
+
+def _single_steps(run: Run) -> NDArray[np.bool_]:
+    """Which rows (T) end one step after the row before; the first one does."""
+    time = run.bodies.time
+    found = np.ones(time.size, dtype=bool)
+    dt = run.series.dt[1 : time.size]
+    found[1 : dt.size + 1] = np.abs(np.diff(time)[: dt.size] - dt) <= _SAME * dt
+    return found
+
+
+def _walls_move(run: Run) -> bool:
+    """Does a side of the tank that blocks can touch move along itself?"""
+    return any(
+        np.any(run.value("boundary", f"{side}_velocity", 0.0))
+        for side, kind in run.sides.items()
+        if kind in WALL_KINDS
     )
-    made = np.zeros(b.time.size)
-    made[1:] = np.diff(own) - work * np.diff(b.time)
-    return made

@@ -42,6 +42,17 @@ def attitude_change_deg(q: Array, q0: Array) -> Array:
     return np.asarray(np.degrees(2 * np.arctan2(vector, np.abs(q @ q0))))
 
 
+def turns(q: Array) -> Array:
+    """Rotation from each of the attitudes `q` (n, 4) to the next one as a vector (n - 1, 3) along
+    its axis [rad], the shorter way round."""
+    one, two = q[:-1], q[1:]
+    vector = one[:, :1] * two[:, 1:] - two[:, :1] * one[:, 1:] + np.cross(one[:, 1:], two[:, 1:])
+    sign = np.sign((one * two).sum(axis=1, keepdims=True))
+    length = np.linalg.norm(vector, axis=1, keepdims=True)
+    angle = 2 * np.arcsin(np.minimum(length, 1.0))
+    return np.asarray(sign * vector * angle / np.where(length > 0, length, 1.0))
+
+
 def place(points: Array, position: Array, q: Array) -> Array:
     """Points (n, 3) in body axes as points in space, for a body at `position` with attitude `q`."""
     return np.asarray(points @ rotation_matrix(q).T + position)
