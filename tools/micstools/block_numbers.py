@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from micstools import rest
 from micstools.geometry import attitude_change_deg
 from micstools.reader import Run
-
-REST_SPEED = 5e-3  # [m/s]
 
 
 @dataclass(frozen=True)
@@ -16,7 +15,7 @@ class BlockNumbers:
 
     block: int  # number, from 1
     released: float  # [s]
-    at_rest: float  # after which it never exceeds the speed of rest [s]
+    at_rest: float  # after which it stays where it ends [s]
     impact_speed: float  # in the row before its first touch [m/s]
     contact_force: float  # the largest, a mean over a step [N]
     fluid_force: float  # the largest, buoyancy included [N]
@@ -25,22 +24,21 @@ class BlockNumbers:
     place: tuple[float, float, float]  # of its centroid at the end [m]
 
 
-def of_blocks(run: Run, rest_speed: float = REST_SPEED) -> list[BlockNumbers]:
+def of_blocks(run: Run) -> list[BlockNumbers]:
     """The numbers of every free block that was released, in the order of their release."""
     b = run.bodies
     present = b.present(-1)
-    return [_of_block(run, int(k), rest_speed) for k in b.dropped if present[k]]
+    return [_of_block(run, int(k)) for k in b.dropped if present[k]]
 
 
-def _of_block(run: Run, k: int, rest_speed: float) -> BlockNumbers:
+def _of_block(run: Run, k: int) -> BlockNumbers:
     b = run.bodies
     start = int(np.searchsorted(b.time, b.release_time[k] - 1e-12))
-    speed = np.linalg.norm(b.velocity[start:, k], axis=1)
     x, y, z = (float(v) for v in b.position[-1, k])
     return BlockNumbers(
         block=k + 1,
         released=float(b.release_time[k]),
-        at_rest=_rest(b.time[start:], speed, rest_speed),
+        at_rest=rest.of_block(run, k).time,
         impact_speed=impact_speed(run, k),
         contact_force=_largest(b.contact_force[start:, k]),
         fluid_force=_largest(b.fluid_force[start:, k]),
@@ -57,15 +55,6 @@ def impact_speed(run: Run, k: int) -> float:
     if not touched.size or touched[0] == 0:
         return float("nan")
     return float(np.linalg.norm(b.velocity[touched[0] - 1, k]))
-
-
-def _rest(time: np.ndarray, speed: np.ndarray, limit: float) -> float:
-    fast = np.flatnonzero(speed >= limit)
-    if len(time) < 2:
-        return float("nan")
-    if not fast.size:
-        return float(time[0])
-    return float(time[fast[-1] + 1]) if fast[-1] + 1 < len(time) else float("nan")
 
 
 def _largest(force: np.ndarray) -> float:

@@ -40,26 +40,30 @@ def largest_excess(run: Run) -> Excess | None:
 
 @dataclass(frozen=True)
 class Made:
-    """The largest energy that contact gave to the blocks in a step."""
+    """The energy that contact made in a step, where it is the most over its limit."""
 
     energy: float  # [J]; nan: not known
+    limit: float  # of it in that step [J]
     time: float  # at the end of the step [s]
-    block: int  # number, from 1, of the one that got most
+    block: int  # number, from 1, of the one that got most of it; 0: it is in springs
     reason: str  # why it is not known; empty where it is
 
 
-def largest_made(run: Run) -> Made:
-    """The largest energy that contact gave in a step; known where each row is a step and no wall
-    moves, which may give energy."""
+def largest_made(run: Run, limit: Array) -> Made:
+    """The energy that contact made in the step where that is the most over the `limit` of each row
+    (T) [J]; known where each row is a step and no wall moves, which may give energy."""
     unknown = float("nan")
     if _walls_move(run):
-        return Made(unknown, unknown, 0, "a wall moves and gives energy by friction")
+        reason = "a wall moves and gives energy by friction"
+        return Made(unknown, float(limit.min()), unknown, 0, reason)
     made = made_by_contact(run)
     if not np.isfinite(made).all():
-        return Made(unknown, unknown, 0, "needs a row every step: &run history_interval = 0")
-    row = int(made.argmax())
-    block = int(_gains(run)[row].argmax()) + 1
-    return Made(float(made[row]), float(run.bodies.time[row]), block, "")
+        reason = "needs a row every step: &run history_interval = 0"
+        return Made(unknown, float(limit.min()), unknown, 0, reason)
+    row = int((made / limit).argmax())
+    gain = _gains(run)[row]
+    block = int(gain.argmax()) + 1 if gain.max() > made[row] / 2 else 0
+    return Made(float(made[row]), float(limit[row]), float(run.bodies.time[row]), block, "")
 
 
 def made_by_contact(run: Run) -> Array:

@@ -35,14 +35,21 @@ class Largest:
         """Was no block kicked? None: not known."""
         return self.acceleration < LIMIT if np.isfinite(self.acceleration) else None
 
-    def __str__(self) -> str:
-        """The figure with block and time, and what to do where it is too large."""
+    @property
+    def figures(self) -> str:
+        """The figure with block and time; where it is not known, why."""
         if self.good is None:
             return f"not known (needs rows every {self.rows:.2g} s)"
-        said = f"{self.acceleration:.2g} g, block {self.block} at t = {self.time:.4g} s"
-        if self.good:
-            return said
-        return f"{said}: smaller cells or step; look at the film at t = {self.time:.4g} s"
+        return f"{self.acceleration:.2g} g, block {self.block} at t = {self.time:.4g} s"
+
+    @property
+    def advice(self) -> str:
+        """What to do where it is too large."""
+        return f"smaller cells or step; look at the film at t = {self.time:.4g} s"
+
+    def __str__(self) -> str:
+        """The figure with block and time, and what to do where it is too large."""
+        return self.figures if self.good is not False else f"{self.figures}: {self.advice}"
 
 
 def window(run: Run, length: float) -> float:

@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
+from micstools import scales
 from micstools.geometry import (
     Array,
     distance_between_segments,
@@ -194,8 +195,10 @@ class Touches:
         return body in self.bed or (body, "z_min") in self.walls
 
 
-def touches(run: Run, row: int, reach: float = 5e-4) -> Touches:
-    """What is within `reach` [m]: pairs of released blocks, and they and walls or the bed."""
+def touches(run: Run, row: int) -> Touches:
+    """What is within the reach of `scales` of each other: pairs of released blocks, and they and
+    walls or the bed."""
+    reach = scales.reach(run)
     bodies = present_bodies(run, row)
     balls = {k: _stick_out(body) for k, body in bodies.items() if by_spheres(run, body)}
     blocks = {}

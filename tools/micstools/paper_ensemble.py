@@ -16,7 +16,6 @@ import numpy as np
 from micstools import pile_ensemble, settings
 from micstools.geometry import quaternion_from_axis, quaternion_product
 from micstools.overlap import touches
-from micstools.pile import REACH
 from micstools.pile_ensemble import Pile
 from micstools.reader import BadRun, Run
 from micstools.shares import in_words
@@ -97,7 +96,7 @@ CHOICES = (
 
 def first_on_floor(run: Run) -> int | None:
     """Number of the drop, from 1, of the first one that lies on the floor in the end, if any."""
-    seen = touches(run, -1, REACH)
+    seen = touches(run, -1)
     return next((n for n, k in enumerate(run.bodies.dropped, 1) if seen.on_floor(int(k))), None)
 
 

@@ -1,20 +1,19 @@
 """What can be said of any pile, and the paper's words on its figures 5 to 7, checked on a run.
 
 Every finding is seen or not seen, with the figures behind it, in which blocks are counted from 1.
-Geometry is that of the true shapes; a contact counts where the gap is at most `REACH`.
+Geometry is that of the true shapes; a contact counts where the gap is within the reach of `scales`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from micstools import kicks
+from micstools import health, kicks, rest, units
 from micstools.geometry import attitude_change_deg, below_plane
 from micstools.overlap import overlap, present_bodies, touches
 from micstools.reader import BadRun, Run
+from micstools.units import Unit, figure
 
-REACH = 5e-4  # [m] blocks nearer than this touch
-REST_SPEED = 5e-3  # [m/s]
 TURN_LIMIT = 5.0  # [degrees]
 LEVEL_BAND = 0.01  # share of the rise
 
@@ -57,17 +56,22 @@ def findings(run: Run, paper: bool | None = None) -> list[Finding]:
     if kick := kicks.largest(run):
         found.append(untouched(kick))
     if has_level(run) and (rise := water_level(run)).shows(run):
-        found.append(level(rise))
+        found.append(level(rise, units.of_run(run).length))
     return found
 
 
 def is_papers_tank(run: Run) -> bool:
-    """Do blocks of 60 mm drop on three fixed ones in a tank with water of 0.3 x 0.1 x 0.2 m?"""
+    """Do blocks drop on the paper's three fixed ones in water that was written?"""
+    return bool(run.field_times.size and has_papers_blocks(run))
+
+
+def has_papers_blocks(run: Run) -> bool:
+    """Do blocks of 60 mm drop on three fixed ones in a tank of 0.3 x 0.1 x 0.2 m, so that their
+    piles have the paper's patterns?"""
     b, size = run.bodies, run.grid.high - run.grid.low
     lengths = [np.ptp(run.shapes[name].points, axis=0) for name in set(b.shape)]
     return bool(
-        run.field_times.size
-        and np.allclose(size, (0.3, 0.1, 0.2))
+        np.allclose(size, (0.3, 0.1, 0.2))
         and b.fixed.sum() == 3
         and b.dropped.size
         and np.allclose(lengths, 0.06)
@@ -143,7 +147,7 @@ def first_block(run: Run) -> list[Finding]:
         rows = {"before the second is dropped": before, **rows}
     found = []
     for when, row in rows.items():
-        seen = touches(run, row, REACH)
+        seen = touches(run, row)
         on_fixed = [k for k in seen.of(first) if b.fixed[k]]
         sides = [side for side in seen.walls_of(first) if not side.startswith("z")]
         speed = float(np.linalg.norm(b.velocity[row, first]))
@@ -152,7 +156,7 @@ def first_block(run: Run) -> list[Finding]:
                 f"the first block lies on fixed blocks and a wall {when}",
                 bool(on_fixed) and bool(sides),
                 f"t = {b.time[row]:.3f} s: fixed blocks {_named(on_fixed)}, walls {sides}, "
-                f"speed {1e3 * speed:.2f} mm/s",
+                f"speed {figure(speed)} m/s",
             )
         )
     return found
@@ -160,7 +164,7 @@ def first_block(run: Run) -> list[Finding]:
 
 def walls(run: Run) -> Finding:
     """The paper on figure 7: the blocks pile up in touch with the front and the back wall."""
-    seen = touches(run, len(run.bodies.time) - 1, REACH)
+    seen = touches(run, len(run.bodies.time) - 1)
     by_side = {s: [k for k, side in seen.walls if side == s] for s in ("y_min", "y_max")}
     figures = ", ".join(f"{side}: blocks {_named(blocks)}" for side, blocks in by_side.items())
     statement = "blocks of the final pile touch the front and the back wall"
@@ -169,15 +173,20 @@ def walls(run: Run) -> Finding:
 
 def at_rest(run: Run) -> Finding:
     """The blocks come to rest."""
-    b = run.bodies
-    speed = np.linalg.norm(b.velocity[-1], axis=1)
-    worst = float(speed[b.dropped].max(initial=0.0))
+    b, length = run.bodies, units.of_run(run).length
+    found = rest.of_blocks(run)
     out = int((~b.present(-1)).sum())
-    figures = f"fastest {1e3 * worst:.3f} mm/s at t = {b.time[-1]:.3f} s"
+    worst = max(found, key=lambda one: one.moved / one.limit, default=None)
+    figures = "no free block"
+    statement = "all blocks at rest in the end"
+    if worst:
+        figures = f"block {worst.block} moved most, by {length.text(worst.moved)}"
+        last = max(one.time for one in found)
+        figures += f"; all at rest from t = {figure(last)} s on" if last == last and not out else ""
+        statement += f" (moved less than {length.text(worst.limit)} in {figure(worst.span)} s)"
     if out:
         figures += f", {out} blocks not released yet"
-    statement = f"all blocks at rest in the end (speed < {1e3 * REST_SPEED:g} mm/s)"
-    return Finding(statement, worst < REST_SPEED and not out, figures)
+    return Finding(statement, not out and all(one.time == one.time for one in found), figures)
 
 
 def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
@@ -188,7 +197,7 @@ def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
     """
     b = run.bodies
     row = row % len(b.time)
-    seen = touches(run, row, REACH)
+    seen = touches(run, row)
     low = [int(k) for k in b.dropped if seen.on_floor(int(k))]
     if not b.present(row).all() or len(low) > 1:
         return "other", low
@@ -205,14 +214,13 @@ def pattern(run: Run) -> Finding:
     return Finding(statement, kind == "A", f"{figures}; {released} of {b.dropped.size} released")
 
 
-def depth(run: Run, limit: float = 1e-3) -> Finding:
+def depth(run: Run) -> Finding:
     """True overlap of the final pile."""
-    found = overlap(run)
-    pairs = {f"{i + 1}-{j + 1}": d for (i, j), d in found.blocks.items()}
-    pairs |= {f"{k + 1}-{side}": d for (k, side), d in found.walls.items()}
-    worst = max(pairs, key=lambda key: pairs[key], default="none")
-    figures = f"largest {1e3 * found.largest:.4f} mm ({worst}), {len(pairs)} overlapping pairs"
-    statement = f"true overlap of the pile below {1e3 * limit:g} mm"
+    found, limit, length = overlap(run), health.overlap_limit(run), units.of_run(run).length
+    where = health.deepest(found) or "none"
+    pairs = len(found.blocks) + len(found.walls)
+    figures = f"largest {length.text(found.largest)} ({where}), {pairs} overlapping pairs"
+    statement = f"true overlap of the pile below {length.text(limit)}"
     return Finding(statement, found.largest < limit, figures)
 
 
@@ -274,10 +282,10 @@ def water_level(run: Run) -> Level:
     return Level(start, measured_level(run, t, demanded), demanded)
 
 
-def level(found: Level) -> Finding:
+def level(found: Level, length: Unit) -> Finding:
     """Final level against the rise that the submerged volume demands."""
     figures = (
-        f"level {1e3 * found.found:.3f} mm, demanded {1e3 * found.demanded:.3f} mm, "
+        f"level {length.text(found.found, 6)}, demanded {length.text(found.demanded, 6)}, "
         f"rise off by {100 * found.error:.2f} %"
     )
     statement = f"final level within {100 * LEVEL_BAND:g} % of the rise the blocks demand"
@@ -291,7 +299,7 @@ def untouched(kick: kicks.Largest) -> Finding:
 
 
 def report(found: list[Finding]) -> str:
-    """The findings as lines of text."""
+    """The findings as lines of text, in ASCII."""
     marks = {True: "yes", False: "no", None: "?"}
     lines = [f"{marks[f.seen]:3}  {f.statement}\n     {f.figures}" for f in found]
-    return "\n".join(lines)
+    return units.ascii_of("\n".join(lines))

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from micstools import block_numbers, pile_numbers
+from micstools import block_numbers, pile_numbers, units
 from micstools.block_numbers import BlockNumbers
 from micstools.ensemble import OUTCOMES
 from micstools.geometry import Array
-from micstools.pile import still_level
+from micstools.pile import has_papers_blocks, still_level
 from micstools.pile_numbers import PileNumbers
+from micstools.placing import Area, Placing, drop_area, placing
 from micstools.reader import BadRun, Run
 from micstools.shares import wilson
+from micstools.units import Units
 
 PATTERNS = ("A", "B", "neither")
 MEANING = {
@@ -42,6 +44,12 @@ class Pile:
     numbers: PileNumbers
     blocks: list[BlockNumbers]
     top: Array  # height map (ny, nx) [m], nan where there is no block
+    ground: Array  # height of the bed or floor under it (ny, nx) [m]
+
+    @property
+    def height(self) -> Array:
+        """Height of its top above the ground (ny, nx) [m], 0 where there is no block."""
+        return np.nan_to_num(self.top - self.ground, nan=0.0)
 
     @property
     def number(self) -> int:
@@ -63,6 +71,22 @@ class Ensemble:
     piles: list[Pile]
     step: float  # of the maps [m]
     left_out: dict[int, str]  # runs without an outcome, and what they are instead
+    area: Area  # of the plan, in which blocks should lie
+
+    @property
+    def placing(self) -> Placing | None:
+        """Where the released free blocks of all runs lie."""
+        return placing([p.run for p in self.piles], self.area)
+
+    @property
+    def has_patterns(self) -> bool:
+        """Do the paper's patterns A and B mean anything here?"""
+        return has_papers_blocks(self.example.run)
+
+    @property
+    def units(self) -> Units:
+        """The units of its figures."""
+        return units.of_run(self.example.run)
 
     @property
     def whole(self) -> list[Pile]:
@@ -107,7 +131,7 @@ class Maps:
     x: Array  # (nx) middles [m]
     y: Array  # (ny)
     cover: Array  # probability that a block lies over the point
-    mean: Array  # height above the floor [m]
+    mean: Array  # height above the floor or bed [m]
     low: Array  # 10 % of the piles are lower [m]
     high: Array  # 10 % are higher [m]
 
@@ -118,10 +142,14 @@ def is_ensemble(path: Path) -> bool:
 
 
 def open_ensemble(
-    folder: Path, step: float | None = None, box: tuple[Array, Array] | None = None
+    folder: Path,
+    step: float | None = None,
+    box: tuple[Array, Array] | None = None,
+    area: Area | None = None,
 ) -> Ensemble:
     """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
-    the tank; `box` is that of the porosity, by default the one around each pile."""
+    the tank; `box` is that of the porosity, by default the one around each pile; blocks should lie
+    in the `area`, by default that of the drops."""
     about = _about(folder / "ensemble.json")
     table = about["table"]
     done = [row for row in table if row["outcome"] in OUTCOMES]
@@ -131,7 +159,7 @@ def open_ensemble(
     if step is None:
         step = pile_numbers.usual_step(Run(folder / str(done[0]["folder"]) / "result"))
     piles = [_pile(folder, row, step, box) for row in done]
-    return Ensemble(folder, about, piles, step, left)
+    return Ensemble(folder, about, piles, step, left, area or drop_area([p.run for p in piles]))
 
 
 def _about(path: Path) -> dict[str, Any]:
@@ -151,7 +179,8 @@ def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Arra
     run = Run(folder / str(row["folder"]) / "result")
     found = pile_numbers.numbers(run, step, box=box)
     top = pile_numbers.top_of(run, step)
-    return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top)
+    ground = pile_numbers.ground_map(run, run.grid.low, run.grid.high, step)
+    return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top, ground)
 
 
 def pattern(run: Run, found: PileNumbers) -> str:
@@ -193,7 +222,7 @@ def maps(ensemble: Ensemble) -> Maps:
         raise BadRun(f"{ensemble.folder} holds no pile with all its blocks")
     tops = np.array([p.top for p in whole])
     grid = whole[0].run.grid
-    height = np.nan_to_num(tops - grid.low[2], nan=0.0)
+    height = np.array([p.height for p in whole])
     low, high = np.percentile(height, [10, 90], axis=0)
     x, y = (grid.low[d] + (np.arange(tops.shape[2 - d]) + 0.5) * ensemble.step for d in (0, 1))
     return Maps(x, y, np.isfinite(tops).mean(axis=0), height.mean(axis=0), low, high)
@@ -205,9 +234,8 @@ def remarkable(ensemble: Ensemble) -> dict[int, list[str]]:
     whole = ensemble.whole
     if len(whole) < 3:
         return {}
-    mean, floor = maps(ensemble).mean, float(whole[0].run.grid.low[2])
-    height = [np.nan_to_num(p.top - floor, nan=0.0) for p in whole]
-    away = np.array([np.sqrt(((h - mean) ** 2).mean()) for h in height])
+    mean = maps(ensemble).mean
+    away = np.array([np.sqrt(((p.height - mean) ** 2).mean()) for p in whole])
     tops = np.array([p.numbers.top for p in whole])
     marks = {"most typical": away.argmin(), "least typical": away.argmax(),
              "highest": tops.argmax(), "lowest": tops.argmin()}  # fmt: skip
@@ -269,6 +297,7 @@ def summary(ensemble: Ensemble) -> dict[str, Any]:
         "complete": len(ensemble.whole),
         "left_out": {str(k): v for k, v in ensemble.left_out.items()},
         "step": ensemble.step,
+        "units": pile_numbers.si_units(flat(ensemble.example.numbers)),
         "patterns": [
             {
                 "choice": part.choices[0],
@@ -288,6 +317,7 @@ def _estimates(part: Ensemble) -> dict[str, Any]:
     piles, and which runs are remarkable."""
     return {
         "convergence": {name: list(running(part.piles, name)) for name in PATTERNS},
+        "placing": asdict(part.placing) if part.placing else None,
         "numbers": spreads(part),
         "remarkable": {str(k): v for k, v in remarkable(part).items()},
     }

@@ -19,11 +19,51 @@ def around(bodies: list[Placed], low: Array, high: Array) -> tuple[Array, Array]
     return np.maximum(points.min(axis=0), low), np.minimum(points.max(axis=0), high)
 
 
-def porosity(bodies: list[Placed], low: Array, high: Array) -> float:
-    """Share of the box between `low` and `high` (3) [m] that no block fills. Exact; where blocks
-    overlap they count twice, and a bed is not looked at."""
+def porosity(bodies: list[Placed], low: Array, high: Array, bed: float = 0.0) -> float:
+    """Share of the box between `low` and `high` (3) [m] that no block fills, of what the `bed`
+    leaves of it: the volume of bed in the box [m3]. Exact; where blocks overlap they count twice.
+    nan where the bed leaves nothing."""
     filled = sum(volume_in_box(body.tets, low, high) for body in bodies)
-    return float(1 - filled / np.prod(high - low))
+    room = float(np.prod(high - low)) - bed
+    return float(1 - filled / room) if room > 0 else float("nan")
+
+
+def layer(top: Array, ground: Array) -> tuple[float, float]:
+    """Mean and largest height [m] of the top of a pile (ny, nx) above the `ground` (ny, nx) under
+    it, where it covers that; nan without a pile."""
+    thick = (top - ground)[np.isfinite(top)]
+    return (float(thick.mean()), float(thick.max())) if thick.size else (np.nan, np.nan)
+
+
+def footprint(top: Array, step: float) -> float:
+    """Area [m2] of the smallest convex plan that holds all that a pile covers, from its height map
+    (ny, nx) of squares of `step` [m]."""
+    y, x = np.nonzero(np.isfinite(top))
+    if not x.size:
+        return 0.0
+    corners = np.concatenate([np.stack([x + i, y + j], axis=1) for i in (0, 1) for j in (0, 1)])
+    hull = _hull(np.unique(corners, axis=0))
+    (a, b), (c, d) = hull.T, np.roll(hull, -1, axis=0).T
+    return 0.5 * abs(float((a * d - b * c).sum())) * step**2
+
+
+def _hull(points: Array) -> Array:
+    """Corners (k, 2) of the convex hull of points (n, 2) that are sorted by their first, then their
+    second coordinate: A. M. Andrew (1979), two chains."""
+    chains = []
+    for ordered in (points, points[::-1]):
+        chain: list[Array] = []
+        for p in ordered:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0:
+                chain.pop()
+            chain.append(p)
+        chains += chain[:-1]
+    return np.array(chains, float)
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    """Twice the area of a triangle (2) each, positive where it turns left."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def outline(top: Array, low: Array, step: float) -> list[Array]:

@@ -1,15 +1,16 @@
 """Numbers of a pile, of the true shapes at one row of a run: lengths in m, speeds in m/s."""
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from micstools import block_numbers, pile_form
+from micstools import block_numbers, pile_form, rest
 from micstools.geometry import Array
 from micstools.overlap import Placed, images, present_bodies, touches
-from micstools.pile import REACH
 from micstools.reader import BadRun, Run
+from micstools.units import SI, Unit, Units, ascii_of
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,37 @@ class PileNumbers:
     contact_force: float  # largest on a dropped block, a mean over a step [N]
     slopes: tuple[float, float, float, float]  # of the sides towards -x, +x, -y, +y [degrees]
     attitude_randomness: float  # of the free blocks of the commonest shape; 0 alike, 1 random
-    porosity: float  # of the box; nan where a bed may fill part of it
+    porosity: float  # of the box, above the bed
     box: tuple[float, ...]  # its low and its high corner [m]
+    height: float  # largest, of the top above the floor or the bed under it [m]
+    layer_thickness: float  # mean of the same over the plan area [m], upright
+    layer_porosity: float  # of the layer: plan area times thickness
+    footprint: float  # the smallest convex plan that holds the pile [m2]
+
+
+KINDS = {
+    "plan_area": "area", "top": "length", "centre": "length", "spread": "length",
+    "time_to_rest": "time", "impact_speed": "speed", "contact_force": "force", "slopes": "angle",
+    "box": "length", "height": "length", "layer_thickness": "length", "footprint": "area",
+}  # fmt: skip
+"""What the numbers that have a unit are, as `Units` names it."""
+
+
+def unit(units: Units, name: str) -> Unit:
+    """The unit of a number by its name, as `top`, or of a part of it, as `box_x_min`."""
+    kind = KINDS.get(name) or KINDS.get(name.split("_")[0], "number")
+    return units.of_kind(kind)
+
+
+def si_units(names: Iterable[str]) -> dict[str, str]:
+    """The SI unit of each number that has one, as files hold it."""
+    found = {name: ascii_of(unit(SI, name).name) for name in names}
+    return {name: text for name, text in found.items() if text}
+
+
+def words(units: Units, name: str, values: Iterable[float]) -> str:
+    """A number by its name, or its parts, with its unit, in ASCII."""
+    return ascii_of(unit(units, name).row(values, digits=5))
 
 
 def numbers(
@@ -41,7 +71,7 @@ def numbers(
     if not b.n:
         raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
     row = row % len(b.time)
-    bodies, seen = present_bodies(run, row), touches(run, row, REACH)
+    bodies, seen = present_bodies(run, row), touches(run, row)
     if not bodies:
         raise BadRun(f"{run.folder}: no block is let go at t = {b.time[row]:g} s: there is no pile")
     blocks = images(run, bodies.values())
@@ -50,23 +80,33 @@ def numbers(
     mass, place = b.mass[here], np.array([body.position for body in bodies.values()])
     x, y, z = (float(v) for v in (mass[:, None] * place).sum(axis=0) / mass.sum())
     low, high = box or pile_form.around(blocks, run.grid.low, run.grid.high)
-    known = box is not None or not len(run.bed[1])
+    ground = ground_map(run, run.grid.low, run.grid.high, step)
+    thickness, height = pile_form.layer(top, ground)
+    highest = max(float(body.points[:, 2].max()) for body in blocks)
+    if not len(run.bed[1]):
+        height = highest - float(run.grid.low[2])  # exact
+    area = float(np.isfinite(top).sum() * step**2)
+    volume = sum(body.shape.volume for body in bodies.values())
     forces = [k.contact_force for k in block_numbers.of_blocks(run)]
     return PileNumbers(
         blocks=len(bodies),
         on_floor=sum(seen.on_floor(int(k)) for k in b.dropped),
-        plan_area=float(np.isfinite(top).sum() * step**2),
-        top=max(float(body.points[:, 2].max()) for body in blocks),
+        plan_area=area,
+        top=highest,
         coordination=2 * len(seen.blocks) / len(bodies),
         centre=(x, y, z),
         spread=(float(place[:, 0].std()), float(place[:, 1].std())),
-        time_to_rest=time_to_rest(run, block_numbers.REST_SPEED),
+        time_to_rest=time_to_rest(run),
         impact_speed=impact_speed(run),
         contact_force=max(forces, default=float("nan")),
         slopes=pile_form.slopes(top, float(run.grid.low[2]), step),
         attitude_randomness=_randomness(run, row),
-        porosity=pile_form.porosity(blocks, low, high) if known else float("nan"),
+        porosity=pile_form.porosity(blocks, low, high, bed_volume(run, low, high, step)),
         box=tuple(float(v) for v in (*low, *high)),
+        height=height,
+        layer_thickness=thickness,
+        layer_porosity=1 - volume / (area * thickness) if area * thickness > 0 else float("nan"),
+        footprint=pile_form.footprint(top, step),
     )
 
 
@@ -97,12 +137,40 @@ def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Ar
     n = np.maximum(1, np.round((high[:2] - low[:2]) / step).astype(int))
     top = np.full((n[1], n[0]), -np.inf)
     for body in bodies:
-        for triangle in body.triangles:
-            patch = under(triangle, low, step, top.shape)
-            if patch is not None:
-                rows, columns, heights = patch
-                np.maximum(top[rows, columns], heights, out=top[rows, columns])
+        _raise(top, body.triangles, low, step)
     return np.where(np.isfinite(top), top, np.nan)
+
+
+def _raise(top: Array, triangles: Array, low: Array, step: float) -> None:
+    """Raise a map (ny, nx) to triangles (m, 3, 3) where these are higher."""
+    high = low[:2] + step * np.array(top.shape[::-1])
+    over = (triangles[..., :2].max(axis=1) >= low[:2]) & (triangles[..., :2].min(axis=1) <= high)
+    for triangle in triangles[over.all(axis=1)]:
+        patch = under(triangle, low, step, top.shape)
+        if patch is not None:
+            rows, columns, heights = patch
+            np.maximum(top[rows, columns], heights, out=top[rows, columns])
+
+
+def ground_map(run: Run, low: Array, high: Array, step: float) -> Array:
+    """Height (ny, nx) [m] of the bed above the middle of each square of `step` [m] between the
+    corners, of the floor of the tank where there is none."""
+    n = np.maximum(1, np.round((high[:2] - low[:2]) / step).astype(int))
+    ground = np.full((n[1], n[0]), float(run.grid.low[2]))
+    points, triangles = run.bed
+    if len(triangles):
+        _raise(ground, points[triangles], low, step)
+    return ground
+
+
+def bed_volume(run: Run, low: Array, high: Array, step: float) -> float:
+    """Volume [m3] of the bed in a box, from its heights on squares of about `step` [m]."""
+    if not len(run.bed[1]):
+        return 0.0
+    step = min(step, float((high - low)[:2].min()))
+    ground = ground_map(run, low, high, step)
+    inside = np.clip(ground, low[2], high[2]) - low[2]
+    return float(inside.mean() * np.prod((high - low)[:2]))
 
 
 def under(
@@ -128,14 +196,16 @@ def under(
     return slice(first[1], last[1] + 1), slice(first[0], last[0] + 1), heights
 
 
-def time_to_rest(run: Run, rest_speed: float) -> float:
-    """Time [s] after which no released block is faster than `rest_speed` [m/s]."""
+def time_to_rest(run: Run) -> float:
+    """Time [s] after which every free block stays; nan where one moves or is still to come."""
     b = run.bodies
-    fast = (np.linalg.norm(b.velocity[:, ~b.fixed], axis=2) >= rest_speed).any(axis=1)
-    if fast[-1] or not b.present(-1).all():
+    if not b.present(-1).all():
         return float("nan")
-    moving = np.flatnonzero(fast)
-    return float(b.time[moving[-1] + 1]) if moving.size else float(b.time[0])
+    return max((found.time for found in rest.of_blocks(run)), key=_nan_last, default=0.0)
+
+
+def _nan_last(value: float) -> float:
+    return np.inf if value != value else value
 
 
 def impact_speed(run: Run) -> float:

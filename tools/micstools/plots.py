@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from micstools import kicks
+from micstools import health, kicks, scales, units
 from micstools.balance import EXCESS_LIMIT
 from micstools.geometry import Array
 from micstools.reader import Run
@@ -108,7 +108,9 @@ def _legend_above(axis: Axes) -> None:
 
 
 def _heights(axis: Axes, run: Run) -> None:
-    _each_block(axis, run, 1e3 * run.bodies.position[..., 2], "height of the centroid [mm]")
+    length = units.of_run(run).length
+    height = length.of(run.bodies.position[..., 2])
+    _each_block(axis, run, height, f"height of the centroid, z [{length.name}]")
 
 
 def _speeds(axis: Axes, run: Run) -> None:
@@ -116,13 +118,16 @@ def _speeds(axis: Axes, run: Run) -> None:
 
 
 def _fluid_force(axis: Axes, run: Run) -> None:
-    _each_block(axis, run, run.bodies.fluid_force[..., 2], "vertical force of the fluid [N]")
+    unit = units.of_run(run).force
+    force = unit.of(run.bodies.fluid_force[..., 2])
+    _each_block(axis, run, force, f"vertical force of the fluid [{unit.name}]")
 
 
 def _contact_force(axis: Axes, run: Run) -> None:
-    force = np.linalg.norm(run.bodies.contact_force, axis=2)
-    _each_block(axis, run, force, "contact force [N]")
-    axis.set_yscale("symlog", linthresh=1.0)
+    unit = units.of_run(run).force
+    force = unit.of(np.linalg.norm(run.bodies.contact_force, axis=2))
+    _each_block(axis, run, force, f"contact force [{unit.name}]")
+    axis.set_yscale("symlog", linthresh=unit.of(scales.weight(run)) or 1.0)
     axis.set_ylim(bottom=0)
 
 
@@ -134,8 +139,9 @@ def _untouched(axis: Axes, run: Run) -> None:
 
 
 def _overlap(axis: Axes, run: Run) -> None:
-    axis.plot(run.series.time, 1e3 * run.series.max_overlap, color="#2e4057", lw=0.8)
-    axis.set_title("largest overlap [mm]", loc="left")
+    share = 100 * run.series.max_overlap / scales.smallest(run)
+    axis.plot(run.series.time, share, color="#2e4057", lw=0.8)
+    axis.set_title("largest overlap [% of the smallest block's length]", loc="left")
 
 
 def _liquid(axis: Axes, run: Run) -> None:
@@ -151,22 +157,21 @@ def _excess(axis: Axes, run: Run) -> None:
 
 def _divergence(axis: Axes, run: Run) -> None:
     axis.semilogy(run.series.time, _positive(run.series.divergence_max), color="#00798c", lw=0.8)
-    tolerance = float(run.value("numerics", "divergence_tolerance", 1e-6))
-    axis.axhline(tolerance, color="#d1495b", lw=0.8, ls="--")
+    axis.axhline(health.divergence_limit(run), color="#d1495b", lw=0.8, ls="--")
     axis.set_title("largest divergence [1/s], tolerance dashed", loc="left")
 
 
 def _energies(axis: Axes, run: Run) -> None:
-    s = run.series
+    s, unit = run.series, units.of_run(run).energy
     for values, label, colour, dashes in (
         (s.kinetic_energy_bodies, "kinetic, blocks", "#d1495b", "-"),
         (s.kinetic_energy_fluid, "kinetic, fluid", "#00798c", "--"),
         (s.contact_energy, "contact", "#edae49", ":"),
     ):
         if np.isfinite(values).any() and np.nanmax(np.abs(values)) > 0:
-            axis.plot(s.time, 1e3 * values, color=colour, ls=dashes, lw=1, label=label)
+            axis.plot(s.time, unit.of(values), color=colour, ls=dashes, lw=1, label=label)
     _legend_above(axis)
-    axis.set_title("energy [mJ]", loc="left")
+    axis.set_title(f"energy [{unit.name}]", loc="left")
 
 
 def _steps(axis: Axes, run: Run) -> None:

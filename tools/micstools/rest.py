@@ -20,7 +20,9 @@ class Rest:
 
     block: int  # number, from 1
     time: float  # after which it stays where it ends [s]; nan: it still moves
-    moved: float  # largest distance of its place in the `span` before the end from that of the end [m]
+    moved: (
+        float  # largest distance of its place in the `span` before the end from that of the end [m]
+    )
     span: float  # for so long a block must stay to be at rest [s]
     limit: float  # of `moved` [m]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from micstools import extras, labels
+from micstools import extras, labels, units
 from micstools.geometry import Array, IntArray
 from micstools.overlap import present_bodies
 from micstools.reader import Fields, Run
@@ -174,7 +174,7 @@ def _keys(run: Run, speed: float, pixels: float, view: str) -> list[labels.Key]:
         length = told / speed * ARROW * float(size[2])
         keys.append(labels.Key("arrow", round(pixels * length), f"{told:g} m/s"))
     length = labels.round_below(0.25 * float(size[1 if view == "side" else 0]))
-    text = f"{length:g} m" if length >= 1 else f"{1e3 * length:g} mm"
+    text = units.of_run(run).length.plain(length)
     return [*keys, labels.Key("bar", round(pixels * length), text)]
 
 

@@ -1,6 +1,7 @@
 """Units of the figures that people read: one set for a run, by the size of its blocks.
 
-Result files, JSON, CSV and Python values stay in SI units; only text, charts and pictures use these.
+Result files, JSON, CSV and Python values stay in SI units; only text, charts and pictures use
+these.
 """
 
 from collections.abc import Iterable
@@ -10,6 +11,9 @@ from typing import Any
 import numpy as np
 
 from micstools.reader import Run
+
+_TOGETHER = "\u00a0"  # between a figure and its unit: they stay on one line
+_PLAIN = {_TOGETHER: " ", "²": "2", "³": "3", "°": "deg", "–": "-", "±": "+-"}
 
 
 def figure(value: float, digits: int = 3) -> str:
@@ -52,12 +56,14 @@ class Unit:
         return ascii_of(self.text(value, digits))
 
     def _with_name(self, text: str) -> str:
-        return text if text == "–" else f"{text} {self.name}".rstrip()
+        return text if text == "–" else f"{text}{_TOGETHER}{self.name}".rstrip()  # of nan
 
 
 def ascii_of(text: str) -> str:
-    """Text with powers and dashes in ASCII."""
-    return text.translate(str.maketrans({"²": "2", "³": "3", "°": "deg", "–": "-"}))
+    """Text in ASCII: powers, dashes and the blanks before units."""
+    for sign, plain in _PLAIN.items():
+        text = text.replace(sign, plain)
+    return text
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,7 @@ _METRES = Unit("m"), Unit("m²"), Unit("m³")
 LABORATORY = Units(
     Unit("mm", 1e-3), Unit("cm²", 1e-4), Unit("cm³", 1e-6), Unit("kg"), Unit("N"), Unit("mJ", 1e-3)
 )
-BETWEEN = Units(*_METRES, Unit("kg"), Unit("N"), Unit("J"))
+SI = Units(*_METRES, Unit("kg"), Unit("N"), Unit("J"))
 SITE = Units(*_METRES, Unit("t", 1e3), Unit("kN", 1e3), Unit("kJ", 1e3))
 _SMALL, _LARGE = 0.2, 0.5  # [m] lengths of blocks that part the three
 _TANK = 0.1  # of the longest side of the tank stands for the length of a block where there is none
@@ -95,7 +101,7 @@ def of_size(length: float) -> Units:
     """The units for blocks of a length [m]."""
     if length < _SMALL:
         return LABORATORY
-    return BETWEEN if length < _LARGE else SITE
+    return SI if length < _LARGE else SITE
 
 
 def of_run(run: Run) -> Units:

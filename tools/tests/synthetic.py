@@ -18,12 +18,13 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 CASE = """\
 &run title = 'synthetic' t_end = {t_end} /
-&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = 0.3, 0.1, 0.2 /
+&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = {tank} /
 &fluid water_level = {level} /
-&shape name = 'hexapod' kind = 'hexapod' size = 0.02 /
+&shape name = 'hexapod' kind = 'hexapod' size = {size} /
 """
-BODY = "&body shape = 'hexapod' position = {0}, {1}, {2} fixed = .true. /\n"
-DROP = "&drop shape = 'hexapod' position = 0.15, 0.05, 0.16 first_time = {0} /\n"
+BODY = "&body shape = 'hexapod' position = {0} fixed = .true. /\n"
+DROP = "&drop shape = 'hexapod' position = {0} first_time = {1} /\n"
+TANK = np.array([0.3, 0.1, 0.2])
 
 
 def resting_places() -> list[tuple[Array, Array]]:
@@ -58,6 +59,7 @@ class Motion:
     wave: float = 0.004  # [m]
     turn_in_fall: float = 0.0  # degrees before the first touch
     more: str = ""  # groups of the case
+    scale: float = 1.0  # of all lengths; times, speeds, forces and energies follow (Froude)
 
 
 def write_run(folder: Path, motion: Motion | None = None) -> Path:
@@ -69,13 +71,41 @@ def write_run(folder: Path, motion: Motion | None = None) -> Path:
     with h5py.File(folder / "run.h5", "w") as h5:
         h5.attrs["format"], h5.attrs["format_version"] = "mics-run", 1
         _write_provenance(h5, motion)
-        for axis, n, length in zip("xyz", motion.cells, (0.3, 0.1, 0.2), strict=True):
+        for axis, n, length in zip("xyz", motion.cells, TANK, strict=True):
             h5[f"grid/{axis}"] = np.linspace(0, length, n + 1)
         _write_shape(h5.create_group(f"shapes/{motion.shape.name}"), motion.shape)
         _write_bodies(h5.create_group("bodies"), motion, time, position, quaternion, touching)
         _write_series(h5.create_group("series"), time, len(motion.places))
     _write_fields(folder / "fields.vtkhdf", motion, time, position, quaternion)
+    if motion.scale != 1.0:
+        _enlarge(folder, motion.scale)
     return folder
+
+
+_POWERS = {
+    "x": 1, "y": 1, "z": 1, "points": 1, "sphere_centre": 1, "sphere_radius": 1, "time": 0.5,
+    "release_time": 0.5, "dt": 0.5, "position": 1, "velocity": 0.5, "angular_velocity": -0.5,
+    "mass": 3, "fluid_force": 3, "contact_force": 3, "fluid_torque": 4, "contact_torque": 4,
+    "max_overlap": 1, "liquid_volume": 3, "divergence_max": -0.5, "Values": 0.5, "pressure": 1,
+}  # fmt: skip
+"""By which power of the scale a dataset grows."""
+
+
+def _enlarge(folder: Path, scale: float) -> None:
+    """All lengths times a scale, at the same gravity and densities."""
+
+    def grow(path: str, data: h5py.Group | h5py.Dataset) -> None:
+        name = path.split("/")[-1]
+        power = 4 if "energy" in name and name != "energy_excess" else _POWERS.get(name, 0)
+        if isinstance(data, h5py.Dataset) and power and "Offsets" not in path:
+            data[...] = data[...] * scale**power
+        if "volume" in data.attrs:
+            data.attrs["volume"] = data.attrs["volume"] * scale**3
+            data.attrs["inertia"] = data.attrs["inertia"] * scale**5
+
+    for name in ("run.h5", "fields.vtkhdf"):
+        with h5py.File(folder / name, "r+") as h5:
+            h5.visititems(grow)
 
 
 def _paths(motion: Motion, time: Array) -> tuple[Array, Array, Array]:
@@ -99,11 +129,26 @@ def _paths(motion: Motion, time: Array) -> tuple[Array, Array, Array]:
 
 
 def _write_provenance(h5: h5py.File, motion: Motion) -> None:
-    case = CASE.format(cells=motion.cells, level=motion.level, t_end=motion.t_end)
-    case += "".join(BODY.format(x, 0.05, 0.0288675) for x in (0.09, 0.15, 0.21))
-    case += "".join(DROP.format(k) for k in range(len(motion.places))) + motion.more
+    scale = motion.scale
+
+    def row(*values: float) -> str:
+        return ", ".join(f"{scale * v:.10g}" for v in values)
+
+    case = CASE.format(cells=motion.cells, level=scale * motion.level, tank=row(*TANK),
+                       size=0.02 * scale, t_end=motion.t_end * scale**0.5)  # fmt: skip
+    case += "".join(BODY.format(row(x, 0.05, 0.0288675)) for x in (0.09, 0.15, 0.21))
+    start = row(0.15, 0.05, 0.16)
+    case += "".join(DROP.format(start, k * scale**0.5) for k in range(len(motion.places)))
+    case += motion.more
     h5.create_group("provenance").attrs.update(
-        {"namelist": case, "parameters": case, "version": "0.1.0", "threads": 1, "ranks": 1}
+        {
+            "namelist": case,
+            "parameters": case,
+            "version": "0.1.0",
+            "threads": 1,
+            "ranks": 1,
+            "exit_status": 0,
+        }
     )
 
 
@@ -208,8 +253,7 @@ def _write_fields(
 def _fluid(motion: Motion, t: float, position: Array, quaternion: Array) -> dict[str, Array]:
     """Fields of a standing wave at time `t`, solid shares by the cubes of the hexapods."""
     centre = [
-        (np.arange(n) + 0.5) * length / n
-        for n, length in zip(motion.cells, (0.3, 0.1, 0.2), strict=True)
+        (np.arange(n) + 0.5) * length / n for n, length in zip(motion.cells, TANK, strict=True)
     ]
     z, y, x = np.meshgrid(centre[2], centre[1], centre[0], indexing="ij")
     step = centre[2][1] - centre[2][0]

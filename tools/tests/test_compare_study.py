@@ -60,6 +60,9 @@ def test_what_two_cases_differ_in(pair: tuple[Run, Run], capsys) -> None:
     assert comparison.same_bits(pair[0], pair[0]) and not comparison.same_bits(*pair)
     code, out, _ = call(capsys, "compare", *(str(run.folder) for run in pair))
     assert code == 0 and "contact.friction" in out and "bit by bit" not in out
+    top = next(line for line in out.splitlines() if line.strip().startswith("top "))
+    assert top.count(" mm") == 2 and "apart [mm]" in out and "cm2" in out
+    assert out.splitlines()[-1].split()[2] == "3"  # mm
     code, out, _ = call(capsys, "compare", str(pair[0].folder), str(pair[0].folder))
     assert "bit by bit" in out and "no difference" in out and "never" in out
 
@@ -157,6 +160,7 @@ def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
     words = study_with(tmp_path)
     code, out, _ = call(capfd, *words, "--cells", "1,1.5,2")
     assert code == 0 and out.count("\nran ") == 3
+    assert " mm  order 2.00, limit 110, error 1 mm" in out
     rows = {row["number"]: row for row in json.loads((tmp_path / "out/study.json").read_text())}
     assert rows["top"]["order"] == pytest.approx(2.0, abs=1e-6)
     assert rows["top"]["limit"] == pytest.approx(0.08 + 0.03)

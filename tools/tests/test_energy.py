@@ -9,6 +9,7 @@ import pytest
 from micstools.energy import largest_made, made_by_contact
 
 MASS, SPIN, G, STEP = 2.0, 0.3, 9.81, 0.1
+LIMIT = np.ones(8)  # [J]
 KICKED = 4  # the row of the step in which contact acts
 
 
@@ -46,7 +47,7 @@ def thrown(push: float = 0.0, twist: float = 0.0, **values: Any) -> Any:
 def test_a_block_that_is_let_go_with_a_speed_gets_nothing_from_contact() -> None:
     """Whatever the step: weight, water and the speed of the drop are no contact."""
     assert made_by_contact(thrown()) == pytest.approx(np.zeros(8), abs=1e-12)
-    assert largest_made(thrown()).energy == 0.0
+    assert largest_made(thrown(), LIMIT).energy == 0.0
 
 
 def test_a_throw_is_found_in_its_row() -> None:
@@ -56,7 +57,7 @@ def test_a_throw_is_found_in_its_row() -> None:
     made = made_by_contact(run)
     assert made[KICKED] == pytest.approx(gain)
     assert np.delete(made, KICKED) == pytest.approx(np.zeros(7), abs=1e-12)
-    found = largest_made(run)
+    found = largest_made(run, LIMIT)
     assert (found.energy, found.block) == (pytest.approx(gain), 2)
     assert found.time == pytest.approx(KICKED * STEP)
 
@@ -75,16 +76,26 @@ def test_energy_in_springs_is_no_gain() -> None:
     assert (made_by_contact(run) <= 0.0).all()
 
 
+def test_the_step_that_is_most_over_its_limit_counts() -> None:
+    """Energy that appears in springs is of no block."""
+    run = thrown(push=5.0)
+    run.series.contact_energy[6:] = 0.5
+    limit = np.where(np.arange(8) == KICKED, 1e6, 1.0)
+    found = largest_made(run, limit)
+    assert (found.energy, found.limit, found.block) == (pytest.approx(0.5), 1.0, 0)
+    assert found.time == pytest.approx(6 * STEP)
+
+
 def test_rows_of_several_steps_are_not_known() -> None:
     run = thrown(push=5.0)
     run.series.dt[:] = STEP / 2
     made = made_by_contact(run)
     assert np.isnan(made[1:]).all()
-    found = largest_made(run)
+    found = largest_made(run, LIMIT)
     assert np.isnan(found.energy) and "history_interval = 0" in found.reason
 
 
 def test_a_moving_wall_gives_energy() -> None:
-    found = largest_made(thrown(push=5.0, x_min_velocity=[0.0, 1.0, 0.0]))
+    found = largest_made(thrown(push=5.0, x_min_velocity=[0.0, 1.0, 0.0]), LIMIT)
     assert np.isnan(found.energy) and "wall moves" in found.reason
-    assert largest_made(thrown(z_max_velocity=[1.0, 0.0, 0.0])).energy == 0.0  # no wall
+    assert largest_made(thrown(z_max_velocity=[1.0, 0.0, 0.0]), LIMIT).energy == 0.0  # no wall

@@ -13,18 +13,23 @@ import pytest
 from browser import MISSING, Browser
 from micstools import cli, pile_ensemble
 from micstools.page import charts, ensemble_page
-from test_pile_ensemble import ENDS, WAITING, write_ensemble
+from test_pile_ensemble import ENDS, HALF, HEXAPOD, WAITING, write_ensemble
 
 in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = write_ensemble(tmp_path_factory.mktemp("page") / "piles", ENDS * 2)
+    folder = write_ensemble(tmp_path_factory.mktemp("page") / "piles", ENDS * 2, paper=True)
     with pytest.raises(SystemExit) as end:
         cli.main(["report", str(folder)])
     assert end.value.code == 0
     return folder / "report.html"
+
+
+def on_hexapods(end: tuple[float, float, float]) -> list[float]:
+    """Where a hexapod ends in the place of a cube."""
+    return [end[0], end[1], end[2] + HEXAPOD - HALF]
 
 
 def test_the_sentence_has_shares_and_heights(report: Path) -> None:
@@ -32,7 +37,9 @@ def test_the_sentence_has_shares_and_heights(report: Path) -> None:
     said = ensemble_page.sentence(found)
     assert "17\u00a0%" in said  # numbers and units stay on one line
     said = said.replace("\u00a0", " ")
-    assert said.startswith("In 2 of 12 (17 %, 5 to 45) runs every dropped block ends off the floor")
+    assert said.startswith("12 blocks lie around x = 223, y = 50 mm, with a standard deviation")
+    assert "% of them (" in said and "lie outside the area of the drops, x = 120 to 180" in said
+    assert "In 2 of 12 (17 %, 5 to 45) runs every dropped block ends off the floor" in said
     assert "in 6 of 12 (50 %, 25 to 75) at least one more" in said
     assert "Half of the 10 complete piles are higher than" in said
     assumed = ensemble_page.assumptions(found)
@@ -46,7 +53,7 @@ def test_the_page_holds_every_pile(report: Path) -> None:
     piles = json.loads(found[1])
     assert list(piles["runs"]) == [str(k) for k in range(1, 13)]
     place = np.frombuffer(base64.b64decode(piles["runs"]["1"]["scene"]["place"]), "<f4")
-    assert place.reshape(-1, 3)[3] == pytest.approx(ENDS[0])
+    assert place.reshape(-1, 3)[3] == pytest.approx(on_hexapods(ENDS[0]))
     assert text.count("data-pile=") == 12
     for mark in ("most typical", "least typical", "highest", "lowest"):
         assert f"<b>{mark}</b>" in text
@@ -68,15 +75,25 @@ def test_health_is_the_worst_of_all_runs(tmp_path: Path) -> None:
     found.piles[1].run.__dict__["series"] = deep
     bad = ensemble_page.page(found).split('id="health"')[1].split("</section>")[0]
     assert bad.count("! look") == good.count("! look") + 1
-    assert "<td>500</td>" in bad and "run 2" in bad
+    assert "500\u00a0mm" in bad and "contact_time" in bad and "run 2" in bad
 
 
 def test_an_ensemble_without_a_complete_pile_tells_so(tmp_path: Path) -> None:
     found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, [WAITING] * 2), 0.002)
     text = ensemble_page.page(found).replace("\u00a0", " ")
-    assert "in 2 of 2 (100 %, 34 to 100) a block finds no room" in text
+    assert "In 2 of 2 (100 %, 34 to 100) runs not all blocks found room." in text
     assert "No pile has all its blocks, so there is no mean pile." in text
     assert text.count("data-pile=") == 2 and 'id="plan"' not in text
+
+
+def test_no_pattern_where_the_papers_blocks_are_not(tmp_path: Path) -> None:
+    folder = write_ensemble(tmp_path)
+    found = pile_ensemble.open_ensemble(folder, 0.002)
+    text = ensemble_page.page(found)
+    shown = text.split("<main>")[1].split('id="case"')[0]
+    assert "pattern" not in shown and "Were the runs enough" in shown
+    assert "All blocks let go, five runs" in shown and "Blocks without room, one run" in shown
+    assert shown.index("Where blocks will lie") < shown.index("How much piles differ")
 
 
 def test_an_ensemble_without_a_title_bears_the_name_of_its_folder(tmp_path: Path) -> None:
@@ -88,7 +105,7 @@ def test_an_ensemble_without_a_title_bears_the_name_of_its_folder(tmp_path: Path
 def test_one_pile_is_an_ensemble(tmp_path: Path) -> None:
     found = pile_ensemble.open_ensemble(write_ensemble(tmp_path, ENDS[:1]), 0.002)
     text = ensemble_page.page(found).replace("\u00a0", " ")
-    assert "In 0 of 1 (0 %, 0 to 79) runs" in text
+    assert "One block lies at x = 40, y = 50 mm. 100 % of them" in text
     assert re.search(r"The one complete pile is [0-9.]+ mm high", text)
 
 
@@ -142,7 +159,7 @@ def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
         assert browser.run("dialog.open")
         assert f"Run {number}:" in browser.run("dialog.querySelector('h3').textContent")
         place = browser.run("pilePlayer.stage.pose(3).place")
-        assert place == pytest.approx(ENDS[number - 1], abs=1e-6)
+        assert place == pytest.approx(on_hexapods(ENDS[number - 1]), abs=1e-6)
         browser.run("dialog.querySelector('.close').click()")
         assert not browser.run("dialog.open")
     browser.run("document.querySelector('[data-pile]').click()")

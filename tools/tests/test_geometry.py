@@ -20,6 +20,16 @@ def test_product_is_composition_of_rotations() -> None:
     assert np.allclose(both, g.rotation_matrix(TILTED) @ g.rotation_matrix(other), atol=1e-15)
 
 
+@pytest.mark.parametrize("angle", [1e-6, 3.0, -100.0])
+def test_turns_are_vectors_along_their_axes(angle: float) -> None:
+    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
+    turned = g.quaternion_product(g.quaternion_from_axis(axis, angle), TILTED)
+    for sign in (1, -1):  # both are the same attitude
+        found = g.turns(np.array([TILTED, sign * turned, sign * turned]))
+        assert found[0] == pytest.approx(np.radians(angle) * axis, rel=1e-9)
+        assert found[1] == pytest.approx(np.zeros(3), abs=1e-15)
+
+
 @pytest.mark.parametrize("angle", [1e-6, 0.01, 5.0, 120.0, 180.0])
 def test_attitude_change_is_the_angle_turned(angle: float) -> None:
     turned = g.quaternion_product(g.quaternion_from_axis(np.array([1.0, 2, 3]), angle), TILTED)

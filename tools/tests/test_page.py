@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from browser import MISSING, Browser
-from micstools import block_numbers, cli, shapes
+from micstools import block_numbers, cli, pile_numbers, shapes
 from micstools.overlap import Placed
 from micstools.page import charts, html, motion, run_page, run_words, views
 from micstools.page.charts import Curve
@@ -22,6 +22,7 @@ from micstools.reader import Run
 from synthetic import UPRIGHT, Motion, write_run
 
 TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"
+CLEAR = np.array([0.2, 0.05, 0.12])  # of the other blocks [m]
 in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 
 
@@ -99,10 +100,40 @@ def test_energy_that_a_run_made_is_to_be_looked_at(make_run) -> None:
     run.__dict__["series"] = replace(run.series, energy_excess=made)
     bad = run_page.page(run).split('id="health"')[1].split("</section>")[0]
     assert bad.count("! look") == good.count("! look") + 1
-    assert f"3 %, t = {run.series.time[-1]:.3g} s" in bad and "smaller dt" in bad
+    assert f"3 %, t = {run.series.time[-1]:.3g} s" in bad and "a smaller &amp;run dt" in bad
     run.__dict__["series"] = replace(run.series, energy_excess=np.full_like(made, np.nan))
     unknown = run_page.page(run).split('id="health"')[1].split("</section>")[0]
     assert "not known" in unknown and unknown.count("! look") == good.count("! look")
+
+
+def words_of(page: str) -> str:
+    """What stands on a page, but for pictures and data, down to the settings of the case."""
+    return re.sub(r"data:[^\"]*", "", page).split("<main>")[1].split('id="settings"')[0]
+
+
+def test_units_go_with_the_blocks(make_run) -> None:
+    """Blocks of 2 m: m, m2, m3, kN, t and kJ everywhere, and figures without exponents; of 60 mm:
+    mm, N, kg."""
+    motion = Motion(t_end=2.0, field_step=2.0, cells=(12, 4, 8), places=[(CLEAR, UPRIGHT)])
+    small = words_of(run_page.page(make_run(motion)))
+    large = words_of(run_page.page(make_run(replace(motion, scale=100 / 3))))
+    for text, there, never in (
+        (small, ("mm", "cm²", "cm³", "N", "kg", "mJ", "m/s"), ("m", "m²", "m³", "kN", "t", "kJ")),
+        (large, ("m", "m²", "m³", "kN", "t", "kJ", "m/s"), ("mm", "cm²", "cm³", "N", "kg", "mJ")),
+    ):
+        found = set(re.findall(r"(?:\[|[\d–]\u00a0)([^\d\W][²³\w/]*)", text))
+        assert found >= set(there), set(there) - found
+        assert not found & set(never), found & set(never)
+    tiles = large.split('class="facts"')[1].split("</dl>")[0]
+    assert "e+" not in tiles and "\u00a0kN" in tiles
+
+
+def test_plan_is_covered_within_the_footprint(make_run) -> None:
+    run = make_run(Motion(t_end=2.0, field_step=2.0, cells=(12, 4, 8), places=[(CLEAR, UPRIGHT)]))
+    n = pile_numbers.numbers(run, pile_numbers.usual_step(run))
+    tile = run_page.page(run).split("plan covered")[1].split("</div>")[0].replace("\u00a0", " ")
+    share = f"{100 * n.plan_area / n.footprint:.0f} % of a footprint of"
+    assert share in tile and f"{1e4 * n.footprint:.3g} cm²" in tile
 
 
 def test_make_run_makes_the_page() -> None:
@@ -236,7 +267,7 @@ def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
         about["parameters"] = str(about["parameters"]).replace("&run", "&run physics = 'dry'")
     text = run_page.page(Run(run.folder))
     assert (
-        "and dry" in text
+        "and is dry" in text
         and '"water":null' in text
         and not re.search(r"\bnan", text.lower().split("<style")[1].split("</style>")[1])
     )
@@ -260,6 +291,26 @@ def wait_for(browser: Browser, condition: str) -> None:
 def settled(browser: Browser) -> None:
     """Until what was asked for is drawn."""
     browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+OUT_OF_TILES = """[...document.querySelectorAll('.facts div')].filter(tile => {
+  const edge = tile.getBoundingClientRect();
+  return [...tile.querySelectorAll('*')].some(text => {
+    const range = document.createRange();
+    range.selectNodeContents(text);
+    const box = range.getBoundingClientRect();
+    return box.right > edge.right + 0.5 || box.bottom > edge.bottom + 0.5;
+  });
+}).map(tile => tile.textContent)"""
+"""Tiles whose text is wider or higher than they are."""
+
+
+@in_browser
+@pytest.mark.parametrize("width", [360, 700, 1100])
+def test_no_text_leaves_its_tile(browser: Browser, report: Path, width: int) -> None:
+    browser.open(report, width)
+    assert browser.run("document.querySelectorAll('.facts div').length") == 8
+    assert browser.run(OUT_OF_TILES) == []
 
 
 @in_browser
@@ -335,6 +386,7 @@ def test_keys_and_mouse_turn_and_zoom(browser: Browser, report: Path) -> None:
 def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
     browser.open(report, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
+    assert browser.run(OUT_OF_TILES) == []
     light = browser.run("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert light is not dark
     assert browser.errors == []

@@ -149,7 +149,7 @@ def test_missing_libraries_end_the_program_with_the_command(monkeypatch, capsys)
 
 def test_history_has_a_panel_for_each_matter(loose_pile: Run) -> None:
     titles = [axis.get_title(loc="left") for axis in plots.history(loose_pile).axes]
-    assert titles[:2] == ["height of the centroid [mm]", "speed [m/s]"]
+    assert titles[:2] == ["height of the centroid, z [mm]", "speed [m/s]"]
     assert "drift of the liquid volume [-]" in titles
     assert "largest excess of fluid in a cell [V], limit dashed" in titles
     assert len(titles) == 12  # with the empty one at the end

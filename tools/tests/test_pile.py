@@ -8,6 +8,7 @@ import pytest
 
 from micstools import pile
 from micstools.reader import BadRun, Run
+from micstools.units import LABORATORY
 from synthetic import UPRIGHT, Motion
 
 
@@ -82,7 +83,7 @@ def test_depth_names_the_pair(make_run) -> None:
     ends = places((0.06, 0.05, 0.12), (0.1195, 0.05, 0.12))
     found = pile.depth(make_run(Motion(places=ends, t_end=3.0, field_step=3.0)))
     assert found.seen
-    assert found.figures.startswith("largest 0.5000 mm (4-5)")
+    assert found.figures.startswith("largest 0.5\u00a0mm (blocks 4 and 5)")
 
 
 def test_level_follows_the_submerged_volume(make_run) -> None:
@@ -94,7 +95,7 @@ def test_level_follows_the_submerged_volume(make_run) -> None:
     found = pile.water_level(run)
     assert found.demanded == pytest.approx(0.15 + rise, rel=1e-12)
     assert found.found == pytest.approx(0.15 + rise, abs=1e-8)
-    assert pile.level(pile.water_level(run)).seen
+    assert pile.level(pile.water_level(run), LABORATORY.length).seen
 
 
 def test_level_with_a_block_through_the_surface(make_run) -> None:
@@ -102,7 +103,8 @@ def test_level_with_a_block_through_the_surface(make_run) -> None:
     level = pile.demanded_level(run, -1)
     below = pile.submerged_volume(run, -1, level)
     assert level * 0.03 - below == pytest.approx(0.15 * 0.03 - 3 * 56e-6, rel=1e-12)
-    assert not pile.level(pile.water_level(run)).seen
+    found = pile.level(pile.water_level(run), LABORATORY.length)
+    assert not found.seen and "demanded 151\u00a0mm" in found.figures
 
 
 def test_telling_times_are_written_times(loose_pile) -> None:
@@ -118,7 +120,7 @@ def test_the_paper_is_spoken_of_in_its_own_tank_only(make_run, loose_pile) -> No
     general = [f.statement for f in pile.findings(loose_pile, paper=False)]
     assert [text.split(" (")[0] for text in general] == [
         "all blocks at rest in the end",
-        "true overlap of the pile below 1 mm",
+        "true overlap of the pile below 0.6\u00a0mm",
         "untouched blocks under water accelerate less than 1 g",
         "final level within 1 % of the rise the blocks demand",
     ]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -12,7 +13,7 @@ from micstools import cli, pile_ensemble, pile_numbers, shapes, shares
 from micstools.reader import BadRun, Run
 from synthetic import UPRIGHT, Motion, write_run
 
-EDGE, HALF = 0.02, 0.01
+EDGE, HALF, HEXAPOD = 0.02, 0.01, 0.03
 LEFT, RIGHT, HIGH, WAITING = 0.04, 0.26, 0.12, (0.15, 0.05, 0.16)
 # Where the one dropped cube of each run ends: on the floor left, right, again right, hanging, in
 # the air above the water, nowhere.
@@ -20,13 +21,21 @@ ENDS = [(LEFT, 0.05, HALF), (RIGHT, 0.05, HALF), (RIGHT, 0.05, HALF), (RIGHT, 0.
         (RIGHT, 0.05, 0.17), WAITING]  # fmt: skip
 
 
-def write_ensemble(folder: Path, ends: list[tuple[float, float, float]] = ENDS) -> Path:
-    """An ensemble with a run for each end, and one more that failed."""
+def write_ensemble(
+    folder: Path, ends: list[tuple[float, float, float]] = ENDS, paper: bool = False
+) -> Path:
+    """An ensemble with a run for each end, and one more that failed; of cubes, or of the `paper`'s
+    hexapods, which reach 2 cm farther."""
     table = []
     for number, end in enumerate(ends, start=1):
         # One that waits does so behind another one.
         places = [(RIGHT, 0.05, HIGH), end] if end == WAITING else [end]
-        write_run(folder / f"{number:04d}" / "result", cube_run(places))
+        motion = cube_run(places)
+        if paper:
+            lift = np.array([0.0, 0.0, HEXAPOD - HALF])
+            up = [(at if tuple(at) == WAITING else at + lift, q) for at, q in motion.places]
+            motion = replace(motion, places=up, shape=shapes.hexapod(EDGE))
+        write_run(folder / f"{number:04d}" / "result", motion)
         table.append(row(number, "no room" if end == WAITING else "settled"))
     table.append(row(len(ends) + 1, "failed"))
     about = {"format": "mics-ensemble", "runs": len(table), "seed": 1, "spread": 0.005,
@@ -105,7 +114,9 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys) -> None:
                   "0.06", "0.04"])  # fmt: skip
     said = capsys.readouterr().out
     assert end.value.code == 0
-    assert "A 1 of 6 (17 %, 3 to 56), B 3 of 6 (50 %, 19 to 81)" in said
+    assert "5 blocks lie around x = " not in said and "6 blocks lie around x = " in said
+    assert "A 1 of 6" not in said  # these are no blocks of the paper
+    assert " mm (" in said and " cm2 (" in said
     content = json.loads((folder / "pile.json").read_text())
     assert content["complete"] == 5 and content["left_out"] == {"7": "failed"}
     assert content["convergence"]["A"][3][:2] == [4, 0.25]
@@ -117,6 +128,52 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys) -> None:
     assert content["numbers"]["porosity"]["median"] == pytest.approx(1.0)
     with h5py.File(folder / "pile_maps.h5") as h5:
         assert h5["cover"].shape == (50, 150) and h5["mean"].attrs["units"] == "m"
+
+
+def test_patterns_are_told_of_the_papers_blocks(tmp_path: Path, capsys) -> None:
+    folder = write_ensemble(tmp_path / "e", paper=True)
+    with pytest.raises(SystemExit):
+        cli.main(["pile", str(folder), "--step", "0.002"])
+    said = capsys.readouterr().out
+    assert "A 1 of 6 (17 %, 3 to 56), B 3 of 6 (50 %, 19 to 81)" in said
+
+
+def test_where_blocks_lie(ensemble: pile_ensemble.Ensemble, tmp_path: Path, capsys) -> None:
+    """Seven cubes were let go, two of them in the last run, where one hangs at the drop."""
+    found = ensemble.placing
+    x = np.array([LEFT, RIGHT, RIGHT, RIGHT, RIGHT, RIGHT])
+    assert found and found.blocks == 6
+    assert found.centre == pytest.approx((x.mean(), 0.05))
+    assert found.spread == pytest.approx((x.std(), 0.0))
+    away = np.abs(x - x.mean())
+    assert found.half_within == pytest.approx(np.percentile(away, 50))
+    assert found.most_within == pytest.approx(np.percentile(away, 90))
+    # All are dropped at x = 0.15, so the area of the drops is as large as a cube.
+    assert found.area.low == pytest.approx((0.14, 0.04))
+    assert found.area.high == pytest.approx((0.16, 0.06))
+    assert found.outside == 1.0 and found.outside_of_runs == (1.0, 1.0)
+    words = ["pile", str(ensemble.folder), "--step", "0.002", "--area", "0.2", "0", "0.3", "0.1"]
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    said = capsys.readouterr().out
+    assert end.value.code == 0
+    assert "17 % of them (0 to 75 % in 90 % of the runs) lie outside the wanted area" in said
+    assert "x = 200 to 300, y = 0 to 100 mm" in said
+    placing = json.loads((ensemble.folder / "pile.json").read_text())["placing"]
+    assert placing["outside"] == pytest.approx(1 / 6)
+    assert placing["area"]["high"] == [0.3, 0.1]
+    for wrong, text in ((["--area", "0.3", "0", "0.2", "0.1"], "first corner must be the lower"),):
+        with pytest.raises(SystemExit) as end:
+            cli.main(["pile", str(ensemble.folder), *wrong])
+        assert end.value.code == 2 and text in capsys.readouterr().err
+
+
+def test_an_area_is_for_an_ensemble(ensemble: pile_ensemble.Ensemble, capsys) -> None:
+    run = str(ensemble.piles[0].run.folder)
+    for command in ("pile", "report"):
+        with pytest.raises(SystemExit) as end:
+            cli.main([command, run, "--area", "0", "0", "1", "1"])
+        assert end.value.code == 2 and "for an ensemble" in capsys.readouterr().err
 
 
 def test_an_ensemble_without_an_end_is_refused(tmp_path: Path) -> None:
@@ -166,7 +223,7 @@ def test_under_water_is_judged_by_the_level_of_the_end(
 
 def test_each_choice_has_its_own_numbers(tmp_path: Path, capsys) -> None:
     """Choices share their drops, so no interval is taken over all of them."""
-    folder, name = write_ensemble(tmp_path, ENDS[:4]), "contact.friction"
+    folder, name = write_ensemble(tmp_path, ENDS[:4], paper=True), "contact.friction"
     about = json.loads((folder / "ensemble.json").read_text())
     about["choices"] = [{name: 0.4}, {name: 0.6}]
     for line in about["table"]:

@@ -53,6 +53,32 @@ def _area(line: np.ndarray) -> float:
     return 0.5 * float((x * v - u * y).sum())
 
 
+def test_footprint_and_layer() -> None:
+    """Cubes in three corners of a square of three cubes' sides: half of the square and the bands
+    beside its diagonal; two of them on a step of 5 mm, one stacked double."""
+    low = np.zeros(3)
+    blocks = [cube_at(0.03, 0.03, 0.01), cube_at(0.07, 0.03, 0.015), cube_at(0.03, 0.07, 0.015),
+              cube_at(0.03, 0.07, 0.035)]  # fmt: skip
+    top = height_map(blocks, low, low + 0.1, STEP)
+    assert pile_form.footprint(top, STEP) == pytest.approx(0.06**2 - 0.04**2 / 2)
+    ground = np.zeros(top.shape)
+    ground[:, 50:], ground[50:] = 0.005, 0.005
+    mean, most = pile_form.layer(top, ground)
+    assert mean == pytest.approx((0.02 + 0.02 + 0.04) / 3) and most == pytest.approx(0.04)
+    bare = np.full((5, 5), np.nan)
+    assert pile_form.footprint(bare, STEP) == 0.0
+    assert np.isnan(pile_form.layer(bare, np.zeros((5, 5)))).all()
+
+
+def test_porosity_above_a_bed() -> None:
+    """A cube in a box of twice its volume, of which the bed fills a quarter."""
+    low, high = np.array([0.04, 0.04, 0.0]), np.array([0.06, 0.06, 0.04])
+    cube = [cube_at(0.05, 0.05, 0.03)]
+    bed = 0.25 * 2 * EDGE**3
+    assert pile_form.porosity(cube, low, high, bed) == pytest.approx(1 - 1 / 1.5)
+    assert np.isnan(pile_form.porosity(cube, low, high, 2 * EDGE**3))
+
+
 def test_slopes_of_a_roof() -> None:
     """30 degrees towards -x, 45 towards +x; both ends of y lie against the map."""
     x = (np.arange(200) + 0.5) * STEP

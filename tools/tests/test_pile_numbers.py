@@ -49,6 +49,33 @@ def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:
     assert pile_numbers.numbers(Run(run.folder), step=0.001).on_floor == 1
 
 
+def test_layer_and_porosity_on_a_slope(make_run) -> None:
+    """Cubes on a slope of 1:5 along x: the height of each over the bed, and a box less the bed in
+    it."""
+    places = [(np.array([x, 0.03, 0.0101 + 0.2 * (x + 0.01)]), UPRIGHT) for x in (0.03, 0.25)]
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    x, y = np.meshgrid([0.0, 0.3], [0.0, 0.1])
+    corners = np.stack([x, y, 0.2 * x], axis=-1).reshape(-1, 3)
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bed/points"], h5["bed/triangles"] = corners, np.array([(0, 1, 3), (0, 3, 2)])
+        h5["bodies/position"][:, :3, 0] = 0.14  # the fixed ones, all at one place above the bed
+        h5["bodies/position"][:, :3, 2] = 0.2 * 0.14 + 0.05
+    run = Run(run.folder)
+    found = pile_numbers.numbers(run, step=0.001)
+    lowest = run.points(0, -1)[:, 2].max() - 0.2 * 0.14
+    assert found.height == pytest.approx(lowest, abs=0.005)
+    assert 0 < found.porosity < 1
+    volume = pile_numbers.bed_volume(run, np.zeros(3), np.array([0.3, 0.1, 0.2]), 0.001)
+    assert volume == pytest.approx(0.5 * 0.3 * 0.06 * 0.1, rel=1e-3)
+    box = (np.array([0.24, 0.02, 0.0]), np.array([0.26, 0.04, 0.1]))
+    inside = pile_numbers.numbers(run, step=0.001, box=box).porosity
+    assert inside == pytest.approx(1 - EDGE**3 / (EDGE**2 * (0.1 - 0.2 * 0.25)), rel=1e-3)
+    bare = Run(run.folder)
+    bare.__dict__["bed"] = (np.empty((0, 3)), np.empty((0, 3), int))
+    flat = pile_numbers.numbers(bare, step=0.001)
+    assert flat.layer_thickness - found.layer_thickness == pytest.approx(0.028, abs=2e-3)
+
+
 def test_height_map_of_a_cube_and_a_tilted_one() -> None:
     cube = shapes.cube(EDGE)
     low, high = np.zeros(3), np.array([0.1, 0.1, 0.1])
@@ -73,6 +100,9 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
         cli.main(["pile", str(run.folder)])
     assert end.value.code == 0
     content = json.loads((run.folder / "pile.json").read_text())
+    assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
+        "time_to_rest": "s", "impact_speed": "m/s", "contact_force": "N", "slopes": "deg",
+        "box": "m", "height": "m", "layer_thickness": "m", "footprint": "m2"}  # fmt: skip
     corners = np.concatenate(content["outline"])
     assert len(content["outline"]) == 4
     assert corners[:, 0].min() == pytest.approx(0.02, abs=1e-9)

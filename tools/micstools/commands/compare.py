@@ -3,9 +3,10 @@
 import argparse
 from pathlib import Path
 
-from micstools import command, comparison, pile_ensemble, pile_numbers
+from micstools import command, comparison, pile_ensemble, pile_numbers, units
 from micstools.commands.base import Command
 from micstools.reader import BadRun, Run
+from micstools.units import Units, figure
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,8 +15,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _numbers(run: Run) -> dict[str, float | str]:
-    step = float((run.grid.high - run.grid.low)[:2].max()) / 300
-    return pile_ensemble.flat(pile_numbers.numbers(run, step))
+    return pile_ensemble.flat(pile_numbers.numbers(run, pile_numbers.usual_step(run)))
 
 
 def _compare(given: argparse.Namespace) -> int:
@@ -27,12 +27,14 @@ def _compare(given: argparse.Namespace) -> int:
     if comparison.same_bits(one, two):
         print("blocks move alike in both, bit by bit")
     _lines("variable", comparison.parameters(one, two))
-    a, b = _numbers(one), _numbers(two)
-    _lines("number of the pile", [(name, _figure(a[name]), _figure(b[name])) for name in a])
-    print(f"{'block':>8}{'parted [s]':>14}{'apart [mm]':>14}{'turned [deg]':>14}   at the end")
+    a, b, chosen = _numbers(one), _numbers(two), units.of_run(one)
+    _lines("number of the pile", [_row(chosen, name, a[name], b[name]) for name in a])
+    apart = f"apart [{chosen.length.name}]"
+    print(f"{'block':>8}{'parted [s]':>14}{apart:>14}{'turned [deg]':>14}   at the end")
     for k in comparison.blocks(one, two):
-        parted = "never" if k.parted != k.parted else f"{k.parted:.4g}"
-        print(f"{k.block:8}{parted:>14}{1e3 * k.distance:14.4g}{k.angle:14.3g}")
+        parted = "never" if k.parted != k.parted else figure(k.parted, 4)
+        distance = chosen.length.figure(k.distance, 4)
+        print(f"{k.block:8}{parted:>14}{distance:>14}{figure(k.angle):>14}")
     return 0
 
 
@@ -43,8 +45,11 @@ def _lines(head: str, rows: list[tuple[str, str, str]]) -> None:
     print()
 
 
-def _figure(value: float | str) -> str:
-    return "-" if value == "" else f"{value:.6g}"
+def _row(chosen: Units, name: str, one: float | str, two: float | str) -> tuple[str, str, str]:
+    """A number of both piles with its unit."""
+    unit = pile_numbers.unit(chosen, name)
+    a, b = ("-" if v == "" else unit.plain(float(v), 6) for v in (one, two))
+    return name, a, b
 
 
 COMPARE = Command(

@@ -10,12 +10,23 @@ from typing import Any
 import h5py
 import numpy as np
 
-from micstools import block_numbers, command, pile, pile_ensemble, pile_form, pile_numbers
+from micstools import (
+    block_numbers,
+    command,
+    pile,
+    pile_ensemble,
+    pile_form,
+    pile_numbers,
+    placing,
+    units,
+)
 from micstools.commands.base import Command
 from micstools.geometry import Array
 from micstools.pile_ensemble import Ensemble
+from micstools.placing import Area
 from micstools.reader import BadRun
 from micstools.shares import in_words
+from micstools.units import ascii_of
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,6 +49,22 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--step", type=float, help="of plan area and maps [m], default a 300th of the tank")
     add("--box", type=float, nargs=6, metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
         help="of the porosity [m], default the box around the pile")  # fmt: skip
+    add_area(parser)
+
+
+def add_area(parser: argparse.ArgumentParser) -> None:
+    """Where blocks should lie, for an ensemble."""
+    parser.add_argument("--area", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"),
+        help="where blocks should lie [m], of an ensemble; default: around the drops")  # fmt: skip
+
+
+def area_of(values: list[float] | None) -> Area | None:
+    """The area that a user gave."""
+    if values is None:
+        return None
+    if not (values[0] < values[2] and values[1] < values[3]):
+        raise BadRun(f"--area {' '.join(map(str, values))}: the first corner must be the lower one")
+    return Area((values[0], values[1]), (values[2], values[3]), True)
 
 
 def _pile(given: argparse.Namespace) -> int:
@@ -46,7 +73,10 @@ def _pile(given: argparse.Namespace) -> int:
     if pile_ensemble.is_ensemble(given.run):
         if given.paper:
             raise BadRun("--paper: for one run, not for an ensemble")
-        return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, _box(given.box)))
+        box, area = _box(given.box), area_of(given.area)
+        return _of_ensemble(pile_ensemble.open_ensemble(given.run, given.step, box, area))
+    if given.area:
+        raise BadRun("--area: for an ensemble, not for one run")
     return _of_run(given)
 
 
@@ -60,20 +90,21 @@ def _box(values: list[float] | None) -> tuple[Array, Array] | None:
 
 
 def _of_run(given: argparse.Namespace) -> int:
-    """Print the findings and the numbers; these and the outline go into `pile.json`, the height map
-    into `pile_maps.h5`."""
+    """Print the findings and the numbers in units by the size of the blocks; in SI units these and
+    the outline go into `pile.json`, the height map into `pile_maps.h5`."""
     box = _box(given.box)
     findings(given)
     run = command.open_run(given.run)
     step = given.step or pile_numbers.usual_step(run)
-    found = asdict(pile_numbers.numbers(run, step, box=box))
+    numbers, chosen = pile_numbers.numbers(run, step, box=box), units.of_run(run)
+    found = asdict(numbers)
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
-        words = ["-" if v != v else f"{v:.5g}" for v in values]
-        print(f"     {name:20}{', '.join(words)}")
+        print(f"     {name:20}{pile_numbers.words(chosen, name, values)}")
     top = pile_numbers.top_of(run, step)
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
+    found["units"] = pile_numbers.si_units(found)
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
     _write_json(run.folder / "pile.json", found)
@@ -100,13 +131,18 @@ def _of_ensemble(ensemble: Ensemble) -> int:
 def _tell(part: Ensemble) -> None:
     """Print what there is to say of the runs of one choice."""
     total = len(part.piles)
-    shares = pile_ensemble.pattern_shares(part.piles)
-    said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
-    print((f"{part.name}: " if part.name else "") + ", ".join(said))
+    head, chosen = f"{part.name}: " if part.name else "", part.units
+    if found := part.placing:
+        print(head + ascii_of(placing.words(found, chosen)))
+    if part.has_patterns:
+        shares = pile_ensemble.pattern_shares(part.piles)
+        said = [f"{k} {in_words(s['count'], total)}" for k, s in shares.items()]
+        print(head + ", ".join(said))
     print(f"numbers of the {len(part.whole)} complete piles of {total}: median (5 to 95 %)")
     for name, spread in pile_ensemble.spreads(part).items():
-        low, high = spread["5 %"], spread["95 %"]
-        print(f"     {name:20}{spread['median']:.5g} ({low:.5g} to {high:.5g})")
+        unit = pile_numbers.unit(chosen, name)
+        low, high = (unit.figure(spread[k], 5) for k in ("5 %", "95 %"))
+        print(ascii_of(f"     {name:20}{unit.text(spread['median'], 5)} ({low} to {high})"))
 
 
 def _write_maps(ensemble: Ensemble) -> None:
@@ -143,10 +179,10 @@ def _known(value: Any) -> Any:
 
 PILE = Command(
     "pile",
-    "Say what can be said of the pile of a run, with its numbers in SI units and its outline\n"
-    "(pile.json) and its height map (pile_maps.h5); or of the piles of an ensemble: shares of the\n"
-    "patterns, spread of the numbers (pile.json, pile.csv), maps of the mean pile and of the\n"
-    "probability of cover (pile_maps.h5).\n"
+    "Print what a run shows of its pile, with its numbers; these in SI units and its outline\n"
+    "(pile.json) and its height map (pile_maps.h5); or of the piles of an ensemble: where blocks\n"
+    "lie, spread of the numbers (pile.json, pile.csv), maps of the mean pile and of the\n"
+    "probability of cover (pile_maps.h5). Printed units go with the size of the blocks.\n"
     "The exit code is 0 whatever is seen.",
     (
         "pile mics-coarse",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from micstools import command, pile_ensemble
 from micstools.commands.base import Command
+from micstools.commands.pile import add_area, area_of
 from micstools.page import ensemble_page, run_page
 from micstools.reader import BadRun
 
@@ -14,6 +15,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
     add("--north", type=float, metavar="DEGREES", help="direction of north in the plan, from +y "
         "towards +x; default: +y is taken as north, and the page says so")  # fmt: skip
+    add_area(parser)
     add("--out", type=Path, help="the file, default report.html in the folder")
 
 
@@ -22,7 +24,10 @@ def _report(given: argparse.Namespace) -> int:
         raise BadRun(f"--north {given.north}: must be degrees from -360 to 360")
     if pile_ensemble.is_ensemble(given.run):
         folder = given.run
-        text = ensemble_page.page(pile_ensemble.open_ensemble(folder), given.north)
+        found = pile_ensemble.open_ensemble(folder, area=area_of(given.area))
+        text = ensemble_page.page(found, given.north)
+    elif given.area:
+        raise BadRun("--area: for an ensemble, not for one run")
     else:
         run = command.open_run(given.run)
         folder, text = run.folder, run_page.page(run, given.north)
@@ -35,7 +40,7 @@ def _report(given: argparse.Namespace) -> int:
 REPORT = Command(
     "report",
     "Make one page of a run: the fall to play, the pile to scale, forces, health, provenance; or\n"
-    "of an ensemble: shares, maps, histograms, every pile. It is one file that loads nothing.",
+    "of an ensemble: where blocks lie, maps, histograms, every pile. One file that loads nothing.",
     (
         "report mics-coarse",
         "report mics-coarse --out pile.html",

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import case_copy, pile_ensemble, pile_numbers, program, settings
+from micstools import case_copy, pile_ensemble, pile_numbers, program, settings, units
 from micstools.commands.base import Command
 from micstools.convergence import Convergence, converge
 from micstools.reader import BadRun, Run
+from micstools.units import Unit, Units, ascii_of
 
 _ENDED = (0, 3)  # codes of a run that would end in the same way again
 
@@ -83,19 +84,25 @@ def _study(given: argparse.Namespace) -> int:
         whole.append(factor)
         found.append(pile_ensemble.flat(pile_numbers.numbers(run, pile_numbers.usual_step(run))))
     if found:
-        _tell(folder, whole, found)
+        _tell(folder, whole, found, units.of_run(run))
     return 0 if len(whole) == len(factors) else 3
 
 
-def _tell(folder: Path, factors: list[float], found: list[dict[str, float | str]]) -> None:
-    """Print a line for each number and write `study.csv` and `study.json`."""
+def _tell(
+    folder: Path, factors: list[float], found: list[dict[str, float | str]], chosen: Units
+) -> None:
+    """Print a line for each number with its unit and write `study.csv` and `study.json` in SI
+    units."""
     rows: list[dict[str, object]] = []
     for name in found[0]:
         values = [float(numbers[name]) if numbers[name] != "" else np.nan for numbers in found]
         told = converge(factors, values)
-        rows.append({"number": name} | dict(zip(map(_column, factors), values, strict=True))
-                    | asdict(told))  # fmt: skip
-        print(f"     {name:20}{', '.join(f'{v:.5g}' for v in values)}  {_words(told)}")
+        row: dict[str, object] = {"number": name}
+        row["unit"] = pile_numbers.si_units([name]).get(name, "")
+        row |= dict(zip(map(_column, factors), values, strict=True))
+        rows.append(row | asdict(told))
+        unit = pile_numbers.unit(chosen, name)
+        print(ascii_of(f"     {name:20}{unit.row(values, digits=5)}  {_words(told, unit)}"))
     with (folder / "study.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
@@ -109,10 +116,11 @@ def _column(factor: float) -> str:
     return f"cells x {factor:g}"
 
 
-def _words(told: Convergence) -> str:
+def _words(told: Convergence, unit: Unit) -> str:
     if told.words:
         return f"({told.words})"
-    return f"order {told.order:.2f}, limit {told.limit:.5g}, error {told.error:+.2g}"
+    limit, error = unit.figure(told.limit, 5), unit.text(told.error, 2)
+    return f"order {told.order:.2f}, limit {limit}, error {error}"
 
 
 STUDY = Command(

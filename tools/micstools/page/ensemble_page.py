@@ -1,5 +1,6 @@
-"""The page of an ensemble: how often which pile, where blocks will lie, whether the runs were
-enough, and every pile to look at."""
+"""The page of an ensemble: where blocks will lie and how far they scatter, how much piles differ,
+whether the runs were enough, and every pile to look at; the shares of the paper's patterns where
+blocks drop on its three fixed ones."""
 
 import csv
 import io
@@ -10,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from micstools import kicks, pile, pile_ensemble
-from micstools.balance import EXCESS_LIMIT
-from micstools.energy import ENERGY_LIMIT, made_by_contact
+from micstools import health, pile, pile_ensemble, placing
+from micstools.geometry import Array
+from micstools.health import Check
 from micstools.overlap import present_bodies
 from micstools.page import charts, motion, run_page, run_words, views
 from micstools.page.html import (
@@ -26,10 +27,11 @@ from micstools.page.html import (
     tag,
 )
 from micstools.page.parts import north_note, number, player
-from micstools.page.run_words import count, millimetres
+from micstools.page.run_words import count
 from micstools.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
 from micstools.reader import Run
 from micstools.shares import in_words
+from micstools.units import Unit, Units, figure
 
 _START = """
 const piles = read('piles'), dialog = document.getElementById('shown');
@@ -57,16 +59,24 @@ class Quantity:
     """A number that is shown as a histogram."""
 
     name: str
+    kind: str  # what it is, as `Units` names it
     value: Callable[[Pile], float]
+
+    def heading(self, units: Units) -> str:
+        """Its name and unit."""
+        unit = units.of_kind(self.kind).name
+        return f"{self.name} [{unit}]" if unit else self.name
 
 
 _QUANTITIES = (
-    Quantity("top of the pile [mm]", lambda p: _top(p)),
-    Quantity("plan area covered [cm²]", lambda p: 1e4 * p.numbers.plan_area),
-    Quantity("contacts per block", lambda p: p.numbers.coordination),
-    Quantity("porosity of the box around the pile", lambda p: p.numbers.porosity),
-    Quantity("time to rest [s]", lambda p: p.numbers.time_to_rest),
-    Quantity("hardest contact [N]", lambda p: p.numbers.contact_force),
+    Quantity("height of the pile", "length", lambda p: p.numbers.height),
+    Quantity("layer thickness", "length", lambda p: p.numbers.layer_thickness),
+    Quantity("plan area covered", "area", lambda p: p.numbers.plan_area),
+    Quantity("footprint", "area", lambda p: p.numbers.footprint),
+    Quantity("contacts per block", "number", lambda p: p.numbers.coordination),
+    Quantity("void share of the layer", "number", lambda p: p.numbers.layer_porosity),
+    Quantity("time to rest", "time", lambda p: p.numbers.time_to_rest),
+    Quantity("hardest contact", "force", lambda p: p.numbers.contact_force),
 )
 
 
@@ -80,8 +90,9 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
         tag("h1", title),
         *(tag("p", sentence(part), class_="lead") for part in ensemble.parts),
         tag("p", assumptions(ensemble)),
-        _patterns(ensemble),
-        *([_plan(ensemble), _histograms(ensemble)] if ensemble.whole else []),
+        *([_plan(ensemble)] if ensemble.whole else []),
+        *([_patterns(ensemble)] if ensemble.has_patterns else []),
+        *([_histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
         north_note(north),
         _running(ensemble),
@@ -94,31 +105,36 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
 
 
 def sentence(ensemble: Ensemble) -> str:
-    """Shares of the patterns of one choice and the height of the piles, each with its interval."""
-    total, shares = len(ensemble.piles), pile_ensemble.pattern_shares(ensemble.piles)
-    said = [f"in {in_words(shares[name]['count'], total)} {words}" for name, words in _SAID.items()]
-    if ensemble.name:
-        said[0] = f"with {ensemble.name} {said[0]}"
-    words = f"{run_words.capital(', '.join(said))} (in brackets: share and 95 % interval). "
-    words += _heights([_top(p) for p in ensemble.whole])
-    return words.replace(" %", "\u00a0%").replace(" mm", "\u00a0mm")
+    """Where the blocks of one choice lie, the shares of the patterns where these mean something,
+    and the height of the piles."""
+    units, total = ensemble.units, len(ensemble.piles)
+    head = f"With {ensemble.name}: " if ensemble.name else ""
+    where = ensemble.placing
+    said = [placing.words(where, units)] if where else ["No block was let go."]
+    if ensemble.has_patterns:
+        shares = pile_ensemble.pattern_shares(ensemble.piles)
+        each = [f"in {in_words(shares[k]['count'], total)} {words}" for k, words in _SAID.items()]
+        said.append(f"{run_words.capital(', '.join(each))} (in brackets: share and 95 % interval).")
+    elif missing := total - len(ensemble.whole):
+        said.append(f"In {in_words(missing, total)} runs not all blocks found room.")
+    said.append(_heights([p.numbers.height for p in ensemble.whole], units))
+    words = head + " ".join(said)
+    for unit in ("%", units.length.name):
+        words = words.replace(f" {unit}", f"\u00a0{unit}")
+    return words
 
 
-def _top(p: Pile) -> float:
-    """Height of a pile above the floor of the tank [mm]."""
-    return 1e3 * (p.numbers.top - float(p.run.grid.low[2]))
-
-
-def _heights(tops: list[float]) -> str:
-    """The tops [mm] of the complete piles in words."""
-    if not tops:
+def _heights(heights: list[float], units: Units) -> str:
+    """The heights [m] of the complete piles in words."""
+    length = units.length
+    if not heights:
         return "No pile has all its blocks, so there is no mean pile."
-    if len(tops) == 1:
-        return f"The one complete pile is {tops[0]:.3g} mm high."
-    low, median, high = np.percentile(tops, [5, 50, 95])
+    if len(heights) == 1:
+        return f"The one complete pile is {length.text(heights[0])} high."
+    low, median, high = np.percentile(heights, [5, 50, 95])
     return (
-        f"Half of the {len(tops)} complete piles are higher than {median:.3g} mm, and 90 % have "
-        f"their top between {low:.3g} and {high:.3g} mm."
+        f"Half of the {len(heights)} complete piles are higher than {length.text(median)}, and "
+        f"90 % are between {length.figure(low)} and {length.text(high)} high."
     )
 
 
@@ -127,12 +143,13 @@ def assumptions(ensemble: Ensemble) -> str:
     run = ensemble.example.run
     varied = sorted({name for choice in ensemble.choices for name in choice})
     said = ["This rests on what was assumed: " + _friction(run, varied)]
-    by_chance = [w for drop in run.parameters.get("drop", []) for w in run_words.chance(drop)]
-    said += [f"blocks {words}" for words in dict.fromkeys(by_chance)]
+    said += run_words.drops(run, ensemble.units, seeds=False)
     cells = " x ".join(str(len(f) - 1) for f in run.grid.faces)
     model = str(run.value("contact", "model", "surface")).strip()
-    coupling = str(run.value("numerics", "coupling", "monolithic")).strip()
-    said.append(f"{cells} cells, contact '{model}', coupling '{coupling}'")
+    said.append(f"contact '{model}'")
+    if str(run.value("run", "physics", "coupled")).strip() == "coupled":
+        coupling = str(run.value("numerics", "coupling", "monolithic")).strip()
+        said[-1] += f", {cells} cells, coupling '{coupling}'"
     if varied:
         said.append("varied: " + "; ".join(_varied(ensemble, name) for name in varied))
     if ensemble.left_out:
@@ -198,26 +215,33 @@ def _plan(ensemble: Ensemble) -> Markup:
     """The mean pile from above, for each choice of the varied variables to one scale of height."""
     whole = [part for part in ensemble.parts if part.whole]
     found = [pile_ensemble.maps(part) for part in whole]
-    top = 1e3 * max(float(maps.high.max()) for maps in found)
+    top, length = max(float(maps.high.max()) for maps in found), ensemble.units.length
     size = ensemble.example.run.grid
-    extent = " x ".join(millimetres(v) for v in (size.high - size.low)[:2])
+    extent = length.row((size.high - size.low)[:2], " x ")
     note = f"Seen from above, x to the right, y up; the plan is {extent}. Of the "
     note += f"{len(ensemble.whole)} piles with all their blocks, fixed blocks included."
     parts: list[Markup] = []
     for part, maps in zip(whole, found, strict=True):
         if part.name:
             parts.append(tag("h3", f"{part.name}: {count(len(part.whole), 'pile')}"))
-        parts.append(tag("div", *_maps(maps, top), class_="maps"))
+        parts.append(tag("div", *_maps(maps, top, length), class_="maps"))
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
 
 
-def _maps(found: Maps, top: float) -> list[Markup]:
-    """Cover and height of a mean pile, on a scale that ends at `top` [mm]."""
+def _maps(found: Maps, top: float, length: Unit) -> list[Markup]:
+    """Cover and height of a mean pile, on a scale that ends at `top` [m]."""
+    heights = (
+        (found.mean, "mean height above floor or bed"),
+        (found.low, "height that 90 % of the piles exceed"),
+        (found.high, "height that 10 % of the piles exceed"),
+    )
+    cover = "probability that a block lies over a point"
     return [
-        views.plan_map(100 * found.cover, 100.0, "probability that a block lies over a point", "%"),
-        views.plan_map(1e3 * found.mean, top, "mean height", "mm"),
-        views.plan_map(1e3 * found.low, top, "height that 90 % of the piles exceed", "mm"),
-        views.plan_map(1e3 * found.high, top, "height that 10 % of the piles exceed", "mm"),
+        views.plan_map(100 * found.cover, 100.0, cover, "%"),
+        *(
+            views.plan_map(length.of(values), length.of(top), name, length.name)
+            for values, name in heights
+        ),
     ]
 
 
@@ -240,14 +264,15 @@ def _spreads(ensemble: Ensemble) -> list[Markup]:
     drawn: list[Markup] = []
     rows: list[list[object]] = []
     for quantity in _QUANTITIES:
-        values = [quantity.value(p) for p in ensemble.whole]
+        unit, name = ensemble.units.of_kind(quantity.kind), quantity.heading(ensemble.units)
+        values = [unit.of(quantity.value(p)) for p in ensemble.whole]
         spread = pile_ensemble.spread_of(values)
         if spread is None:
             continue
         marks = [(spread["5 %"], "5 %"), (spread["median"], "median"), (spread["95 %"], "95 %")]
         known = np.array([v for v in values if v == v])
-        drawn.append(charts.histogram(known, quantity.name, marks))
-        rows.append([quantity.name, *(f"{value:.4g}" for value, _ in marks)])
+        drawn.append(charts.histogram(known, name, marks))
+        rows.append([name, *(figure(value, 4) for value, _ in marks)])
     return [
         tag("div", *drawn, class_="charts"),
         table(["of the complete piles", "5 %", "median", "95 %"], rows),
@@ -258,13 +283,12 @@ def _wall(ensemble: Ensemble) -> Markup:
     """A small picture of every pile, by pattern; a click shows it in three dimensions."""
     marks = {k: words for part in ensemble.parts
              for k, words in pile_ensemble.remarkable(part).items()}  # fmt: skip
+    frame = _frame(ensemble)
     parts: list[Markup] = []
-    for pattern in PATTERNS:
-        piles = [p for p in ensemble.piles if p.pattern == pattern]
-        if piles:
-            entries = [_thumbnail(p, marks.get(p.number, [])) for p in piles]
-            parts.append(tag("h3", f"{pattern}: {MEANING[pattern]}, {count(len(piles), 'run')}"))
-            parts.append(tag("ul", *entries, class_="wall"))
+    for name, piles in _groups(ensemble):
+        entries = [_thumbnail(p, marks.get(p.number, []), ensemble.units, frame) for p in piles]
+        parts.append(tag("h3", f"{name}, {count(len(piles), 'run')}"))
+        parts.append(tag("ul", *entries, class_="wall"))
     close = tag("button", "Close", class_="close", type="button")
     shown = tag(
         "dialog",
@@ -278,13 +302,32 @@ def _wall(ensemble: Ensemble) -> Markup:
     return section("wall", "Every pile", tag("p", words, class_="note no-print"), *parts, shown)
 
 
-def _thumbnail(p: Pile, marks: list[str]) -> Markup:
-    b, grid = p.run.bodies, p.run.grid
-    bodies = present_bodies(p.run, -1)
+def _groups(ensemble: Ensemble) -> list[tuple[str, list[Pile]]]:
+    """The piles by pattern, or those with all their blocks and the others."""
+    if ensemble.has_patterns:
+        found = [(f"{k}: {MEANING[k]}", [p for p in ensemble.piles if p.pattern == k])
+                 for k in PATTERNS]  # fmt: skip
+    else:
+        partly = [p for p in ensemble.piles if not p.complete]
+        found = [("All blocks let go", ensemble.whole), ("Blocks without room", partly)]
+    return [(name, piles) for name, piles in found if piles]
+
+
+def _frame(ensemble: Ensemble) -> tuple[Array, Array]:
+    """The box around the piles of all runs, with a margin, within the tank."""
+    boxes = np.array([p.numbers.box for p in ensemble.piles])
+    low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
+    grid, margin = ensemble.example.run.grid, 0.08 * float((high - low).max())
+    return np.maximum(low - margin, grid.low), np.minimum(high + margin, grid.high)
+
+
+def _thumbnail(p: Pile, marks: list[str], units: Units, frame: tuple[Array, Array]) -> Markup:
+    """A small picture of a pile in a box, its corners `frame`, that a click opens."""
+    b, bodies = p.run.bodies, present_bodies(p.run, -1)
     colours = views.block_colours(b.dropped, b.n)
-    sheet = views.Sheet(grid.low, grid.high, views.bed_of(p.run), _SMALL)
+    sheet = views.Sheet(*frame, views.bed_of(p.run), _SMALL)
     address = views.uri(sheet.picture(bodies, colours, "front")[0], 48)
-    words = f"run {p.number}, top {millimetres(1e-3 * _top(p))}"
+    words = f"run {p.number}, {units.length.text(p.numbers.height)} high"
     image = tag("img", src=address, alt=f"pile of {words}")
     said = markup(image, words, *(tag("b", mark) for mark in marks))
     button = tag("button", said, type="button", data_pile=p.number)
@@ -300,12 +343,14 @@ def _scenes(ensemble: Ensemble, north: float | None) -> dict[str, Any]:
     return {
         "tanks": [motion.tank(part.example.run, north) for part in parts],
         "runs": {
-            p.number: _shown(p) | {"tank": n} for n, part in enumerate(parts) for p in part.piles
+            p.number: _shown(p, ensemble) | {"tank": n}
+            for n, part in enumerate(parts)
+            for p in part.piles
         },
     }
 
 
-def _shown(p: Pile) -> dict[str, Any]:
+def _shown(p: Pile, ensemble: Ensemble) -> dict[str, Any]:
     scene = motion.blocks(p.run, np.array([len(p.run.bodies.time) - 1]))
     level = pile.still_level(p.run)
     scene["water"] = None if level is None else {"level": level}
@@ -315,9 +360,9 @@ def _shown(p: Pile) -> dict[str, Any]:
              f"{n.coordination:.2f} contacts per block",
              f"{count(n.on_floor, 'dropped block')} on the floor",
              f"folder {p.row['folder']}"]  # fmt: skip
-    top = millimetres(1e-3 * _top(p))
+    pattern = f"pattern {p.pattern}, " if ensemble.has_patterns else ""
     return {
-        "title": f"Run {p.number}: pattern {p.pattern}, top {top}",
+        "title": f"Run {p.number}: {pattern}{ensemble.units.length.text(n.height)} high",
         "about": "; ".join(about) + ".",
         "scene": scene,
     }
@@ -333,55 +378,47 @@ def _running(ensemble: Ensemble) -> Markup:
 
 
 def _estimates(ensemble: Ensemble) -> list[Markup]:
-    """How the share of the commonest pattern and the median of the top of one choice went."""
-    shares = pile_ensemble.pattern_shares(ensemble.piles)
-    name = max(("A", "B"), key=lambda k: shares[k]["count"])
-    steps = np.array(list(pile_ensemble.running(ensemble.piles, name)))
-    percent = steps * np.array([1, 100, 100, 100])
-    names = ("number of runs", f"share of pattern {name} [%]")
-    drawn = [charts.band(percent, names, (0, 100))]
-    tops = [_top(p) for p in ensemble.whole]
+    """How the share of the commonest pattern and the median height of one choice went."""
+    said, drawn = [], []
+    runs = count(len(ensemble.piles), "run")
+    if ensemble.has_patterns:
+        shares = pile_ensemble.pattern_shares(ensemble.piles)
+        name = max(("A", "B"), key=lambda k: shares[k]["count"])
+        steps = np.array(list(pile_ensemble.running(ensemble.piles, name)))
+        percent = steps * np.array([1, 100, 100, 100])
+        names = ("number of runs", f"share of pattern {name} [%]")
+        drawn.append(charts.band(percent, names, (0, 100)))
+        low, high = (100 * v for v in steps[-1, 2:])
+        said.append(f"the share of {name} is known to lie between {low:.0f} and {high:.0f} %")
+    length = ensemble.units.length
+    heights = [length.of(p.numbers.height) for p in ensemble.whole]
     known = [
-        [n, float(np.median(tops[:n])), *pile_ensemble.median_interval(tops[:n])]
-        for n in range(6, len(tops) + 1)
+        [n, float(np.median(heights[:n])), *pile_ensemble.median_interval(heights[:n])]
+        for n in range(6, len(heights) + 1)
     ]
+    if known:
+        low, high = known[-1][2:]
+        said.append(f"the median height lies between {figure(low)} and {figure(high)} "
+                    f"{length.name}, with 95 % confidence")  # fmt: skip
     if len(known) > 1:
-        names = ("number of complete piles", "median top [mm]")
+        names = ("number of complete piles", f"median height [{length.name}]")
         drawn.append(charts.band(np.array(known), names))
-    low, high = (100 * v for v in steps[-1, 2:])
-    said = (
-        f"After {count(len(ensemble.piles), 'run')} the share of {name} is known to lie between "
-        f"{low:.0f} and {high:.0f} %; four times as many runs would about halve that width."
-    )
-    return [tag("p", said), tag("div", *drawn, class_="charts")]
+    if not said:
+        return [tag("p", f"{run_words.capital(runs)}: six complete piles are needed to tell.")]
+    words = f"After {runs} {' and '.join(said)}; four times as many would about halve that width."
+    return [tag("p", words), tag("div", *drawn, class_="charts")]
 
 
 def _health(ensemble: Ensemble) -> Markup:
-    """The worst of all runs, against what a run should keep."""
+    """The worst run in each check."""
+    each: dict[str, list[tuple[int, Check]]] = {}
+    for p in ensemble.piles:
+        for check in health.checks(p.run, ensemble.units):
+            each.setdefault(check.name, []).append((p.number, check))
     rows: list[list[object]] = []
-    series = {p.number: p.run.series for p in ensemble.piles}
-    for words, values, limit, form in (
-        ("largest overlap of true shapes [mm]", _worst(series, "max_overlap", 1e3),
-         1e3 * run_page.overlap_limit(ensemble.example.run), ".3g"),
-        ("largest drift of the liquid volume", _worst(series, "liquid_volume_drift", 1.0),
-         run_page.DRIFT, ".1e"),
-        ("largest excess of fluid in a cell, of its volume",
-         _worst(series, "volume_excess_max", 1.0), EXCESS_LIMIT, ".1e"),
-        ("largest energy over what was put in, of what was set free",
-         _worst(series, "energy_excess", 1.0), ENERGY_LIMIT, ".1e"),
-        ("largest divergence [1/s]", _worst(series, "divergence_max", 1.0),
-         run_page.divergence_limit(ensemble.example.run), ".1e"),
-        ("largest energy that contact made in a step [J]",
-         {p.number: float(made_by_contact(p.run).max()) for p in ensemble.piles},
-         run_page.energy_limit(ensemble.example.run), ".1e"),
-        ("largest acceleration of an untouched block [g]", _kicks(ensemble),
-         kicks.LIMIT, ".2g"),
-    ):  # fmt: skip
-        if values:
-            where = max(values, key=lambda k: values[k])
-            found, wanted = f"{values[where]:{form}}", f"below {limit:{form}}"
-            mark = run_page.mark(values[where] < limit)
-            rows.append([words, found, wanted, mark, f"run {where}"])
+    for found in each.values():
+        number, worst = max(found, key=lambda one: _badness(one[1]))
+        rows.append([*run_page.check_row(worst), f"run {number}"])
     outcomes: dict[str, int] = {}
     for row in ensemble.about["table"]:
         outcomes[row["outcome"]] = outcomes.get(row["outcome"], 0) + 1
@@ -391,21 +428,15 @@ def _health(ensemble: Ensemble) -> Markup:
     return section("health", "Health of the computations", said)
 
 
-def _kicks(ensemble: Ensemble) -> dict[int, float]:
-    """The largest acceleration of untouched blocks [g] of the runs whose rows tell it."""
-    found = {p.number: kicks.largest(p.run) for p in ensemble.piles}
-    return {k: one.acceleration for k, one in found.items() if one and one.good is not None}
-
-
-def _worst(series: dict[int, Any], name: str, scale: float) -> dict[int, float]:
-    found = {k: np.abs(getattr(s, name)[1:]) for k, s in series.items()}
-    return {k: scale * float(np.nanmax(v)) for k, v in found.items() if np.isfinite(v).any()}
+def _badness(check: Check) -> tuple[int, float]:
+    """What is not good comes before what is not known, and this before what is good."""
+    return {False: 2, None: 1, True: 0}[check.good], float(np.nan_to_num(check.share))
 
 
 def _case(ensemble: Ensemble, run: Run) -> Markup:
     about = ensemble.about
     p = run.provenance
-    words = [tag("p", text) for text in run_words.case(run)]
+    words = [tag("p", text) for text in run_words.case(run, ensemble.units)]
     which = f"As in run {ensemble.example.number}; seeds differ from run to run."
     words.append(tag("p", which, class_="note"))
     command = f"mics-tools ensemble case.nml --runs {about['runs']} --seed {about['seed']}"
@@ -437,23 +468,20 @@ def _table(ensemble: Ensemble) -> Markup:
     writer.writerows(found)
     content = json.dumps(pile_ensemble.summary(ensemble), indent=1)
     varied = sorted({name for choice in ensemble.choices for name in choice})
+    shown, patterns = ensemble.units, ensemble.has_patterns
     rows: list[list[object]] = [
         [
             p.number,
             *(str(p.row.get(name, "")) for name in varied),
-            p.pattern,
+            *([p.pattern] if patterns else []),
             f"{p.numbers.blocks} of {p.run.bodies.n}",
-            f"{_top(p):.1f}",
-            f"{1e4 * p.numbers.plan_area:.1f}",
-            f"{p.numbers.coordination:.2f}",
-            number(p.numbers.porosity),
-            number(p.numbers.time_to_rest),
-            number(p.numbers.contact_force),
+            number(100 * ensemble.area.share_outside(placing.ends(p.run)), ".0f"),
+            *(shown.of_kind(q.kind).figure(q.value(p)) for q in _QUANTITIES),
         ]
         for p in ensemble.piles
     ]
-    heads: list[object] = ["run", *varied, "pattern", "blocks", "top [mm]", "plan [cm²]",
-                           "contacts", "porosity", "at rest [s]", "hardest [N]"]  # fmt: skip
+    heads: list[object] = ["run", *varied, *(["pattern"] if patterns else []), "blocks",
+                           "outside [%]", *(q.heading(shown) for q in _QUANTITIES)]  # fmt: skip
     name = ensemble.folder.resolve().name
     links = tag("p", "To take along: ",
                 download(f"{name}.csv", "text/csv", file.getvalue(), "all numbers as CSV"), ", ",

@@ -7,21 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from micstools.geometry import Array
 from micstools.reader import Run
+from micstools.units import Units, figure
 
 _SMALL = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
           "eleven", "twelve")  # fmt: skip
+_KINDS = ("hexapod", "cube", "box", "sphere", "cylinder", "tetrapod", "dolos", "reef_cube", "rock")
+_PLURALS = {"box": "boxes", "dolos": "dolosse"}
 
 
 def count(n: int, thing: str, things: str | None = None) -> str:
     """As in `six blocks`."""
     number = _SMALL[n] if n < len(_SMALL) else str(n)
     return f"{number} {thing if n == 1 else things or thing + 's'}"
-
-
-def millimetres(value: float, digits: int = 3) -> str:
-    """A length in mm, or in m from 10 m on."""
-    return f"{value:.{digits}g} m" if abs(value) >= 10 else f"{1e3 * value:.{digits}g} mm"
 
 
 def title(run: Run, folder: Path | None = None) -> str:
@@ -35,79 +34,160 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def shapes(run: Run) -> list[str]:
+def shapes(run: Run, units: Units) -> list[str]:
     """A sentence for each shape that is used."""
     found = []
     for name in dict.fromkeys(run.bodies.shape):
         shape = run.shapes[name]
-        size = " x ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(shape.points, axis=0))
-        kind = next((s for s in run.parameters.get("shape", []) if s.get("name") == name), {})
-        form = str(kind.get("kind", "")).strip()
+        size = units.length.row(np.ptp(shape.points, axis=0), " x ")
+        form = _kind(run, name)
         form = f" ({form})" if form and form != name else ""
         found.append(
-            f"A block '{name}'{form} is {size} mm large, has {1e6 * shape.volume:.4g} cm³ and "
-            f"weighs {shape.volume * shape.density:.4g} kg ({shape.density:.0f} kg/m³)."
+            f"A block '{name}'{form} measures {size}, has a volume of "
+            f"{units.volume.text(shape.volume)} and a mass of "
+            f"{units.mass.text(shape.volume * shape.density)} ({shape.density:.0f} kg/m³)."
         )
     return found
 
 
-def blocks(run: Run) -> str:
+def _kind(run: Run, name: str) -> str:
+    """The kind of a shape by its name."""
+    groups = run.parameters.get("shape", [])
+    kind = next((s for s in groups if str(s.get("name")).strip() == name), {})
+    return str(kind.get("kind", "")).strip()
+
+
+def _many(run: Run, name: str, n: int) -> str:
+    """As in `12 tetrapods`; with the name of the shape where that is not its kind."""
+    kind = _kind(run, name)
+    word = kind.replace("_", " ") if kind in _KINDS else "block"
+    named = "" if name == kind or not name else f" '{name}'"
+    return f"{n} {word if n == 1 else _PLURALS.get(word, word + 's')}{named}"
+
+
+def blocks(run: Run, units: Units) -> str:
     """How many blocks there are, and how they come in."""
     b = run.bodies
-    free = b.dropped
     if not b.n:
         return "There are no blocks."
-    fixed = int(b.fixed.sum())
-    said = capital(count(b.n - fixed, "free block"))
-    said += f" and {count(fixed, 'fixed one')}" if fixed else ""
-    due = [t for t in b.release_time[free] if np.isfinite(t)]
-    if len(due) > 1 and max(due) > min(due):
-        said += f", let go between {min(due):.3g} and {max(due):.3g} s"
-    return said + "." + "".join(f" {capital(text)}." for text in drops(run))
+    placed = len(run.parameters.get("body", []))
+    fixed, free = int(b.fixed.sum()), int((~b.fixed[:placed]).sum())
+    said = [count(fixed, "fixed block")] if fixed else []
+    said += [f"{count(free, 'free block')} from the case's &body"] if free else []
+    said += drops(run, units)
+    groups = run.parameters.get("drop", [])
+    last = max((t for t in b.release_time[b.dropped] if np.isfinite(t)), default=0.0)
+    listed = any(str(drop.get("file", "") or "").strip() for drop in groups)  # times are there
+    if groups and not listed and last > 1e-9 + max(_due(drop)[-1] for drop in groups):
+        said.append(f"blocks waited for room: the last was let go at t = {figure(last)} s")
+    return " ".join(capital(text) + "." for text in said)
 
 
-def drops(run: Run) -> list[str]:
-    """A half sentence for each &drop."""
-    found = []
+def drops(run: Run, units: Units, seeds: bool = True) -> list[str]:
+    """A half sentence for each kind of &drop, with the `seeds` of what is random; groups that
+    differ in place, time and seed alone are told once."""
+    alike: dict[str, list[dict[str, Any]]] = {}
+    own = ("position", "to", "first_time", "count", "seed")
     for drop in run.parameters.get("drop", []):
-        x, y, z = (float(v) for v in drop["position"])
-        n = int(drop.get("count", 1))
-        said = f"{count(n, 'block is', 'blocks are')} dropped at x = {1e3 * x:.4g}, "
-        said += f"y = {1e3 * y:.4g}, z = {1e3 * z:.4g} mm"
-        said += f", one every {drop.get('interval', 1.0):.3g} s" if n > 1 else ""
-        said += "".join(f", {words}" for words in chance(drop))
-        said += f" (seed {drop.get('seed', 1)})" if chance(drop) else ""
-        found.append(said)
-    return found
+        key = repr(sorted((k, repr(v)) for k, v in drop.items() if k not in own))
+        alike.setdefault(key, []).append(drop)
+    return [_dropped(run, group, units, seeds) for group in alike.values()]
 
 
-def chance(drop: dict[str, Any]) -> list[str]:
-    """What of a &drop is left to chance."""
+def _dropped(run: Run, group: list[dict[str, Any]], units: Units, tell_seeds: bool) -> str:
+    """Drops that are alike: how many of what, when, where, and what is left to chance."""
+    one = group[0]
+    total = sum(int(drop.get("count", 1)) for drop in group)
+    file = str(one.get("file", "") or "").strip()
+    if file:
+        return f"blocks are dropped at the places of {file}"
+    said = [_many(run, str(one.get("shape", "") or "").strip(), total), *_times(group)]
+    said.append(f"dropped {_places(group, units)}")
+    said += attitude(one)
+    seeds = [int(drop.get("seed", 1)) for drop in group]
+    if tell_seeds and left_to_chance(one):
+        few = len(set(seeds)) == 1
+        said[-1] += f" (seed {seeds[0]})" if few else f" (seeds {min(seeds)} to {max(seeds)})"
+    return ", ".join(said)
+
+
+def _times(group: list[dict[str, Any]]) -> list[str]:
+    """When blocks are due: at once, one every so many seconds, or between two times; nothing for a
+    single one at the start."""
+    due = np.concatenate([_due(drop) for drop in group])
+    times, many = np.unique(np.round(due, 9), return_counts=True)
+    start = f" from t = {figure(times[0])} s on" if times[0] > 0 else ""
+    if times.size == 1:
+        at_once = "at once" if due.size > 1 else ""
+        when = f"{at_once} at t = {figure(times[0])} s" if times[0] > 0 else at_once
+        return [when.strip()] if when else []
+    steps = np.diff(times)
+    if np.allclose(steps, steps[0]) and (many == many[0]).all():
+        each = "one" if many[0] == 1 else f"{many[0]} at once"
+        return [f"{each} every {figure(steps[0])} s{start}"]
+    return [f"from t = {figure(times[0])} to {figure(times[-1])} s"]
+
+
+def _due(drop: dict[str, Any]) -> Array:
+    """Times at which the blocks of a &drop are due [s]."""
+    number = np.arange(max(1, int(drop.get("count", 1))))
+    return np.asarray(
+        float(drop.get("first_time", 0.0)) + float(drop.get("interval", 1.0)) * number
+    )
+
+
+def _places(group: list[dict[str, Any]], units: Units) -> str:
+    """As in `at x = 14 ± 4, y = 3 ± 1.4, z = 11.2 m`, or from the first to the last of several."""
+    places = np.array([drop[k] for drop in group for k in ("position", "to") if _given(drop, k)])
+    spread = np.broadcast_to(np.ravel(group[0].get("spread", 0.0)).astype(float), 3)
+    words = []
+    for axis, low, high, by_chance in zip(
+        "xyz", places.min(axis=0), places.max(axis=0), spread, strict=True
+    ):
+        text = f"{axis}\u00a0=\u00a0{units.length.figure(low, 4)}"
+        if high - low > 1e-9 * max(abs(low), abs(high)):
+            text += f" to {units.length.figure(high, 4)}"
+        words.append(text + (f" ± {units.length.figure(by_chance)}" if by_chance else ""))
+    several = (places != places[0]).any()
+    return ("from " if several else "at ") + ", ".join(words) + f" {units.length.name}"
+
+
+def _given(drop: dict[str, Any], name: str) -> bool:
+    """Is a place of a drop given?"""
+    found = drop.get(name)
+    return found is not None and all(isinstance(v, (int, float)) for v in np.ravel(found).tolist())
+
+
+def left_to_chance(drop: dict[str, Any]) -> bool:
+    """Is anything of a &drop random?"""
+    random = str(drop.get("orientation", "given")).strip() == "random"
+    return random or bool(np.any(drop.get("spread", 0.0)) or float(drop.get("tilt_deg", 0.0)))
+
+
+def attitude(drop: dict[str, Any]) -> list[str]:
+    """What of the attitude of a &drop is left to chance."""
     found = []
-    spread = [float(v) for v in np.ravel(drop.get("spread", 0.0))]
-    if any(spread):
-        sizes = ", ".join(f"{1e3 * v:.3g}" for v in spread)
-        found.append(f"moved by chance up to ± ({sizes}) mm")
     if float(drop.get("tilt_deg", 0.0)):
-        found.append(f"tilted by chance up to {drop['tilt_deg']:.3g}°")
+        found.append(f"random tilt up to {figure(float(drop['tilt_deg']))}°")
     if str(drop.get("orientation", "given")).strip() == "random":
-        found.append("turned anyhow")
+        found.append("random attitude")
     return found
 
 
-def tank(run: Run) -> str:
+def tank(run: Run, units: Units) -> str:
     """The tank, its water and its cells."""
     size, spacing = run.grid.high - run.grid.low, run.grid.spacing
-    said = "The tank is " + " x ".join(f"{v:.4g}" for v in size) + " m"
+    said = "The tank measures " + units.length.row(size, " x ", 4)
     level = run.value("fluid", "water_level", None)
     if str(run.value("run", "physics", "coupled")).strip() == "dry":
-        said += " and dry"
+        said += " and is dry"
     elif bool(run.value("fluid", "single_phase", False)):
-        said += " and full of liquid"
+        said += " and is full of liquid"
     elif level is not None:
-        said += f", its water {millimetres(float(level) - float(run.grid.low[2]))} deep at first"
+        depth = float(level) - float(run.grid.low[2])
+        said += f", its water stands {units.length.text(depth, 4)} above its floor at first"
     said += "; it has " + " x ".join(str(len(f) - 1) for f in run.grid.faces) + " cells of "
-    return said + " x ".join(f"{1e3 * v:.3g}" for v in spacing) + " mm."
+    return said + units.length.row(spacing, " x ") + "."
 
 
 def contact(run: Run) -> str:
@@ -123,12 +203,12 @@ def contact(run: Run) -> str:
     return said + "."
 
 
-def case(run: Run) -> list[str]:
+def case(run: Run, units: Units) -> list[str]:
     """The whole case, a paragraph each."""
-    parts = [blocks(run)]
+    parts = [blocks(run, units)]
     if run.bodies.n:
-        parts.append(" ".join(shapes(run)))
-    parts.append(tank(run))
+        parts.append(" ".join(shapes(run, units)))
+    parts.append(tank(run, units))
     if run.bodies.n:
         parts.append(contact(run))
     return parts

@@ -16,6 +16,7 @@ from micstools.page.charts import colour
 from micstools.page.html import Markup, tag
 from micstools.pile_numbers import under
 from micstools.reader import Run
+from micstools.units import Unit
 
 # What runs to the right, what runs up, what comes towards the viewer; as the pictures of `scene`.
 VIEWS = {
@@ -169,8 +170,9 @@ class Sheet:
         return picture, seen
 
     def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
-                level: float | None = None) -> Markup:  # fmt: skip
-        """One view with the numbers of the blocks, the tank, the water level and a length."""
+                unit: Unit, level: float | None = None) -> Markup:  # fmt: skip
+        """One view with the numbers of the blocks, the tank, the water level and a length in a
+        unit."""
         picture, seen = self.picture(bodies, colours, view)
         rows, columns = seen.block.shape
         image = tag("image", href=uri(picture), width=columns, height=rows)
@@ -179,7 +181,7 @@ class Sheet:
             at = f"{rows - (level - seen.low[1]) / self.step:.1f}"
             drawn.append(tag("line", class_="level", x1=0, x2=columns, y1=at, y2=at))
         drawn += _numbers(seen)
-        drawn += self._bar(rows)
+        drawn += self._bar(rows, unit)
         across, up = NAMES[view]
         margin = 8
         box = f"{-margin} {-margin} {columns + 2 * margin} {rows + 2 * margin + 46}"
@@ -189,11 +191,11 @@ class Sheet:
         words = f"{view}: {across} to the right, {up} up"
         return tag("figure", svg, tag("figcaption", words), class_="view", style=size)
 
-    def _bar(self, rows: int) -> list[Markup]:
+    def _bar(self, rows: int, unit: Unit) -> list[Markup]:
         """A bar of a round length under a view."""
         length = round_below(0.3 * float((self.high - self.low)[:2].min()))
         long, y = length / self.step, rows + 22
-        text = f"{length:g} m" if length >= 1 else f"{1e3 * length:g} mm"
+        text = unit.text(length)
         return [
             tag("path", class_="scale", d=f"M0 {y - 7}V{y + 7}M0 {y}H{long:.1f}M{long:.1f} "
                 f"{y - 7}V{y + 7}"),
