@@ -160,7 +160,7 @@ def test_a_study_finds_the_order(tmp_path: Path, capfd) -> None:
     words = study_with(tmp_path)
     code, out, _ = call(capfd, *words, "--cells", "1,1.5,2")
     assert code == 0 and out.count("\nran ") == 3
-    assert " mm  order 2.00, limit 110, error 1 mm" in out
+    assert " mm  order 2.00, limit 110 mm, error +1 mm" in out
     rows = {row["number"]: row for row in json.loads((tmp_path / "out/study.json").read_text())}
     assert rows["top"]["order"] == pytest.approx(2.0, abs=1e-6)
     assert rows["top"]["limit"] == pytest.approx(0.08 + 0.03)

@@ -13,6 +13,7 @@ import pytest
 from browser import MISSING, Browser
 from micstools import cli, pile_ensemble
 from micstools.page import charts, ensemble_page
+from test_page import OUT_OF_TILES
 from test_pile_ensemble import ENDS, HALF, HEXAPOD, WAITING, write_ensemble
 
 in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
@@ -174,4 +175,5 @@ def test_a_click_opens_a_pile(browser: Browser, report: Path) -> None:
 def test_the_page_fits_a_phone(browser: Browser, report: Path, dark: bool) -> None:
     browser.open(report, 360, 740, dark)
     assert browser.run("document.documentElement.scrollWidth") <= 360
+    assert browser.run(OUT_OF_TILES.replace(".facts div", ".wall button")) == []
     assert browser.errors == []

@@ -149,7 +149,7 @@ def test_pages_and_history_tell_it(make_run) -> None:
     assert "not known (needs rows every 0.002 s)" in row and ">–<" in row
     assert title not in [axis.get_title(loc="left") for axis in plots.history(run).axes]
     run.__dict__["series"] = replace(run.series, dt=np.full(run.bodies.time.size, 0.005))
-    row = run_page.page(run).split(name)[1].split("</tr>")[0]
+    row = run_page.page(run).split(name)[1].split("</tr>")[0].replace("\u00a0", " ")
     assert "g, block 4 at t = " in row and "below 1 g over 0.017 s" in row and "good" in row
     assert title in [axis.get_title(loc="left") for axis in plots.history(run).axes]
 

@@ -78,6 +78,12 @@ def test_a_run_without_blocks_has_a_page(make_run) -> None:
     assert "drift of the liquid volume" in text and "overlap" not in text.split("<main>")[1]
 
 
+def health_of(run: Run) -> str:
+    """The health of a page, in plain blanks."""
+    text = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    return text.replace("\u00a0", " ")
+
+
 def test_cells_that_hold_too_much_are_to_be_looked_at(make_run) -> None:
     run = make_run(Motion(t_end=0.1))
     good = run_page.page(run).split('id="health"')[1].split("</section>")[0]
@@ -94,15 +100,15 @@ def test_cells_that_hold_too_much_are_to_be_looked_at(make_run) -> None:
 
 def test_energy_that_a_run_made_is_to_be_looked_at(make_run) -> None:
     run = make_run(Motion(t_end=0.1))
-    good = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    good = health_of(run)
     assert "over what was put in" in good and "0 %" in good
     made = np.linspace(0.0, 0.03, run.series.energy_excess.size)
     run.__dict__["series"] = replace(run.series, energy_excess=made)
-    bad = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    bad = health_of(run)
     assert bad.count("! look") == good.count("! look") + 1
     assert f"3 %, t = {run.series.time[-1]:.3g} s" in bad and "a smaller &amp;run dt" in bad
     run.__dict__["series"] = replace(run.series, energy_excess=np.full_like(made, np.nan))
-    unknown = run_page.page(run).split('id="health"')[1].split("</section>")[0]
+    unknown = health_of(run)
     assert "not known" in unknown and unknown.count("! look") == good.count("! look")
 
 

@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 SAID = {
     "convergence": [
-        r"impact_speed +0\.35\d+, 0\.34\d+, 0\.32\d+  \(no order fits\)",
-        r"impact_speed +0\.34\d+, 0\.32\d+, 0\.32\d+  order 2\.1\d*, limit 0\.31\d+",
+        r"impact_speed +0\.35\d+, 0\.34\d+, 0\.32\d* m/s  \(no order fits\)",
+        r"impact_speed +0\.34\d+, 0\.32\d+, 0\.32\d* m/s  order 2\.1\d*, limit 0\.31\d+ m/s",
         r"impact at 0\.32 to 0\.35 m/s: \n",
     ],
     "own_block": [

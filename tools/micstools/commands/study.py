@@ -119,8 +119,9 @@ def _column(factor: float) -> str:
 def _words(told: Convergence, unit: Unit) -> str:
     if told.words:
         return f"({told.words})"
-    limit, error = unit.figure(told.limit, 5), unit.text(told.error, 2)
-    return f"order {told.order:.2f}, limit {limit}, error {error}"
+    limit, error = unit.text(told.limit, 5), unit.text(told.error, 2)
+    sign = "+" if told.error > 0 else ""
+    return f"order {told.order:.2f}, limit {limit}, error {sign}{error}"
 
 
 STUDY = Command(

@@ -1,6 +1,7 @@
 """The page of a run: the fall to play, the pile to scale, what the blocks felt, whether the numbers
 can be trusted, and how to get them again."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -235,7 +236,13 @@ def _health(run: Run, shown: Units) -> Markup:
 def check_row(check: Check) -> list[object]:
     """A check as a row of a table; below what was found stands what to do where it needs that."""
     todo = tag("div", f"→ {check.todo}", class_="todo") if check.todo else None
-    return [check.name, markup(check.found, todo), check.wanted, mark(check.good)]
+    return [check.name, markup(_whole(check.found), todo), _whole(check.wanted), mark(check.good)]
+
+
+def _whole(text: str) -> str:
+    """Text whose times and percentages stay on one line."""
+    text = re.sub(r"t = ([\d.e+-]+) s", "t\u00a0=\u00a0\\1\u00a0s", text)
+    return text.replace(" %", "\u00a0%")
 
 
 def mark(good: bool | None) -> Markup:
