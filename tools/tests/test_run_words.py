@@ -37,7 +37,7 @@ def test_one_drop_of_many() -> None:
     ]
 
 
-def test_like_drops_are_told_once() -> None:
+def test_like_drops_are_listed_once() -> None:
     """Twelve &drop groups of one block each, along a line, one every 8 s."""
     groups = [drop(10 + k, 3, 11.2, first_time=8.0 * k, seed=k + 1) for k in range(12)]
     assert said(*groups) == [
@@ -94,7 +94,7 @@ def test_the_whole_case(make_run) -> None:
     )
 
 
-def test_blocks_that_waited_are_told(make_run) -> None:
+def test_blocks_that_waited_are_mentioned(make_run) -> None:
     run: Run = make_run(Motion(t_end=8.0, field_step=8.0, cells=(12, 4, 8)))
     late = np.array(run.bodies.release_time)
     late[-1] = 6.5

@@ -389,7 +389,7 @@ def _estimates(ensemble: Ensemble) -> list[Markup]:
         names = ("number of runs", f"share of pattern {name} [%]")
         drawn.append(charts.band(percent, names, (0, 100)))
         low, high = (100 * v for v in steps[-1, 2:])
-        said.append(f"the share of {name} is known to lie between {low:.0f} and {high:.0f} %")
+        said.append(f"the share of {name} lies between {low:.0f} and {high:.0f} %")
     length = ensemble.units.length
     heights = [length.of(p.numbers.height) for p in ensemble.whole]
     known = [
@@ -399,13 +399,19 @@ def _estimates(ensemble: Ensemble) -> list[Markup]:
     if known:
         low, high = known[-1][2:]
         said.append(f"the median height lies between {figure(low)} and {figure(high)} "
-                    f"{length.name}, with 95 % confidence")  # fmt: skip
+                    f"{length.name}")  # fmt: skip
     if len(known) > 1:
         names = ("number of complete piles", f"median height [{length.name}]")
         drawn.append(charts.band(np.array(known), names))
     if not said:
-        return [tag("p", f"{run_words.capital(runs)}: six complete piles are needed to tell.")]
-    words = f"After {runs} {' and '.join(said)}; four times as many would about halve that width."
+        return [
+            tag(
+                "p",
+                f"{run_words.capital(runs)}: an interval of the median needs six complete piles.",
+            )
+        ]
+    words = f"After {runs} {' and '.join(said)}, with 95 % confidence; four times as many would "
+    words += "about halve that width."
     return [tag("p", words), tag("div", *drawn, class_="charts")]
 
 

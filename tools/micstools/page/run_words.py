@@ -85,7 +85,7 @@ def blocks(run: Run, units: Units) -> str:
 
 def drops(run: Run, units: Units, seeds: bool = True) -> list[str]:
     """A half sentence for each kind of &drop, with the `seeds` of what is random; groups that
-    differ in place, time and seed alone are told once."""
+    differ in place, time and seed alone are listed once."""
     alike: dict[str, list[dict[str, Any]]] = {}
     own = ("position", "to", "first_time", "count", "seed")
     for drop in run.parameters.get("drop", []):
@@ -94,7 +94,7 @@ def drops(run: Run, units: Units, seeds: bool = True) -> list[str]:
     return [_dropped(run, group, units, seeds) for group in alike.values()]
 
 
-def _dropped(run: Run, group: list[dict[str, Any]], units: Units, tell_seeds: bool) -> str:
+def _dropped(run: Run, group: list[dict[str, Any]], units: Units, with_seeds: bool) -> str:
     """Drops that are alike: how many of what, when, where, and what is left to chance."""
     one = group[0]
     total = sum(int(drop.get("count", 1)) for drop in group)
@@ -105,7 +105,7 @@ def _dropped(run: Run, group: list[dict[str, Any]], units: Units, tell_seeds: bo
     said.append(f"dropped {_places(group, units)}")
     said += attitude(one)
     seeds = [int(drop.get("seed", 1)) for drop in group]
-    if tell_seeds and left_to_chance(one):
+    if with_seeds and left_to_chance(one):
         few = len(set(seeds)) == 1
         said[-1] += f" (seed {seeds[0]})" if few else f" (seeds {min(seeds)} to {max(seeds)})"
     return ", ".join(said)
