@@ -56,12 +56,13 @@ def largest_made(run: Run, limit: Array) -> Made:
     if _walls_move(run):
         reason = "a wall moves and gives energy by friction"
         return Made(unknown, float(limit.min()), unknown, 0, reason)
-    made = made_by_contact(run)
+    gains = _gains(run)
+    made = _made(run, gains)
     if not np.isfinite(made).all():
         reason = "needs a row every step: &run history_interval = 0"
         return Made(unknown, float(limit.min()), unknown, 0, reason)
     row = int((made / limit).argmax())
-    gain = _gains(run)[row]
+    gain = gains[row]
     block = int(gain.argmax()) + 1 if gain.max() > made[row] / 2 else 0
     return Made(float(made[row]), float(limit[row]), float(run.bodies.time[row]), block, "")
 
@@ -69,8 +70,13 @@ def largest_made(run: Run, limit: Array) -> Made:
 def made_by_contact(run: Run) -> Array:
     """Energy that contact gave to the blocks and to its springs in the step that ends at each row
     [J] (T); negative where contact takes energy, as it should; nan in a row of several steps."""
-    b, s = run.bodies, run.series
-    made, n = _gains(run).sum(axis=1), min(b.time.size, s.time.size)  # of a run that goes on
+    return _made(run, _gains(run))
+
+
+def _made(run: Run, gains: Array) -> Array:
+    """The same from what each block got, `gains` (T, N) [J]."""
+    s = run.series
+    made, n = gains.sum(axis=1), min(len(gains), s.time.size)  # of a run that goes on
     made[1:n] += np.diff(np.nan_to_num(s.contact_energy[:n]))
     return np.where(_single_steps(run), made, np.nan)
 
