@@ -5,9 +5,8 @@ model of a run; but blocks that collide by spheres, which reach beyond their sur
 these do. All lengths in metres.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
@@ -98,10 +97,21 @@ def nearest(run: Run, body: Placed, to: Placed) -> Placed:
     return body.moved(way)
 
 
-def near(a: Placed, b: Placed, margin: float = 0.0) -> bool:
-    """Whether the spheres around two blocks come nearer than `margin` [m]."""
-    reach = a.shape.radius + b.shape.radius + margin
-    return bool(np.linalg.norm(a.position - b.position) < reach)
+def near_pairs(
+    run: Run, bodies: dict[int, Placed], reach: float = 0.0, out: dict[int, float] | None = None
+) -> Iterator[tuple[int, int]]:
+    """Pairs of blocks, the lower number first, whose spheres around them come nearer than `reach`
+    [m], through periodic sides, too; `out` is how much farther than that some of them stick out."""
+    numbers = list(bodies)
+    place = np.array([body.position for body in bodies.values()])
+    radius = np.array([body.shape.radius + (out or {}).get(k, 0.0) for k, body in bodies.items()])
+    period = np.where(run.period > 0, run.period, np.inf)
+    for n, i in enumerate(numbers):
+        way = place[n + 1 :] - place[n]
+        way -= run.period * np.round(way / period)
+        close = np.linalg.norm(way, axis=1) < radius[n] + radius[n + 1 :] + reach
+        for k in np.flatnonzero(close):
+            yield i, numbers[n + 1 + int(k)]
 
 
 def gap(a: Placed, b: Placed) -> float:
@@ -202,17 +212,16 @@ def touches(run: Run, row: int) -> Touches:
     bodies = present_bodies(run, row)
     balls = {k: _stick_out(body) for k, body in bodies.items() if by_spheres(run, body)}
     blocks = {}
-    for i, j in combinations(bodies, 2):
+    for i, j in near_pairs(run, bodies, reach, balls):
         a = bodies[i]
         b = nearest(run, bodies[j], a)
-        if near(a, b, reach + balls.get(i, 0.0) + balls.get(j, 0.0)):
-            distance = gap(a, b)
-            if distance > reach and depth(a, b) > 0:
-                distance = 0.0
-            if distance > reach and i in balls and j in balls:
-                distance = sphere_gap(a, b)
-            if distance <= reach:
-                blocks[i, j] = distance
+        distance = gap(a, b)
+        if distance > reach and depth(a, b) > 0:
+            distance = 0.0
+        if distance > reach and i in balls and j in balls:
+            distance = sphere_gap(a, b)
+        if distance <= reach:
+            blocks[i, j] = distance
     gaps = _all_wall_gaps(run, bodies)
     corners, facets = run.bed
     beds = {k: bed_gap(body, corners[facets], reach) for k, body in bodies.items()}
@@ -255,12 +264,10 @@ def overlap(run: Run, row: int = -1) -> Overlap:
     """True overlap of all released blocks at a row."""
     bodies = present_bodies(run, row)
     blocks = {}
-    for i, j in combinations(bodies, 2):
-        other = nearest(run, bodies[j], bodies[i])
-        if near(bodies[i], other):
-            found = depth(bodies[i], other)
-            if found > 0:
-                blocks[i, j] = found
+    for i, j in near_pairs(run, bodies):
+        found = depth(bodies[i], nearest(run, bodies[j], bodies[i]))
+        if found > 0:
+            blocks[i, j] = found
     gaps = _all_wall_gaps(run, bodies)
     return Overlap(blocks, {key: -g for key, g in gaps.items() if g < 0})
 

@@ -1,10 +1,13 @@
 """Gaps and depths of true shapes at places where they are known."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from micstools.geometry import quaternion_from_axis
-from micstools.overlap import Placed, bed_gap, depth, gap, wall_gaps
+from micstools.overlap import Placed, bed_gap, depth, gap, near_pairs, wall_gaps
 from micstools.shapes import cube, hexapod
 
 UPRIGHT = np.array([1.0, 0, 0, 0])
@@ -55,6 +58,26 @@ def test_hexapods_lying_in_one_anothers_notches_are_apart() -> None:
     beside = at(h, 0.0201, 0.0201, 0.0201)  # every leg in a notch of the other
     assert depth(at(h, 0, 0, 0), beside) == 0.0
     assert gap(at(h, 0, 0, 0), beside) == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_pairs_are_near_through_periodic_sides_too() -> None:
+    """Against all pairs and all images, 60 cubes in a tank that is periodic in x."""
+    c, rng, reach = cube(0.02), np.random.default_rng(3), 1e-3
+    run: Any = SimpleNamespace(period=np.array([0.2, 0.0, 0.0]))
+    bodies = {k: at(c, *rng.uniform(0, 0.2, 3)) for k in range(0, 120, 2)}
+    wanted = {
+        (i, j)
+        for i in bodies
+        for j in bodies
+        if i < j
+        and min(
+            np.linalg.norm(bodies[i].position - bodies[j].position + [way, 0, 0])
+            for way in (-0.2, 0.0, 0.2)
+        )
+        < 2 * c.radius + reach + (0.01 if 4 in (i, j) else 0.0)
+    }
+    found = list(near_pairs(run, bodies, reach, {4: 0.01}))
+    assert set(found) == wanted and len(found) == len(wanted) > 20
 
 
 def test_walls_give_signed_gaps_and_open_sides_none() -> None:
