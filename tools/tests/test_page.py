@@ -263,6 +263,18 @@ def test_blocks_still_to_come_have_no_curves(make_run) -> None:
     assert [k.block for k in block_numbers.of_blocks(run)] == [4, 5]
 
 
+def test_the_lead_counts_blocks_that_move(make_run) -> None:
+    """Three blocks that come to rest after 0.8, 1.8 and 2.8 s, looked at before and after."""
+    places = [(np.array([x, 0.05, 0.12]), UPRIGHT) for x in (0.06, 0.15, 0.24)]
+    motion = Motion(places=places, field_step=2.4, cells=(12, 4, 8))
+    words = {2.4: "After 2.4 s one of three free blocks still moves;",
+             4.8: "After 2.78 s three free blocks lie still;"}  # fmt: skip
+    for end, said in words.items():
+        text = run_page.page(make_run(replace(motion, t_end=end)))
+        lead = text.split('class="lead">')[1].split("</p>")[0].replace("\u00a0", " ")
+        assert lead.startswith(said) and "above the floor under it" in lead
+
+
 def test_a_dry_run_without_fields_has_a_page(make_run) -> None:
     run = make_run(Motion(t_end=2.0, field_step=2.0))
     (run.folder / "fields.vtkhdf").unlink()

@@ -72,17 +72,21 @@ def page(run: Run, north: float | None = None) -> str:
 def outcome(run: Run, found: Found) -> str:
     """How the run ended, in a sentence or two."""
     b = run.bodies
-    n, end = len(found.blocks), float(b.time[-1])
+    n, end = len(found.blocks), f"After {figure(float(b.time[-1]))} s "
     missing = int((~b.fixed).sum()) - n
+    moving = sum(k.at_rest != k.at_rest for k in found.blocks)
     if missing:
-        said = f"After {end:.3g} s {count(missing, 'block is', 'blocks are')} still to come and "
+        said = f"{end}{count(missing, 'block is', 'blocks are')} still to come and "
         said += f"{count(n, 'block was', 'blocks were')} let go"
-    elif found.numbers.time_to_rest == found.numbers.time_to_rest:
-        said = f"After {found.numbers.time_to_rest:.3g} s {count(n, 'free block')} "
+    elif moving:
+        of_all = f"{count(moving, 'of', 'of')} {count(n, 'free block')}"
+        said = end + (of_all if n > moving else count(n, "free block"))
+        said += " still moves" if moving == 1 else " still move"
+    elif n:
+        said = f"After {figure(found.numbers.time_to_rest)} s {count(n, 'free block')} "
         said += "lies still" if n == 1 else "lie still"
     else:
-        said = f"After {end:.3g} s {count(n, 'free block')} still "
-        said += "moves" if n == 1 else "move"
+        said = "All blocks are fixed"
     low, ground = found.numbers.on_floor, _ground(run)
     return (
         f"{said}; the pile reaches {found.units.length.text(found.numbers.height)} above the "
