@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -153,6 +154,20 @@ def test_history_has_a_panel_for_each_matter(loose_pile: Run) -> None:
     assert "drift of the liquid volume [-]" in titles
     assert "largest excess of fluid in a cell [V], limit dashed" in titles
     assert len(titles) == 12  # with the empty one at the end
+
+
+def test_units_of_diagrams_and_pictures_go_with_the_blocks(make_run) -> None:
+    motion = Motion(t_end=2.0, field_step=2.0, cells=(12, 4, 8))
+    for scale, length, force, energy, bar in (
+        (1.0, "mm", "N", "mJ", "50 mm"),
+        (100 / 3, "m", "kN", "kJ", "2 m"),
+    ):
+        run = make_run(replace(motion, scale=scale))
+        titles = [axis.get_title(loc="left") for axis in plots.history(run).axes]
+        assert titles[0] == f"height of the centroid, z [{length}]"
+        assert f"contact force [{force}]" in titles and f"energy [{energy}]" in titles
+        assert "largest overlap [% of the smallest block's length]" in titles
+        assert scene._keys(run, 0.0, 100.0, "front")[-1].text == bar
 
 
 def test_the_legend_names_every_block_and_covers_no_curve(make_run) -> None:

@@ -113,6 +113,24 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     assert np.isfinite(top).sum() * 1e-6 == pytest.approx(content["plan_area"])
 
 
+def test_the_command_prints_units_by_the_size_of_the_blocks(make_run, capsys) -> None:
+    """A cube of 0.67 m: m, m2 and kN, and limits that are as large; plain ASCII."""
+    place = (np.array([0.03, 0.03, 0.05]), UPRIGHT)
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=[place], history_step=0.05, t_end=2.0,
+                          field_step=2.0, cells=(12, 4, 8), scale=100 / 3))  # fmt: skip
+    with pytest.raises(SystemExit):
+        cli.main(["pile", str(run.folder)])
+    said = capsys.readouterr().out
+    rows = dict(line.split(None, 1) for line in said.splitlines() if line.startswith("     "))
+    assert said.isascii()
+    assert rows["top"].split()[1] == rows["height"].split()[1] == "m"
+    assert rows["plan_area"].endswith(" m2") and rows["contact_force"].endswith(" kN")
+    assert rows["time_to_rest"].endswith(" s") and rows["impact_speed"].endswith(" m/s")
+    assert rows["box"].count(",") == 5 and rows["box"].endswith(" m")
+    assert "overlap of the pile below 0.00667 m" in said
+    assert json.loads((run.folder / "pile.json").read_text())["units"]["contact_force"] == "N"
+
+
 PERIODIC = "&boundary x_min = 'periodic' x_max = 'periodic' /\n"
 
 
