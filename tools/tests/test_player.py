@@ -209,6 +209,14 @@ def test_a_length_is_measured(browser: Browser, page: Path) -> None:
 
 
 @in_browser
+def test_lengths_have_the_unit_of_the_page(browser: Browser, page: Path) -> None:
+    """What is below a metre is told in m beside blocks of metres, as all else on the page."""
+    browser.open(page)
+    assert browser.run("inWords(0.4, runPlayer.stage.scene.unit)") == "400 mm"
+    assert browser.run("inWords(0.4, { name: 'm', size: 1 })") == "0.4 m"
+
+
+@in_browser
 @pytest.mark.parametrize("name", ["corner", *FLAT])
 def test_no_bed_hides_a_block(browser: Browser, tmp_path: Path, name: str) -> None:
     """The block lies in a hole of the bed, and a roof of the bed is over it."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from micstools import pile
+from micstools import pile, units
 from micstools.geometry import Array, IntArray
 from micstools.page.views import block_colours
 from micstools.reader import Run
@@ -102,7 +102,9 @@ def tank(run: Run, north: float | None = None) -> dict[str, Any]:
     """What stands still: the tank, the bed, and the shapes. `north`: its direction in the plan,
     degrees from +y towards +x; +y where it is not known."""
     points, triangles = bed(run)
+    unit = units.of_run(run).length
     return {
+        "unit": {"name": unit.name, "size": unit.size},
         "north": north or 0.0,
         "period": run.period.tolist(),
         "low": run.grid.low.tolist(),

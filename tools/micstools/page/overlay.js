@@ -180,15 +180,15 @@ class Overlay {
       for (const at of [x, end]) this.line([[at, y - 5], [at, y + 5]], colour, width);
     }
     this.bar = { length, pixels: end - x };
-    this.write(inWords(length), end + 8, y, 'left');
+    this.write(inWords(length, this.stage.scene.unit), end + 8, y, 'left');
   }
 
   // Coordinates along the lower and the left edge.
   drawRulers() {
     const { stage, wide, high } = this, step = 2 * stage.half / high, [across, upward] = stage.flat;
-    const tick = roundBelow(90 * step), large = Math.max(...stage.size) >= 1;
-    const words = value => large ? `${+value.toFixed(6)}` : `${+(1e3 * value).toFixed(3)}`;
-    const middle = [stage.focus[across], stage.focus[upward]], unitName = large ? 'm' : 'mm';
+    const tick = roundBelow(90 * step), { unit } = stage.scene;
+    const words = value => `${+(value / unit.size).toFixed(6)}`;
+    const middle = [stage.focus[across], stage.focus[upward]];
     this.pen.fillStyle = this.paper;
     this.pen.globalAlpha = 0.75;
     this.pen.fillRect(0, high - 22, wide, 22);
@@ -211,13 +211,14 @@ class Overlay {
       this.line([[38, y], [44, y]], this.ink, 1);
       this.write(words(value), 35, y, 'right');
     }
-    this.write(`${'xyz'[across]} [${unitName}]`, wide - 6, high - 8, 'right');
-    this.write(`${'xyz'[upward]} [${unitName}]`, 4, 82, 'left');
+    this.write(`${'xyz'[across]} [${unit.name}]`, wide - 6, high - 8, 'right');
+    this.write(`${'xyz'[upward]} [${unit.name}]`, 4, 82, 'left');
   }
 
   // The length that was dragged, and the place under the mouse.
   drawMeasured() {
     const { stage } = this, [across, upward] = stage.flat, names = ['xyz'[across], 'xyz'[upward]];
+    const inUnit = length => inWords(length, stage.scene.unit);
     const { from, to } = stage.measured || {};
     this.told = '';
     if (to && Math.hypot(...to.map((v, i) => v - from[i])) > 0) {
@@ -226,9 +227,9 @@ class Overlay {
         this.line(ends.map(({ x, y }) => [x, y]), colour, width);
         for (const { x, y } of ends) this.line([[x - 4, y], [x + 4, y]], colour, width);
       }
-      this.told = `${inWords(Math.hypot(...d))} (${names.map((n, i) => `Δ${n} ${inWords(d[i])}`).join(', ')})`;
+      this.told = `${inUnit(Math.hypot(...d))} (${names.map((n, i) => `Δ${n} ${inUnit(d[i])}`).join(', ')})`;
     } else if (stage.pointed)
-      this.told = names.map((n, i) => `${n} ${inWords(stage.pointed[stage.flat[i]])}`).join(', ');
+      this.told = names.map((n, i) => `${n} ${inUnit(stage.pointed[stage.flat[i]])}`).join(', ');
     this.write(this.told, 96, 38, 'left');
   }
 }

@@ -42,9 +42,8 @@ function roundBelow(value) {
   return [5, 2, 1].find(step => step * power <= value * (1 + 1e-9)) * power;
 }
 
-// A length in words: mm below 1 m.
-const inWords = (length, digits = 3) => Math.abs(length) < 1
-  ? `${+(1e3 * length).toPrecision(digits)} mm` : `${+length.toPrecision(digits)} m`;
+// A length [m] in words, in the unit of the page: its `name`, and its `size` in m.
+const inWords = (length, unit, digits = 3) => `${+(length / unit.size).toPrecision(digits)} ${unit.name}`;
 
 // The camera, column-major 4 x 4, of a viewer who looks from `eye` along -back.
 function inPerspective(eye, [right, up, back], angle, aspect, near, far) {
