@@ -8,6 +8,7 @@ program mics
   use build_info_m, only: version, git_revision
   use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
+  use stack_limit_m, only: check_stack
   use signals_m, only: catch_signals
   use stop_requests_m, only: stop_requests_t, watch_for_stop, stop_asked
   use timers_m, only: wall_clock
@@ -123,6 +124,7 @@ contains
     character(:), allocatable :: reference
 
     reference = ''
+    call check_stack(problems)
     call read_command_line(options, problems)
     if (options%help) reference = reference_text(options%topic, problems)
     if (problems%n > 0) call refuse(problems)
@@ -140,7 +142,7 @@ contains
 
   !> The case with its shapes; every problem with them is reported at once.
   subroutine read_and_check()
-    type(problems_t) :: problems, oddities
+    type(problems_t) :: problems, warnings
     character(:), allocatable :: text
     integer :: n
 
@@ -149,7 +151,7 @@ contains
     call broadcast(n)
     if (n > 0) call refuse(problems)
     call broadcast(text)
-    call read_case(text, case, problems)
+    call read_case(text, case, problems, warnings)
     call look_beside(options%case_file, case)
     call make_shapes(case, shapes, problems)
     call make_bed(case, bed, problems)
@@ -157,10 +159,14 @@ contains
     call check_initial_state(case, problems)
     call check_output(case, options, problems)
     if (problems%n > 0) call refuse(problems)
-    if (.not. options%check) return
+    if (.not. options%check) then
+      call warnings%report(error_unit, 'mics: warning: ')
+      return
+    end if
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
-    call find_oddities(case, shapes, oddities)
-    call oddities%report(output_unit, '  warning: ')
+    call find_oddities(case, shapes, bed, warnings)
+    if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
+    call warnings%report(output_unit, '  warning: ')
     call finish()
   end subroutine read_and_check
 

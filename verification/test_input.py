@@ -249,7 +249,7 @@ ODD = {
 
 
 def odd_case(text: str) -> str:
-    """A sound case of 40 m with `text` in the group it belongs to, in place of its own value."""
+    """A sound case, 40 m high; `text` in its group in place of the value there."""
     group = {"density": "shape", "size": "shape", "refinement": "shape"}.get(
         text.split()[0], "fluid"
     )
@@ -262,7 +262,7 @@ def odd_case(text: str) -> str:
     kept = [v for v in values[group] if v.split()[0] not in text]
     values[group] = [*kept, text]
     return (
-        "&run t_end = 1 /\n&grid cells = 800, 800, 800  length = 40, 40, 40 /\n"
+        "&run t_end = 1 /\n&grid cells = 20, 20, 800  length = 1, 1, 40 /\n"
         f"&shape {' '.join(values['shape'])} /\n&fluid {' '.join(values['fluid'])} /\n"
     )
 
@@ -284,6 +284,19 @@ def test_geometry_is_checked_beside_other_problems(tmp_path: Path) -> None:
     assert "&fluid colour = 1: unknown variable" in done.stderr
     assert "through the wall x_min" in done.stderr
     assert done.returncode == 2
+
+
+def test_overlaps_are_found_beside_a_faulty_tank(tmp_path: Path) -> None:
+    """Without the length of the tank, and beside sides that are misspelt."""
+    pair = BODY + "0.1, 0.1, 0.1 /\n" + BODY + "0.11, 0.1, 0.1 /\n"
+    done = mics([], tmp_path, TANK.replace("length = 0.3", "length = x") + pair)
+    assert "&grid length = x, 0.2, 0.2: value 1 must be a number" in done.stderr
+    assert "overlaps the &body on line 4 by 0.01 m" in done.stderr
+    sides = "&boundary y_min = 'wall'  color = 1 /\n"
+    done = mics([], tmp_path, TANK + pair + BODY + "-0.1, 0.1, 0.1 weight = 1 /\n" + sides)
+    assert "overlaps the &body on line 4 by 0.01 m" in done.stderr
+    assert "reaches 0.11 m through the wall x_min" in done.stderr
+    assert len(done.stderr.splitlines()) == 5
 
 
 def bodies_apart(count: int) -> str:

@@ -648,9 +648,10 @@ def test_same_folder_by_another_name(tmp_path: Path) -> None:
 
 
 def test_every_change_of_a_case_is_told(tmp_path: Path) -> None:
-    case = short_case(tmp_path / "case.nml", "t_end = 0.02")
+    settled = "t_end = 0.02  stop_when_settled = .true."
+    case = short_case(tmp_path / "case.nml", settled)
     assert run(tmp_path / "run", case=case) == (0, "")
-    short_case(case, "t_end = 0.02  rest_time = 3", size=0.2)
+    short_case(case, f"{settled}  rest_time = 3", size=0.2)
     code, said = run(None, "--restart", tmp_path / "run" / "restart-a.h5", case=case)
     assert code == 2
     assert "&run rest_time = 3, was rest_time = 0.5; &shape size = 0.2, was size = 0.1" in said

@@ -20,7 +20,7 @@ module exact_bins_m
   public :: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
 
   integer, parameter :: bin_size = 7         !! index of the highest bin, three counts of two words
-  integer, parameter :: chunk_size = 4096    !! most terms in one call of `add_terms`
+  integer, parameter :: chunk_size = 1024    !! most terms in one call of `add_terms`, on the stack
   integer, parameter :: bin_digits = 36
   integer, parameter :: low_digits = 32      !! of a count, in its lower word
   integer, parameter :: lowest = -24         !! smallest index, so that no unit is subnormal

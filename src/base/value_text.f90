@@ -8,7 +8,7 @@ module value_text_m
   private
   public :: parse_real, parse_integer, parse_logical
   public :: quoted_text, printable, tame, fixed_text
-  public :: lower_case, nearest_name, edit_distance
+  public :: lower_case, nearest_name, edit_distance, looks_like_name
   public :: byte_order_mark
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
 
@@ -205,6 +205,18 @@ contains
       nearest = trim(known(i))
     end do
   end function nearest_name
+
+  !> Could the word be a variable whose '=' was forgotten? (A logical could not.)
+  pure function looks_like_name(word) result(yes)
+    character(*), intent(in) :: word
+    logical :: yes
+    logical :: flag
+    integer :: info
+
+    flag = .false.
+    call parse_logical(word, flag, info)
+    yes = info /= value_ok .and. scan(lower_case(word(1:1)), 'abcdefghijklmnopqrstuvwxyz') == 1
+  end function looks_like_name
 
   !> Least number of letters to insert, delete, replace or swap (neighbours) that turns a into b.
   pure function edit_distance(a, b) result(distance)

@@ -65,8 +65,9 @@ contains
     character(*), intent(in) :: file
     character(:), allocatable, intent(out) :: text
     type(problems_t), intent(inout) :: problems
-    character(kind=c_char), target :: piece(65536)
-    character(65536) :: part
+    integer, parameter :: length = 8192   ! of a piece, short enough for a small stack
+    character(kind=c_char), target :: piece(length)
+    character(length) :: part
     character(:), allocatable :: source
     type(c_ptr) :: stream
     integer :: n, i, status

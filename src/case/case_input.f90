@@ -13,6 +13,7 @@ module case_input_m
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: visit_run, visit_grid, visit_boundary, side_name
   use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics
+  use idle_variables_m, only: find_idle
   use block_groups_m, only: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text
   implicit none
@@ -27,10 +28,11 @@ module case_input_m
 contains
 
   !> Read the text of a case. Variables that are wrong keep their defaults; see `problems%n` first.
-  subroutine read_case(text, case, problems)
+  subroutine read_case(text, case, problems, passed_over)
     character(*), intent(in) :: text
     type(case_t), intent(out) :: case
     type(problems_t), intent(inout) :: problems
+    type(problems_t), intent(out), optional :: passed_over   !! given, but idle with `physics`
     type(namelist_text_t) :: list
     type(group_visitor_t) :: v
     character(name_length), allocatable :: shapes(:)
@@ -52,6 +54,7 @@ contains
     call read_missing_groups(n, v, case)
     call check_together(list, case, v)
     problems = v%problems
+    if (present(passed_over)) passed_over = v%passed_over
     if (case%run%physics == 'fluid') call leave_out_blocks(case)
   end subroutine read_case
 
@@ -135,32 +138,48 @@ contains
     case default; error stop 'visit_group: a group of the list has no procedure'
     end select
     call v%finish()
-    if (.not. v%all_good()) call mark_faulty(case, name, n)
+    if (v%reading) call mark_faulty(v, case, name, n)
   end subroutine visit_group
 
-  !> Remember that a group is faulty, so that later checks leave it alone.
-  subroutine mark_faulty(input, name, n)
+  !> Remember what of a group cannot be relied on, so that later checks leave it alone.
+  subroutine mark_faulty(v, input, name, n)
+    type(group_visitor_t), intent(in) :: v
     type(case_t), intent(inout) :: input
     character(*), intent(in) :: name
     integer, intent(in) :: n
+    integer :: s, d
 
     select case (name)
     case ('grid')
-      input%grid%faulty = .true.
+      input%grid%cells_faulty = faulty('cells')
+      input%grid%extent_faulty = faulty('length origin')
     case ('boundary')
-      input%boundary%faulty = .true.
+      do d = 1, 3
+        do s = 1, 2
+          input%boundary%faulty(s, d) = faulty(side_name(s, d))
+        end do
+      end do
     case ('water')
-      input%water(n)%faulty = .true.
+      input%water(n)%faulty = faulty('min max')
     case ('shape')
-      input%shape(n)%faulty = .true.
+      input%shape(n)%faulty = faulty('name kind size file scale refinement')
     case ('body')
-      input%body(n)%faulty = .true.
+      input%body(n)%faulty = faulty('shape position quaternion axis angle_deg')
+      input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time')
     case ('drop')
-      input%drop(n)%faulty = .true.
+      input%drop(n)%faulty = faulty('shape position count first_time interval spread ' &
+        //'orientation quaternion axis angle_deg tilt_deg seed')
     case ('bed')
-      input%bed%faulty = .true.
+      input%bed%faulty = faulty('file kind')
     case default   ! nobody asks about the others
     end select
+  contains
+    !> Is something wrong with one of these variables?
+    pure logical function faulty(variables)
+      character(*), intent(in) :: variables
+
+      faulty = v%group%faulty .or. .not. v%good(variables)
+    end function faulty
   end subroutine mark_faulty
 
   !> Groups that hold required variables and are not there at all.
@@ -201,27 +220,37 @@ contains
 
   !> Checks across groups.
   subroutine check_together(list, case, v)
-    type(namelist_text_t), intent(in) :: list
+    type(namelist_text_t), intent(inout) :: list
     type(case_t), intent(in) :: case
     type(group_visitor_t), intent(inout) :: v
     integer :: d, i
 
     call check_names(case, v%problems)
-    if (.not. case%boundary%faulty) call check_streams(list, case, v)
-    if (case%grid%faulty .or. case%boundary%faulty) return
-    do i = 1, list%n
-      if (list%group(i)%name == 'grid') exit
-    end do
-    if (i > list%n) return
+    call check_streams(list, case, v)
+    call find_idle(list, case, v)
+    i = first_of(list, 'grid')
+    if (i == 0 .or. case%grid%cells_faulty) return
     call v%start_reading(list%group(i))
     do d = 1, 3
-      if (case%grid%cells(d) /= 1) cycle
+      if (case%grid%cells(d) /= 1 .or. any(case%boundary%faulty(:, d))) cycle
       call v%require('cells', all(case%boundary%kind(:, d) == 'slip') .or. &
         all(case%boundary%kind(:, d) == 'periodic'), &
         'one cell in a direction makes the case 2-D, then '//side_name(1, d)//' and ' &
         //side_name(2, d)//' must both be ''slip'' or ''periodic''')
     end do
   end subroutine check_together
+
+  !> Number of the first group of a name; 0 if there is none.
+  pure function first_of(list, name) result(i)
+    type(namelist_text_t), intent(in) :: list
+    character(*), intent(in) :: name
+    integer :: i
+
+    do i = 1, list%n
+      if (list%group(i)%name == name) return
+    end do
+    i = 0
+  end function first_of
 
   !> What enters through an inflow must find a way out; an outflow needs a level to keep, and
   !! gravity along it.
@@ -232,16 +261,14 @@ contains
     logical :: way_out
     integer :: d, s, i
 
-    if (case%run%physics == 'dry') return
-    do i = 1, list%n
-      if (list%group(i)%name == 'boundary') exit
-    end do
-    if (i > list%n) return
+    i = first_of(list, 'boundary')
+    if (i == 0 .or. case%run%physics == 'dry') return
     call v%start_reading(list%group(i))
-    way_out = any(gives_pressure(side_code(case%boundary%kind)))
+    way_out = any(gives_pressure(side_code(case%boundary%kind)) .or. case%boundary%faulty)
     associate (fluid => case%fluid)
       do d = 1, 3
         do s = 1, 2
+          if (case%boundary%faulty(s, d)) cycle
           call v%require(side_name(s, d), case%boundary%kind(s, d) /= 'inflow' .or. way_out, &
             'what flows in must leave, another side must be ''open'' or ''outflow''')
           if (case%boundary%kind(s, d) /= 'outflow') cycle

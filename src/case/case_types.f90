@@ -31,7 +31,8 @@ module case_types_m
     integer :: cells(3) = 0                         !! required
     real(wp) :: length(3) = absent                  !! required [m]
     real(wp) :: origin(3) = 0.0_wp                  !! [m]
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: cells_faulty = .false.               !! not known: they are wrong or missing
+    logical :: extent_faulty = .false.              !! likewise length and origin
   end type grid_input_t
 
   !> First index: 1 lower side, 2 upper side; last index: x, y, z.
@@ -39,7 +40,7 @@ module case_types_m
     character(name_length) :: kind(2, 3) = reshape([character(name_length) :: &
       'no_slip', 'no_slip', 'no_slip', 'no_slip', 'no_slip', 'open'], [2, 3])
     real(wp) :: velocity(3, 2, 3) = 0.0_wp          !! wall or inflow velocity [m/s]
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty(2, 3) = .false.               !! the kind of this side is not known
   end type boundary_input_t
 
   type :: fluid_t
@@ -58,7 +59,7 @@ module case_types_m
   type :: water_t
     real(wp) :: min(3) = absent, max(3) = absent    !! a box of liquid at t = 0 [m]
     integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty = .false.                     !! where the box is is not known
   end type water_t
 
   type :: numerics_t
@@ -99,7 +100,7 @@ module case_types_m
     character(name_length) :: spheres = 'centroid'
     real(wp) :: sphere_spacing = 0.0_wp             !! [m]
     integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty = .false.                     !! its form is not known
   end type shape_input_t
 
   type :: body_input_t
@@ -112,7 +113,8 @@ module case_types_m
     logical :: fixed = .false.
     real(wp) :: release_time = 0.0_wp               !! [s]
     integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty = .false.                     !! its shape, place or attitude is not known
+    logical :: time_faulty = .false.                !! when it is there, or whether it moves
   end type body_input_t
 
   type :: drop_input_t
@@ -127,7 +129,7 @@ module case_types_m
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1
     integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty = .false.                     !! its places or times are not known
   end type drop_input_t
 
   type :: bed_input_t
@@ -135,7 +137,7 @@ module case_types_m
     character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(name_length) :: kind = 'heightmap'
     integer :: line = 0                             !! of the case file, where the group begins
-    logical :: faulty = .false.                     !! something is wrong with the group
+    logical :: faulty = .false.                     !! its file is not known
   end type bed_input_t
 
   type :: case_t

@@ -2,9 +2,10 @@
 module description_m
   use kinds_m, only: name_length
   use allowed_values_m, only: allowed_t
+  use value_text_m, only: quoted_text
   implicit none
   private
-  public :: variable_t, group_description_t, described
+  public :: variable_t, group_description_t, described, choices, word_text, next_word
 
   !> One variable of a group.
   type :: variable_t
@@ -46,5 +47,39 @@ contains
     variable%choices = ''
     if (present(required)) variable%required = required
   end function described
+
+  !> The words of a list, as a message shows them.
+  pure function choices(allowed) result(text)
+    character(*), intent(in) :: allowed
+    character(:), allocatable :: text
+    integer :: first, last
+
+    text = ''
+    last = -1
+    do while (last < len(allowed))
+      call next_word(allowed, first, last)
+      if (len(text) > 0) text = text//', '
+      text = text//quoted_text(allowed(first:last))
+    end do
+  end function choices
+
+  !> Where the next word of a list stands, one blank between the words; begin with `last` = -1.
+  pure subroutine next_word(words, first, last)
+    character(*), intent(in) :: words
+    integer, intent(out) :: first
+    integer, intent(inout) :: last   !! of the word before, then of this one
+
+    first = last + 2
+    last = first + scan(words(first:)//' ', ' ') - 2
+  end subroutine next_word
+
+  !> A word between quotes; empty for none.
+  pure function word_text(word) result(text)
+    character(*), intent(in) :: word
+    character(:), allocatable :: text
+
+    text = ''
+    if (word /= '') text = quoted_text(trim(word))
+  end function word_text
 
 end module description_m

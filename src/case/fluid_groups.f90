@@ -20,6 +20,11 @@ contains
 
     fluid%line = v%group%line
     call v%about('water and air: what they are made of, and where they are at the start')
+    call v%logical('single_phase', fluid%single_phase, 'the liquid fills the whole tank, there ' &
+      //'is no gas')
+    call v%without_meaning(fluid%single_phase, &
+      'gas_density gas_viscosity water_level surface_tension', 'single_phase = .true.', &
+      'there is no gas and no surface')
     call v%real('liquid_density', fluid%liquid_density, &
       between(lightest, 1.0_wp/lightest, 'kg/m3'), 'density of the liquid', example='1025')
     call v%real('liquid_viscosity', fluid%liquid_viscosity, not_negative('Pa s'), &
@@ -36,8 +41,6 @@ contains
       //'only the liquid of &water', example='0.15')
     call v%real('surface_tension', fluid%surface_tension, not_negative('N/m'), &
       'tension of the surface between liquid and gas', example='0.072')
-    call v%logical('single_phase', fluid%single_phase, 'the liquid fills the whole tank, there ' &
-      //'is no gas')
     call v%real('velocity', fluid%velocity, any_number('m/s'), &
       'velocity of the fluid at the start, everywhere the same', example='0.1, 0, 0')
     call v%text('initial_state', fluid%initial_state, 'HDF5 file with the liquid shares and the ' &

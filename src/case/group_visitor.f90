@@ -14,30 +14,34 @@ module group_visitor_m
   use errors_m, only: problems_t, to_text
   use long_text_m, only: long_text_t
   use allowed_values_m, only: allowed_t
-  use description_m, only: variable_t, group_description_t, described
+  use description_m, only: variable_t, group_description_t, described, choices, &
+    word_text, next_word
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
-  use value_text_m, only: parse_real, parse_integer, parse_logical, lower_case, nearest_name, &
-    quoted_text, printable, tame, value_ok, value_not_finite, value_too_large, value_not_whole
+  use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
+    edit_distance, quoted_text, printable, tame, value_ok, value_not_finite, value_too_large, &
+    value_not_whole, looks_like_name
   implicit none
   private
-  public :: group_visitor_t, choices
+  public :: group_visitor_t
 
   integer, parameter :: most_variables = 64   !! of one group
+  integer, parameter :: slip_of_pen = 2       !! letters by which a misspelt name may differ
 
   type :: group_visitor_t
     logical :: reading = .false., writing = .false., describing = .false.   !! one of them
     type(long_text_t) :: written           !! what a writing visitor has written
     type(group_description_t) :: told      !! what a describing visitor was told
     type(problems_t) :: problems           !! what a reading visitor has found
+    type(problems_t) :: passed_over        !! and what it passes over, for warnings
     type(group_text_t) :: group            !! the group being read
     integer, private :: n_known = 0
-    integer, private :: n_before = 0       !! problems before this group
     character(name_length), private :: known(most_variables) = ''
     character(:), allocatable, private :: left_out   !! not written: they have no meaning
+    character(:), allocatable, private :: unsure   !! required and missing, or misspelt, it seems
   contains
     procedure :: start_reading, start_writing, start_describing, about, finish
-    procedure :: given, good, all_good, needed, require, without_meaning, note
+    procedure :: given, good, needed, require, without_meaning, note, pass_over
     procedure :: name, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
@@ -55,7 +59,7 @@ contains
     self%reading = .true.
     self%group = group
     self%n_known = 0
-    self%n_before = self%problems%n
+    self%unsure = ' '
   end subroutine start_reading
 
   !> Begin to write a group.
@@ -64,6 +68,7 @@ contains
     character(*), intent(in) :: group
 
     self%writing = .true.
+    self%unsure = ' '
     self%left_out = ' '
     call self%written%add_line('&'//group)
   end subroutine start_writing
@@ -74,6 +79,7 @@ contains
     character(*), intent(in) :: group
 
     self%describing = .true.
+    self%unsure = ' '
     self%told = group_description_t(name=group)
     allocate (self%told%variable(most_variables))
   end subroutine start_describing
@@ -89,6 +95,7 @@ contains
   !> End a group: report the variables nobody asked for, or close the group written.
   subroutine finish(self)
     class(group_visitor_t), intent(inout) :: self
+    character(:), allocatable :: nearest
     integer :: i
 
     if (self%writing) call self%written%add_line('/')
@@ -96,8 +103,9 @@ contains
     do i = 1, self%group%n
       associate (name => self%group%assignment(i)%name)
         if (any(self%known(:self%n_known) == name)) cycle
-        call self%fault(i, 'unknown variable, nearest known: ' &
-                        //nearest_name(name, self%known(:self%n_known)))
+        nearest = nearest_name(name, self%known(:self%n_known))
+        call self%fault(i, 'unknown variable, nearest known: '//nearest)
+        if (edit_distance(name, nearest) <= slip_of_pen) self%unsure = self%unsure//nearest//' '
       end associate
     end do
   end subroutine finish
@@ -112,29 +120,23 @@ contains
     if (self%reading) yes = self%group%find(variable) > 0
   end function given
 
-  !> Is nothing wrong with this variable so far? A default is good.
-  pure function good(self, variable) result(yes)
+  !> Is nothing wrong with these variables so far? A default is good, unless the variable is
+  !! required, or an unknown name looks like it (that is known after `finish`).
+  pure function good(self, variables) result(yes)
     class(group_visitor_t), intent(in) :: self
-    character(*), intent(in) :: variable
+    character(*), intent(in) :: variables   !! one blank between them
     logical :: yes
-    integer :: i
+    integer :: first, last, i
 
-    i = self%group%find(variable)
     yes = .true.
-    if (i > 0) yes = .not. self%group%assignment(i)%faulty
-  end function good
-
-  !> Is nothing wrong with the whole group so far?
-  pure function all_good(self) result(yes)
-    class(group_visitor_t), intent(in) :: self
-    logical :: yes
-    integer :: i
-
-    yes = .not. self%group%faulty .and. self%problems%n == self%n_before
-    do i = 1, self%group%n
-      yes = yes .and. .not. self%group%assignment(i)%faulty
+    last = -1
+    do while (last < len(variables))
+      call next_word(variables, first, last)
+      i = self%group%find(variables(first:last))
+      if (i > 0) yes = yes .and. .not. self%group%assignment(i)%faulty
+      if (index(self%unsure, ' '//variables(first:last)//' ') > 0) yes = .false.
     end do
-  end function all_good
+  end function good
 
   !> Report a required variable that is missing.
   subroutine needed(self, variable, meaning)
@@ -144,6 +146,7 @@ contains
 
     if (.not. self%reading .or. self%group%faulty) return
     if (self%group%find(variable) > 0) return
+    self%unsure = self%unsure//variable//' '
     if (self%group%line > 0) then
       call self%note(' '//variable//': missing, required: '//meaning)
     else
@@ -182,14 +185,39 @@ contains
     if (.not. idle) return
     if (self%writing) self%left_out = self%left_out//variables//' '
     if (.not. self%reading) return
-    first = 1
-    do while (first <= len(variables))
-      last = first + scan(variables(first:)//' ', ' ') - 2
+    last = -1
+    do while (last < len(variables))
+      call next_word(variables, first, last)
       i = self%group%find(variables(first:last))
       if (i > 0) call self%fault(i, 'has no meaning with '//chosen//'; '//remedy)
-      first = last + 2
     end do
   end subroutine without_meaning
+
+  !> Variables that have no meaning because of the physics that was chosen: those given are passed
+  !! over with a warning, see `idle_variables_m`.
+  subroutine pass_over(self, variables, chosen)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variables   !! one blank between them
+    character(*), intent(in) :: chosen      !! as in `physics = 'dry'`
+    character(:), allocatable :: names
+    integer :: first, last, i, line, n
+
+    names = ''
+    n = 0
+    last = -1
+    do while (last < len(variables))
+      call next_word(variables, first, last)
+      i = self%group%find(variables(first:last))
+      if (i > 0) then
+        if (n == 0) line = self%group%assignment(i)%line
+        if (n > 0) names = names//', '
+        names = names//variables(first:last)
+        n = n + 1
+      end if
+    end do
+    if (n > 0) call self%passed_over%add_message('&'//self%group%name//' '//names//': ' &
+      //trim(merge('has ', 'have', n == 1))//' no meaning with '//chosen//', passed over', line)
+  end subroutine pass_over
 
   !> Report a problem of the group; `what` goes on right after its name.
   subroutine note(self, what)
@@ -428,22 +456,6 @@ contains
     end if
   end subroutine tell
 
-  !> The words of a list, as a message shows them.
-  pure function choices(allowed) result(text)
-    character(*), intent(in) :: allowed
-    character(:), allocatable :: text
-    integer :: first, last
-
-    text = ''
-    first = 1
-    do while (first <= len(allowed))
-      last = first + scan(allowed(first:)//' ', ' ') - 2
-      if (len(text) > 0) text = text//', '
-      text = text//quoted_text(allowed(first:last))
-      first = last + 2
-    end do
-  end function choices
-
   !> Number of the assignment to a variable, 0 if the user gave none (a problem if it is required)
   !! or it is damaged.
   function lookup(self, variable, meaning, required) result(i)
@@ -564,26 +576,5 @@ contains
       end if
     end associate
   end subroutine read_text
-
-  !> A word between quotes; empty for none.
-  pure function word_text(word) result(text)
-    character(*), intent(in) :: word
-    character(:), allocatable :: text
-
-    text = ''
-    if (word /= '') text = quoted_text(trim(word))
-  end function word_text
-
-  !> Could the word be a variable whose '=' was forgotten? (A logical could not.)
-  pure function looks_like_name(word) result(yes)
-    character(*), intent(in) :: word
-    logical :: yes
-    logical :: flag
-    integer :: info
-
-    flag = .false.
-    call parse_logical(word, flag, info)
-    yes = info /= value_ok .and. scan(lower_case(word(1:1)), 'abcdefghijklmnopqrstuvwxyz') == 1
-  end function looks_like_name
 
 end module group_visitor_m

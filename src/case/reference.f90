@@ -1,8 +1,7 @@
 !> The reference of the case file: each variable of each group as the reading procedures tell it.
 module reference_m
-  use description_m, only: group_description_t, variable_t
+  use description_m, only: group_description_t, variable_t, choices
   use long_text_m, only: long_text_t
-  use group_visitor_m, only: choices
   use case_input_m, only: describe_groups
   use errors_m, only: problems_t, to_text
   use schema_m, only: schema_text

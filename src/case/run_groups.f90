@@ -54,8 +54,11 @@ contains
       //'all blocks are released or find no room, and are slower than rest_speed during rest_time')
     call v%real('rest_speed', run%rest_speed, positive('m/s'), &
       'speed below which a block counts as at rest', example='5e-4')
+    call v%without_meaning(.not. run%stop_when_settled .and. v%good('stop_when_settled'), &
+      'rest_time', 'stop_when_settled = .false.', 'only .true. waits for it')
     call v%real('rest_time', run%rest_time, not_negative('s'), &
-      'how long every block must be that slow', example='1')
+      'how long every block must be that slow for stop_when_settled', &
+      example='stop_when_settled = .true.  rest_time = 1')
 
     if (is_given(run%t_end) .and. v%good('dt')) then
       call v%require('t_end', run%t_end <= most_steps*run%dt, 'must be at most ' &

@@ -1,8 +1,8 @@
 !> Checks of a case that need geometry: bodies inside the tank and apart, room for the drops.
 !!
 !! They measure with the true shapes and the rule of a release (`room_for`): a body has room where
-!! nothing reaches deeper into it than 1 % of its size. Groups that `read_case` found faulty are
-!! left out, so these problems can be listed together with those.
+!! nothing reaches deeper into it than 1 % of its size. What `read_case` found faulty is left out
+!! (a side, a shape, a body, but nothing else), so these problems can be listed together with those.
 module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
@@ -39,6 +39,7 @@ module case_check_m
     integer, allocatable :: line(:)     !! (n) lines of the bodies in the case file
     logical, allocatable :: held(:)     !! (n) fixed and never moved
     logical, allocatable :: outside(:)  !! (n) reported as outside the tank
+    logical, allocatable :: dated(:)    !! (n) it is known when they are there
   end type scene_t
 
 contains
@@ -76,18 +77,23 @@ contains
     type(bed_t), intent(in) :: bed           !! from `make_bed`
     type(problems_t), intent(inout) :: problems
     type(scene_t) :: scene
+    type(case_t) :: known   ! the case without the sides that are wrong
     integer :: i
 
-    if (case%grid%faulty .or. case%boundary%faulty) return
-    call check_water(case, problems)
-    call check_capillary_step(case, problems)
-    call check_lengths(case, shapes, problems)
-    call set_scene(case, shapes, bed, scene)
+    known = case
+    where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
+    if (.not. case%grid%extent_faulty) call check_water(case, problems)
+    if (.not. (case%grid%extent_faulty .or. case%grid%cells_faulty)) then
+      call check_capillary_step(case, problems)
+    end if
+    if (.not. case%grid%extent_faulty) call check_lengths(known, shapes, problems)
+    call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
-    call check_places(case, scene, problems)
+    if (.not. case%grid%extent_faulty) call check_places(known, scene, problems)
     call check_pairs(scene, problems)
+    if (case%grid%extent_faulty) return
     do i = 1, size(case%drop)
-      if (.not. case%drop(i)%faulty) call check_drop(case, case%drop(i), scene, problems)
+      if (.not. case%drop(i)%faulty) call check_drop(known, case%drop(i), scene, problems)
     end do
   end subroutine check_case
 
@@ -209,15 +215,17 @@ contains
     good%body = [good%body(scene%n + 1), good%body(scene%n + 1)]
     call blocks_init(good, made, scene%two)
     call overlap_init(made, 2, scene%overlap)
-    call walls_init(case%grid, case%boundary, scene%walls)
+    if (.not. case%grid%extent_faulty) call walls_init(case%grid, case%boundary, scene%walls)
     scene%walls%bed = bed
     scene%no_walls%period = scene%walls%period
     allocate (scene%held(scene%n), scene%outside(scene%n))
     scene%line = pack(case%body%line, use_it)
+    scene%dated = pack(.not. case%body%time_faulty, use_it)
     scene%outside = .false.
     associate (blocks => scene%blocks)
       do n = 1, scene%n
-        scene%held(n) = blocks%fixed(n) .and. all(abs(blocks%given%v(:, n)) <= 0.0_wp) &
+        scene%held(n) = blocks%fixed(n) .and. scene%dated(n) &
+          .and. all(abs(blocks%given%v(:, n)) <= 0.0_wp) &
           .and. all(abs(blocks%given%omega(:, n)) <= 0.0_wp)
       end do
     end associate
@@ -278,6 +286,7 @@ contains
       do s = 1, 2
         side = side_code(case%boundary%kind(s, d))
         if (is_wall(side) .or. side == side_periodic) cycle   ! walls have been looked at
+        if (case%boundary%faulty(s, d)) cycle
         beyond = scene%blocks%x(d, b) - case%grid%origin(d)
         if (s == 2) beyond = case%grid%length(d) - beyond
         if (beyond < 0.0_wp .and. .not. (s == 2 .and. d == 3)) then
@@ -297,7 +306,7 @@ contains
     integer :: a, b, n, p, cells(3)
     real(wp) :: depth
 
-    if (count(.not. scene%outside) < 2) return
+    if (count(.not. scene%outside .and. scene%dated) < 2) return
     allocate (x(3, scene%n), radius(scene%n))
     associate (blocks => scene%blocks, period => scene%walls%period)
       do b = 1, scene%n
@@ -305,11 +314,12 @@ contains
         where (period > 0.0_wp) x(:, b) = modulo(x(:, b), period)
         radius(b) = blocks%shapes(blocks%shape(b))%radius
       end do
-      call sort_bodies(x, radius, .not. scene%outside, period, 0.0_wp, cells, pairs)
+      call sort_bodies(x, radius, .not. scene%outside .and. scene%dated, period, 0.0_wp, &
+        cells, pairs)
     end associate
     n = 0
     do b = 2, scene%n
-      if (scene%outside(b)) cycle
+      if (scene%outside(b) .or. .not. scene%dated(b)) cycle
       pairs%n = 0
       call add_partners(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
       do p = 1, pairs%n

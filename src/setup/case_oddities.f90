@@ -1,11 +1,16 @@
 !> What is allowed in a case but is hardly what its author meant: warnings of `--check`.
 module case_oddities_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
   use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
+  use fall_m, only: fall_t, find_fall, as_drop
+  use machine_memory_m, only: available_memory
+  use memory_plan_m, only: planned_memory, size_text
+  use contact_sphere_placement_m, only: height_errors
   use wave_step_m, only: gravity_step
   use rest_depth_m, only: look_at_rest
   implicit none
@@ -17,13 +22,16 @@ module case_oddities_m
   real(wp), parameter :: least_cells = 10.0_wp       !! along a block
   integer, parameter :: few_tets = 50                !! of a round shape
   integer, parameter :: many_tets = 250000           !! of one shape
+  real(wp), parameter :: far_above = 0.5_wp          !! over the top of the tank, over its height
+  integer, parameter :: most_bodies = 5              !! warned of one by one
 
 contains
 
   !> Collect everything odd about a checked case; nothing of it forbids a run.
-  subroutine find_oddities(case, shapes, oddities)
+  subroutine find_oddities(case, shapes, bed, oddities)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
     type(problems_t), intent(inout) :: oddities
     integer :: s
 
@@ -32,9 +40,13 @@ contains
     if (case%run%physics /= 'dry') then
       call look_at_water(case, oddities)
       call look_at_inflows(case, oddities)
+      call look_at_open_sides(case, oddities)
     end if
+    call look_at_memory(case, shapes, oddities)
     call look_at_seeds(case, oddities)
     call look_at_rest(case, shapes, oddities)
+    call look_at_times(case, oddities)
+    call look_at_heights(case, shapes, bed, oddities)
     do s = 1, size(shapes)
       call look_at_shape(case, case%shape(s), shapes(s), oddities)
     end do
@@ -82,6 +94,101 @@ contains
     end do
   end subroutine look_at_inflows
 
+  !> Without a surface an open side has pressure 0 from top to bottom, which still water has not.
+  subroutine look_at_open_sides(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    real(wp) :: along(3)
+    integer :: s, d
+
+    if (.not. case%fluid%single_phase) return
+    do d = 1, 3
+      along = case%fluid%gravity
+      along(d) = 0.0_wp
+      if (.not. any(abs(along) > 0.0_wp)) cycle
+      do s = 1, 2
+        if (case%boundary%kind(s, d) == 'open') call oddities%add_message('&boundary ' &
+          //side_name(s, d)//' = ''open'': gravity acts along it and the pressure on it is 0 ' &
+          //'from top to bottom, so with single_phase the liquid flows from rest')
+      end do
+    end do
+  end subroutine look_at_open_sides
+
+  !> More memory than there is.
+  subroutine look_at_memory(case, shapes, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(problems_t), intent(inout) :: oddities
+    integer(i8) :: planned, available
+
+    planned = planned_memory(case, shapes)
+    available = available_memory()
+    if (available > 0 .and. planned > available) call oddities%add_message('&grid cells = ' &
+      //to_text(case%grid%cells)//': the run takes about '//size_text(real(planned, wp)) &
+      //' of memory, more than the '//size_text(real(available, wp))//' that this machine has left')
+  end subroutine look_at_memory
+
+  !> Blocks that are due only after the end of the run.
+  subroutine look_at_times(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    character(:), allocatable :: late
+    integer :: i, k, n
+
+    late = ' due only after the end of the run, t_end = '//to_text(case%run%t_end)//' s'
+    do i = 1, size(case%drop)
+      associate (drop => case%drop(i))
+        n = count([(drop%first_time + real(k, wp)*drop%interval, k=0, drop%count - 1)] &
+                  > case%run%t_end)
+        if (n > 0) call oddities%add('&drop count', drop%count, to_text(n)//trim(merge(' is ', &
+          ' are', n == 1))//late, drop%line)
+      end associate
+    end do
+    do i = 1, size(case%body)
+      if (case%body(i)%release_time > case%run%t_end) call oddities%add('&body release_time', &
+        case%body(i)%release_time, 'is'//late, case%body(i)%line)
+    end do
+  end subroutine look_at_times
+
+  !> Blocks that begin far above the tank.
+  subroutine look_at_heights(case, shapes, bed, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(bed_t), intent(in) :: bed
+    type(problems_t), intent(inout) :: oddities
+    integer :: i, n
+
+    do i = 1, size(case%drop)
+      call look_at(case%drop(i), '&drop')
+    end do
+    n = 0
+    do i = 1, size(case%body)
+      if (n < most_bodies) call look_at(as_drop(case%body(i)), '&body')
+    end do
+  contains
+    subroutine look_at(drop, group)
+      type(drop_input_t), intent(in) :: drop
+      character(*), intent(in) :: group
+      type(fall_t) :: fall
+      real(wp) :: above
+      integer :: s
+
+      above = drop%position(3) - case%grid%origin(3) - case%grid%length(3)
+      if (above <= far_above*case%grid%length(3)) return   ! no need to look closer
+      do s = 1, size(shapes)
+        if (shapes(s)%name == drop%shape) exit
+      end do
+      if (s > size(shapes)) return
+      call find_fall(case, drop, shapes(s), bed, fall)
+      above = fall%bottom - case%grid%origin(3) - case%grid%length(3)
+      if (above <= far_above*case%grid%length(3)) return
+      n = n + 1
+      call oddities%add_message(group//' position = '//to_text(drop%position)//': begins ' &
+        //brief(above, 3)//' m above the tank, which is '//brief(case%grid%length(3), 3) &
+        //' m high; is that meant?', drop%line)
+    end subroutine look_at
+  end subroutine look_at_heights
+
   !> Random drops of the same seed: their blocks have the same shifts and turns.
   subroutine look_at_seeds(case, oddities)
     type(case_t), intent(in) :: case
@@ -115,6 +222,7 @@ contains
     type(problems_t), intent(inout) :: oddities
     character(:), allocatable :: name
     real(wp) :: extent, cells, least_turning   ! [m], [cells], [kg/m3]
+    real(wp) :: lowest, highest                ! contact spheres over the surface [m]
 
     name = trim(input%name)
     extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
@@ -140,6 +248,12 @@ contains
       if (cells < least_cells) call oddities%add_message('&shape '//name//' is ' &
         //brief(cells, 3)//' cells long; below '//to_text(nint(least_cells)) &
         //' the water around it is coarse: more &grid cells', input%line)
+    end if
+    if (case%contact%model == 'spheres') then
+      call height_errors(shape, lowest, highest)
+      if (max(-lowest, highest) > 0.0_wp) call oddities%add_message('&shape '//name//': its ' &
+        //'contact spheres reach up to '//brief(-lowest, 3)//' m short of its surface and ' &
+        //brief(highest, 3)//' m beyond it', input%line)
     end if
     if (size(shape%tet, 2) > many_tets) call oddities%add_message('&shape '//name//' has ' &
       //to_text(size(shape%tet, 2))//' tetrahedra; more than '//to_text(many_tets) &

@@ -3,6 +3,7 @@ module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
+  use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: told_file
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
@@ -11,14 +12,18 @@ module case_plan_m
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
   use wave_step_m, only: gravity_step, capillary_step
-  use contact_sphere_placement_m, only: height_errors
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
+  use plan_text_m, only: heading, entry, left, right, triple, count_text
+  use bed_measure_m, only: bed_volume
+  use fall_m, only: has_level
+  use fall_plan_m, only: print_falls
+  use surface_features_m, only: surface_init
+  use surface_search_m, only: surface_t
   implicit none
   private
   public :: print_plan
 
-  integer, parameter :: label_width = 24      !! columns of the names
   real(wp), parameter :: speed = 1.0_wp       !! at which time-step limits are quoted [m/s]
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
@@ -33,16 +38,20 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
     logical :: wet, blocks
+    integer :: touching(size(shapes))
+    real(wp) :: d_s
 
     wet = case%run%physics /= 'dry'
     blocks = case%run%physics /= 'fluid'
+    call find_touching(case, shapes, touching, d_s)
     call print_run(unit, case)
     call print_grid(unit, case, wet)
     if (bed%there) call print_bed(unit, case, bed)
-    if (wet) call print_liquid(unit, case)
-    if (blocks) call print_shapes(unit, case, wet, shapes)
-    if (blocks) call print_bodies(unit, case, shapes)
-    call print_steps(unit, case, shapes, wet, blocks)
+    if (wet) call print_liquid(unit, case, bed)
+    if (blocks) call print_shapes(unit, case, wet, shapes, touching)
+    if (blocks) call print_bodies(unit, case, shapes, bed)
+    if (blocks) call print_falls(unit, case, shapes, bed)
+    call print_steps(unit, case, shapes, d_s, wet, blocks)
     call print_memory(unit, case, shapes)
     call print_files(unit, case, wet)
   end subroutine print_plan
@@ -101,10 +110,12 @@ contains
                //'heights from '//brief(low(3))//' to '//brief(high(3))//' m')
   end subroutine print_bed
 
-  subroutine print_liquid(unit, case)
+  subroutine print_liquid(unit, case, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    real(wp) :: height
+    type(bed_t), intent(in) :: bed
+    character(:), allocatable :: without
+    real(wp) :: height, volume, high(3)
 
     call heading(unit, 'Fluid')
     call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3, ' &
@@ -117,9 +128,16 @@ contains
                //brief(case%fluid%gas_viscosity)//' Pa s')
     if (is_given(case%fluid%water_level)) then
       height = min(max(case%fluid%water_level - case%grid%origin(3), 0.0_wp), case%grid%length(3))
-      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; ' &
-                 //brief(height*case%grid%length(1)*case%grid%length(2)) &
-                 //' m3 below it, bodies included')
+      volume = height*case%grid%length(1)*case%grid%length(2)
+      without = ', bodies included'
+      if (bed%there) then
+        high = case%grid%origin + case%grid%length
+        high(3) = case%grid%origin(3) + height
+        volume = volume - bed_volume(bed, case%grid%origin, high)
+        without = ' without the bed'//without
+      end if
+      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; '//brief(volume) &
+                 //' m3 below it'//without)
     end if
     if (size(case%water) > 0) call entry(unit, 'boxes of liquid', to_text(size(case%water)))
     if (len(case%fluid%initial_state) > 0) then
@@ -130,36 +148,43 @@ contains
     end if
   end subroutine print_liquid
 
-  !> A table with one line for each shape.
-  subroutine print_shapes(unit, case, wet, shapes)
+  !> A table with one line for each shape: its tetrahedra, what of it touches (points and the
+  !! smallest edge of the form, or spheres and the smallest diameter), mass and weight.
+  subroutine print_shapes(unit, case, wet, shapes, touching)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
     type(shape_t), intent(in) :: shapes(:)
+    integer, intent(in) :: touching(:)   !! points or spheres of each
     character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
     character(:), allocatable :: submerged
-    real(wp) :: mass, g, diameter
+    real(wp) :: mass, g, smallest
     integer :: s
 
     if (size(shapes) == 0) return
     call heading(unit, 'Shapes')
-    write (unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
-      'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
+    if (case%contact%model == 'surface') then
+      write (unit, form) left('name', 14), left('kind', 9), 'tets', 'points', 'edge [m]', &
+        'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
+    else
+      write (unit, form) left('name', 14), left('kind', 9), 'tets', 'spheres', 'sphere [m]', &
+        'volume [m3]', 'mass [kg]', 'weight [N]', 'submerged [N]'
+    end if
     g = norm2(case%fluid%gravity)
     do s = 1, size(shapes)
       mass = shapes(s)%density*shapes(s)%volume
       submerged = '-'
       if (wet) submerged = brief((mass - case%fluid%liquid_density*shapes(s)%volume)*g)
-      diameter = 2*minval(shapes(s)%sphere_radius)
+      smallest = 2*minval(shapes(s)%sphere_radius)
+      if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
       write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
         right(to_text(size(shapes(s)%tet, 2)), 7), &
-        right(to_text(size(shapes(s)%sphere_radius)), 7), &
-        right(brief(diameter), 12), right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
+        right(to_text(touching(s)), 7), right(brief(smallest), 12), &
+        right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
         right(brief(mass*g), 12), right(submerged, 13)
     end do
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s), shapes(s))
-      if (case%contact%model == 'spheres') call print_height_errors(unit, shapes(s))
     end do
   end subroutine print_shapes
 
@@ -174,54 +199,72 @@ contains
                //to_text(size(shape%facet) - 1)//' facets')
   end subroutine print_file_shape
 
-  !> A warning: what the contact spheres do to the heights of a block at rest.
-  subroutine print_height_errors(unit, shape)
-    integer, intent(in) :: unit
-    type(shape_t), intent(in) :: shape
-    real(wp) :: lowest, highest
-
-    call height_errors(shape, lowest, highest)
-    if (max(-lowest, highest) <= 0.0_wp) return
-    call entry(unit, 'warning', 'contact spheres of '//trim(shape%name)//' reach up to ' &
-               //brief(-lowest)//' m short of its surface and '//brief(highest)//' m beyond it')
-  end subroutine print_height_errors
-
-  subroutine print_bodies(unit, case, shapes)
+  subroutine print_bodies(unit, case, shapes, bed)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    real(wp) :: rise, last   ! of the level [m], release [s]
-    integer :: i, n_fixed, n_drops
+    type(bed_t), intent(in) :: bed
+    real(wp) :: last   ! release [s]
+    integer :: n_fixed
 
     n_fixed = count(case%body%fixed)
-    n_drops = sum(case%drop%count)
     call heading(unit, 'Bodies')
     call entry(unit, 'fixed', to_text(n_fixed))
     call entry(unit, 'free', to_text(size(case%body) - n_fixed))
-    if (n_drops == 0) then
+    if (sum(case%drop%count) == 0) then
       call entry(unit, 'dropped', '0')
-      return
+    else
+      last = maxval(case%drop%first_time + real(case%drop%count - 1, wp)*case%drop%interval)
+      call entry(unit, 'dropped', to_text(sum(case%drop%count))//', the last one at ' &
+                 //brief(last)//' s')
     end if
-    last = 0.0_wp
-    rise = 0.0_wp
-    do i = 1, size(case%drop)
-      associate (drop => case%drop(i))
-        last = max(last, drop%first_time + real(drop%count - 1, wp)*drop%interval)
-        rise = rise + real(drop%count, wp)*volume_of(shapes, drop%shape)
-      end associate
-    end do
-    rise = rise/(case%grid%length(1)*case%grid%length(2))
-    call entry(unit, 'dropped', to_text(n_drops)//', the last one at '//brief(last)//' s')
-    if (last > case%run%t_end) call entry(unit, '', 'some are due only after the end of the run')
-    if (case%run%physics == 'dry' .or. case%fluid%single_phase) return
-    call entry(unit, 'water level', 'rises by '//brief(rise)//' m when all of them are under water')
+    if (keeps_its_water(case, bed)) call print_rise(unit, case, shapes)
   end subroutine print_bodies
 
-  !> What limits the steps of the fluid and of the bodies.
-  subroutine print_steps(unit, case, shapes, wet, blocks)
+  !> Does the level rise by the volume of what comes in, over the area of the tank? Not where water
+  !! can leave through a side, nor where a bed reaches out of it.
+  pure function keeps_its_water(case, bed) result(yes)
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(in) :: bed
+    logical :: yes
+
+    yes = has_level(case) .and. .not. case%fluid%single_phase
+    if (yes) yes = .not. any(gives_pressure(side_code(case%boundary%kind(:, 1:2))) &
+      .or. case%boundary%kind(:, 1:2) == 'inflow') &
+      .and. .not. gives_pressure(side_code(case%boundary%kind(1, 3)))
+    if (yes .and. bed%there) yes = maxval(bed%point(3, :)) <= case%fluid%water_level
+  end function keeps_its_water
+
+  !> The level when all that comes later is under water.
+  subroutine print_rise(unit, case, shapes)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    character(:), allocatable :: text
+    real(wp) :: rise   ! [m]
+    integer :: i
+
+    rise = 0.0_wp
+    do i = 1, size(case%drop)
+      rise = rise + real(case%drop(i)%count, wp)*volume_of(shapes, case%drop(i)%shape)
+    end do
+    do i = 1, size(case%body)
+      if (case%body(i)%release_time > 0.0_wp) rise = rise + volume_of(shapes, case%body(i)%shape)
+    end do
+    if (rise <= 0.0_wp) return
+    rise = rise/(case%grid%length(1)*case%grid%length(2))
+    text = 'rises by '//brief(rise)//' m if all that comes later ends under water'
+    if (case%fluid%water_level + rise > case%grid%origin(3) + case%grid%length(3)) text = text &
+      //', over the top of the tank'
+    call entry(unit, 'water level', text)
+  end subroutine print_rise
+
+  !> What limits the steps of the fluid and of the bodies.
+  subroutine print_steps(unit, case, shapes, d_s, wet, blocks)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     logical, intent(in) :: wet, blocks
     real(wp) :: h
 
@@ -244,7 +287,7 @@ contains
         call entry(unit, 'surface tension', brief(capillary_step(case%fluid, h))//' s')
       end if
     end if
-    if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes)
+    if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes, d_s)
   end subroutine print_steps
 
   !> Time for the fewest steps that the run can take.
@@ -269,10 +312,11 @@ contains
   end function time_text
 
   !> Limits of the body steps, and how far the lightest shape gives way.
-  subroutine print_body_steps(unit, case, shapes)
+  subroutine print_body_steps(unit, case, shapes, d_s)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
+    real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     class(contact_law_t), allocatable :: law
     type(load_t) :: heaviest
     real(wp) :: ratio_step, time_step, courant_step, mass, k
@@ -280,7 +324,7 @@ contains
 
     ratio_step = case%contact%substep_ratio*case%run%dt
     time_step = case%contact%contact_time/20.0_wp
-    courant_step = case%contact%courant_max*smallest_sphere(shapes)/speed
+    courant_step = case%contact%courant_max*d_s/speed
     call entry(unit, 'body step', brief(min(ratio_step, time_step, courant_step)) &
                //' s, the smallest of')
     call entry(unit, '  share of dt', brief(ratio_step)//' s')
@@ -374,70 +418,27 @@ contains
     volume = sum(shapes%volume, shapes%name == name)
   end function volume_of
 
-  !> Diameter of the smallest contact sphere of all shapes [m].
-  pure function smallest_sphere(shapes) result(diameter)
+  !> What of each shape touches, points of the surface or contact spheres, and the smallest length
+  !! d_s of the contact Courant number, eq. (6), of all shapes.
+  subroutine find_touching(case, shapes, touching, d_s)
+    type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    real(wp) :: diameter
+    integer, intent(out) :: touching(:)   !! how many [-]
+    real(wp), intent(out) :: d_s          !! [m]
+    type(surface_t) :: surface
     integer :: s
 
-    diameter = huge(diameter)
+    d_s = huge(d_s)
     do s = 1, size(shapes)
-      diameter = min(diameter, 2*minval(shapes(s)%sphere_radius))
+      if (case%contact%model == 'surface') then
+        call surface_init(shapes(s), surface)
+        touching(s) = size(surface%probe, 2)
+        d_s = min(d_s, surface%length)
+      else
+        touching(s) = size(shapes(s)%sphere_radius)
+        d_s = min(d_s, 2*minval(shapes(s)%sphere_radius))
+      end if
     end do
-  end function smallest_sphere
-
-  subroutine heading(unit, text)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: text
-
-    write (unit, '(a)') text
-  end subroutine heading
-
-  !> One line: a name and what is to be said about it.
-  subroutine entry(unit, name, text)
-    integer, intent(in) :: unit
-    character(*), intent(in) :: name, text
-
-    write (unit, '(2x, a, a)') left(name, label_width), trim(text)
-  end subroutine entry
-
-  !> Text with blanks behind it, cut or filled to a width.
-  pure function left(text, width) result(filled)
-    character(*), intent(in) :: text
-    integer, intent(in) :: width
-    character(width) :: filled
-
-    filled = text
-  end function left
-
-  !> Text with blanks in front of it.
-  pure function right(text, width) result(filled)
-    character(*), intent(in) :: text
-    integer, intent(in) :: width
-    character(width) :: filled
-
-    filled = text
-    filled = adjustr(filled)
-  end function right
-
-  !> Three numbers.
-  pure function triple(x, between) result(text)
-    real(wp), intent(in) :: x(3)
-    character(*), intent(in), optional :: between
-    character(:), allocatable :: text, gap
-
-    gap = ' x '
-    if (present(between)) gap = between
-    text = brief(x(1))//gap//brief(x(2))//gap//brief(x(3))
-  end function triple
-
-  !> A count that may be too large for an integer, rounded down with a little tolerance.
-  pure function count_text(x) result(text)
-    real(wp), intent(in) :: x
-    character(:), allocatable :: text
-
-    text = brief(x)
-    if (x < 1.0e9_wp) text = to_text(int(x*(1.0_wp + 1.0e-9_wp)))
-  end function count_text
+  end subroutine find_touching
 
 end module case_plan_m

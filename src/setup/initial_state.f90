@@ -37,7 +37,7 @@ contains
     type(h5_file_t) :: file
     logical :: liquid, velocity
 
-    if (.not. is_named(case%fluid) .or. case%run%physics == 'dry' .or. case%grid%faulty) return
+    if (.not. is_named(case%fluid) .or. case%run%physics == 'dry') return
     call file%open(found_file(case%fluid%folder, case%fluid%initial_state), .false., .false.)
     liquid = file%has(liquid_name)
     velocity = file%has(velocity_name)
@@ -87,6 +87,8 @@ contains
         if (size(found) /= n) then
           call note(name//' has another number of dimensions than (nz, ny, nx'// &
                     trim(merge(', 3)', ')   ', n == 4)))
+          return
+        else if (case%grid%cells_faulty) then
           return
         else if (any(found /= extent)) then
           call note(name//' does not have the cells of &grid')

@@ -21,7 +21,7 @@ module bed_m
   implicit none
   private
   public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
-  public :: facet_within, clip_polygon, most_corners
+  public :: facet_within, clip_polygon, most_corners, way_of, height_of
 
   integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
   integer, parameter :: most_corners = 12  !! of a facet cut at five planes, and more
@@ -67,7 +67,7 @@ contains
       call note(message)
       return
     end if
-    if (case%grid%faulty .or. case%boundary%faulty) return
+    if (case%grid%extent_faulty .or. any(case%boundary%faulty)) return
     n_before = problems%n
     call check_extent()
     if (problems%n > n_before) return

@@ -159,7 +159,52 @@ contains
       //'|&grid length: missing, required: the length of the tank in x, y, z [m]' &
       //' (there is no group &grid)')
     call expect(tank//'&shape name=''d'' kind=''cube'' size=1 refinement=8/', '')
+    call test_partly_known()
   end subroutine test_together
+
+  !> What is wrong with a group hides only what depends on it.
+  subroutine test_partly_known()
+    character(*), parameter :: run = '&run t_end = 1 /'//lf
+    character(*), parameter :: grid = '&grid cells = 6, 2, 4 length = 0.3, 0.1, 0.2 /'//lf
+    character(*), parameter :: shape = '&shape name = ''c'' kind = ''cube'' size = 0.02 /'//lf
+    character(*), parameter :: out = '&body shape=''c'' position=-0.1, 0.05, 0.1 '
+    character(*), parameter :: is_out = '&body position = -0.1, 0.05, 0.1: reaches 0.11 m ' &
+      //'through the wall x_min'//inside
+    character(*), parameter :: two = '&body shape=''c'' position=0.1, 0.05, 0.1 /'//lf &
+      //'&body shape=''c'' position=0.11, 0.05, 0.1 '
+    character(*), parameter :: overlap = '&body position = 0.11, 0.05, 0.1: overlaps the &body ' &
+      //'on line 4 by 0.01 m'//apart//' (line 5)'
+
+    call expect(run//'&grid cells = 6, 2, 4 length = 0.3, 0.1 /'//lf//shape//two//'/ '//out//'/', &
+      '&grid length = 0.3, 0.1: 2 values given, 3 needed (line 2)|'//overlap)
+    call expect(run//'&grid length = 0.3, 0.1, 0.2 /'//lf//shape//out//'/', '&grid cells: ' &
+      //'missing, required: how many cells in x, y, z (line 2)|'//is_out//' (line 4)')
+    call expect(run//'&grid cells = 6, 2, 4 lenght = 0.3, 0.1, 0.2 /'//lf//shape//out//'/', &
+      '&grid length: missing, required: the length of the tank in x, y, z [m] (line 2)|&grid ' &
+      //'lenght = 0.3, 0.1, 0.2: unknown variable, nearest known: length (line 2)')
+    call expect(tank//out//'/ &boundary y_min=''wall'' z_maxi=''slip''/', '&boundary y_min = ' &
+      //'''wall'': unknown, must be one of ''no_slip'', ''slip'', ''open'', ''periodic'', ' &
+      //'''inflow'', ''outflow'' (line 4)|&boundary z_maxi = ''slip'': unknown variable, ' &
+      //'nearest known: z_max (line 4)|'//is_out//' (line 4)')
+    call expect(tank//out//'/ &boundary xmin=''open''/', '&boundary xmin = ''open'': unknown ' &
+      //'variable, nearest known: x_min (line 4)')
+    call expect(tank//out//'colour=1/', '&body colour = 1: unknown variable, nearest known: ' &
+      //'shape (line 4)|'//is_out//' (line 4)')
+    call expect(tank//out//'positoin=1/', '&body positoin = 1: unknown variable, nearest known: ' &
+      //'position (line 4)')
+    call expect(tank//two//'velocity=1/', '&body velocity = 1: 1 value given, 3 needed (line 5)')
+    call expect(tank//two//'relase_time=1/', '&body relase_time = 1: unknown variable, nearest ' &
+      //'known: release_time (line 5)')
+    call expect(tank//two//'colour=1/', '&body colour = 1: unknown variable, nearest known: ' &
+      //'shape (line 5)|'//overlap)
+    call expect(run//grid//'&shape name = ''c'' kind = ''cube'' size = 0.02 density=-1 /'//lf//two &
+      //'/', '&shape density = -1: must be positive [kg/m3] (line 3)|'//overlap)
+    call expect(run//grid//'&shape name = ''c'' kind = ''cube'' /'//lf//two//'/', &
+      '&shape size: missing, required: the edge [m] (line 3)')
+    call expect(tank//'&drop shape=''c'' position=-0.1, 0.05, 0.1 velocity=1/', '&drop velocity ' &
+      //'= 1: 1 value given, 3 needed (line 4)|&drop position = -0.1, 0.05, 0.1: reaches 0.11 m ' &
+      //'through the wall x_min'//never//' (line 4)')
+  end subroutine test_partly_known
 
   !> The fixed blocks of the paper stand on three corners: side of the triangle sqrt 2 d.
   subroutine test_three_legs()

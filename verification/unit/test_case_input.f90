@@ -26,6 +26,8 @@ program test_case_input
   call test_contact()
   call test_shapes()
   call test_bodies()
+  call test_idle()
+  call test_physics()
   call test_options()
   call test_all_at_once()
   call finish_checks()
@@ -190,6 +192,12 @@ contains
     call read_case(text, again, problems)
     call check('parameters of files and spheres are a good case', problems%n, 0)
     call check('a file has a scale', index(text, 'scale = 1') > 0)
+    call read_case('&run t_end=1 stop_when_settled=t rest_time=3/'//grid &
+      //'&fluid single_phase=t/', case, problems)
+    text = parameters_text(case)
+    call read_case(text, again, problems)
+    call check('parameters of one phase are a good case', problems%n, 0)
+    call check('the time of rest is kept', again%run%rest_time, 3.0_wp, 0.0_wp)
     call read_case(base, case, problems)
     call check('an absent level is not written', index(parameters_text(case), 'water_level') == 0)
   end subroutine test_way_back
@@ -296,7 +304,7 @@ contains
       '&run field_interval = -1: must not be negative [s]; 0 means never (line 1)|' &
       //'&run history_interval = -2: must not be negative [s]; 0 means every step (line 1)|' &
       //'&run restart_interval = -3: must not be negative [s]; 0 means only at the end (line 1)')
-    call expect('&run t_end=1 rest_speed=0 rest_time=-1/'//grid, &
+    call expect('&run t_end=1 stop_when_settled=T rest_speed=0 rest_time=-1/'//grid, &
       '&run rest_speed = 0: must be positive [m/s] (line 1)|' &
       //'&run rest_time = -1: must not be negative [s] (line 1)')
     call expect(run//'&grid cells=0,2,4 length=3*1/', &
@@ -512,6 +520,77 @@ contains
     call expect(cube//'&body shape=''c'' position=3*0 colour=''red''/', &
       '&body colour = ''red'': unknown variable, nearest known: shape (line 4)')
   end subroutine test_bodies
+
+  !> What a choice leaves without meaning is an error, of its own group or of another.
+  subroutine test_idle()
+    character(*), parameter :: phase = ': has no meaning with single_phase = .true.; there is no ' &
+      //'gas and no surface (line 3)'
+
+    call expect(base//'&fluid gas_density=1 single_phase=T gas_viscosity=1 water_level=1 ' &
+      //'surface_tension=0/', '&fluid gas_density = 1'//phase//'|&fluid gas_viscosity = 1'//phase &
+      //'|&fluid water_level = 1'//phase//'|&fluid surface_tension = 0'//phase)
+    call expect(base//'&fluid gas_density=1 single_phase=F water_level=1/', '')
+    call expect(base//'&water min=3*0 max=3*1/ &fluid single_phase=T/ &water min=3*0 max=3*1/', &
+      '&water: has no meaning with &fluid single_phase = .true.; the liquid fills the whole tank ' &
+      //'(line 3)|&water: has no meaning with &fluid single_phase = .true.; the liquid fills ' &
+      //'the whole tank (line 3)')
+    call expect('&run t_end=1 rest_time=1/'//grid, '&run rest_time = 1: has no meaning with ' &
+      //'stop_when_settled = .false.; only .true. waits for it (line 1)')
+    call expect('&run t_end=1 rest_time=1 stop_when_settled=T/'//grid, '')
+    call expect('&run t_end=1 rest_time=1 stop_when_settled=yes/'//grid, &
+      '&run stop_when_settled = yes: must be .true. or .false. (line 1)')
+    call expect('&run t_end=1 rest_speed=1/'//grid, '')   ! the table counts those that move
+  end subroutine test_idle
+
+  !> What `physics` leaves without meaning is passed over, for a case can be tried with each.
+  subroutine test_physics()
+    character(*), parameter :: blocks = '&shape name=''c'' kind=''cube'' size=1/ &body ' &
+      //'shape=''c'' position=3*0/'//lf &
+      //'&body shape=''c'' position=3*0/ &drop shape=''c'' position=3*1/'//lf
+    character(*), parameter :: dry = ' no meaning with physics = ''dry'', passed over (line '
+    character(*), parameter :: fluid = ' no meaning with physics = ''fluid'', passed over (line '
+
+    call warn('physics=''dry'' cfl_max=1', '&fluid gravity=3*1 water_level=1 single_phase=F/'//lf &
+      //'&numerics coupling=''mics''/ &contact friction=1 lubrication=F/'//lf &
+      //'&water min=3*0 max=3*1/ &water min=3*0 max=3*2/'//lf//blocks//'&boundary x_min=' &
+      //'''inflow'' x_min_velocity=1,0,0 y_min_velocity=1,0,0 x_max=''open''/', &
+      '2 groups &water: have'//dry//'5)|&numerics: has'//dry//'4)|&run cfl_max: has'//dry//'1)|' &
+      //'&fluid water_level, single_phase: have'//dry//'3)|&contact lubrication: has'//dry//'4)|' &
+      //'&boundary x_min_velocity: has'//dry//'8)')
+    call warn('physics=''dry''', '&fluid gravity=3*1/'//lf//'&contact friction=1/ ' &
+      //'&bed file=''b''/ '//blocks, '')
+    call warn('physics=''fluid'' stop_when_settled=T'//lf//' rest_speed=1 rest_time=2', &
+      blocks//'&contact law=''constants''/ &numerics subcells=3 solid_fraction=''subcell'' ' &
+      //'coupling=''mics''/'//lf//'&boundary x_min=''slip'' x_min_velocity=0,1,0 ' &
+      //'x_max_velocity=0,1,0/', '&contact: has'//fluid//'6)|&shape: has'//fluid &
+      //'4)|2 groups &body: have'//fluid//'4)|&drop: has'//fluid//'5)|&run stop_when_settled, ' &
+      //'rest_speed, rest_time: have'//fluid//'1)|&numerics solid_fraction, subcells: have' &
+      //fluid//'6)|&boundary x_min_velocity: has'//fluid//'7)')
+    call warn('physics=''fluid''', '&bed file=''b''/ &numerics solid_fraction=''subcell''/', '')
+    call warn('physics=''coupled''', '&water min=3*0 max=3*1/ &numerics coupling=''mics''/ ' &
+      //'&contact lubrication=T/'//lf//blocks, '')
+    call warn('physics=''dry''', '&fluid single_phase=T/ &water min=3*0 max=3*1/', '&water: has' &
+      //dry//'3)|&fluid single_phase: has'//dry//'3)')
+  end subroutine test_physics
+
+  !> Read a good case with these variables of &run and compare all warnings, '|' between them.
+  subroutine warn(of_run, groups, messages)
+    character(*), intent(in) :: of_run, groups, messages
+    type(case_t) :: case
+    type(problems_t) :: problems, passed_over
+    character(:), allocatable :: found
+    integer :: i
+
+    call read_case('&run t_end=1 '//of_run//'/'//lf//grid//groups, case, problems, passed_over)
+    call check('problems with: '//groups, problems%n, 0)
+    found = ''
+    do i = 1, passed_over%n
+      if (i > 1) found = found//'|'
+      found = found//passed_over%message(i)
+    end do
+    call check('passed over: '//messages, found == messages)
+    if (found /= messages) print '(2a)', '  got: ', found
+  end subroutine warn
 
   !> Options that came late.
   subroutine test_options()

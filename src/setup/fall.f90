@@ -1,0 +1,241 @@
+!> How a block will fall, before anything is computed: heights, depth, speeds.
+!!
+!! In air it falls freely, v**2 = v_0**2 + 2 g h. Under water, after the distance z, its speed is an
+!! estimate: weight, buoyancy and a drag coefficient C on the mean projected area A, with the added
+!! mass of a sphere,
+!!
+!! $$ v^2 = v_t^2 + (v_0^2 - v_t^2) \, e^{-2 z / L}, \qquad
+!!    L = \frac{2 (\rho_s + \rho / 2) V}{\rho C A}, \qquad
+!!    v_t^2 = \frac{2 (\rho_s - \rho) V g}{\rho C A} . $$
+!!
+!! C = 0.42 * 10**(0.4 (-log10 f)**0.2) with the sphericity f: A. Hoelzer, M. Sommerfeld (2008),
+!! Powder Technology 184, 361, for high Reynolds numbers. Resolved falls of armour units are within
+!! 20 % of it in drag (verification/cases/settling_units).
+module fall_m
+  use kinds_m, only: wp, pi
+  use vectors_m, only: rotate, cross
+  use case_types_m, only: case_t, drop_input_t, body_input_t, is_given
+  use boundary_kinds_m, only: side_code, is_wall
+  use tet_mesh_m, only: shape_t
+  use mass_properties_m, only: surface_area
+  use bed_m, only: bed_t
+  use bed_measure_m, only: bed_height
+  use drops_m, only: draw_drop
+  implicit none
+  private
+  public :: fall_t, find_fall, gravity_down, has_level, as_drop
+  public :: projected_area, drag_coefficient, terminal_speed, fall_under_water
+
+  !> The fall of the first block of a drop.
+  type :: fall_t
+    real(wp) :: bottom = 0.0_wp           !! height of its lowest point at the start [m]
+    logical :: has_floor = .false.
+    real(wp) :: floor = 0.0_wp            !! height of the ground below it [m]
+    logical :: has_water = .false.
+    real(wp) :: level = 0.0_wp            !! of the water [m]
+    real(wp) :: at_surface = -1.0_wp      !! speed there; -1: it starts in the water [m/s]
+    real(wp) :: at_floor = -1.0_wp        !! speed there; -1: it does not get there [m/s]
+    real(wp) :: terminal = -1.0_wp        !! speed of a long fall in water; -1: no water [m/s]
+    real(wp) :: drag = 0.0_wp             !! its coefficient, on the mean projected area [-]
+  end type fall_t
+
+contains
+
+  !> Gravity if it points straight down, else zero [m/s2].
+  pure function gravity_down(gravity) result(g)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp) :: g
+
+    g = 0.0_wp
+    if (.not. any(abs(gravity(1:2)) > 0.0_wp)) g = max(0.0_wp, -gravity(3))
+  end function gravity_down
+
+  !> Does the case begin with a level of the liquid, or full of it?
+  pure function has_level(case) result(yes)
+    type(case_t), intent(in) :: case
+    logical :: yes
+
+    yes = case%run%physics /= 'dry' .and. len_trim(case%fluid%initial_state) == 0 &
+      .and. (case%fluid%single_phase .or. is_given(case%fluid%water_level))
+  end function has_level
+
+  !> A body as a drop of one block.
+  pure function as_drop(body) result(drop)
+    type(body_input_t), intent(in) :: body
+    type(drop_input_t) :: drop
+
+    drop%shape = body%shape
+    drop%position = body%position
+    drop%quaternion = body%quaternion
+    drop%velocity = body%velocity
+    drop%first_time = body%release_time
+    drop%line = body%line
+  end function as_drop
+
+  !> What to expect of the first block of a drop.
+  subroutine find_fall(case, drop, shape, bed, fall)
+    type(case_t), intent(in) :: case
+    type(drop_input_t), intent(in) :: drop
+    type(shape_t), intent(in) :: shape
+    type(bed_t), intent(in) :: bed
+    type(fall_t), intent(out) :: fall
+    real(wp) :: x(3), q(4), g, speed, ground, top
+
+    call draw_drop(drop, 1, x, q)
+    fall%bottom = x(3) - depth_below_centre(shape, q)
+    fall%has_floor = bed%there .or. is_wall(side_code(case%boundary%kind(1, 3)))
+    fall%floor = bed_height(bed, x, case%grid%origin(3))
+    ground = merge(fall%floor, -huge(ground), fall%has_floor)
+    top = case%grid%origin(3) + case%grid%length(3)
+    if (has_level(case)) then
+      fall%level = top
+      if (.not. case%fluid%single_phase) fall%level = min(top, case%fluid%water_level)
+      fall%has_water = fall%level > max(ground, case%grid%origin(3))
+    end if
+    g = gravity_down(case%fluid%gravity)
+    if (g <= 0.0_wp) return
+    speed = -drop%velocity(3)
+    if (fall%has_water) then
+      if (fall%bottom > fall%level) then
+        speed = speed_after(speed, g, fall%bottom - fall%level)
+        fall%at_surface = speed
+      end if
+      fall%drag = drag_coefficient(shape)
+      if (shape%density <= case%fluid%liquid_density) return
+      fall%terminal = terminal_speed(shape, case%fluid%liquid_density, g)
+      if (fall%has_floor) fall%at_floor = fall_under_water(shape, case%fluid%liquid_density, g, &
+        max(0.0_wp, speed), max(0.0_wp, min(fall%bottom, fall%level) - fall%floor))
+    else if (fall%has_floor .and. (case%run%physics == 'dry' .or. has_level(case))) then
+      fall%at_floor = speed_after(speed, g, max(0.0_wp, fall%bottom - fall%floor))
+    end if
+  end subroutine find_fall
+
+  !> Speed after a free fall [m/s].
+  elemental function speed_after(speed, g, height) result(v)
+    real(wp), intent(in) :: speed    !! downward at the start [m/s]
+    real(wp), intent(in) :: g        !! > 0 [m/s2]
+    real(wp), intent(in) :: height   !! >= 0 [m]
+    real(wp) :: v
+
+    v = sqrt(speed**2 + 2*g*height)
+  end function speed_after
+
+  !> From the centre of mass of a turned shape down to its lowest point [m].
+  pure function depth_below_centre(shape, q) result(depth)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: q(4)   !! attitude
+    real(wp) :: depth
+    real(wp) :: p(3)
+    integer :: i
+
+    if (shape%kind == 'sphere') then
+      depth = shape%sphere_radius(1)
+      return
+    end if
+    depth = 0.0_wp
+    do i = 1, size(shape%point, 2)
+      p = rotate(q, shape%point(:, i))
+      depth = max(depth, -p(3))
+    end do
+  end function depth_below_centre
+
+  !> Area of the shadow of a shape, the mean over thirteen directions [m2].
+  function projected_area(shape) result(area)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: area
+    integer, parameter :: directions(3, 13) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1, -1, &
+      0, 1, 0, 1, 1, 0, -1, 0, 1, 1, 0, 1, -1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, -1], [3, 13])
+    integer :: d
+
+    if (shape%kind == 'sphere') then
+      area = pi*shape%sphere_radius(1)**2
+      return
+    end if
+    area = 0.0_wp
+    do d = 1, size(directions, 2)
+      area = area + shadow(shape, real(directions(:, d), wp))/real(size(directions, 2), wp)
+    end do
+  end function projected_area
+
+  !> Area of the shadow of a shape along a direction, on a fine raster [m2].
+  function shadow(shape, direction) result(area)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: direction(3)
+    real(wp) :: area
+    integer, parameter :: n = 128   ! points of the raster across the shape
+    logical, allocatable :: dark(:, :)
+    real(wp) :: u(3), v(3), p(2, 3), step, low(2), side(3), at(2)
+    integer :: t, i, j, c, from(2), to(2)
+
+    u = cross(direction, cshift([1.0_wp, 0.0_wp, 0.0_wp], -maxloc(abs(direction), 1)))
+    u = u/norm2(u)
+    v = cross(direction/norm2(direction), u)
+    low = -shape%radius
+    step = 2*shape%radius/n
+    allocate (dark(n, n), source=.false.)
+    do t = 1, size(shape%triangle, 2)
+      do c = 1, 3
+        p(:, c) = [dot_product(u, shape%point(:, shape%triangle(c, t))), &
+                   dot_product(v, shape%point(:, shape%triangle(c, t)))]
+      end do
+      from = max(1, ceiling((minval(p, 2) - low)/step + 0.5_wp))
+      to = min(n, floor((maxval(p, 2) - low)/step + 0.5_wp))
+      do j = from(2), to(2)
+        do i = from(1), to(1)
+          at = low + (real([i, j], wp) - 0.5_wp)*step
+          do c = 1, 3
+            associate (a => p(:, c), b => p(:, 1 + mod(c, 3)))
+              side(c) = (b(1) - a(1))*(at(2) - a(2)) - (b(2) - a(2))*(at(1) - a(1))
+            end associate
+          end do
+          if (all(side >= 0.0_wp) .or. all(side <= 0.0_wp)) dark(i, j) = .true.
+        end do
+      end do
+    end do
+    area = count(dark)*step**2
+  end function shadow
+
+  !> Drag coefficient of a shape on its mean projected area, at high Reynolds numbers [-]. Source:
+  !! Hoelzer and Sommerfeld (2008), see above.
+  pure function drag_coefficient(shape) result(drag)
+    type(shape_t), intent(in) :: shape
+    real(wp) :: drag
+    real(wp) :: sphericity
+
+    drag = 0.42_wp
+    if (shape%kind == 'sphere') return
+    sphericity = min(1.0_wp, (pi*(6*shape%volume)**2)**(1.0_wp/3.0_wp) &
+      /surface_area(shape%point, shape%triangle))
+    drag = drag*10.0_wp**(0.4_wp*max(0.0_wp, -log10(sphericity))**0.2_wp)
+  end function drag_coefficient
+
+  !> Speed at which weight, buoyancy and drag are in balance, for a shape heavier than the liquid
+  !! [m/s].
+  function terminal_speed(shape, liquid_density, g) result(speed)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: liquid_density   !! [kg/m3]
+    real(wp), intent(in) :: g                !! [m/s2]
+    real(wp) :: speed
+
+    speed = sqrt(2*(shape%density/liquid_density - 1.0_wp)*shape%volume*g &
+      /(drag_coefficient(shape)*projected_area(shape)))
+  end function terminal_speed
+
+  !> Speed after a way down through still liquid [m/s], see above.
+  function fall_under_water(shape, liquid_density, g, speed, way) result(v)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: liquid_density   !! less than that of the shape [kg/m3]
+    real(wp), intent(in) :: g                !! [m/s2]
+    real(wp), intent(in) :: speed            !! downward at the start [m/s]
+    real(wp), intent(in) :: way              !! [m]
+    real(wp) :: v
+    real(wp), parameter :: added_mass = 0.5_wp   ! of a sphere [-]
+    real(wp) :: length, terminal
+
+    length = 2*(shape%density/liquid_density + added_mass)*shape%volume &
+      /(drag_coefficient(shape)*projected_area(shape))
+    terminal = terminal_speed(shape, liquid_density, g)
+    v = sqrt(terminal**2 + (speed**2 - terminal**2)*exp(-2*way/length))
+  end function fall_under_water
+
+end module fall_m

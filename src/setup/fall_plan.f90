@@ -1,0 +1,126 @@
+!> The part of the plan that tells how the blocks will fall: heights, depth, speeds.
+module fall_plan_m
+  use kinds_m, only: wp
+  use errors_m, only: to_text, brief
+  use case_types_m, only: case_t, drop_input_t
+  use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
+  use fall_m, only: fall_t, find_fall, as_drop, gravity_down
+  use plan_text_m, only: heading, entry
+  implicit none
+  private
+  public :: print_falls
+
+  integer, parameter :: most_told = 20   !! groups &drop
+
+contains
+
+  !> The first block of each drop, and the free body that starts highest.
+  subroutine print_falls(unit, case, shapes, bed)
+    integer, intent(in) :: unit
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
+    logical :: under_water
+    integer :: i, b
+
+    b = 0
+    do i = 1, size(case%body)
+      if (case%body(i)%fixed) cycle
+      if (b > 0) then
+        if (case%body(i)%position(3) <= case%body(b)%position(3)) cycle
+      end if
+      b = i
+    end do
+    if (size(case%drop) == 0 .and. b == 0) return
+    call heading(unit, 'Falls')
+    under_water = .false.
+    if (b > 0) call print_fall('&body', as_drop(case%body(b)))
+    do i = 1, min(size(case%drop), most_told)
+      call print_fall('&drop', case%drop(i))
+    end do
+    if (size(case%drop) > most_told) call entry(unit, '', 'and of ' &
+      //to_text(size(case%drop) - most_told)//' more groups &drop')
+    if (gravity_down(case%fluid%gravity) <= 0.0_wp) return
+    call entry(unit, 'in air', 'v^2 = v_0^2 + 2 g h, without drag')
+    if (.not. under_water) return
+    call entry(unit, 'in water, estimates', 'v_t^2 = 2 (s - 1) g V / (C A), ' &
+      //'v^2 = v_t^2 + (v_0^2 - v_t^2) exp(-C A z / ((s + 0.5) V)),')
+    call entry(unit, '', 's = density over that of the liquid, A = mean projected area, ' &
+      //'C after Hoelzer and Sommerfeld (2008)')
+  contains
+    subroutine print_fall(group, drop)
+      character(*), intent(in) :: group
+      type(drop_input_t), intent(in) :: drop
+      type(fall_t) :: fall
+      character(:), allocatable :: label, start
+      integer :: s
+
+      do s = 1, size(shapes)
+        if (shapes(s)%name == drop%shape) exit
+      end do
+      if (s > size(shapes)) return
+      call find_fall(case, drop, shapes(s), bed, fall)
+      label = trim(drop%shape)
+      if (drop%line > 0) label = group//' on line '//to_text(drop%line)
+      start = 'starts '
+      if (drop%count > 1) start = 'the first of '//to_text(drop%count)//' starts '
+      call entry(unit, label, start//start_text(case, bed, fall))
+      if (fall%at_surface >= 0.0_wp) call entry(unit, '', 'meets the water at ' &
+        //brief(fall%at_surface, 3)//' m/s')
+      if (fall%terminal >= 0.0_wp) then
+        under_water = .true.
+        if (fall%at_floor >= 0.0_wp) call entry(unit, '', 'meets the '//ground(bed, fall, case) &
+          //' at about '//brief(fall%at_floor, 2)//' m/s')
+        call entry(unit, '', 'a long fall in water ends at about '//brief(fall%terminal, 2) &
+          //' m/s, C = '//brief(fall%drag, 2))
+      else if (fall%at_floor >= 0.0_wp) then
+        call entry(unit, '', 'meets the '//ground(bed, fall, case)//' at ' &
+          //brief(fall%at_floor, 3)//' m/s')
+      else if (fall%has_water .and. fall%drag > 0.0_wp) then
+        call entry(unit, '', 'is lighter than the liquid and floats')
+      end if
+    end subroutine print_fall
+  end subroutine print_falls
+
+  !> Where the lowest point of a block is at the start.
+  function start_text(case, bed, fall) result(text)
+    type(case_t), intent(in) :: case
+    type(bed_t), intent(in) :: bed
+    type(fall_t), intent(in) :: fall
+    character(:), allocatable :: text
+    real(wp) :: depth, lower
+
+    lower = case%grid%origin(3)
+    if (fall%has_floor) lower = fall%floor
+    text = ''
+    if (fall%has_floor) text = brief(fall%bottom - fall%floor, 3)//' m above the ' &
+      //ground(bed, fall, case)
+    if (fall%has_water) then
+      depth = fall%level - lower
+      if (len(text) > 0) text = text//', '
+      if (case%fluid%single_phase) then
+        text = text//'under water'
+      else if (fall%bottom > fall%level) then
+        text = text//brief(fall%bottom - fall%level, 3)//' m above the water'
+      else
+        text = text//brief(fall%level - fall%bottom, 3)//' m deep in the water'
+      end if
+      text = text//'; water '//brief(depth, 3)//' m deep, ' &
+        //brief(depth*case%grid%cells(3)/case%grid%length(3), 3)//' cells'
+    end if
+    if (len(text) == 0) text = 'at '//brief(fall%bottom, 3)//' m, with no floor below'
+  end function start_text
+
+  !> What is below a block, in a word.
+  pure function ground(bed, fall, case) result(word)
+    type(bed_t), intent(in) :: bed
+    type(fall_t), intent(in) :: fall
+    type(case_t), intent(in) :: case
+    character(:), allocatable :: word
+
+    word = 'floor'
+    if (bed%there .and. fall%floor > case%grid%origin(3)) word = 'bed'
+  end function ground
+
+end module fall_plan_m

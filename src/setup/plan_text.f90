@@ -1,0 +1,67 @@
+!> How the plan of a case is laid out: headings, and lines of a name and a text.
+module plan_text_m
+  use kinds_m, only: wp
+  use errors_m, only: to_text, brief
+  implicit none
+  private
+  public :: heading, entry, left, right, triple, count_text
+
+  integer, parameter :: label_width = 24      !! columns of the names
+
+contains
+
+  subroutine heading(unit, text)
+    integer, intent(in) :: unit
+    character(*), intent(in) :: text
+
+    write (unit, '(a)') text
+  end subroutine heading
+
+  !> One line: a name and what is to be said about it.
+  subroutine entry(unit, name, text)
+    integer, intent(in) :: unit
+    character(*), intent(in) :: name, text
+
+    write (unit, '(2x, a, a)') left(name, label_width), trim(text)
+  end subroutine entry
+
+  !> Text with blanks behind it, cut or filled to a width.
+  pure function left(text, width) result(filled)
+    character(*), intent(in) :: text
+    integer, intent(in) :: width
+    character(width) :: filled
+
+    filled = text
+  end function left
+
+  !> Text with blanks in front of it.
+  pure function right(text, width) result(filled)
+    character(*), intent(in) :: text
+    integer, intent(in) :: width
+    character(width) :: filled
+
+    filled = text
+    filled = adjustr(filled)
+  end function right
+
+  !> Three numbers.
+  pure function triple(x, between) result(text)
+    real(wp), intent(in) :: x(3)
+    character(*), intent(in), optional :: between
+    character(:), allocatable :: text, gap
+
+    gap = ' x '
+    if (present(between)) gap = between
+    text = brief(x(1))//gap//brief(x(2))//gap//brief(x(3))
+  end function triple
+
+  !> A count that may be too large for an integer, rounded down with a little tolerance.
+  pure function count_text(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+
+    text = brief(x)
+    if (x < 1.0e9_wp) text = to_text(int(x*(1.0_wp + 1.0e-9_wp)))
+  end function count_text
+
+end module plan_text_m

@@ -1,0 +1,77 @@
+!> How high the bed is at a place, and how much of the tank below a height is bed.
+module bed_measure_m
+  use kinds_m, only: wp
+  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, &
+    clip_polygon, most_corners
+  implicit none
+  private
+  public :: bed_volume, bed_height
+
+contains
+
+  !> Volume of the bed between a floor and a level, over a rectangle of the ground plane [m3].
+  !!
+  !! Under a facet that looks up stands a column of solid, under one that looks down it is taken
+  !! away again: the areas seen from above have that sign.
+  pure function bed_volume(bed, low, high) result(volume)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: low(3), high(3)   !! corners of the space: floor and level in z [m]
+    real(wp) :: volume
+    real(wp) :: p(3, most_corners), under(3, most_corners), above(3, most_corners)
+    integer :: f, n, m
+
+    volume = 0.0_wp
+    do f = 1, size(bed%triangle, 2)
+      call facet_within(bed, f, low, high, n, p)
+      call clip_polygon(3, low(3), 1.0_wp, n, p)
+      if (n < 3) cycle
+      under = p
+      m = n
+      call clip_polygon(3, high(3), -1.0_wp, m, under)
+      volume = volume + column(under(:, :m), low(3))
+      above = p
+      m = n
+      call clip_polygon(3, high(3), 1.0_wp, m, above)
+      above(3, :m) = high(3)
+      volume = volume + column(above(:, :m), low(3))
+    end do
+  end function bed_volume
+
+  !> Volume between a flat polygon and the floor, negative if the polygon runs clockwise seen from
+  !! above [m3].
+  pure function column(p, floor) result(volume)
+    real(wp), intent(in) :: p(:, :)   !! (3, n) corners; less than three have none [m]
+    real(wp), intent(in) :: floor     !! [m]
+    real(wp) :: volume
+    real(wp) :: a(2), b(2)
+    integer :: v
+
+    volume = 0.0_wp
+    do v = 2, size(p, 2) - 1
+      a = p(1:2, v) - p(1:2, 1)
+      b = p(1:2, v + 1) - p(1:2, 1)
+      volume = volume + 0.5_wp*(a(1)*b(2) - a(2)*b(1)) &
+        *((p(3, 1) + p(3, v) + p(3, v + 1))/3.0_wp - floor)
+    end do
+  end function column
+
+  !> Height of the first ground below a point, of the bed or the floor of the tank [m].
+  pure function bed_height(bed, x, floor) result(height)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: x(3)    !! [m]
+    real(wp), intent(in) :: floor   !! of the tank [m]
+    real(wp) :: height
+    real(wp) :: at(3), here
+    integer :: f
+
+    height = floor
+    if (.not. bed%there) return
+    at = bed_place(bed, x)
+    do f = 1, size(bed%triangle, 2)
+      if (way_of(bed, f, at) <= 0) cycle
+      here = height_of(bed, f, at)
+      if (here <= x(3)) height = max(height, here)
+    end do
+  end function bed_height
+
+end module bed_measure_m
