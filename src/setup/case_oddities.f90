@@ -109,7 +109,8 @@ contains
       do s = 1, 2
         if (case%boundary%kind(s, d) == 'open') call oddities%add_message('&boundary ' &
           //side_name(s, d)//' = ''open'': gravity acts along it and the pressure on it is 0 ' &
-          //'from top to bottom, so with single_phase the liquid flows from rest')
+          //'from top to bottom, so with single_phase the liquid flows from rest; it ' &
+          //'stays at rest beside an ''outflow''')
       end do
     end do
   end subroutine look_at_open_sides
