@@ -115,6 +115,13 @@ def test_the_bed_is_no_water(heights: str, volume: float, tmp_path: Path) -> Non
     assert "water level 2 m; 32 m3 below it, bodies included" in plan_of(tmp_path, "")
 
 
+def test_a_box_of_water_has_a_volume(tmp_path: Path) -> None:
+    """The part of it in the tank; several may overlap."""
+    box = "&water min = -1, 0, 0  max = 2, 4, 1 /"
+    assert "boxes of liquid 1, 8 m3, bodies included\n" in plan_of(tmp_path, box, "")
+    assert "boxes of liquid 2\n" in plan_of(tmp_path, 2 * box, "")
+
+
 def speed(plan: str, start: str) -> float:
     """The speed that a plan tells [m/s]."""
     found = re.search(re.escape(start) + r" (\S+) m/s", plan)
@@ -125,7 +132,10 @@ def speed(plan: str, start: str) -> float:
 def test_falls_are_foreseen(tmp_path: Path) -> None:
     """Height, depth and cells; free fall in air; under water the estimate of the plan."""
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 6.5  velocity = 0, 0, -1 /")
-    assert "starts 6 m above the floor, 4 m above the water; water 2 m deep, 20 cells" in plan
+    assert (
+        "lowest point 6 m above the floor, 4 m above the water; water 2 m deep there, 20 cells"
+        in plan
+    )
     enters = (1 + 2 * 9.81 * 4) ** 0.5
     assert speed(plan, "meets the water at") == pytest.approx(enters, rel=0.01)
     s, sphericity = 2300 / 998.2, (np.pi * 6**2) ** (1 / 3) / 6
@@ -139,19 +149,25 @@ def test_falls_are_foreseen(tmp_path: Path) -> None:
     assert "v_t^2 = 2 (s - 1) g V / (C A)" in plan and "Hoelzer and Sommerfeld" in plan
 
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 6.5 /", run="physics = 'dry'", fluid="")
-    assert "starts 6 m above the floor\n" in plan
+    assert "lowest point 6 m above the floor\n" in plan
     assert speed(plan, "meets the floor at") == pytest.approx((2 * 9.81 * 6) ** 0.5, rel=0.01)
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 2  count = 3 /")
-    assert "the first of 3 starts 1.5 m above the floor, 0.5 m deep in the water" in plan
+    assert "the first of 3: lowest point 1.5 m above the floor, 0.5 m under water" in plan
     assert "meets the water" not in plan
     plan = plan_of(tmp_path, "&body shape = 'ball'  position = 2, 2, 3 /")
-    assert "&body on line 7 starts 2.5 m above the floor, 0.5 m above the water" in plan
+    assert "&body on line 7 lowest point 2.5 m above the floor, 0.5 m above the water" in plan
     assert "is lighter than the liquid and floats" in plan
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 3 /", "single_phase = .true.")
-    assert "under water; water 4 m deep, 40 cells" in plan
+    assert "under water; water 4 m deep there, 40 cells" in plan
     (tmp_path / "bed.txt").write_text("2 2 0 0 4 4\n0 2 0 2\n")
     plan = plan_of(tmp_path, f"&bed file = 'bed.txt' / {CUBE} 3, 2, 3 /")
-    assert "starts 1 m above the bed, 0.5 m above the water; water 0.5 m deep, 5 cells" in plan
+    assert (
+        "lowest point 1 m above the bed, 0.5 m above the water; water 0.5 m deep there, 5 cells"
+        in plan
+    )
+    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 3 /", sides="z_min = 'open'")
+    assert "lowest point at 2.5 m, 0.5 m above the water; water 2 m deep there, 20 cells" in plan
+    assert "if no block is in its way" not in plan
     assert "Falls" not in plan_of(tmp_path, "&body shape = 'cube' position = 2,2,2 fixed = T /")
 
 

@@ -139,7 +139,13 @@ contains
       call entry(unit, 'water level', brief(case%fluid%water_level)//' m; '//brief(volume) &
                  //' m3 below it'//without)
     end if
-    if (size(case%water) > 0) call entry(unit, 'boxes of liquid', to_text(size(case%water)))
+    if (size(case%water) == 1 .and. .not. bed%there) then
+      volume = product(max(0.0_wp, min(case%water(1)%max, case%grid%origin + case%grid%length) &
+        - max(case%water(1)%min, case%grid%origin)))
+      call entry(unit, 'boxes of liquid', '1, '//brief(volume)//' m3, bodies included')
+    else if (size(case%water) > 0) then
+      call entry(unit, 'boxes of liquid', to_text(size(case%water)))
+    end if
     if (len(case%fluid%initial_state) > 0) then
       call entry(unit, 'initial state', 'from ' &
                  //told_file(case%fluid%folder, case%fluid%initial_state))

@@ -63,20 +63,20 @@ contains
       call find_fall(case, drop, shapes(s), bed, fall)
       label = trim(drop%shape)
       if (drop%line > 0) label = group//' on line '//to_text(drop%line)
-      start = 'starts '
-      if (drop%count > 1) start = 'the first of '//to_text(drop%count)//' starts '
+      start = ''
+      if (drop%count > 1) start = 'the first of '//to_text(drop%count)//': '
       call entry(unit, label, start//start_text(case, bed, fall))
       if (fall%at_surface >= 0.0_wp) call entry(unit, '', 'meets the water at ' &
         //brief(fall%at_surface, 3)//' m/s')
       if (fall%terminal >= 0.0_wp) then
         under_water = .true.
         if (fall%at_floor >= 0.0_wp) call entry(unit, '', 'meets the '//ground(bed, fall, case) &
-          //' at about '//brief(fall%at_floor, 2)//' m/s')
+          //' at about '//brief(fall%at_floor, 2)//' m/s, if no block is in its way')
         call entry(unit, '', 'a long fall in water ends at about '//brief(fall%terminal, 2) &
           //' m/s, C = '//brief(fall%drag, 2))
       else if (fall%at_floor >= 0.0_wp) then
         call entry(unit, '', 'meets the '//ground(bed, fall, case)//' at ' &
-          //brief(fall%at_floor, 3)//' m/s')
+          //brief(fall%at_floor, 3)//' m/s, if no block is in its way')
       else if (fall%has_water .and. fall%drag > 0.0_wp) then
         call entry(unit, '', 'is lighter than the liquid and floats')
       end if
@@ -93,23 +93,22 @@ contains
 
     lower = case%grid%origin(3)
     if (fall%has_floor) lower = fall%floor
-    text = ''
-    if (fall%has_floor) text = brief(fall%bottom - fall%floor, 3)//' m above the ' &
-      //ground(bed, fall, case)
+    text = 'lowest point at '//brief(fall%bottom, 3)//' m'
+    if (fall%has_floor) text = 'lowest point '//brief(fall%bottom - fall%floor, 3) &
+      //' m above the '//ground(bed, fall, case)
     if (fall%has_water) then
       depth = fall%level - lower
-      if (len(text) > 0) text = text//', '
+      text = text//', '
       if (case%fluid%single_phase) then
         text = text//'under water'
       else if (fall%bottom > fall%level) then
         text = text//brief(fall%bottom - fall%level, 3)//' m above the water'
       else
-        text = text//brief(fall%level - fall%bottom, 3)//' m deep in the water'
+        text = text//brief(fall%level - fall%bottom, 3)//' m under water'
       end if
-      text = text//'; water '//brief(depth, 3)//' m deep, ' &
+      text = text//'; water '//brief(depth, 3)//' m deep there, ' &
         //brief(depth*case%grid%cells(3)/case%grid%length(3), 3)//' cells'
     end if
-    if (len(text) == 0) text = 'at '//brief(fall%bottom, 3)//' m, with no floor below'
   end function start_text
 
   !> What is below a block, in a word.
