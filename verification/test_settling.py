@@ -90,6 +90,7 @@ def test_what_never_settles(body: str, tmp_path: Path) -> None:
 
 def test_goes_on_when_not_asked(tmp_path: Path) -> None:
     """Without `stop_when_settled` the run goes to its end and does not speak of rest."""
-    code, said, end = run(tmp_path, CASE.format(stop="F", count=2))
+    text = CASE.format(stop="F", count=2).replace("rest_time = 0.3", "")
+    code, said, end = run(tmp_path, text)
     assert code == 3 and end == pytest.approx(5.0)
     assert "1 due block(s) never found room" in said and "at rest" not in said
