@@ -182,6 +182,22 @@ def test_a_drop_far_above_the_tank_is_asked_about(tmp_path: Path) -> None:
     assert plan_of(tmp_path, bodies).count("warning: &body position") == 5
 
 
+def test_contact_without_effect_is_warned_of(tmp_path: Path) -> None:
+    """Films without a sphere, contact spheres beside the exact surface."""
+    box = "&shape name = 'box' kind = 'box' size = 1, 1, 1 {} /"
+    tank = "&run t_end = 1 / &grid cells = 40, 40, 40 length = 4, 4, 4 / &fluid water_level = 2 /"
+    for shape, contact, warning in (
+        ("", "lubrication = T", "&contact lubrication = .true.: has no effect"),
+        ("spheres = 'dense'", "", "&shape spheres = 'dense': of box: no sphere touches"),
+        ("", "", None),
+        ("spheres = 'centroid'", "", None),
+    ):
+        plan = mics(["--check"], tmp_path, f"{tank}{box.format(shape)} &contact {contact} /").stdout
+        found = warnings_of(plan)
+        assert found == [] if warning is None else [w.startswith(warning) for w in found] == [True]
+    assert "lubrication" not in plan_of(tmp_path, "&contact lubrication = T /")
+
+
 def test_one_phase_beside_an_open_side_flows_from_rest(tmp_path: Path) -> None:
     """Where gravity acts along it."""
     warning = "warning: &boundary x_max = 'open': gravity acts along it and the pressure on it is 0"

@@ -43,6 +43,7 @@ contains
       call look_at_open_sides(case, oddities)
     end if
     call look_at_memory(case, shapes, oddities)
+    call look_at_contact(case, oddities)
     call look_at_seeds(case, oddities)
     call look_at_rest(case, shapes, oddities)
     call look_at_times(case, oddities)
@@ -114,6 +115,23 @@ contains
       end do
     end do
   end subroutine look_at_open_sides
+
+  !> Parts of the contact that this case does not have.
+  subroutine look_at_contact(case, oddities)
+    type(case_t), intent(in) :: case
+    type(problems_t), intent(inout) :: oddities
+    integer :: s
+
+    if (case%run%physics == 'coupled' .and. case%contact%lubrication &
+        .and. .not. any(case%shape%kind == 'sphere')) call oddities%add('&contact lubrication', &
+      case%contact%lubrication, 'has no effect: only blocks of kind ''sphere'' have such films')
+    if (case%contact%model /= 'surface') return
+    do s = 1, size(case%shape)
+      if (case%shape(s)%spheres /= 'centroid') call oddities%add('&shape spheres', &
+        trim(case%shape(s)%spheres), 'of '//trim(case%shape(s)%name)//': no sphere touches with ' &
+        //'&contact model = ''surface'', they only come into run.h5', case%shape(s)%line)
+    end do
+  end subroutine look_at_contact
 
   !> More memory than there is.
   subroutine look_at_memory(case, shapes, oddities)
