@@ -65,18 +65,19 @@ contains
     type(case_t) :: case
     type(shape_t), allocatable :: shapes(:)
     real(wp), parameter :: dt = 1.0e-4_wp
-    real(wp) :: v, z, before, start, half
+    real(wp) :: v, z, before, start, half, pull
     integer :: i
 
     call make('', case, shapes)
+    pull = 0.5_wp*water*drag_coefficient(shapes(1))*projected_area(shapes(1))
     do i = 0, 2
       start = 6.0_wp*i
       v = start
       z = 0.0_wp
       do while (z < 1.5_wp)
         before = v
-        half = v + 0.5_wp*dt*acceleration(shapes(1), v)
-        v = v + dt*acceleration(shapes(1), half)
+        half = v + 0.5_wp*dt*acceleration(pull, v)
+        v = v + dt*acceleration(pull, half)
         z = z + 0.5_wp*dt*(before + v)
       end do
       call check('speed after 1.5 m', fall_under_water(shapes(1), water, g, start, 1.5_wp), v, &
@@ -88,12 +89,12 @@ contains
   end subroutine ways
 
   !> Of a cube of 2500 kg/m3 in water, with the added mass of a sphere [m/s2].
-  function acceleration(cube, v) result(a)
-    type(shape_t), intent(in) :: cube
-    real(wp), intent(in) :: v
+  pure function acceleration(pull, v) result(a)
+    real(wp), intent(in) :: pull   !! of the water over the square of the speed [kg/m]
+    real(wp), intent(in) :: v      !! [m/s]
     real(wp) :: a
 
-    a = (1500*g - 0.5_wp*water*drag_coefficient(cube)*projected_area(cube)*v**2)/3000
+    a = (1500*g - pull*v**2)/3000
   end function acceleration
 
   !> Heights, depth and speeds of drops in air, into water, in water, without floor or water.
