@@ -159,6 +159,8 @@ def test_falls_are_foreseen(tmp_path: Path) -> None:
     assert "is lighter than the liquid and floats" in plan
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 3 /", "single_phase = .true.")
     assert "under water; water 4 m deep there, 40 cells" in plan
+    plan = plan_of(tmp_path, f"{CUBE} 2, 2, 5 /", "single_phase = .true.")
+    assert "0.5 m above the water; water 4 m deep there, 40 cells" in plan
     (tmp_path / "bed.txt").write_text("2 2 0 0 4 4\n0 2 0 2\n")
     plan = plan_of(tmp_path, f"&bed file = 'bed.txt' / {CUBE} 3, 2, 3 /")
     assert (

@@ -99,10 +99,10 @@ contains
     if (fall%has_water) then
       depth = fall%level - lower
       text = text//', '
-      if (case%fluid%single_phase) then
-        text = text//'under water'
-      else if (fall%bottom > fall%level) then
+      if (fall%bottom > fall%level) then
         text = text//brief(fall%bottom - fall%level, 3)//' m above the water'
+      else if (case%fluid%single_phase) then
+        text = text//'under water'
       else
         text = text//brief(fall%level - fall%bottom, 3)//' m under water'
       end if
