@@ -79,7 +79,7 @@ contains
     type(shape_t), intent(in) :: shape
     type(bed_t), intent(in) :: bed
     type(fall_t), intent(out) :: fall
-    real(wp) :: x(3), q(4), g, speed, ground, top
+    real(wp) :: x(3), q(4), g, speed, ground, top, drag_area
 
     call draw_drop(drop, 1, x, q)
     fall%bottom = x(3) - depth_below_centre(shape, q)
@@ -102,9 +102,12 @@ contains
       end if
       fall%drag = drag_coefficient(shape)
       if (shape%density <= case%fluid%liquid_density) return
-      fall%terminal = terminal_speed(shape, case%fluid%liquid_density, g)
-      if (fall%has_floor) fall%at_floor = fall_under_water(shape, case%fluid%liquid_density, g, &
-        max(0.0_wp, speed), max(0.0_wp, min(fall%bottom, fall%level) - fall%floor))
+      drag_area = fall%drag*projected_area(shape)
+      associate (s => shape%density/case%fluid%liquid_density)
+        fall%terminal = terminal_speed(s, shape%volume, drag_area, g)
+        if (fall%has_floor) fall%at_floor = fall_under_water(s, shape%volume, drag_area, g, &
+          max(0.0_wp, speed), max(0.0_wp, min(fall%bottom, fall%level) - fall%floor))
+      end associate
     else if (fall%has_floor .and. (case%run%physics == 'dry' .or. has_level(case))) then
       fall%at_floor = speed_after(speed, g, max(0.0_wp, fall%bottom - fall%floor))
     end if
@@ -209,33 +212,29 @@ contains
     drag = drag*10.0_wp**(0.4_wp*max(0.0_wp, -log10(sphericity))**0.2_wp)
   end function drag_coefficient
 
-  !> Speed at which weight, buoyancy and drag are in balance, for a shape heavier than the liquid
-  !! [m/s].
-  function terminal_speed(shape, liquid_density, g) result(speed)
-    type(shape_t), intent(in) :: shape
-    real(wp), intent(in) :: liquid_density   !! [kg/m3]
-    real(wp), intent(in) :: g                !! [m/s2]
+  !> Speed at which weight, buoyancy and drag are in balance [m/s], see above.
+  elemental function terminal_speed(s, volume, drag_area, g) result(speed)
+    real(wp), intent(in) :: s           !! density over that of the liquid, above 1 [-]
+    real(wp), intent(in) :: volume      !! [m3]
+    real(wp), intent(in) :: drag_area   !! drag coefficient times area [m2]
+    real(wp), intent(in) :: g           !! [m/s2]
     real(wp) :: speed
 
-    speed = sqrt(2*(shape%density/liquid_density - 1.0_wp)*shape%volume*g &
-      /(drag_coefficient(shape)*projected_area(shape)))
+    speed = sqrt(2*(s - 1.0_wp)*volume*g/drag_area)
   end function terminal_speed
 
   !> Speed after a way down through still liquid [m/s], see above.
-  function fall_under_water(shape, liquid_density, g, speed, way) result(v)
-    type(shape_t), intent(in) :: shape
-    real(wp), intent(in) :: liquid_density   !! less than that of the shape [kg/m3]
-    real(wp), intent(in) :: g                !! [m/s2]
-    real(wp), intent(in) :: speed            !! downward at the start [m/s]
-    real(wp), intent(in) :: way              !! [m]
-    real(wp) :: v
+  elemental function fall_under_water(s, volume, drag_area, g, start, way) result(speed)
+    real(wp), intent(in) :: s, volume, drag_area, g   !! as for `terminal_speed`
+    real(wp), intent(in) :: start                     !! speed downward at the start [m/s]
+    real(wp), intent(in) :: way                       !! [m]
+    real(wp) :: speed
     real(wp), parameter :: added_mass = 0.5_wp   ! of a sphere [-]
     real(wp) :: length, terminal
 
-    length = 2*(shape%density/liquid_density + added_mass)*shape%volume &
-      /(drag_coefficient(shape)*projected_area(shape))
-    terminal = terminal_speed(shape, liquid_density, g)
-    v = sqrt(terminal**2 + (speed**2 - terminal**2)*exp(-2*way/length))
+    length = 2*(s + added_mass)*volume/drag_area
+    terminal = terminal_speed(s, volume, drag_area, g)
+    speed = sqrt(terminal**2 + (start**2 - terminal**2)*exp(-2*way/length))
   end function fall_under_water
 
 end module fall_m
