@@ -13,7 +13,7 @@
 !! 20 % of it in drag (verification/cases/settling_units).
 module fall_m
   use kinds_m, only: wp, pi
-  use vectors_m, only: rotate, cross
+  use vectors_m, only: rotation_matrix, cross
   use case_types_m, only: case_t, drop_input_t, body_input_t, is_given
   use boundary_kinds_m, only: side_code, is_wall
   use tet_mesh_m, only: shape_t
@@ -128,7 +128,7 @@ contains
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: q(4)   !! attitude
     real(wp) :: depth
-    real(wp) :: p(3)
+    real(wp) :: turn(3, 3), p(3)
     integer :: i
 
     if (shape%kind == 'sphere') then
@@ -136,8 +136,9 @@ contains
       return
     end if
     depth = 0.0_wp
+    turn = rotation_matrix(q)
     do i = 1, size(shape%point, 2)
-      p = rotate(q, shape%point(:, i))
+      p = matmul(turn, shape%point(:, i))
       depth = max(depth, -p(3))
     end do
   end function depth_below_centre
