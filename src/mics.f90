@@ -33,6 +33,7 @@ program mics
   use step_m, only: take_step
   use faults_m, only: fault_t, note_places, find_fault, find_final_fault
   implicit none
+  save   ! keeps the state off the stack
   type(options_t) :: options
   type(case_t) :: case
   type(shape_t), allocatable :: shapes(:)

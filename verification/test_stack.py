@@ -16,10 +16,10 @@ SMALL = TANK.replace("= 1 /", "= 0.01 /") + "&fluid water_level = 0.1 /\n"
 
 @pytest.mark.parametrize("name", ["blocks", "blocks_paper", "tetrapods"])
 def test_a_small_stack_is_enough(name: str, tmp_path: Path) -> None:
-    """Of 128 kB, also for each thread."""
+    """Of 96 kB, also for each thread."""
 
     def small_stack() -> None:
-        resource.setrlimit(resource.RLIMIT_STACK, (2**17, 2**17))
+        resource.setrlimit(resource.RLIMIT_STACK, (96 * 1024, 96 * 1024))
 
     text = re.sub(r"t_end = \S+", "t_end = 0.06", (ROOT / "input" / f"{name}.nml").read_text())
     (tmp_path / "input").symlink_to(ROOT / "input")
@@ -53,7 +53,7 @@ def test_a_stack_that_is_too_small_is_refused(size: str, tmp_path: Path) -> None
     assert f"environment variable OMP_STACKSIZE = '{size.rstrip()}': the stack" in done.stderr
 
     def tiny_stack() -> None:
-        resource.setrlimit(resource.RLIMIT_STACK, (110 * 1024, 110 * 1024))
+        resource.setrlimit(resource.RLIMIT_STACK, (60 * 1024, 60 * 1024))
 
     done = subprocess.run(
         [ROOT / "mics"],
@@ -66,5 +66,5 @@ def test_a_stack_that_is_too_small_is_refused(size: str, tmp_path: Path) -> None
         preexec_fn=tiny_stack,
     )
     assert done.returncode == 2
-    assert "ulimit -s 110: the stack is too small, the program needs at least" in done.stderr
+    assert "ulimit -s 60: the stack is too small, the program needs at least" in done.stderr
     assert list(tmp_path.iterdir()) == []

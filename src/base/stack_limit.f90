@@ -1,7 +1,7 @@
 !> How large the stacks of a process and of its threads may grow, and whether that is enough.
 !!
-!! Measured on the longest chains of calls (gfortran 12): see `least_main` and `least_thread`. A
-!! stack that is too small ends a program without a word, so this is asked first.
+!! Cases of `input` take up to 48 kB of either (gfortran 12). A stack that is too small ends a
+!! program without a word, so this is asked first.
 module stack_limit_m
   use, intrinsic :: iso_c_binding, only: c_int, c_long
   use kinds_m, only: wp, i8
@@ -12,8 +12,7 @@ module stack_limit_m
   public :: check_stack, stack_bytes
 
   integer(i8), parameter :: kilobyte = 1024_i8
-  integer(i8), parameter :: least_main = 120*kilobyte    !! of the process itself [B]
-  integer(i8), parameter :: least_thread = 64*kilobyte   !! of each further thread [B]
+  integer(i8), parameter :: least_stack = 64*kilobyte    !! of the process or a thread [B]
 
   interface
     integer(c_int) function c_getrlimit(resource, limit) bind(c, name='getrlimit')
@@ -38,17 +37,17 @@ contains
 
     limit = -1
     if (c_getrlimit(rlimit_stack, limit) /= 0) limit = -1
-    if (limit(1) >= 0 .and. limit(1) < least_main) call problems%add_message('ulimit -s ' &
+    if (limit(1) >= 0 .and. limit(1) < least_stack) call problems%add_message('ulimit -s ' &
       //to_text(int(limit(1)/kilobyte))//': the stack is too small, the program needs at least ' &
-      //to_text(int(least_main/kilobyte))//' kB; 8192 is usual')
+      //to_text(int(least_stack/kilobyte))//' kB; 8192 is usual')
     do i = 1, size(names)
       call get_environment_variable(trim(names(i)), text, status=status)
       if (status /= 0) cycle
       bytes = stack_bytes(text)
-      if (bytes >= 0 .and. bytes < least_thread) call problems%add_message( &
+      if (bytes >= 0 .and. bytes < least_stack) call problems%add_message( &
         'environment variable '//trim(names(i))//' = '//quoted_text(trim(text)) &
         //': the stack of a thread is too small, it needs at least ' &
-        //to_text(int(least_thread/kilobyte))//'k; without the variable it has that of ulimit -s')
+        //to_text(int(least_stack/kilobyte))//'k; without the variable it has that of ulimit -s')
       return
     end do
   end subroutine check_stack
