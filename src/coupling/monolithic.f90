@@ -24,7 +24,7 @@ module monolithic_m
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use face_memory_m, only: note_deviation
-  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, find_liquid, add_second_half, &
+  use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, add_second_half, &
                         add_whole
   use buoyancy_m, only: displaced_force, uncounted_fluid
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities
@@ -32,7 +32,7 @@ module monolithic_m
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
-                            note_velocity, force_of_walls, force_of_mid_step
+                            note_velocity, force_of_walls, force_of_half_kick
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
   use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
@@ -51,12 +51,12 @@ module monolithic_m
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(linked_cells_t), allocatable :: links_before, links
       !! of the surface at the start and at the end of the step
-    type(mid_step_t) :: mid_step
+    type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
     real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
-    real(wp), allocatable :: from_mid_step(:, :)   !! (6, n) what its two halves differ by
+    real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
     real(wp), allocatable :: deviation(:, :, :, :)
@@ -90,13 +90,13 @@ contains
     allocate (self%links_before, self%links)
     call linked_cells_init(grid, self%links_before)
     call linked_cells_init(grid, self%links)
-    call mid_step_init(grid, self%mid_step)
-    call give(scratch, self%mid_step%given)
+    call half_kick_init(grid, self%half_kick)
+    call give(scratch, self%half_kick%given)
     call clear(scratch)
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%lack(6, 3, n), source=0.0_wp)
-    allocate (self%dry_motion, self%from_mid_step, self%late, self%counted, self%trend, &
+    allocate (self%dry_motion, self%from_half_kick, self%late, self%counted, self%trend, &
               source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
@@ -119,15 +119,15 @@ contains
     call find_links_before(grid, solid, self)
     if (self%implicit_momentum) then
       call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
-      call find_liquid(grid, flow, self%mid_step%takes_part)
+      call find_liquid(grid, flow, self%half_kick%takes_part)
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, self)
       call give(scratch, self%tension%force)
     else
       call take(scratch, self%deviation)
-      call take(scratch, self%mid_step%given)
+      call take(scratch, self%half_kick%given)
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
-      call to_mid_step(grid, case%fluid, solid, self%links_before, self%bodies, self%trend, dt, &
-                       flow, self%acceleration, self%mid_step)
+      call add_first_half(grid, case%fluid, solid, self%links_before, self%bodies, self%trend, dt, &
+                       flow, self%acceleration, self%half_kick)
     end if
   end subroutine begin
 
@@ -245,10 +245,10 @@ contains
       if (self%implicit_momentum) then
         call accelerate_cells(grid, dt, flow, self)
       else
-        call add_second_half(grid, dt, a%cell, self%mid_step, flow%u)
-        call force_of_mid_step(grid, case%fluid, self%links_before, self%links, self%bodies, dt, &
-                               flow, a%cell, self%mid_step, self%from_mid_step)
-        call give(scratch, self%mid_step%given)
+        call add_second_half(grid, dt, a%cell, self%half_kick, flow%u)
+        call force_of_half_kick(grid, case%fluid, self%links_before, self%links, self%bodies, dt, &
+                               flow, a%cell, self%half_kick, self%from_half_kick)
+        call give(scratch, self%half_kick%given)
       end if
       call add_product(grid, dt, by_stress, flow%u)
     end associate
@@ -289,7 +289,7 @@ contains
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
       self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, self)
-      self%from_level = self%from_level + self%from_mid_step + self%late
+      self%from_level = self%from_level + self%from_half_kick + self%late
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
@@ -346,7 +346,7 @@ contains
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(self%acceleration%cell, n_halo, layers=1)
     associate (a => self%acceleration, links => self%links, &
-               given => self%mid_step%takes_part, in_liquid => self%mid_step%in_liquid)
+               given => self%half_kick%takes_part, in_liquid => self%half_kick%in_liquid)
       call find_liquid(grid, flow, in_liquid, among=given)   ! the surface may have come
       if (self%implicit_momentum) then
         call predict_face_velocity(grid, dt, self%rho, a, flow)
@@ -361,7 +361,7 @@ contains
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)
       else
-        call add_whole(grid, dt, a%cell, self%mid_step, flow%u)
+        call add_whole(grid, dt, a%cell, self%half_kick, flow%u)
       end if
     end associate
   end subroutine predict_faces

@@ -8,7 +8,7 @@
 !! group took and delta U that of the wall, whose part `uncounted_fluid` counts. It is the part of
 !! the pressure on the wall that the trapezoid rule of the faces misses. I is the momentum of films
 !! that the wall bears as one end of a lever (`group_momentum_m`). In the same way the half of
-!! the old pressure that acts before the transport (`mid_step_m`) does so on the surface of the
+!! the old pressure that acts before the transport (`half_kick_m`) does so on the surface of the
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
   use kinds_m, only: wp, i8
@@ -20,14 +20,14 @@ module wall_balance_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
   use linked_cells_m, only: linked_cells_t, open_shares
-  use mid_step_m, only: mid_step_t
+  use half_kick_m, only: half_kick_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
   public :: wall_balance_t, wall_balance_init, begin_balance, note_change, note_velocity
-  public :: force_of_walls, force_of_mid_step
+  public :: force_of_walls, force_of_half_kick
 
   integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
 
@@ -164,9 +164,9 @@ contains
   end subroutine force_of_walls
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
-  !! start (`mid_step%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
+  !! start (`half_kick%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
   !! surface of the end, of groups.
-  subroutine force_of_mid_step(grid, fluid, before, links, bodies, dt, flow, a, mid_step, force)
+  subroutine force_of_half_kick(grid, fluid, before, links, bodies, dt, flow, a, half_kick, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(linked_cells_t), intent(in) :: before, links   !! of the start and of the end
@@ -175,7 +175,7 @@ contains
     type(flow_t), intent(in) :: flow
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
-    type(mid_step_t), intent(in) :: mid_step
+    type(half_kick_t), intent(in) :: half_kick
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
     integer(i8) :: bins(bin_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n)
@@ -222,13 +222,13 @@ contains
       real(wp) :: owed(6)
       real(wp) :: f(3), mass
 
-      f = -mid_step%given(c(1), c(2), c(3), :)
-      if (mid_step%takes_part(c(1), c(2), c(3))) then
+      f = -half_kick%given(c(1), c(2), c(3), :)
+      if (half_kick%takes_part(c(1), c(2), c(3))) then
         mass = mass_through(fluid, flow%room(c(1), c(2), c(3)), flow%liquid(c(1), c(2), c(3)))
         f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
       end if
       owed = wrench(f/dt, arm_to_cell(grid, c, bodies%x(:, b)))
     end function of_cell
-  end subroutine force_of_mid_step
+  end subroutine force_of_half_kick
 
 end module wall_balance_m

@@ -13,9 +13,9 @@ program test_wall_balance
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, order_by_body, &
     open_shares
   use group_momentum_m, only: share_acceleration
-  use mid_step_m, only: mid_step_t, mid_step_init
+  use half_kick_m, only: half_kick_t, half_kick_init
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
-    force_of_walls, force_of_mid_step
+    force_of_walls, force_of_half_kick
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -204,52 +204,52 @@ contains
   !! the surface of the start less what would be on that of the end, wherever there was a wall.
   subroutine two_halves()
     type(linked_cells_t) :: before
-    type(mid_step_t) :: mid_step
+    type(half_kick_t) :: half_kick
     real(wp) :: sums(3), mass
     integer :: i, j, k
 
     before = links
-    call mid_step_init(box%grid, mid_step)
-    mid_step%takes_part = .true.
+    call half_kick_init(box%grid, half_kick)
+    half_kick%takes_part = .true.
     call begin()
     call fill(a%cell)
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
           mass = box%case%fluid%liquid_density*box%flow%room(i, j, k)
-          mid_step%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+          half_kick%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
-    call find_halves(before, mid_step)
+    call find_halves(before, half_kick)
     call check('equal halves: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
 
     ! The box was elsewhere; a cell gets no second half.
     call move_box(0.13_wp, before)
-    mid_step%takes_part(6, 4, 5) = .false.
+    half_kick%takes_part(6, 4, 5) = .false.
     sums = 0.0_wp
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          call random_numbers(seed, mid_step%given(i, j, k, :))
+          call random_numbers(seed, half_kick%given(i, j, k, :))
           if (max(before%number(i, j, k), links%number(i, j, k)) == 0) cycle
-          sums = sums - mid_step%given(i, j, k, :)
-          if (.not. mid_step%takes_part(i, j, k)) cycle
+          sums = sums - half_kick%given(i, j, k, :)
+          if (.not. half_kick%takes_part(i, j, k)) cycle
           sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%room(i, j, k) &
                         *a%cell(i, j, k, :)
         end do
       end do
     end do
-    call find_halves(before, mid_step)
+    call find_halves(before, half_kick)
     call check('momentum of the halves goes to the body', dt*force(1:3, 1), sums, 1.0e-11_wp)
   end subroutine two_halves
 
-  subroutine find_halves(before, mid_step)
+  subroutine find_halves(before, half_kick)
     type(linked_cells_t), intent(in) :: before
-    type(mid_step_t), intent(in) :: mid_step
+    type(half_kick_t), intent(in) :: half_kick
 
-    call force_of_mid_step(box%grid, box%case%fluid, before, links, box%bodies, dt, box%flow, &
-                           a%cell, mid_step, force)
+    call force_of_half_kick(box%grid, box%case%fluid, before, links, box%bodies, dt, box%flow, &
+                           a%cell, half_kick, force)
   end subroutine find_halves
 
   !> The links of the box lifted by `way`.

@@ -16,7 +16,7 @@
 !! new pressure alone. Else columns of viscous liquid made a thousand times the energy that they had
 !! (docs/decisions/surface.md). Cells at an outflow do not take part either: the drag of the
 !! side, half of which they take (`predict_face_velocity`), is no part of it.
-module mid_step_m
+module half_kick_m
   use kinds_m, only: wp
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo
@@ -33,24 +33,24 @@ module mid_step_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: mid_step_t, mid_step_init, to_mid_step, find_liquid
+  public :: half_kick_t, half_kick_init, add_first_half, find_liquid
   public :: add_second_half, add_whole
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
 
-  type :: mid_step_t
+  type :: half_kick_t
     logical, allocatable :: takes_part(:, :, :)
       !! cells whose neighbours are all full of liquid at the start of the step
     logical, allocatable :: in_liquid(:, :, :)     !! those of them that are so at its end, too
     real(wp), allocatable :: given(:, :, :, :)     !! momentum given before the transport [kg m/s]
-  end type mid_step_t
+  end type half_kick_t
 
 contains
 
   !> Allocate for a grid; nothing given.
-  subroutine mid_step_init(grid, self)
+  subroutine half_kick_init(grid, self)
     type(grid_t), intent(in) :: grid
-    type(mid_step_t), intent(out) :: self
+    type(half_kick_t), intent(out) :: self
     integer :: a(3), b(3)
 
     a = grid%first
@@ -58,10 +58,10 @@ contains
     allocate (self%takes_part(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
     allocate (self%in_liquid, source=self%takes_part)
     allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-  end subroutine mid_step_init
+  end subroutine half_kick_init
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine to_mid_step(grid, fluid, solid, links, bodies, trend, dt, flow, a, self)
+  subroutine add_first_half(grid, fluid, solid, links, bodies, trend, dt, flow, a, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
@@ -71,7 +71,7 @@ contains
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
     type(acceleration_t), intent(inout) :: a      !! work
-    type(mid_step_t), intent(inout) :: self
+    type(half_kick_t), intent(inout) :: self
     integer :: i, j, k
     real(wp) :: mass
 
@@ -99,7 +99,7 @@ contains
       end do
     end do
     call fill_velocity_halo(grid, flow%u)
-  end subroutine to_mid_step
+  end subroutine add_first_half
 
   !> The second half of weight and old pressure in the cells that take part.
   subroutine add_second_half(grid, dt, a, self, u)
@@ -107,7 +107,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
-    type(mid_step_t), intent(in) :: self
+    type(half_kick_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
     call change_where(grid, self%takes_part, .true., u, 0.5_wp*dt, a)
@@ -119,7 +119,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
-    type(mid_step_t), intent(in) :: self
+    type(half_kick_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
     call change_where(grid, self%takes_part, .false., u, dt, a)
@@ -184,4 +184,4 @@ contains
     end do
   end subroutine find_liquid
 
-end module mid_step_m
+end module half_kick_m

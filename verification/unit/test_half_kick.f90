@@ -1,9 +1,9 @@
 !> What the transport gets of half a step of weight and pressure, which cells get it, how much
 !! momentum that is, and what the cells get after it.
-program test_mid_step
+program test_half_kick
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use mid_step_m, only: mid_step_t, mid_step_init, to_mid_step, add_second_half, add_whole
+  use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, add_second_half, add_whole
   use mixture_m, only: mix_fluid
   use momentum_conservative_m, only: mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init
@@ -24,7 +24,7 @@ program test_mid_step
   type(acceleration_t) :: a
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: before
-  type(mid_step_t) :: mid_step
+  type(half_kick_t) :: half_kick
   real(wp) :: half(3), given(3), trend(6, 1) = 0.0_wp
   integer :: i, j, k, seed
 
@@ -46,12 +46,12 @@ program test_mid_step
     flow%liquid = flow%room*flow%c
     before = flow%u
     half = 0.5_wp*dt*(fluid%gravity - rise/fluid%liquid_density)
-    call mid_step_init(grid, mid_step)
+    call half_kick_init(grid, half_kick)
     call acceleration_init(grid, a)
     call linked_cells_init(grid, links)
     call link_cells(grid, box%solid, links)
     trend(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
-    call to_mid_step(grid, fluid, box%solid, links, box%bodies, trend, dt, flow, a, mid_step)
+    call add_first_half(grid, fluid, box%solid, links, box%bodies, trend, dt, flow, a, half_kick)
     call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
     call check('a cut cell, too', box%solid%alpha(5, 3, 3) > 0.0_wp &
                .and. maxval(abs(change(5, 3, 3) - half)) < 1.0e-14_wp)
@@ -65,7 +65,7 @@ program test_mid_step
       do j = 1, cells(2)
         do i = 1, cells(1)
           given = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))*change(i, j, k)
-          call check('the momentum is told', mid_step%given(i, j, k, :), given, 1.0e-12_wp)
+          call check('the momentum is told', half_kick%given(i, j, k, :), given, 1.0e-12_wp)
         end do
       end do
     end do
@@ -84,12 +84,12 @@ contains
       a%cell(:, :, :, i) = gain(i)/dt
     end do
     before = box%flow%u
-    call add_second_half(box%grid, dt, a%cell, mid_step, box%flow%u)
+    call add_second_half(box%grid, dt, a%cell, half_kick, box%flow%u)
     call check('liquid: the other half', maxval(abs(change(7, 3, 2) - 0.5_wp*gain)), 0.0_wp, &
                1.0e-14_wp)
     call check('not at the surface', maxval([abs(change(7, 6, 5)), abs(change(6, 5, 4))]), 0.0_wp, &
                0.0_wp)
-    call add_whole(box%grid, dt, a%cell, mid_step, box%flow%u)
+    call add_whole(box%grid, dt, a%cell, half_kick, box%flow%u)
     call check('liquid: no more', maxval(abs(change(7, 3, 2) - 0.5_wp*gain)), 0.0_wp, 1.0e-14_wp)
     call check('the whole at the surface', maxval(abs(change(7, 6, 5) - gain)), 0.0_wp, 1.0e-14_wp)
     call check('and beside it', maxval(abs(change(6, 5, 4) - gain)), 0.0_wp, 1.0e-14_wp)
@@ -102,4 +102,4 @@ contains
 
     du = box%flow%u(i, j, k, :) - before(i, j, k, :)
   end function change
-end program test_mid_step
+end program test_half_kick
