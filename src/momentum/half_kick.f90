@@ -7,7 +7,7 @@
 !! on the surface of the bodies at the start of the step, before the transport, and the other half
 !! in the velocity stage, on the surface at its end: the impulse of a pressure acts on the surface
 !! of the middle of the step, and each half is a gradient on its own surface. Near the bodies the
-!! old pressure is carried along with them first (`carried_pressure_m`).
+!! old pressure is carried along with them first (`advected_pressure_m`).
 !!
 !! Only liquid away from the free surface takes part. At the surface and in gas the density changes
 !! from step to step, and the old pressure of a cell that was liquid would act on gas, 830 times as
@@ -28,7 +28,7 @@ module half_kick_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
   use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces, hold_in_cells
-  use carried_pressure_m, only: carry_pressure
+  use advected_pressure_m, only: advect_pressure
   use mixture_m, only: pure_share
   use parallel_m, only: halo_exchange
   implicit none
@@ -76,7 +76,7 @@ contains
     real(wp) :: mass
 
     call find_liquid(grid, flow, self%takes_part)
-    call carry_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, bodies, &
+    call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, bodies, &
                         self%takes_part, dt, a, flow%p)
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
     call cell_mean_of_faces(grid, solid%open, a%face, a%cell)

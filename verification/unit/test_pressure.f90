@@ -11,7 +11,7 @@ program test_pressure
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
   use pressure_extension_m, only: extend_pressure
-  use carried_pressure_m, only: carry_pressure
+  use advected_pressure_m, only: advect_pressure
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -405,7 +405,7 @@ contains
 
   !> One call, of the case as it is.
   subroutine carry()
-    call carry_pressure(box%grid, weight, box%solid%alpha, box%bodies, takes_part, dt, a, &
+    call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, takes_part, dt, a, &
                         box%flow%p)
   end subroutine carry
 

@@ -9,7 +9,7 @@
 !! the way w of the body in this step leads back to, \( \tilde p(x) = p(x - w) \), which before a
 !! body is nearer to it or in it: there the pressure of the fluid is continued by its slope. No
 !! guess of the pressure is wrong, since the pressure stage solves for what it lacks.
-module carried_pressure_m
+module advected_pressure_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -18,7 +18,7 @@ module carried_pressure_m
   use boundary_m, only: fill_scalar_halo
   implicit none
   private
-  public :: carry_pressure
+  public :: advect_pressure
 
   real(wp), parameter :: far = 1.5_wp
     !! radii of a body from its centre, where nothing moves with it (docs/decisions/time_step.md)
@@ -28,7 +28,7 @@ contains
 
   !> Carry the pressure of the liquid, less that of its weight at rest, by the way of the bodies in
   !! a step; halo filled.
-  subroutine carry_pressure(grid, weight, alpha, bodies, takes_part, dt, work, p)
+  subroutine advect_pressure(grid, weight, alpha, bodies, takes_part, dt, work, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: weight(3)            !! of the liquid, rho g [N/m3]
     real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -54,7 +54,7 @@ contains
       p(:, :, k) = p(:, :, k) + work%face(:, :, k, 1)
     end do
     call fill_scalar_halo(grid, p, layers=1)
-  end subroutine carry_pressure
+  end subroutine advect_pressure
 
   !> Way of the pressure in plane k: that of the bodies around, each by how near it is.
   subroutine find_way(grid, bodies, dt, k, near, way)
@@ -152,4 +152,4 @@ contains
     end do
   end subroutine find_change
 
-end module carried_pressure_m
+end module advected_pressure_m
