@@ -46,8 +46,8 @@ module monolithic_m
 
   type, extends(coupling_t) :: monolithic_t
     real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
-    type(rigid_motion_t) :: foreseen               !! the motion at the end, by `trend`
-    real(wp), allocatable :: trend(:, :)
+    type(rigid_motion_t) :: predicted               !! the motion at the end, by `change_predicted`
+    real(wp), allocatable :: change_predicted(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(linked_cells_t), allocatable :: links_before, links
       !! of the surface at the start and at the end of the step
@@ -86,7 +86,7 @@ contains
     call coupling_init(grid, n, case, scratch, self)
     a = grid%first
     b = grid%last
-    call rigid_motion_init(n, self%foreseen)
+    call rigid_motion_init(n, self%predicted)
     allocate (self%links_before, self%links)
     call linked_cells_init(grid, self%links_before)
     call linked_cells_init(grid, self%links)
@@ -96,7 +96,7 @@ contains
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%lack(6, 3, n), source=0.0_wp)
-    allocate (self%dry_motion, self%from_half_kick, self%late, self%counted, self%trend, &
+    allocate (self%dry_motion, self%from_half_kick, self%late, self%counted, self%change_predicted, &
               source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
@@ -114,7 +114,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(scratch_t), intent(inout) :: scratch
 
-    call find_trend(case%fluid%gravity, dt, blocks, self)
+    call predict_motion(case%fluid%gravity, dt, blocks, self)
     self%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
     call find_links_before(grid, solid, self)
     if (self%implicit_momentum) then
@@ -126,7 +126,7 @@ contains
       call take(scratch, self%deviation)
       call take(scratch, self%half_kick%given)
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
-      call add_first_half(grid, case%fluid, solid, self%links_before, self%bodies, self%trend, dt, &
+      call add_first_half(grid, case%fluid, solid, self%links_before, self%bodies, self%change_predicted, dt, &
                        flow, self%acceleration, self%half_kick)
     end if
   end subroutine begin
@@ -147,22 +147,22 @@ contains
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
   !! the fluid that gets the old pressure.
-  subroutine find_trend(gravity, dt, blocks, self)
+  subroutine predict_motion(gravity, dt, blocks, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
     type(blocks_t), intent(in) :: blocks
     class(monolithic_t), intent(inout) :: self
     integer :: b
 
-    self%trend = 0.0_wp
+    self%change_predicted = 0.0_wp
     do b = 1, blocks%n
       if (.not. self%bodies%free(b)) cycle
-      self%trend(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
+      self%change_predicted(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
                                           /blocks%mass(b))
-      self%trend(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
+      self%change_predicted(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
                                       blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
     end do
-  end subroutine find_trend
+  end subroutine predict_motion
 
   !> Stage 9: films at the new places and their masters, one momentum for each group; inertia of
   !! the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
@@ -238,8 +238,8 @@ contains
       call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, self%rho, self%tension, a%face)
-      self%counted = self%at_start%motion + self%trend
-      call accelerations_of_groups(grid, solid, dt, self%trend, self)
+      self%counted = self%at_start%motion + self%change_predicted
+      call accelerations_of_groups(grid, solid, dt, self%change_predicted, self)
       if (self%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
       if (self%implicit_momentum) then
@@ -341,8 +341,8 @@ contains
 
     associate (unused => case)
     end associate
-    self%foreseen%x = self%bodies%x
-    self%foreseen%motion = self%at_start%motion + self%trend
+    self%predicted%x = self%bodies%x
+    self%predicted%motion = self%at_start%motion + self%change_predicted
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(self%acceleration%cell, n_halo, layers=1)
     associate (a => self%acceleration, links => self%links, &
@@ -356,7 +356,7 @@ contains
         call shorten_at_walls(grid, dt, self%bodies, links%cell(:, :links%n), links%body, &
                               links%number, in_liquid, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, self%at_start, self%foreseen, links%slip, dt, &
+      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, links%slip, dt, &
                                   self%implicit_momentum, given, in_liquid, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)

@@ -87,12 +87,12 @@ contains
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
   !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
-  subroutine face_velocity_at_walls(grid, solid, at_start, foreseen, slip, dt, c_ismac, given, &
+  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, slip, dt, c_ismac, given, &
                                     in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
-    type(rigid_motion_t), intent(in) :: foreseen   !! motion as far as the old pressure makes it
+    type(rigid_motion_t), intent(in) :: predicted   !! motion as far as the old pressure makes it
     real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of the layer along the wall, in cells with their centre in a body, 0 to 1
     real(wp), intent(in) :: dt                   !! [s]
@@ -160,12 +160,12 @@ contains
 
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
-      arm = nearest_arm(grid, x_wall, foreseen%x(:, body))
+      arm = nearest_arm(grid, x_wall, predicted%x(:, body))
       n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
       n = n/max(norm2(n), tiny(1.0_wp))
       u = flow%u(c(1), c(2), c(3), :)
       if (in_liquid(c(1), c(2), c(3))) then
-        wall = wall_velocity(foreseen%motion(:, body), arm)
+        wall = wall_velocity(predicted%motion(:, body), arm)
         gain = time_in_liquid(c, sum(abs(u - wall)/grid%h)) &
                *(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
       else

@@ -247,7 +247,7 @@ contains
     block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
     call ready()
     block%flow%p = 0.0_wp
-    coupling%trend(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
+    coupling%change_predicted(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
     call begin_step(block%blocks)
     call advance()
     associate (fall => dt*block%case%fluid%gravity)
@@ -320,7 +320,7 @@ contains
                rest*block%blocks%mass(1)*norm2(motion))
   end subroutine momentum_kept
 
-  !> The motion foreseen for the end of the step is that of the last forces, for this step.
+  !> The motion predicted for the end of the step is that of the last forces, for this step.
   subroutine goes_on_as_before()
     real(wp), parameter :: spin(3) = [2.0_wp, 1.0_wp, -3.0_wp]
     real(wp), parameter :: forces(3, 4) = reshape([0.02_wp, -0.03_wp, 0.5_wp, 0.01_wp, 0.02_wp, &
@@ -340,7 +340,7 @@ contains
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
     call coupling%begin(block%case, block%grid, block%solid, dt, 0.5_wp*dt, block%flow, &
                         block%blocks, scratch)
-    call check('foreseen: dt times the last acceleration', coupling%trend(:, 1), dt*gain, &
+    call check('predicted: dt times the last acceleration', coupling%change_predicted(:, 1), dt*gain, &
                1.0e-12_wp)
   end subroutine goes_on_as_before
 
