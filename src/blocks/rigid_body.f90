@@ -51,7 +51,7 @@ module rigid_body_m
     real(wp), allocatable :: v_start(:, :), l_start(:, :)
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
     real(wp), allocatable :: fluid_force(:, :), fluid_torque(:, :)
-    real(wp), allocatable :: late_force(:, :)
+    real(wp), allocatable :: lagged_force(:, :)
       !! (6, n) force and torque of the fluid that the next step adds (`wall_balance_m`) [N, N m]
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
     integer, allocatable :: contacts(:)   !! (n) different partners touched during the last step
@@ -139,7 +139,7 @@ contains
     allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
     allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
     allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
-    allocate (blocks%late_force(6, n), source=0.0_wp)
+    allocate (blocks%lagged_force(6, n), source=0.0_wp)
     allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
   end subroutine allocate_state
 

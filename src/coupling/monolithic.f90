@@ -57,7 +57,7 @@ module monolithic_m
     real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
     real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
-    real(wp), allocatable :: late(:, :)            !! (6, n) force of the walls of the step before
+    real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
     real(wp), allocatable :: deviation(:, :, :, :)
       !! of the faces at the start (`face_memory_m`), from `begin` to `predict_faces`
@@ -96,7 +96,7 @@ contains
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%lack(6, 3, n), source=0.0_wp)
-    allocate (self%dry_motion, self%from_half_kick, self%late, self%counted, self%change_predicted, &
+    allocate (self%dry_motion, self%from_half_kick, self%lagged, self%counted, self%change_predicted, &
               source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
@@ -115,7 +115,7 @@ contains
     type(scratch_t), intent(inout) :: scratch
 
     call predict_motion(case%fluid%gravity, dt, blocks, self)
-    self%late(:, :blocks%n) = dt_before/dt*blocks%late_force   ! what is owed is an impulse
+    self%lagged(:, :blocks%n) = dt_before/dt*blocks%lagged_force   ! what is owed is an impulse
     call find_links_before(grid, solid, self)
     if (self%implicit_momentum) then
       call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
@@ -289,7 +289,7 @@ contains
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
       self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, self)
-      self%from_level = self%from_level + self%from_half_kick + self%late
+      self%from_level = self%from_level + self%from_half_kick + self%lagged
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
@@ -395,14 +395,14 @@ contains
         call force_of_walls(grid, solid, links, bodies, self%at_start, dt, self%rho, balance, &
                             from_walls)
         if (solve == 1) then
-          self%late = from_walls
+          self%lagged = from_walls
           if (.not. any(bodies%free)) exit
-          call push_bodies(dt, self%late, bodies)
+          call push_bodies(dt, self%lagged, bodies)
         end if
       end do
-      self%total = self%total + self%late
+      self%total = self%total + self%lagged
       do b = 1, bodies%n
-        self%late(:, b) = merge(from_walls(:, b) - self%late(:, b), 0.0_wp, bodies%free(b))
+        self%lagged(:, b) = merge(from_walls(:, b) - self%lagged(:, b), 0.0_wp, bodies%free(b))
       end do
       call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
@@ -426,7 +426,7 @@ contains
 
     associate (unused => report)
     end associate
-    blocks%late_force = self%late(:, :blocks%n)
+    blocks%lagged_force = self%lagged(:, :blocks%n)
     call all_fluid_of_faces(grid, solid, self%bodies, self%pressure%system%operator%flux, &
                             flow%uf, flow%solid_flux)
   end subroutine close_faces

@@ -159,7 +159,7 @@ contains
       call visitor%reals('/blocks/angular_velocity', 'rad/s', [3, n], blocks%omega)
       call visitor%reals('/blocks/fluid_force', 'N', [3, n], blocks%fluid_force)
       call visitor%reals('/blocks/fluid_torque', 'N m', [3, n], blocks%fluid_torque)
-      call visitor%reals('/blocks/late_force', 'N, N m', [6, n], blocks%late_force)
+      call visitor%reals('/blocks/lagged_force', 'N, N m', [6, n], blocks%lagged_force)
       call visitor%reals('/blocks/contact_force', 'N', [3, n], blocks%contact_force)
       call visitor%reals('/blocks/contact_torque', 'N m', [3, n], blocks%contact_torque)
       call visitor%integers('/blocks/contacts', [n], blocks%contacts)

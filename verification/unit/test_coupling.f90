@@ -301,8 +301,8 @@ contains
     motion = block%blocks%v(:, 1)
     before = momentum()
     call advance()
-    late = dt*norm2(block%blocks%late_force(2:3, 1))
-    after = momentum() + dt*block%blocks%late_force(1:3, 1)
+    late = dt*norm2(block%blocks%lagged_force(2:3, 1))
+    after = momentum() + dt*block%blocks%lagged_force(1:3, 1)
     motion = block%blocks%v(:, 1) - motion
     call check('momentum '//name//': the water took some', norm2(motion) > 0.05_wp)
     call check('momentum '//name//': fluid and block keep it', after(2:3), before(2:3), &
@@ -315,7 +315,7 @@ contains
                late < 1.0e-4_wp*block%blocks%mass(1)*norm2(motion))
     call begin_step(block%blocks)
     call advance()
-    after = momentum() + dt*block%blocks%late_force(1:3, 1)
+    after = momentum() + dt*block%blocks%lagged_force(1:3, 1)
     call check('momentum '//name//': what is late comes', after(2:3), before(2:3), &
                rest*block%blocks%mass(1)*norm2(motion))
   end subroutine momentum_kept
