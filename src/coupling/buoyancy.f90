@@ -29,7 +29,7 @@ module buoyancy_m
     terms_at_once
   implicit none
   private
-  public :: displaced_t, displaced_force, displaced_fluid, uncounted_fluid
+  public :: displaced_t, displaced_force, displaced_fluid, mass_defect
 
   !> Fluid in the true place of a body.
   type :: displaced_t
@@ -61,30 +61,30 @@ contains
   !> Mass and first moment of the true displaced fluid less what the faces count of them.
   !!
   !! Column d belongs to an acceleration along d: to the pressures at the faces, which it makes,
-  !! `lack(:, d)` times it is to be added for the force and torque on the true body.
-  function uncounted_fluid(grid, fluid, solid, bodies, flux, flow) result(lack)
+  !! `defect(:, d)` times it is to be added for the force and torque on the true body.
+  function mass_defect(grid, fluid, solid, bodies, flux, flow) result(defect)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
     type(flow_t), intent(in) :: flow
-    real(wp) :: lack(6, 3, bodies%n)   !! [kg, kg m]
+    real(wp) :: defect(6, 3, bodies%n)   !! [kg, kg m]
     type(displaced_t) :: displaced(bodies%n)
     real(wp) :: counted(4, 3, bodies%n)
     integer :: b, d
 
     displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, bodies%present)
     counted = mass_at_faces(grid, bodies, flux, flow%rho)
-    lack = 0.0_wp
+    defect = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
       do d = 1, 3
-        lack(1:3, d, b) = (displaced(b)%mass - counted(1, d, b))*unit_step(:, d)
-        lack(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) - counted(2:4, d, b)
+        defect(1:3, d, b) = (displaced(b)%mass - counted(1, d, b))*unit_step(:, d)
+        defect(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) - counted(2:4, d, b)
       end do
     end do
-  end function uncounted_fluid
+  end function mass_defect
 
   !> Fluid in the true place of each body asked for.
   function displaced_fluid(grid, fluid, solid, bodies, c, wanted) result(displaced)

@@ -26,7 +26,7 @@ module monolithic_m
   use face_memory_m, only: note_deviation
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, add_second_half, &
                         add_whole
-  use buoyancy_m, only: displaced_force, uncounted_fluid
+  use buoyancy_m, only: displaced_force, mass_defect
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
@@ -55,7 +55,7 @@ module monolithic_m
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
-    real(wp), allocatable :: lack(:, :, :)         !! (6, 3, n) displaced fluid no face counts
+    real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
@@ -95,7 +95,7 @@ contains
     call clear(scratch)
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
-    allocate (self%lack(6, 3, n), source=0.0_wp)
+    allocate (self%defect(6, 3, n), source=0.0_wp)
     allocate (self%dry_motion, self%from_half_kick, self%lagged, self%counted, self%change_predicted, &
               source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -287,7 +287,7 @@ contains
     associate (bodies => self%bodies, flux => self%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
-      self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, flux, flow)
+      self%defect = mass_defect(grid, case%fluid, solid, bodies, flux, flow)
       call count_fluid(case%fluid%gravity, dt, self)
       self%from_level = self%from_level + self%from_half_kick + self%lagged
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
@@ -471,30 +471,30 @@ contains
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
         self%total(:, b) = self%total(:, b) + &
-          matmul(bodies%lack(:, :, b), bodies%motion(:, b) - self%dry_motion(:, b))/dt
+          matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%dry_motion(:, b))/dt
       end do
     end associate
   end subroutine sum_forces
 
   !> Give the bodies the inertia of the fluid that the faces do not count, and `from_level` its
-  !! force as far as it is known before the solve: -lack (g - a), a by weight and contact.
+  !! force as far as it is known before the solve: -defect (g - a), a by weight and contact.
   subroutine count_fluid(gravity, dt, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
     class(monolithic_t), intent(inout) :: self
-    real(wp) :: lack(6, 6)
+    real(wp) :: defect(6, 6)
     integer :: b
 
     self%bodies%clipped = .false.
-    do b = 1, size(self%lack, 3)
-      self%from_level(:, b) = -matmul(self%lack(:, :, b), gravity)
+    do b = 1, size(self%defect, 3)
+      self%from_level(:, b) = -matmul(self%defect(:, :, b), gravity)
       if (.not. self%bodies%free(b)) cycle
-      lack = 0.0_wp
-      lack(:, 1:3) = self%lack(:, :, b)
-      lack(1:3, 4:6) = transpose(lack(4:6, 1:3))
-      call set_inertia(b, self%bodies, lack)
+      defect = 0.0_wp
+      defect(:, 1:3) = self%defect(:, :, b)
+      defect(1:3, 4:6) = transpose(defect(4:6, 1:3))
+      call set_inertia(b, self%bodies, defect)
       self%from_level(:, b) = self%from_level(:, b) + &
-        matmul(self%bodies%lack(:, :, b), &
+        matmul(self%bodies%defect(:, :, b), &
                self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
     end do
   end subroutine count_fluid
@@ -531,7 +531,7 @@ contains
       call take_faces(scratch, system%operator%cf)
       call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
-      self%lack = uncounted_fluid(grid, case%fluid, solid, bodies, system%operator%flux, flow)
+      self%defect = mass_defect(grid, case%fluid, solid, bodies, system%operator%flux, flow)
       call count_fluid(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp

@@ -5,7 +5,7 @@
 !! $$ F = \frac{1}{\Delta t} \sum \left[ m_d (\delta u_f - \delta U) - m (\delta u - \delta U)
 !! + I \right] $$
 !! with delta u_f the change of velocity by the accelerations at the faces, delta u that which the
-!! group took and delta U that of the wall, whose part `uncounted_fluid` counts. It is the part of
+!! group took and delta U that of the wall, whose part `mass_defect` counts. It is the part of
 !! the pressure on the wall that the trapezoid rule of the faces misses. I is the momentum of films
 !! that the wall bears as one end of a lever (`group_momentum_m`). In the same way the half of
 !! the old pressure that acts before the transport (`half_kick_m`) does so on the surface of the

@@ -8,13 +8,13 @@ module rigid_motion_m
   private
   public :: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity, inverse_of
 
-  real(wp), parameter :: largest_lack = 0.5_wp   !! of the inertia that may be taken off [-]
+  real(wp), parameter :: largest_defect = 0.5_wp   !! of the inertia that may be taken off [-]
 
   type :: rigid_motion_t
     integer :: n = 0   !! bodies, and the bed if there is one: at rest, not free, not `present`
     logical, allocatable :: present(:)         !! (n) in the fluid
     logical, allocatable :: free(:)            !! (n) moved by the fluid
-    logical, allocatable :: clipped(:)         !! (n) `lack` was cut at its limit
+    logical, allocatable :: clipped(:)         !! (n) `defect` was cut at its limit
     real(wp), allocatable :: x(:, :)           !! (3, n) centre of mass [m]
     real(wp), allocatable :: motion(:, :)      !! (6, n) velocity and angular velocity [m/s, rad/s]
     real(wp), allocatable :: mass(:)           !! (n) [kg]
@@ -22,10 +22,10 @@ module rigid_motion_m
     real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, n) [1/(kg m2)]
     real(wp), allocatable :: volume(:)         !! (n) [m3]
     real(wp), allocatable :: radius(:)         !! (n) of the ball around `x` that holds it [m]
-    real(wp), allocatable :: lack(:, :, :)
+    real(wp), allocatable :: defect(:, :, :)
       !! (6, 6, n) of what a body displaces, the inertia that the faces of the grid do not count
     real(wp), allocatable :: apparent(:, :, :)
-      !! (6, 6, n) inertia with which the forces at the faces move a body: its own less `lack`
+      !! (6, 6, n) inertia with which the forces at the faces move a body: its own less `defect`
     real(wp), allocatable :: mobility(:, :, :) !! (6, 6, n) inverse of `apparent`
   end type rigid_motion_t
 
@@ -48,20 +48,20 @@ contains
     bodies%radius = 1.0_wp
     bodies%inertia = 0.0_wp
     bodies%inverse_inertia = 0.0_wp
-    allocate (bodies%lack(6, 6, n), bodies%apparent(6, 6, n), bodies%mobility(6, 6, n), &
+    allocate (bodies%defect(6, 6, n), bodies%apparent(6, 6, n), bodies%mobility(6, 6, n), &
               source=0.0_wp)
   end subroutine rigid_motion_init
 
   !> Inertia of body b and its inverse, with a part taken off if it is given; no more of it than
   !! leaves the rest positive, and `clipped` tells whether that cut it.
-  pure subroutine set_inertia(b, bodies, lack)
+  pure subroutine set_inertia(b, bodies, defect)
     integer, intent(in) :: b
     type(rigid_motion_t), intent(inout) :: bodies
-    real(wp), intent(in), optional :: lack(6, 6)
+    real(wp), intent(in), optional :: defect(6, 6)
     real(wp) :: part(6, 6), share, coupling
     integer :: d
 
-    bodies%lack(:, :, b) = 0.0_wp
+    bodies%defect(:, :, b) = 0.0_wp
     bodies%apparent(:, :, b) = 0.0_wp
     bodies%mobility(:, :, b) = 0.0_wp
     do d = 1, 3
@@ -70,23 +70,23 @@ contains
     end do
     bodies%apparent(4:6, 4:6, b) = bodies%inertia(:, :, b)
     bodies%mobility(4:6, 4:6, b) = bodies%inverse_inertia(:, :, b)
-    if (.not. present(lack)) return
-    part = lack
+    if (.not. present(defect)) return
+    part = defect
     bodies%clipped(b) = .false.
     do d = 1, 3
-      share = sqrt(largest_lack/max(largest_lack, part(d, d)/bodies%mass(b)))
+      share = sqrt(largest_defect/max(largest_defect, part(d, d)/bodies%mass(b)))
       bodies%clipped(b) = bodies%clipped(b) .or. share < 1.0_wp
       part(d, :) = share*part(d, :)
       part(:, d) = share*part(:, d)
     end do
     coupling = sqrt(sum(part(4:6, 1:3)*matmul(bodies%inverse_inertia(:, :, b), part(4:6, 1:3))) &
                     /bodies%mass(b))
-    share = largest_lack/max(largest_lack, coupling)
+    share = largest_defect/max(largest_defect, coupling)
     bodies%clipped(b) = bodies%clipped(b) .or. share < 1.0_wp
     part(4:6, 1:3) = share*part(4:6, 1:3)
     part(1:3, 4:6) = share*part(1:3, 4:6)
-    bodies%lack(:, :, b) = part
-    bodies%apparent(:, :, b) = bodies%apparent(:, :, b) - bodies%lack(:, :, b)
+    bodies%defect(:, :, b) = part
+    bodies%apparent(:, :, b) = bodies%apparent(:, :, b) - bodies%defect(:, :, b)
     bodies%mobility(:, :, b) = inverse_of(bodies%apparent(:, :, b))
   end subroutine set_inertia
 

@@ -7,7 +7,7 @@ program test_buoyancy
   use boundary_m, only: fill_scalar_halo
   use polyhedron_m, only: box_clip_moments_below
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux, force_from_faces
-  use buoyancy_m, only: displaced_force, uncounted_fluid
+  use buoyancy_m, only: displaced_force, mass_defect
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -88,7 +88,7 @@ contains
   subroutine through_the_level(position)
     real(wp), intent(in) :: position(3)
     type(rigid_flux_t) :: flux
-    real(wp) :: force(6, 1), lack(6, 3, 1), by_faces(6, 1), expected(6), weight
+    real(wp) :: force(6, 1), defect(6, 3, 1), by_faces(6, 1), expected(6), weight
     real(wp) :: part, part_moment(3)
     logical, allocatable :: active(:, :, :)
     real(wp) :: mass, moment(3), turn(3, 3), corner(3, 4)
@@ -123,8 +123,8 @@ contains
       call rigid_flux_init(block%grid, 1, flux)
       call build_rigid_flux(block%grid, solid, block%bodies, active, flux)
       call force_from_faces(block%grid, block%bodies, flux, block%flow%p, by_faces)
-      lack = uncounted_fluid(block%grid, fluid, solid, block%bodies, flux, block%flow)
-      force(:, 1) = -matmul(lack(:, :, 1), fluid%gravity)
+      defect = mass_defect(block%grid, fluid, solid, block%bodies, flux, block%flow)
+      force(:, 1) = -matmul(defect(:, :, 1), fluid%gravity)
       call check('faces and correction: force', by_faces(1:3, 1) + force(1:3, 1), expected(1:3), &
                  1.0e-10_wp*weight)
       call check('faces and correction: torque', by_faces(4:6, 1) + force(4:6, 1), expected(4:6), &

@@ -381,22 +381,22 @@ contains
 
   !> However much the faces miss of a light body, its inertia stays positive.
   subroutine limited()
-    real(wp) :: lack(6, 6), z(6)
+    real(wp) :: defect(6, 6), z(6)
     integer :: d
 
     call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 30.0_wp)
     call place(block)
-    lack = 0.0_wp
+    defect = 0.0_wp
     do d = 1, 3
-      lack(d, d) = (-1.0_wp)**d*10.0_wp*block%blocks%mass(1)
-      lack(d, 4:6) = [0.02_wp, -0.01_wp, 0.03_wp]*block%blocks%mass(1)
-      lack(4:6, d) = lack(d, 4:6)
+      defect(d, d) = (-1.0_wp)**d*10.0_wp*block%blocks%mass(1)
+      defect(d, 4:6) = [0.02_wp, -0.01_wp, 0.03_wp]*block%blocks%mass(1)
+      defect(4:6, d) = defect(d, 4:6)
     end do
-    call set_inertia(1, block%bodies, lack)
+    call set_inertia(1, block%bodies, defect)
     call check('limited: counted', block%bodies%clipped(1))
-    call set_inertia(1, block%bodies, 0.01_wp*lack)
+    call set_inertia(1, block%bodies, 0.01_wp*defect)
     call check('a small part is not cut', .not. block%bodies%clipped(1))
-    call set_inertia(1, block%bodies, lack)
+    call set_inertia(1, block%bodies, defect)
     associate (m => block%bodies%apparent(:, :, 1))
       z = matmul(m, [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp])
       call check('limited: symmetric', maxval(abs(m - transpose(m))), 0.0_wp, &

@@ -9,7 +9,7 @@ program test_wall_balance
     cell_mean_of_faces, hold_in_cells
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
-  use buoyancy_m, only: uncounted_fluid
+  use buoyancy_m, only: mass_defect
   use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, order_by_body, &
     open_shares
   use group_momentum_m, only: share_acceleration
@@ -140,7 +140,7 @@ contains
                1.0e-10_wp)
   end subroutine one_film
 
-  !> What the wall's own change takes off is the inertia that `uncounted_fluid` counts, where faces
+  !> What the wall's own change takes off is the inertia that `mass_defect` counts, where faces
   !! move only what the box holds.
   subroutine part_of_the_wall()
     logical :: active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
@@ -152,7 +152,7 @@ contains
     active = box%solid%alpha < 1.0_wp
     call rigid_flux_init(box%grid, 1, flux)
     call build_rigid_flux(box%grid, box%solid, box%bodies, active, flux)
-    lack = uncounted_fluid(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
+    lack = mass_defect(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
     a%face = 0.0_wp
     do d = 1, 3
       change = 0.0_wp
