@@ -6,7 +6,7 @@ module finish_solid_m
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, set_faces
   use share_lists_m, only: body_shares_t, full_cell, full_face
-  use painting_m, only: painting_t, shorten_leg
+  use voxels_m, only: voxels_t, shorten_leg
   implicit none
   private
   public :: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
@@ -77,8 +77,8 @@ contains
 
   !> A leg from a centre inside to one outside always has a hit, also where round-off sees the
   !! centre now on this, now on that side of the surface: then the wall is at the centre inside.
-  subroutine guard_legs(painting, solid)
-    type(painting_t), intent(in) :: painting
+  subroutine guard_legs(voxels, solid)
+    type(voxels_t), intent(in) :: voxels
     type(solid_geometry_t), intent(inout) :: solid
     integer :: m, d, b, i(3), n(3)
 
@@ -88,11 +88,11 @@ contains
       if (b == 0) cycle
       do d = 1, 3
         n = i - unit_step(:, d)
-        if (n(d) >= painting%low(d) .and. solid%leg_number(i(1), i(2), i(3), d) == 0) then
+        if (n(d) >= voxels%low(d) .and. solid%leg_number(i(1), i(2), i(3), d) == 0) then
           if (solid%inside(n(1), n(2), n(3)) == 0) call shorten_leg([i, d], 1.0_wp, b, solid)
         end if
         n = i + unit_step(:, d)
-        if (n(d) > painting%high(d)) cycle
+        if (n(d) > voxels%high(d)) cycle
         if (solid%inside(n(1), n(2), n(3)) == 0 .and. &
             solid%leg_number(n(1), n(2), n(3), d) == 0) call shorten_leg([n, d], 0.0_wp, b, solid)
       end do
@@ -102,7 +102,7 @@ contains
   !> Lists of tetrahedra by cut cell: those of its bodies one after the other.
   pure subroutine tets_of_cut_cells(body, source, solid)
     type(body_shares_t), intent(in) :: body(:)
-    integer, intent(in) :: source(:, :)   !! of `painting_t`
+    integer, intent(in) :: source(:, :)   !! of `voxels_t`
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, e, m, n, t, total, from, to
 

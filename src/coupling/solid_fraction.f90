@@ -19,8 +19,8 @@ module solid_fraction_m
   use body_shares_m, only: find_body_shares
   use cut_tets_m, only: cut_tets_t, list_cut_tets
   use subcell_shares_m, only: subcell_work_t, count_subcells
-  use painting_m, only: painting_t, painting_init, find_images, ensure_lists, place_bodies, &
-    paint_cells, paint_faces, paint_legs
+  use voxels_m, only: voxels_t, voxels_init, find_images, ensure_lists, place_bodies, &
+    voxelise_cells, voxelise_faces, voxelise_legs
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
   use wall_edges_m, only: find_edges
   use held_fluid_m, only: hold_fluid
@@ -43,7 +43,7 @@ module solid_fraction_m
     real(wp) :: bed_centre(3) = 0.0_wp            !! [m]
     integer :: subcells = 0                       !! per direction, 0: exact shares
     type(share_work_t), allocatable :: work(:)    !! (threads)
-    type(painting_t) :: painting
+    type(voxels_t) :: voxels
     type(pockets_t) :: pockets
     integer :: poses = 0                          !! how often a body has moved, come or gone
     real(wp), allocatable :: x(:, :), q(:, :)     !! (3, n), (4, n) the poses of now
@@ -80,8 +80,8 @@ contains
     allocate (self%x(3, n), self%q(4, n), self%present(n))
     if (self%has_bed) n = n + 1
     allocate (self%body(n), self%work(0:omp_get_max_threads() - 1))
-    call painting_init(grid, n, self%painting)
-    call pockets_init(self%painting%low, self%painting%high, self%pockets)
+    call voxels_init(grid, n, self%voxels)
+    call pockets_init(self%voxels%low, self%voxels%high, self%pockets)
   end subroutine solid_fraction_init
 
   !> Fill the solid geometry for the poses of the bodies present.
@@ -95,24 +95,24 @@ contains
     if (solid%poses == self%poses) return
     solid%poses = self%poses
     call find_shares(grid, blocks, self)
-    call ensure_lists(self%body, self%painting, solid)
-    call place_bodies(grid, self%body, self%painting, solid)
+    call ensure_lists(self%body, self%voxels, solid)
+    call place_bodies(grid, self%body, self%voxels, solid)
     !$omp parallel sections
     !$omp section
-    call paint_faces(grid, self%body, self%painting, solid)
+    call voxelise_faces(grid, self%body, self%voxels, solid)
     if (self%has_bed) call make_way(size(self%body), solid)
     call finish_faces(solid)
     !$omp section
-    call paint_cells(grid, self%body, self%painting, solid)
+    call voxelise_cells(grid, self%body, self%voxels, solid)
     !$omp section
-    call paint_legs(grid, self%body, self%painting, solid)
+    call voxelise_legs(grid, self%body, self%voxels, solid)
     !$omp end parallel sections
     !$omp parallel sections
     !$omp section
     call finish_cells(grid, solid)
-    call tets_of_cut_cells(self%body, self%painting%source, solid)
+    call tets_of_cut_cells(self%body, self%voxels%source, solid)
     !$omp section
-    call guard_legs(self%painting, solid)
+    call guard_legs(self%voxels, solid)
     !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
     call find_edges(grid, solid)
@@ -153,14 +153,14 @@ contains
       allocate (self%work(0:omp_get_max_threads() - 1))
     end if
     do b = 1, blocks%n
-      self%painting%near(b) = blocks%present(b)
+      self%voxels%near(b) = blocks%present(b)
       if (.not. blocks%present(b)) cycle
       call find_images(grid, b, blocks%x(:, b), blocks%shapes(blocks%shape(b))%radius, &
-                       self%painting)
+                       self%voxels)
     end do
-    !$omp parallel do private(t) schedule(dynamic, 1) if (count(self%painting%near) > 1)
+    !$omp parallel do private(t) schedule(dynamic, 1) if (count(self%voxels%near) > 1)
     do b = 1, blocks%n
-      if (.not. self%painting%near(b)) cycle
+      if (.not. self%voxels%near(b)) cycle
       t = omp_get_thread_num()
       call shares_of_body(grid, blocks, b, self%subcells, self%work(t), self%body(b))
     end do
@@ -191,7 +191,7 @@ contains
     real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     logical :: changed
 
-    self%painting%near(size(self%body)) = .true.
+    self%voxels%near(size(self%body)) = .true.
     associate (body => self%body(size(self%body)), work => self%work(0))
       call find_body_shares(grid, self%bed, self%bed_centre, upright, work%row, body, changed)
       if (changed) call list_cut_tets(work%tets, body)

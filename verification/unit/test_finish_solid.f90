@@ -4,7 +4,7 @@ program test_finish_solid
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces
   use legs_on_grid_m, only: legs_t, legs_on_grid, no_hit
-  use painting_m, only: painting_t, painting_init
+  use voxels_m, only: voxels_t, voxels_init
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs
   use box_solid_m, only: simple_grid
   use check_m, only: check, finish_checks
@@ -12,11 +12,11 @@ program test_finish_solid
   integer, parameter :: c(3) = [3, 2, 2]   !! the cell looked at
   type(grid_t) :: grid
   type(solid_geometry_t) :: solid
-  type(painting_t) :: painting
+  type(voxels_t) :: voxels
   type(legs_t) :: legs
 
   call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
-  call painting_init(grid, 2, painting)
+  call voxels_init(grid, 2, voxels)
 
   call shared_face(0.7_wp, 0.6_wp)
   call finish_faces(solid)
@@ -46,7 +46,7 @@ program test_finish_solid
   call finish_cells(grid, solid)
   call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
 
-  call guard_legs(painting, solid)
+  call guard_legs(voxels, solid)
   legs = legs_on_grid(solid)
   call check('the wall is at the centre inside, below', legs%high(c(1), c(2), c(3), 1), &
              1.0e-3_wp, 0.0_wp)

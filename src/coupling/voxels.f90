@@ -1,5 +1,5 @@
 !> Bodies with their images in other periods, painted into the cells kept here: shares, legs, lists.
-module painting_m
+module voxels_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t
@@ -7,14 +7,14 @@ module painting_m
   use share_lists_m, only: body_shares_t
   implicit none
   private
-  public :: painting_t, painting_init, find_images, ensure_lists, place_bodies
-  public :: paint_cells, paint_faces, paint_legs, shorten_leg
+  public :: voxels_t, voxels_init, find_images, ensure_lists, place_bodies
+  public :: voxelise_cells, voxelise_faces, voxelise_legs, shorten_leg
 
   real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
   real(wp), parameter :: no_hit = 2.0_wp            !! longer than any leg
 
   !> What is painted where.
-  type :: painting_t
+  type :: voxels_t
     logical, allocatable :: near(:)               !! (n) present and in the cells kept here
     integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by
     !> Images of body b: `first_image(b):first_image(b+1)-1`; of each (4, *) the cell in the place
@@ -24,15 +24,15 @@ module painting_m
     integer :: low(3) = 1, high(3) = 0
     !> (2, cells listed) place in the list of the body; number of its first tetrahedron less one.
     integer, allocatable :: source(:, :)
-  end type painting_t
+  end type voxels_t
 
 contains
 
   !> Nothing is near yet.
-  subroutine painting_init(grid, n, self)
+  subroutine voxels_init(grid, n, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n   !! bodies
-    type(painting_t), intent(out) :: self
+    type(voxels_t), intent(out) :: self
 
     self%low = merge(grid%first, max(grid%first, 1), grid%periodic)
     self%high = merge(grid%last, min(grid%last, grid%n), grid%periodic)
@@ -40,14 +40,14 @@ contains
     allocate (self%first(3, n), self%last(3, n), source=0)
     allocate (self%first_image(n + 1), source=1)
     allocate (self%image(4, 0), self%source(2, 0))
-  end subroutine painting_init
+  end subroutine voxels_init
 
   !> Images of body b, a ball at most, that touch the cells kept here.
   pure subroutine find_images(grid, b, x, radius, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: b
     real(wp), intent(in) :: x(3), radius   !! [m]
-    type(painting_t), intent(inout) :: self
+    type(voxels_t), intent(inout) :: self
     integer :: d, low, high
 
     do d = 1, 3
@@ -60,7 +60,7 @@ contains
 
   !> Numbers of periods by which cells low..high may be shifted to touch the cells kept here.
   pure subroutine images(self, grid, d, low, high, first, last)
-    type(painting_t), intent(in) :: self
+    type(voxels_t), intent(in) :: self
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d, low, high
     integer, intent(out) :: first, last
@@ -84,7 +84,7 @@ contains
   !> Lists long enough for all bodies in all their images; they grow by doubling.
   subroutine ensure_lists(body, self, solid)
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(inout) :: self
+    type(voxels_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, copies, images, cells, faces, legs, tets, n
 
@@ -134,7 +134,7 @@ contains
   pure subroutine place_bodies(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(inout) :: self
+    type(voxels_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, i, j, k, m, first_tet
 
@@ -185,10 +185,10 @@ contains
   end subroutine place_tets
 
   !> Shares of cells, and the centres that are inside.
-  pure subroutine paint_cells(grid, body, self, solid)
+  pure subroutine voxelise_cells(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(inout) :: self
+    type(voxels_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, image, m, n, i(3)
 
@@ -214,13 +214,13 @@ contains
       end do
     end do
     solid%body_cell(size(body) + 1) = n + 1
-  end subroutine paint_cells
+  end subroutine voxelise_cells
 
   !> Shares of faces, with those on the far sides of the domain.
-  pure subroutine paint_faces(grid, body, self, solid)
+  pure subroutine voxelise_faces(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(in) :: self
+    type(voxels_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, image, m, n, f(4)
 
@@ -243,11 +243,11 @@ contains
       end do
     end do
     solid%body_face(size(body) + 1) = n + 1
-  end subroutine paint_faces
+  end subroutine voxelise_faces
 
   !> Is the lower face f of a cell kept? Those on the far sides of the domain are.
   pure logical function kept_face(self, grid, f)
-    type(painting_t), intent(in) :: self
+    type(voxels_t), intent(in) :: self
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: f(4)   !! cell and direction
     integer :: high(3)
@@ -258,10 +258,10 @@ contains
   end function kept_face
 
   !> Nearest hits from both ends of the legs; what lies behind a side of the domain does not count.
-  pure subroutine paint_legs(grid, body, self, solid)
+  pure subroutine voxelise_legs(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
-    type(painting_t), intent(in) :: self
+    type(voxels_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, image, m, f(4)
 
@@ -280,7 +280,7 @@ contains
         end do
       end do
     end do
-  end subroutine paint_legs
+  end subroutine voxelise_legs
 
   !> Body b meets a leg at a place between 0 (lower centre) and 1.
   pure subroutine shorten_leg(f, at, b, solid)
@@ -302,4 +302,4 @@ contains
     end associate
   end subroutine shorten_leg
 
-end module painting_m
+end module voxels_m
