@@ -27,7 +27,7 @@ module monolithic_m
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, add_second_half, &
                         add_whole
   use buoyancy_m, only: displaced_force, mass_defect
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
@@ -49,7 +49,7 @@ module monolithic_m
     type(rigid_motion_t) :: predicted               !! the motion at the end, by `change_predicted`
     real(wp), allocatable :: change_predicted(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
-    type(linked_cells_t), allocatable :: links_before, links
+    type(merged_cells_t), allocatable :: merged_before, merged
       !! of the surface at the start and at the end of the step
     type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
@@ -87,9 +87,9 @@ contains
     a = grid%first
     b = grid%last
     call rigid_motion_init(n, self%predicted)
-    allocate (self%links_before, self%links)
-    call linked_cells_init(grid, self%links_before)
-    call linked_cells_init(grid, self%links)
+    allocate (self%merged_before, self%merged)
+    call merged_cells_init(grid, self%merged_before)
+    call merged_cells_init(grid, self%merged)
     call half_kick_init(grid, self%half_kick)
     call give(scratch, self%half_kick%given)
     call clear(scratch)
@@ -101,7 +101,7 @@ contains
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
 
-  !> Stage 3: the motion of the bodies as it goes on, the links at the start; for C-ISMAC the
+  !> Stage 3: the motion of the bodies as it goes on, the merged cells at the start; for C-ISMAC the
   !! acceleration of the cells, else how the faces at the surface differ from them, and the first
   !! half of the old pressure.
   subroutine begin(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
@@ -126,23 +126,23 @@ contains
       call take(scratch, self%deviation)
       call take(scratch, self%half_kick%given)
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
-      call add_first_half(grid, case%fluid, solid, self%links_before, self%bodies, self%change_predicted, dt, &
+      call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, self%change_predicted, dt, &
                        flow, self%acceleration, self%half_kick)
     end if
   end subroutine begin
 
-  !> The links of the start of the step: those of the end of the last one, or new ones if blocks
+  !> The merged cells of the start of the step: those of the end of the last one, or new ones if blocks
   !! have come.
   subroutine find_links_before(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid   !! at the start
     class(monolithic_t), intent(inout) :: self
-    type(linked_cells_t), allocatable :: keep
+    type(merged_cells_t), allocatable :: keep
 
-    call move_alloc(self%links_before, keep)
-    call move_alloc(self%links, self%links_before)
-    call move_alloc(keep, self%links)
-    call link_cells(grid, solid, self%links_before)
+    call move_alloc(self%merged_before, keep)
+    call move_alloc(self%merged, self%merged_before)
+    call move_alloc(keep, self%merged)
+    call find_merged_cells(grid, solid, self%merged_before)
   end subroutine find_links_before
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
@@ -179,13 +179,13 @@ contains
     associate (unused => dt, unused_too => scratch)
     end associate
     self%dry_motion = self%bodies%motion
-    call link_cells(grid, solid, self%links)
-    call begin_balance(case%fluid, self%links, flow, self%balance)
-    call find_inertia(grid, self%links, self%balance%mass, flow, self%rho)
-    call match_densities(grid, self%rho, self%links)
-    call find_slip(grid, solid, self%at_start, flow%u, self%links)
-    call note_velocity(grid, self%links, flow%u, self%balance%before)
-    call share_momentum(grid, self%links, self%balance%mass, self%at_start, self%balance%before, &
+    call find_merged_cells(grid, solid, self%merged)
+    call begin_balance(case%fluid, self%merged, flow, self%balance)
+    call find_inertia(grid, self%merged, self%balance%mass, flow, self%rho)
+    call match_densities(grid, self%rho, self%merged)
+    call find_slip(grid, solid, self%at_start, flow%u, self%merged)
+    call note_velocity(grid, self%merged, flow%u, self%balance%before)
+    call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
                         flow%u, self%balance%to_wall)
     call find_wall_speeds(grid, solid, self%at_start, flow%u, self%wall_speed)
     associate (system => self%pressure%system)
@@ -198,9 +198,9 @@ contains
   !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
   !! cell lies, bodies thought away, so that still water stays still; inertia in a cut cell that of
   !! the fluid in its open part.
-  subroutine find_inertia(grid, links, mass, flow, rho)
+  subroutine find_inertia(grid, merged, mass, flow, rho)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
     type(flow_t), intent(in) :: flow
     real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -211,8 +211,8 @@ contains
     do k = grid%first(3), grid%last(3)
       rho(:, :, k) = flow%rho(:, :, k)
     end do
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         associate (room => flow%room(c(1), c(2), c(3)))
           if (room > least_room*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/room
         end associate
@@ -246,7 +246,7 @@ contains
         call accelerate_cells(grid, dt, flow, self)
       else
         call add_second_half(grid, dt, a%cell, self%half_kick, flow%u)
-        call force_of_half_kick(grid, case%fluid, self%links_before, self%links, self%bodies, dt, &
+        call force_of_half_kick(grid, case%fluid, self%merged_before, self%merged, self%bodies, dt, &
                                flow, a%cell, self%half_kick, self%from_half_kick)
         call give(scratch, self%half_kick%given)
       end if
@@ -268,10 +268,10 @@ contains
     associate (a => self%acceleration, balance => self%balance)
       call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
       call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
-      call note_change(grid, self%links, dt, a%cell, balance%pushed)
+      call note_change(grid, self%merged, dt, a%cell, balance%pushed)
       call halo_exchange(a%cell, n_halo)
-      call share_acceleration(grid, solid%open, self%rho, self%links, a%cell)
-      call note_change(grid, self%links, dt, a%cell, balance%gained)
+      call share_acceleration(grid, solid%open, self%rho, self%merged, a%cell)
+      call note_change(grid, self%merged, dt, a%cell, balance%gained)
     end associate
   end subroutine accelerations_of_groups
 
@@ -307,24 +307,24 @@ contains
     associate (unused => case)
     end associate
     call take_arrays(scratch, self%viscous)
-    associate (bodies => self%bodies, viscous => self%viscous, links => self%links, &
+    associate (bodies => self%bodies, viscous => self%viscous, merged => self%merged, &
                balance => self%balance)
       call fill_velocity_halo(grid, flow%u)
-      call note_velocity(grid, links, flow%u, balance%before)
+      call note_velocity(grid, merged, flow%u, balance%before)
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
-        call find_centres(grid, solid, self%at_start, flow%u, links)
-        call to_centres(grid, links, self%at_start, flow%u)
+        call find_centres(grid, solid, self%at_start, flow%u, merged)
+        call to_centres(grid, merged, self%at_start, flow%u)
       end if
-      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, links, &
+      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged, &
                          self%wall_speed)
       call predict_velocity(grid, self%rho, flow, self)
-      call to_means(grid, links, self%at_start, flow%u)
+      call to_means(grid, merged, self%at_start, flow%u)
       call fill_velocity_halo(grid, flow%u, layers=1)
-      call follow_masters(grid, links, balance%mass, balance%before, flow%u, balance%to_wall)
+      call follow_masters(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = self%dry_motion
       call push_bodies(dt, self%from_pressure + self%from_level + viscous%force, bodies)
-      call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
+      call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
     end associate
     call give_arrays(scratch, self%viscous)
   end subroutine add_viscosity
@@ -345,7 +345,7 @@ contains
     self%predicted%motion = self%at_start%motion + self%change_predicted
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(self%acceleration%cell, n_halo, layers=1)
-    associate (a => self%acceleration, links => self%links, &
+    associate (a => self%acceleration, merged => self%merged, &
                given => self%half_kick%takes_part, in_liquid => self%half_kick%in_liquid)
       call find_liquid(grid, flow, in_liquid, among=given)   ! the surface may have come
       if (self%implicit_momentum) then
@@ -353,10 +353,10 @@ contains
       else
         call predict_face_velocity(grid, dt, self%rho, a, flow, self%deviation, given, in_liquid)
         call give(scratch, self%deviation)
-        call shorten_at_walls(grid, dt, self%bodies, links%cell(:, :links%n), links%body, &
-                              links%number, in_liquid, self%rho, a, flow)
+        call shorten_at_walls(grid, dt, self%bodies, merged%cell(:, :merged%n), merged%body, &
+                              merged%number, in_liquid, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, links%slip, dt, &
+      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged%slip, dt, &
                                   self%implicit_momentum, given, in_liquid, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)
@@ -382,7 +382,7 @@ contains
     integer :: solve, b
 
     self%total = 0.0_wp
-    associate (bodies => self%bodies, links => self%links, balance => self%balance, &
+    associate (bodies => self%bodies, merged => self%merged, balance => self%balance, &
                pressure => self%pressure)
       do solve = 1, 2
         pressure%rough = solve == 1 .and. any(bodies%free)
@@ -392,7 +392,7 @@ contains
         call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
                               from_faces)
         self%total = self%total + from_faces
-        call force_of_walls(grid, solid, links, bodies, self%at_start, dt, self%rho, balance, &
+        call force_of_walls(grid, solid, merged, bodies, self%at_start, dt, self%rho, balance, &
                             from_walls)
         if (solve == 1) then
           self%lagged = from_walls
@@ -404,7 +404,7 @@ contains
       do b = 1, bodies%n
         self%lagged(:, b) = merge(from_walls(:, b) - self%lagged(:, b), 0.0_wp, bodies%free(b))
       end do
-      call impose_rigid_velocity(grid, solid, links, bodies, flow%u)
+      call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
       call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
                            pressure%system%active, pressure%known, pressure%closed, flow%p)
@@ -552,10 +552,10 @@ contains
   end subroutine force_at_release
 
   !> Cells in a body that hold no film move with it.
-  subroutine impose_rigid_velocity(grid, solid, links, bodies, u)
+  subroutine impose_rigid_velocity(grid, solid, merged, bodies, u)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, b
@@ -567,7 +567,7 @@ contains
         if (maxval(solid%inside(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
-          if (b == 0 .or. links%number(i, j, k) > 0) cycle
+          if (b == 0 .or. merged%number(i, j, k) > 0) cycle
           arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
           u(i, j, k, :) = wall_velocity(bodies%motion(:, b), arm)
         end do

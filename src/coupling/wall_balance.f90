@@ -19,7 +19,7 @@ module wall_balance_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use linked_cells_m, only: linked_cells_t, open_shares
+  use merged_cells_m, only: merged_cells_t, open_shares
   use half_kick_m, only: half_kick_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
@@ -31,7 +31,7 @@ module wall_balance_m
 
   integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
 
-  !> Of each wall cell of `linked_cells_t`.
+  !> Of each wall cell of `merged_cells_t`.
   type :: wall_balance_t
     real(wp), allocatable :: mass(:)        !! of its fluid [kg]
     real(wp), allocatable :: pushed(:, :)   !! (3, *) change of velocity by the faces [m/s]
@@ -51,34 +51,34 @@ contains
   end subroutine wall_balance_init
 
   !> The masses of the wall cells; nothing has changed yet.
-  subroutine begin_balance(fluid, links, flow, self)
+  subroutine begin_balance(fluid, merged, flow, self)
     type(fluid_t), intent(in) :: fluid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(flow_t), intent(in) :: flow
     type(wall_balance_t), intent(inout) :: self
     integer :: m
 
-    call ensure_room(links%n, self%mass)
-    call ensure_room(links%n, self%pushed)
-    call ensure_room(links%n, self%gained)
-    call ensure_room(links%n, self%before)
-    call ensure_room(links%n, self%to_wall)
+    call ensure_room(merged%n, self%mass)
+    call ensure_room(merged%n, self%pushed)
+    call ensure_room(merged%n, self%gained)
+    call ensure_room(merged%n, self%before)
+    call ensure_room(merged%n, self%to_wall)
     !$omp parallel do schedule(static)
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         self%mass(m) = mass_through(fluid, flow%room(c(1), c(2), c(3)), &
                                     flow%liquid(c(1), c(2), c(3)))
       end associate
     end do
-    self%pushed(:, :links%n) = 0.0_wp
-    self%gained(:, :links%n) = 0.0_wp
-    self%to_wall(:, :links%n) = 0.0_wp
+    self%pushed(:, :merged%n) = 0.0_wp
+    self%gained(:, :merged%n) = 0.0_wp
+    self%to_wall(:, :merged%n) = 0.0_wp
   end subroutine begin_balance
 
   !> Add dt a of each wall cell to a change of velocity.
-  subroutine note_change(grid, links, dt, a, change)
+  subroutine note_change(grid, merged, dt, a, change)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s2]
@@ -86,35 +86,35 @@ contains
     integer :: m
 
     !$omp parallel do schedule(static)
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         change(:, m) = change(:, m) + dt*a(c(1), c(2), c(3), :)
       end associate
     end do
   end subroutine note_change
 
   !> Velocity of each wall cell.
-  subroutine note_velocity(grid, links, u, velocity)
+  subroutine note_velocity(grid, merged, u, velocity)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     real(wp), intent(inout) :: velocity(:, :)   !! (3, wall cells) [m/s]
     integer :: m
 
     !$omp parallel do schedule(static)
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         velocity(:, m) = u(c(1), c(2), c(3), :)
       end associate
     end do
   end subroutine note_velocity
 
   !> Force and torque on each body of what faces and masses disagree about [N, N m].
-  subroutine force_of_walls(grid, solid, links, bodies, at_start, dt, rho, self, force)
+  subroutine force_of_walls(grid, solid, merged, bodies, at_start, dt, rho, self, force)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies, at_start   !! motion at the end and the start
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -128,15 +128,15 @@ contains
 
     faster = bodies%motion(:, :bodies%n) - at_start%motion(:, :bodies%n)
     bins = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b, e, n, term, load) if (links%n > worth_threads)
+    !$omp parallel private(b, e, n, term, load) if (merged%n > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
-      do from = links%first_of_body(b), links%first_of_body(b + 1) - 1, terms_at_once
+      do from = merged%first_of_body(b), merged%first_of_body(b + 1) - 1, terms_at_once
         n = 0
-        do e = from, min(from + terms_at_once, links%first_of_body(b + 1)) - 1
-          if (.not. grid%owns(links%cell(:, links%by_body(e)))) cycle
+        do e = from, min(from + terms_at_once, merged%first_of_body(b + 1)) - 1
+          if (.not. grid%owns(merged%cell(:, merged%by_body(e)))) cycle
           n = n + 1
-          load = of_cell(links%by_body(e), b)
+          load = of_cell(merged%by_body(e), b)
           term(n, :) = load
         end do
         call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
@@ -153,7 +153,7 @@ contains
       real(wp) :: owed(6)
       real(wp) :: arm(3), wall(3), moved(3)
 
-      associate (c => links%cell(:, m))
+      associate (c => merged%cell(:, m))
         arm = arm_to_cell(grid, c, bodies%x(:, b))
         wall = wall_velocity(faster(:, b), arm)
         moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
@@ -166,10 +166,10 @@ contains
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
   !! start (`half_kick%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
   !! surface of the end, of groups.
-  subroutine force_of_half_kick(grid, fluid, before, links, bodies, dt, flow, a, half_kick, force)
+  subroutine force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, half_kick, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    type(linked_cells_t), intent(in) :: before, links   !! of the start and of the end
+    type(merged_cells_t), intent(in) :: before, merged   !! of the start and of the end
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(in) :: flow
@@ -182,9 +182,9 @@ contains
     integer :: b
 
     bins = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b) if (links%n > worth_threads)
+    !$omp parallel private(b) if (merged%n > worth_threads)
     do b = 1, bodies%n
-      call add_cells(links, .false., b)
+      call add_cells(merged, .false., b)
       call add_cells(before, .true., b)
     end do
     !$omp end parallel
@@ -193,7 +193,7 @@ contains
   contains
     !> Add the wall cells of body b in a list; of those of the start only what is none at the end.
     subroutine add_cells(list, at_start, b)
-      type(linked_cells_t), intent(in) :: list
+      type(merged_cells_t), intent(in) :: list
       logical, intent(in) :: at_start
       integer, intent(in) :: b
       real(wp) :: term(terms_at_once, 6), load(6)
@@ -206,7 +206,7 @@ contains
         do e = from, min(from + terms_at_once, list%first_of_body(b + 1)) - 1
           c = list%cell(:, list%by_body(e))
           if (.not. grid%owns(c)) cycle
-          if (at_start .and. links%number(c(1), c(2), c(3)) > 0) cycle
+          if (at_start .and. merged%number(c(1), c(2), c(3)) > 0) cycle
           n = n + 1
           load = of_cell(c, b)
           term(n, :) = load

@@ -18,7 +18,7 @@ module centre_velocity_m
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, velocity_at_wall
+  use merged_cells_m, only: merged_cells_t, velocity_at_wall
   use wall_layer_m, only: slip_by_two
   use wall_profile_m, only: slip_at
   implicit none
@@ -32,24 +32,24 @@ module centre_velocity_m
 
 contains
 
-  !> T_c of the own cut cells with their centre in the fluid (`links%centre`); one elsewhere.
-  subroutine find_centres(grid, solid, bodies, u, links)
+  !> T_c of the own cut cells with their centre in the fluid (`merged%centre`); one elsewhere.
+  subroutine find_centres(grid, solid, bodies, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
-    type(linked_cells_t), intent(inout) :: links
+    type(merged_cells_t), intent(inout) :: merged
     real(wp) :: slip
     integer :: m
 
     !$omp parallel do private(slip) schedule(dynamic, 64)
-    do m = links%n_films + 1, links%n
-      links%centre(m) = 1.0_wp
-      if (links%middle(m) <= 0.0_wp) cycle
-      associate (r => links%ratio(m))
-        slip = slip_at(min(most_slip, slip_beside(m, links%normal(:, m), links%middle(m))), r)
-        links%centre(m) = max(r + (1.0_wp - r)*slip, least_share)
+    do m = merged%n_films + 1, merged%n
+      merged%centre(m) = 1.0_wp
+      if (merged%middle(m) <= 0.0_wp) cycle
+      associate (r => merged%ratio(m))
+        slip = slip_at(min(most_slip, slip_beside(m, merged%normal(:, m), merged%middle(m))), r)
+        merged%centre(m) = max(r + (1.0_wp - r)*slip, least_share)
       end associate
     end do
   contains
@@ -64,9 +64,9 @@ contains
 
       slip = 0.0_wp
       weights = 0.0_wp
-      wall = velocity_at_wall(grid, links, m, bodies)
+      wall = velocity_at_wall(grid, merged, m, bodies)
       do d = 1, 3
-        associate (c => links%cell(:, m))
+        associate (c => merged%cell(:, m))
           next = c
           next(d) = c(d) + nint(sign(1.0_wp, n(d)))
           if (grid%outside(next)) cycle
@@ -85,31 +85,31 @@ contains
   end subroutine find_centres
 
   !> Mean velocities of the own wall cells become those at their centres.
-  subroutine to_centres(grid, links, bodies, u)
+  subroutine to_centres(grid, merged, bodies, u)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies   !! the walls, as for `to_means`
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
 
-    call stretch(grid, links, bodies, links%centre(:links%n), u)
+    call stretch(grid, merged, bodies, merged%centre(:merged%n), u)
   end subroutine to_centres
 
   !> And back.
-  subroutine to_means(grid, links, bodies, u)
+  subroutine to_means(grid, merged, bodies, u)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
 
-    call stretch(grid, links, bodies, 1.0_wp/links%centre(:links%n), u)
+    call stretch(grid, merged, bodies, 1.0_wp/merged%centre(:merged%n), u)
   end subroutine to_means
 
   !> Velocities of the own wall cells, seen from the wall, times a factor each.
-  subroutine stretch(grid, links, bodies, factor, u)
+  subroutine stretch(grid, merged, bodies, factor, u)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: factor(:)   !! (wall cells)
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -117,10 +117,10 @@ contains
     integer :: m
 
     !$omp parallel do private(wall) schedule(static)
-    do m = links%n_films + 1, links%n
-      associate (c => links%cell(:, m))
+    do m = merged%n_films + 1, merged%n
+      associate (c => merged%cell(:, m))
         if (.not. grid%owns(c) .or. abs(factor(m) - 1.0_wp) <= 0.0_wp) cycle
-        wall = velocity_at_wall(grid, links, m, bodies)
+        wall = velocity_at_wall(grid, merged, m, bodies)
         u(c(1), c(2), c(3), :) = wall + factor(m)*(u(c(1), c(2), c(3), :) - wall)
       end associate
     end do

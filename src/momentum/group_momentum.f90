@@ -1,4 +1,4 @@
-!> One momentum for each group of linked cells (`linked_cells_m`): what its cells were given is
+!> One momentum for each group of linked cells (`merged_cells_m`): what its cells were given is
 !! summed, and every film moves with its masters.
 !!
 !! Normal to the wall the velocity of a film is linear from its master to the wall; along the wall
@@ -15,7 +15,7 @@ module group_momentum_m
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, masters_at_most, is_alone, along_share, open_shares, &
+  use merged_cells_m, only: merged_cells_t, masters_at_most, is_alone, along_share, open_shares, &
                             velocity_at_wall
   use wall_profile_m, only: slip_at
   implicit none
@@ -34,7 +34,7 @@ contains
   !! own cell are shared, which makes all own cells right.
   subroutine share_momentum(grid, self, mass, bodies, before, u, to_wall)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     real(wp), intent(in) :: mass(:)              !! (wall cells) of the fluid [kg]
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
     real(wp), intent(in) :: before(:, :)         !! (3, wall cells) the velocities in `u` [m/s]
@@ -102,7 +102,7 @@ contains
 
   !> L e: what the master bears of a force on a part of a film.
   pure function to_master(self, part, e) result(borne)
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: part(2)   !! film, which of its masters
     real(wp), intent(in) :: e(3)
     real(wp) :: borne(3)
@@ -115,7 +115,7 @@ contains
   !> Velocity of a film by those of its masters [m/s].
   pure function film_velocity(grid, self, film, t, wall, u) result(velocity)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: film
     real(wp), intent(in) :: t(:, :, :), wall(:, :)   !! T and (1 - T) U_w of its parts
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -135,7 +135,7 @@ contains
   !> T and (1 - T) U_w of a part of a film.
   pure subroutine profile(grid, self, part, bodies, t, wall)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: part(2)   !! film, which of its masters
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(out) :: t(3, 3), wall(3)
@@ -165,7 +165,7 @@ contains
     real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [kg/m3]
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp) :: weight(3), total(3), w(3)
     real(wp) :: excess(3, self%n_films)   !! of a film over the mean of its masters
@@ -210,7 +210,7 @@ contains
   !> Mean of the masters of a film by shares.
   pure subroutine mean_of_masters(grid, self, film, a, mean)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: film
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out) :: mean(3)
@@ -229,7 +229,7 @@ contains
   !! on masters alone: by T_t of what those change. The wall bears what the group lacks of that.
   subroutine follow_masters(grid, self, mass, before, u, to_wall)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     real(wp), intent(in) :: mass(:)        !! (wall cells) of the fluid [kg]
     real(wp), intent(in) :: before(:, :)   !! (3, wall cells) [m/s]
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)

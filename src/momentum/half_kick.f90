@@ -23,7 +23,7 @@ module half_kick_m
   use fields_m, only: flow_t
   use boundary_m, only: fill_velocity_halo
   use momentum_conservative_m, only: mass_through
-  use linked_cells_m, only: linked_cells_t
+  use merged_cells_m, only: merged_cells_t
   use group_momentum_m, only: share_acceleration
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
@@ -61,11 +61,11 @@ contains
   end subroutine half_kick_init
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine add_first_half(grid, fluid, solid, links, bodies, change_predicted, dt, flow, a, self)
+  subroutine add_first_half(grid, fluid, solid, merged, bodies, change_predicted, dt, flow, a, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
-    type(linked_cells_t), intent(in) :: links     !! likewise
+    type(merged_cells_t), intent(in) :: merged     !! likewise
     type(rigid_motion_t), intent(in) :: bodies    !! likewise
     real(wp), intent(in) :: change_predicted(:, :)           !! (6, bodies) predicted change of their motion
     real(wp), intent(in) :: dt            !! [s]
@@ -83,7 +83,7 @@ contains
     call hold_in_cells(grid, solid, bodies, change_predicted/dt, a%face, a%cell)
     call change_where(grid, self%takes_part, .false., a%cell)
     call halo_exchange(a%cell, n_halo)
-    call share_acceleration(grid, solid%open, flow%rho, links, a%cell)
+    call share_acceleration(grid, solid%open, flow%rho, merged, a%cell)
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)

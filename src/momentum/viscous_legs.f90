@@ -3,7 +3,7 @@
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
 !! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
-!! that of its group (`linked_cells_m`). A film without a master keeps its velocity.
+!! that of its group (`merged_cells_m`). A film without a master keeps its velocity.
 !! Where the cells are too coarse for the boundary layer, wall legs pull with the stress of a rough
 !! one instead (`wall_shear_m`).
 module viscous_legs_m
@@ -16,7 +16,7 @@ module viscous_legs_m
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_legs_t, room_for_walls, set_wall, add_side
   use wall_shear_m, only: distance_of_legs, rough_viscosity
-  use linked_cells_m, only: linked_cells_t, is_alone, along_share
+  use merged_cells_m, only: merged_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   use parallel_m, only: global_max
   implicit none
@@ -29,7 +29,7 @@ module viscous_legs_m
 contains
 
   !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
-  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, links, wall_speed)
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, merged, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -37,9 +37,9 @@ contains
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
-    type(linked_cells_t), intent(in), optional :: links   !! none where there are no films
+    type(merged_cells_t), intent(in), optional :: merged   !! none where there are no films
     real(wp), intent(in), optional :: wall_speed(:)
-      !! past the walls at the ends of the legs, with `links` [m/s]; absent: no rough layers
+      !! past the walls at the ends of the legs, with `merged` [m/s]; absent: no rough layers
     integer :: d, k
 
     self%dt = dt
@@ -50,12 +50,12 @@ contains
       self%diagonal(:, :, k, :) = 0.0_wp
     end do
     call unknown_masses(grid, solid, rho, dt, self)
-    if (present(links)) call masses_of_groups(grid, solid, rho, dt, links, self)
+    if (present(merged)) call masses_of_groups(grid, solid, rho, dt, merged, self)
     do d = 1, 3
       call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d))
       call legs_to_sides(grid, solid, mu, d, self)
     end do
-    call legs_to_bodies(grid, solid, bodies, rho, mu, self, links, wall_speed)
+    call legs_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_legs(solid, bodies, mu, grid, self)
     call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%spread)
@@ -116,32 +116,32 @@ contains
   !> The films' mass goes to their masters, as the lever has it (`group_momentum_m`); those without
   !! one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
   !! (`centre_velocity_m`).
-  subroutine masses_of_groups(grid, solid, rho, dt, links, self)
+  subroutine masses_of_groups(grid, solid, rho, dt, merged, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in) :: dt
-    type(linked_cells_t), intent(in) :: links
+    type(merged_cells_t), intent(in) :: merged
     type(viscous_t), intent(inout) :: self
     integer :: g, m
 
-    do g = 1, links%n_groups
-      associate (c => links%cell(:, links%leader(g)))
+    do g = 1, merged%n_groups
+      associate (c => merged%cell(:, merged%leader(g)))
         if (.not. grid%owns(c)) cycle
-        do m = links%first(g), links%first(g + 1) - 1
-          associate (film => links%part(1, m), master => links%part(2, m))
-            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) + links%share(master, film) &
-              *along_share(links, film, master)**2*film_mass(links%cell(:, film))
+        do m = merged%first(g), merged%first(g + 1) - 1
+          associate (film => merged%part(1, m), master => merged%part(2, m))
+            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) + merged%share(master, film) &
+              *along_share(merged, film, master)**2*film_mass(merged%cell(:, film))
           end associate
         end do
       end associate
     end do
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         if (.not. grid%owns(c)) cycle
-        if (m > links%n_films) then
-          self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/links%centre(m)
-        else if (is_alone(links, m)) then
+        if (m > merged%n_films) then
+          self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/merged%centre(m)
+        else if (is_alone(merged, m)) then
           self%mass(c(1), c(2), c(3)) = film_mass(c)
         end if
       end associate
@@ -185,14 +185,14 @@ contains
   end subroutine ordinary_legs
 
   !> Wall legs, of one or both cells of each face through which a leg meets a surface.
-  subroutine legs_to_bodies(grid, solid, bodies, rho, mu, self, links, wall_speed)
+  subroutine legs_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: rho, mu
     type(viscous_t), intent(inout) :: self
-    type(linked_cells_t), intent(in), optional :: links
+    type(merged_cells_t), intent(in), optional :: merged
     real(wp), intent(in), optional :: wall_speed(:)
     real(wp) :: spacing
     integer :: m, f(3)
@@ -241,8 +241,8 @@ contains
       mu_w = 0.0_wp
       if (mu(c(1), c(2), c(3)) <= 0.0_wp .or. wall_speed(n) <= 0.0_wp) return
       at_centre = 1.0_wp
-      associate (m => links%number(c(1), c(2), c(3)))
-        if (m > 0) at_centre = links%centre(m)
+      associate (m => merged%number(c(1), c(2), c(3)))
+        if (m > 0) at_centre = merged%centre(m)
       end associate
       mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*wall_speed(n), &
                              distance_of_legs(grid, solid, c), spacing)

@@ -15,7 +15,7 @@ module wall_layer_m
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use linked_cells_m, only: linked_cells_t, velocity_at_wall
+  use merged_cells_m, only: merged_cells_t, velocity_at_wall
   use parallel_m, only: halo_exchange
   implicit none
   private
@@ -26,35 +26,35 @@ contains
   !> The slip of the layer at each film: the mean over its masters with fluid behind them, by
   !! share times 1 - r (what lies as far out as its master tells little of the layer); none in gaps
   !! where there is no such master.
-  subroutine find_slip(grid, solid, bodies, u, links)
+  subroutine find_slip(grid, solid, bodies, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! the walls
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
-    type(linked_cells_t), intent(inout) :: links
+    type(merged_cells_t), intent(inout) :: merged
     real(wp) :: slip, weight, weights
     integer :: m, n, behind(3)
 
     !$omp parallel do private(n, behind, slip, weight, weights) schedule(static)
-    do m = 1, links%n_films
-      associate (f => links%cell(:, m))
+    do m = 1, merged%n_films
+      associate (f => merged%cell(:, m))
         if (.not. grid%owns(f)) cycle
         slip = 0.0_wp
         weights = 0.0_wp
-        do n = 1, size(links%master, 1)
-          if (links%master(n, m) == 0) cycle
-          behind = 2*links%cell(:, links%master(n, m)) - f
+        do n = 1, size(merged%master, 1)
+          if (merged%master(n, m) == 0) cycle
+          behind = 2*merged%cell(:, merged%master(n, m)) - f
           if (.not. is_fluid(behind)) cycle
-          weight = links%share(n, m)*links%nearer(n, m)
+          weight = merged%share(n, m)*merged%nearer(n, m)
           if (weight <= 0.0_wp) cycle
           slip = slip + weight*slip_beside(m, n)
           weights = weights + weight
         end do
-        links%slip(f(1), f(2), f(3)) = slip/max(weights, tiny(weights))
+        merged%slip(f(1), f(2), f(3)) = slip/max(weights, tiny(weights))
       end associate
     end do
-    call halo_exchange(links%slip, n_halo)
+    call halo_exchange(merged%slip, n_halo)
   contains
     !> Has a cell its centre in the fluid?
     pure logical function is_fluid(c)
@@ -70,13 +70,13 @@ contains
       real(wp) :: wall(3)
       integer :: next(3)
 
-      associate (f => links%cell(:, m), c => links%cell(:, links%master(n, m)), &
-                 normal => links%normal(:, m))
+      associate (f => merged%cell(:, m), c => merged%cell(:, merged%master(n, m)), &
+                 normal => merged%normal(:, m))
         next = 2*c - f
-        wall = velocity_at_wall(grid, links, m, bodies)
+        wall = velocity_at_wall(grid, merged, m, bodies)
         slip_beside = slip_by_two(u(c(1), c(2), c(3), :) - wall, &
                                   u(next(1), next(2), next(3), :) - wall, normal, &
-                                  links%distance(n, m), &
+                                  merged%distance(n, m), &
                                   dot_product(normal, (c - f)*grid%h))
       end associate
     end function slip_beside

@@ -2,7 +2,7 @@
 program test_centre_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use centre_velocity_m, only: find_centres, to_centres, to_means
   use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
@@ -18,7 +18,7 @@ program test_centre_velocity
   real(wp), parameter :: at_centre = 0.05_wp, of_fluid = 0.275_wp   !! from the wall [cells]
   type(one_body_t) :: box
   real(wp) :: wall(3)   !! velocity of the box at the centre of the cut cell [m/s]
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u, means
   real(wp) :: shear
@@ -27,9 +27,9 @@ program test_centre_velocity
   call place(box)
   box%bodies%motion(:, 1) = motion
   wall = wall_at(box, [4, 5, top])
-  call linked_cells_init(box%grid, links)
-  call link_cells(box%grid, box%solid, links)
-  call check('at first all centres have all', all(abs(links%centre(:links%n) - 1.0_wp) <= 0.0_wp))
+  call merged_cells_init(box%grid, merged)
+  call find_merged_cells(box%grid, box%solid, merged)
+  call check('at first all centres have all', all(abs(merged%centre(:merged%n) - 1.0_wp) <= 0.0_wp))
   call run_along(1.0e6_wp)
   call check('shear: linear', centre(), at_centre/of_fluid, 1.0e-5_wp)
   call there_and_back()
@@ -47,11 +47,11 @@ contains
   !> At the centre runs what the layer has there; the means come back.
   subroutine there_and_back()
     means = u
-    call to_centres(box%grid, links, box%bodies, u)
+    call to_centres(box%grid, merged, box%bodies, u)
     call check('at the centre', u(4, 5, top, 2), wall(2) + shear*at_centre, 1.0e-5_wp)
     call check('whole cells keep theirs', maxval(abs(u(:, :, top + 1:, :) &
                                                      - means(:, :, top + 1:, :))), 0.0_wp, 0.0_wp)
-    call to_means(box%grid, links, box%bodies, u)
+    call to_means(box%grid, merged, box%bodies, u)
     call check('there and back', maxval(abs(u - means)), 0.0_wp, 1.0e-13_wp)
   end subroutine there_and_back
 
@@ -63,19 +63,19 @@ contains
     associate (leg => box%solid%leg_number(4, 5, top, 3))
       box%solid%leg_length(2, leg) = near
       box%solid%poses = 0   ! another geometry
-      call link_cells(box%grid, box%solid, links)
-      call find_centres(box%grid, box%solid, box%bodies, u, links)
+      call find_merged_cells(box%grid, box%solid, merged)
+      call find_centres(box%grid, box%solid, box%bodies, u, merged)
       call check('a short leg', centre(), layer(near, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
       box%solid%leg_length(2, leg) = 0.0_wp
-      call link_cells(box%grid, box%solid, links)
-      call find_centres(box%grid, box%solid, box%bodies, u, links)
+      call find_merged_cells(box%grid, box%solid, merged)
+      call find_centres(box%grid, box%solid, box%bodies, u, merged)
       call check('the shortest', centre(), layer(1.0e-3_wp, 1.0_wp)/layer(of_fluid, 1.0_wp), &
                  1.0e-12_wp)
     end associate
   end subroutine as_the_legs_pull
 
   real(wp) function centre()
-    centre = links%centre(links%number(4, 5, top))
+    centre = merged%centre(merged%number(4, 5, top))
   end function centre
 
   !> A layer of thickness delta [cells] along x2, in the frame of the box at the centre of the cell:
@@ -90,6 +90,6 @@ contains
       u(:, :, k, 2) = wall(2) + (1.0_wp + delta)*layer(max(0.0_wp, k - top + of_fluid), delta)
       u(:, :, k, 3) = wall(3) + 7.0_wp*k
     end do
-    call find_centres(box%grid, box%solid, box%bodies, u, links)
+    call find_centres(box%grid, box%solid, box%bodies, u, merged)
   end subroutine run_along
 end program test_centre_velocity

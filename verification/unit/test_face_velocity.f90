@@ -6,7 +6,7 @@ program test_face_velocity
   use boundary_m, only: fill_velocity_halo
   use face_velocity_m, only: acceleration_t, acceleration_init, predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -24,7 +24,7 @@ program test_face_velocity
     !! of the box when the step began [m/s, rad/s]
   real(wp), parameter :: tolerance = 1.0e-13_wp
   type(one_body_t) :: box
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   type(acceleration_t) :: a
   logical, dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                      1 - n_halo:cells(3) + n_halo) :: given, in_liquid
@@ -36,8 +36,8 @@ program test_face_velocity
   call place(box)
   box%bodies%motion(:, 1) = motion
   box%flow%mu = nu*box%flow%rho
-  call linked_cells_init(box%grid, links)
-  call link_cells(box%grid, box%solid, links)
+  call merged_cells_init(box%grid, merged)
+  call find_merged_cells(box%grid, box%solid, merged)
   call acceleration_init(box%grid, a)
   do d = 1, 3
     box%flow%u(:, :, :, d) = stream(d)
@@ -67,8 +67,8 @@ contains
     in_liquid(7, 4, 5) = .false.
     call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
     before = box%flow%uf
-    call shorten_at_walls(box%grid, dt, box%bodies, links%cell(:, :links%n), links%body, &
-                          links%number, in_liquid, box%flow%rho, a, box%flow)
+    call shorten_at_walls(box%grid, dt, box%bodies, merged%cell(:, :merged%n), merged%body, &
+                          merged%number, in_liquid, box%flow%rho, a, box%flow)
     do d = 1, 3
       do k = 2, cells(3)
         do j = 2, cells(2)
@@ -89,7 +89,7 @@ contains
     integer, intent(in) :: f(3), d
 
     associate (low => f - unit_step(:, d))
-      at_wall = max(links%number(f(1), f(2), f(3)), links%number(low(1), low(2), low(3))) > 0 &
+      at_wall = max(merged%number(f(1), f(2), f(3)), merged%number(low(1), low(2), low(3))) > 0 &
         .and. in_liquid(f(1), f(2), f(3)) .and. in_liquid(low(1), low(2), low(3))
     end associate
   end function at_wall
@@ -186,7 +186,7 @@ contains
     a%face = 0.0_wp
     a%cell = 0.0_wp
     box%bodies%motion = 0.0_wp
-    links%slip = 0.0_wp
+    merged%slip = 0.0_wp
     call check('the box has edges', box%solid%edge(box%solid%cut(6, 6, 5)), 1.0_wp, 0.0_wp)
     box%flow%uf(7, 6, 5, 1) = 5.0_wp
     call at_walls()
@@ -198,7 +198,7 @@ contains
     box%solid%edge = 0.0_wp
     call at_walls()
     call check('a line to the wall', box%flow%uf(7, 6, 5, 1), share*stream(1), tolerance)
-    links%slip = 0.25_wp
+    merged%slip = 0.25_wp
     call at_walls()
     associate (n => [0.8_wp, 0.7_wp, 0.0_wp]/norm2([0.8_wp, 0.7_wp]), s => share/(share + 3.0_wp))
       call check('a layer along the wall', box%flow%uf(7, 6, 5, 1), share*stream(1) &
@@ -207,7 +207,7 @@ contains
   end subroutine along_the_wall
 
   subroutine at_walls()
-    call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, links%slip, dt, &
+    call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, merged%slip, dt, &
                                 .false., given, in_liquid, box%flow%rho, a, box%flow)
   end subroutine at_walls
 

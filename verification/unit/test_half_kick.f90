@@ -7,7 +7,7 @@ program test_half_kick
   use mixture_m, only: mix_fluid
   use momentum_conservative_m, only: mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -20,7 +20,7 @@ program test_half_kick
   integer, parameter :: mixed(3) = [7, 6, 5]                         !! a cell with gas
   real(wp), parameter :: dt = 0.02_wp                                !! [s]
   type(one_body_t) :: box
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   type(acceleration_t) :: a
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: before
@@ -48,14 +48,14 @@ program test_half_kick
     half = 0.5_wp*dt*(fluid%gravity - rise/fluid%liquid_density)
     call half_kick_init(grid, half_kick)
     call acceleration_init(grid, a)
-    call linked_cells_init(grid, links)
-    call link_cells(grid, box%solid, links)
+    call merged_cells_init(grid, merged)
+    call find_merged_cells(grid, box%solid, merged)
     change_predicted(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
-    call add_first_half(grid, fluid, box%solid, links, box%bodies, change_predicted, dt, flow, a, half_kick)
+    call add_first_half(grid, fluid, box%solid, merged, box%bodies, change_predicted, dt, flow, a, half_kick)
     call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
     call check('a cut cell, too', box%solid%alpha(5, 3, 3) > 0.0_wp &
                .and. maxval(abs(change(5, 3, 3) - half)) < 1.0e-14_wp)
-    call check('a film moves as its master', links%number(4, 5, 3) <= links%n_films &
+    call check('a film moves as its master', merged%number(4, 5, 3) <= merged%n_films &
                .and. maxval(abs(change(4, 5, 3) - half)) < 1.0e-14_wp)
     call check('none in the box', maxval(abs(change(3, 4, 3))), 0.0_wp, 0.0_wp)
     call check('none at the surface and beside it', &

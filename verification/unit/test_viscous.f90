@@ -10,7 +10,7 @@ program test_viscous
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use viscous_system_m, only: viscous_t, viscous_init
   use viscous_legs_m, only: build_viscous
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use viscous_m, only: solve_viscous, force_of_legs
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
@@ -20,7 +20,7 @@ program test_viscous
   type(solid_geometry_t) :: solid
   type(rigid_motion_t) :: wall
   type(viscous_t) :: viscous
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   real(wp), parameter :: mu = 2.0e-3_wp, rho = 900.0_wp, speed = 0.7_wp, depth = 1.0_wp, &
     lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
@@ -101,15 +101,15 @@ program test_viscous
   ! r of the distance of that cell from the wall, and has no legs. A cell that is known at its
   ! centre is heavier by the part that this has of its velocity.
   call make_wall(heights(2))
-  call linked_cells_init(grid, links)
-  call link_cells(grid, solid, links)
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, links)
+  call merged_cells_init(grid, merged)
+  call find_merged_cells(grid, solid, merged)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, merged)
   film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
   call check('mass of a group', viscous%mass(2, 2, 3), &
              rho*(1.0_wp + (0.5_wp*film/(film + 0.5_wp))**2*film)*grid%volume/5.0_wp, 1.0e-12_wp)
-  links%centre(links%number(2, 2, 3)) = 0.5_wp
+  merged%centre(merged%number(2, 2, 3)) = 0.5_wp
   film = viscous%mass(2, 2, 3)
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, links)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, merged)
   call check('mass at a centre', viscous%mass(2, 2, 3), 2*film, 1.0e-12_wp)
   call check('the film is no unknown', viscous%mass(2, 2, 2), 0.0_wp, 0.0_wp)
 
@@ -130,8 +130,8 @@ program test_viscous
   grid%side_velocity = 0.0_wp
   call make_gap(3.65_wp*grid%h(3), 3.95_wp*grid%h(3), 2)
   flow%u(:, :, :, 1) = speed
-  call link_cells(grid, solid, links)
-  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, links)
+  call find_merged_cells(grid, solid, merged)
+  call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, merged)
   call solve_viscous(grid, wall, flow, viscous)
   call check('film between two walls', flow%u(2, 2, 4, 1), speed, 0.0_wp)
   call waves_in_odd_box(0.3_wp)

@@ -10,7 +10,7 @@ program test_wall_balance
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: mass_defect
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, order_by_body, &
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body, &
     open_shares
   use group_momentum_m, only: share_acceleration
   use half_kick_m, only: half_kick_t, half_kick_init
@@ -28,7 +28,7 @@ program test_wall_balance
   real(wp), parameter :: gained(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
     !! by the box in the step [m/s, rad/s]
   type(one_body_t) :: box
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   type(wall_balance_t) :: balance
   type(rigid_motion_t) :: at_start
   type(acceleration_t) :: a
@@ -39,8 +39,8 @@ program test_wall_balance
   call place(box)
   box%flow%room = box%grid%volume*(1.0_wp - box%solid%alpha)
   box%flow%liquid = box%flow%room
-  call linked_cells_init(box%grid, links)
-  call link_cells(box%grid, box%solid, links)
+  call merged_cells_init(box%grid, merged)
+  call find_merged_cells(box%grid, box%solid, merged)
   call acceleration_init(box%grid, a)
   call wall_balance_init(balance)
   at_start = box%bodies
@@ -55,7 +55,7 @@ program test_wall_balance
 contains
 
   subroutine begin()
-    call begin_balance(box%case%fluid, links, box%flow, balance)
+    call begin_balance(box%case%fluid, merged, box%flow, balance)
   end subroutine begin
 
   !> Force on the box whose motion changes by `change` in the step [N, N m].
@@ -63,7 +63,7 @@ contains
     real(wp), intent(in) :: change(6)
 
     box%bodies%motion(:, 1) = at_start%motion(:, 1) + change
-    call force_of_walls(box%grid, box%solid, links, box%bodies, at_start, dt, box%flow%rho, &
+    call force_of_walls(box%grid, box%solid, merged, box%bodies, at_start, dt, box%flow%rho, &
                         balance, force)
     box%bodies%motion = at_start%motion
   end subroutine find
@@ -80,11 +80,11 @@ contains
       call face_acceleration(grid, fluid%gravity, box%flow%rho, box%flow%rho, box%flow%p, a%face)
       call cell_mean_of_faces(grid, box%solid%open, a%face, a%cell)
       call begin()
-      call check('mass of the fluid that is there', balance%mass(links%number(4, 4, 7)), &
+      call check('mass of the fluid that is there', balance%mass(merged%number(4, 4, 7)), &
                  0.85_wp*fluid%liquid_density*grid%volume, 1.0e-9_wp)
-      call note_change(grid, links, dt, a%cell, balance%pushed)
-      call share_acceleration(grid, box%solid%open, box%flow%rho, links, a%cell)
-      call note_change(grid, links, dt, a%cell, balance%gained)
+      call note_change(grid, merged, dt, a%cell, balance%pushed)
+      call share_acceleration(grid, box%solid%open, box%flow%rho, merged, a%cell)
+      call note_change(grid, merged, dt, a%cell, balance%gained)
       call find(spread(0.0_wp, 1, 6))
       call check('still water: no force', norm2(force), 0.0_wp, &
                  1.0e-12_wp*fluid%liquid_density*norm2(fluid%gravity)*product(tank))
@@ -96,8 +96,8 @@ contains
     real(wp) :: w(3), velocity(3)
 
     call begin()
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         w = open_shares(box%grid, box%solid%open, c)
         balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*w(3)
         balance%pushed(3, m) = 0.1_wp*sum(c)
@@ -108,8 +108,8 @@ contains
     call check('equal masses: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
 
     call begin()
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         velocity = wall_velocity(gained, box%grid%centre(c, [1, 2, 3]) - middle)
         balance%pushed(:, m) = velocity
         balance%gained(:, m) = velocity
@@ -129,7 +129,7 @@ contains
     call begin()
     call check('its open shares', open_shares(box%grid, box%solid%open, c), &
                [0.5_wp, 0.3_wp, 0.3_wp], 1.0e-12_wp)
-    m = links%number(c(1), c(2), c(3))
+    m = merged%number(c(1), c(2), c(3))
     balance%pushed(:, m) = pushed
     balance%gained(:, m) = taken
     call find(spread(0.0_wp, 1, 6))
@@ -161,7 +161,7 @@ contains
       a%cell = 0.0_wp
       call hold_in_cells(box%grid, box%solid, box%bodies, reshape(change/dt, [6, 1]), a%face, &
                          a%cell)
-      call note_change(box%grid, links, dt, a%cell, balance%pushed)
+      call note_change(box%grid, merged, dt, a%cell, balance%pushed)
       call find(change)
       call check('the part of the wall is the uncounted fluid', force(1:3, 1), &
                  -lack(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
@@ -177,38 +177,38 @@ contains
 
     call begin()
     call fill(a%cell)
-    call note_change(box%grid, links, dt, a%cell, balance%pushed)
+    call note_change(box%grid, merged, dt, a%cell, balance%pushed)
     from_faces = 0.0_wp
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         from_faces = from_faces + box%case%fluid%liquid_density*box%grid%volume*dt &
           *open_shares(box%grid, box%solid%open, c)*a%cell(c(1), c(2), c(3), :)
-        if (modulo(sum(c), 3) == 0) links%body(m) = 2
+        if (modulo(sum(c), 3) == 0) merged%body(m) = 2
       end associate
     end do
-    call order_by_body(2, links)
-    call share_acceleration(box%grid, box%solid%open, box%flow%rho, links, a%cell)
-    call note_change(box%grid, links, dt, a%cell, balance%gained)
-    of_fluid = matmul(balance%gained(:, :links%n), balance%mass(:links%n))
+    call order_by_body(2, merged)
+    call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, a%cell)
+    call note_change(box%grid, merged, dt, a%cell, balance%gained)
+    of_fluid = matmul(balance%gained(:, :merged%n), balance%mass(:merged%n))
     call rigid_motion_init(2, two)
     two%x = spread(middle, 2, 2)
-    call force_of_walls(box%grid, box%solid, links, two, two, dt, box%flow%rho, balance, forces)
+    call force_of_walls(box%grid, box%solid, merged, two, two, dt, box%flow%rho, balance, forces)
     call check('momentum: fluid and bodies get what the faces give', &
                of_fluid + dt*sum(forces(1:3, :), 2), from_faces, 1.0e-12_wp*sum(balance%mass))
     call check('momentum: both bodies get some', all(norm2(forces(1:3, :), 1) > 1.0_wp))
-    links%body(:links%n) = 1
-    call order_by_body(1, links)
+    merged%body(:merged%n) = 1
+    call order_by_body(1, merged)
   end subroutine momentum_of_all
 
   !> The two halves of the old pressure: where they are the same, no force; else what was given on
   !! the surface of the start less what would be on that of the end, wherever there was a wall.
   subroutine two_halves()
-    type(linked_cells_t) :: before
+    type(merged_cells_t) :: before
     type(half_kick_t) :: half_kick
     real(wp) :: sums(3), mass
     integer :: i, j, k
 
-    before = links
+    before = merged
     call half_kick_init(box%grid, half_kick)
     half_kick%takes_part = .true.
     call begin()
@@ -232,7 +232,7 @@ contains
       do j = 1, cells(2)
         do i = 1, cells(1)
           call random_numbers(seed, half_kick%given(i, j, k, :))
-          if (max(before%number(i, j, k), links%number(i, j, k)) == 0) cycle
+          if (max(before%number(i, j, k), merged%number(i, j, k)) == 0) cycle
           sums = sums - half_kick%given(i, j, k, :)
           if (.not. half_kick%takes_part(i, j, k)) cycle
           sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%room(i, j, k) &
@@ -245,23 +245,23 @@ contains
   end subroutine two_halves
 
   subroutine find_halves(before, half_kick)
-    type(linked_cells_t), intent(in) :: before
+    type(merged_cells_t), intent(in) :: before
     type(half_kick_t), intent(in) :: half_kick
 
-    call force_of_half_kick(box%grid, box%case%fluid, before, links, box%bodies, dt, box%flow, &
+    call force_of_half_kick(box%grid, box%case%fluid, before, merged, box%bodies, dt, box%flow, &
                            a%cell, half_kick, force)
   end subroutine find_halves
 
-  !> The links of the box lifted by `way`.
+  !> The merged cells of the box lifted by `way`.
   subroutine move_box(way, lifted)
     real(wp), intent(in) :: way   !! [m]
-    type(linked_cells_t), intent(out) :: lifted
+    type(merged_cells_t), intent(out) :: lifted
     type(one_body_t) :: other
 
     call describe(cells, tank, sides, 'box', edges, middle + [0.0_wp, 0.0_wp, way], other%case)
     call place(other)
-    call linked_cells_init(other%grid, lifted)
-    call link_cells(other%grid, other%solid, lifted)
+    call merged_cells_init(other%grid, lifted)
+    call find_merged_cells(other%grid, other%solid, lifted)
   end subroutine move_box
 
   !> Numbers between -1 and 1.

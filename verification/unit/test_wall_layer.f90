@@ -2,7 +2,7 @@
 program test_wall_layer
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use wall_layer_m, only: find_slip, layer_slip
   use wall_profile_m, only: slip_at
   use one_body_m, only: one_body_t, describe, place, wall_at, layer
@@ -19,7 +19,7 @@ program test_wall_layer
     !! of the box [m/s, rad/s]
   type(one_body_t) :: box
   real(wp) :: wall(3)   !! velocity of the box at the centre of the cut cell [m/s]
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u
 
@@ -28,8 +28,8 @@ program test_wall_layer
   call place(box)
   box%bodies%motion(:, 1) = motion
   wall = wall_at(box, [4, 5, top])
-  call linked_cells_init(box%grid, links)
-  call link_cells(box%grid, box%solid, links)
+  call merged_cells_init(box%grid, merged)
+  call find_merged_cells(box%grid, box%solid, merged)
   call above_the_box()
   call finish_checks()
 
@@ -73,10 +73,10 @@ contains
       u(:, :, k, 2) = wall(2) + (1.0_wp + delta)*layer(max(0.0_wp, k - top - 0.2_wp), delta)
       u(:, :, k, 3) = wall(3) + 7.0_wp*k
     end do
-    call find_slip(box%grid, box%solid, box%bodies, u, links)
+    call find_slip(box%grid, box%solid, box%bodies, u, merged)
   end subroutine run_along
 
   real(wp) function slip()
-    slip = slip_at(links%slip(4, 5, top), r)
+    slip = slip_at(merged%slip(4, 5, top), r)
   end function slip
 end program test_wall_layer

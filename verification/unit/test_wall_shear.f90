@@ -4,7 +4,7 @@ program test_wall_shear
   use wall_shear_m, only: find_wall_speeds, distance_of_legs, rough_viscosity
   use viscous_legs_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
@@ -20,7 +20,7 @@ program test_wall_shear
   real(wp), parameter :: thin = 1.0e-3_wp, thick = 1.0e3_wp        !! [Pa s]
   integer, parameter :: beside(3) = [7, 4, 5]                      !! its centre .8 h from the wall
   type(one_body_t) :: box
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   real(wp), allocatable :: speed(:)
   real(wp) :: rho
   integer :: d
@@ -32,9 +32,9 @@ program test_wall_shear
   do d = 1, 3
     box%flow%u(:, :, :, d) = stream(d)
   end do
-  call linked_cells_init(box%grid, links)
-  call link_cells(box%grid, box%solid, links)
-  links%centre = 1.0_wp
+  call merged_cells_init(box%grid, merged)
+  call find_merged_cells(box%grid, box%solid, merged)
+  merged%centre = 1.0_wp
   allocate (speed(0))
   call find_wall_speeds(box%grid, box%solid, box%bodies, box%flow%u, speed)
   call law()
@@ -70,10 +70,10 @@ contains
     call check('a cell without walls', distance_of_legs(box%grid, box%solid, [9, 9, 9]) > 1.0e9_wp)
     call check('pull of the leg', leg_of(beside, thin, speed), &
                rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
-    links%centre = 0.5_wp
+    merged%centre = 0.5_wp
     call check('by the velocity at the centre', leg_of(beside, thin, speed), &
                0.5_wp*rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
-    links%centre = 1.0_wp
+    merged%centre = 1.0_wp
   end subroutine at_one_wall
 
   !> Without viscosity, where the grid is fine enough, with the block: to the bit.
@@ -119,7 +119,7 @@ contains
     box%flow%mu = mu
     call viscous_init(box%grid, 1, viscous)
     call build_viscous(box%grid, box%solid, box%bodies, box%flow%rho, box%flow%mu, 0.01_wp, &
-                       viscous, links, wall_speed)
+                       viscous, merged, wall_speed)
     leg_of = 0.0_wp
     do m = 1, viscous%walls%n
       if (all(viscous%walls%cell(:, m) == c)) leg_of = leg_of + viscous%walls%k(m)

@@ -1,9 +1,9 @@
 !> Films and their masters at a box, and what groups share: momentum is kept with what the wall
 !! bears, a film moves between its master and the wall, what moves as one keeps moving as one.
-program test_linked_cells
+program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use linked_cells_m, only: linked_cells_t, linked_cells_init, link_cells, match_densities, &
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities, &
     is_alone
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use rigid_motion_m, only: wall_velocity
@@ -20,7 +20,7 @@ program test_linked_cells
     !! of the box [m/s, rad/s]
   real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top film over its master, from the wall
   type(one_body_t) :: box
-  type(linked_cells_t) :: links
+  type(merged_cells_t) :: merged
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: u, before
   real(wp), allocatable :: mass(:), noted(:, :), to_wall(:, :)
@@ -30,12 +30,12 @@ program test_linked_cells
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
   call place(box)
   box%bodies%motion(:, 1) = motion
-  call linked_cells_init(box%grid, links)
+  call merged_cells_init(box%grid, merged)
   do m = 1, 2   ! the second time from what the first has left
-    call link_cells(box%grid, box%solid, links)
+    call find_merged_cells(box%grid, box%solid, merged)
   end do
   call the_links()
-  allocate (mass(links%n), noted(3, links%n), to_wall(3, links%n))
+  allocate (mass(merged%n), noted(3, merged%n), to_wall(3, merged%n))
   call random_numbers(seed, mass)
   mass = 2.0_wp + mass
   call the_shares()
@@ -49,30 +49,30 @@ contains
 
   !> Who belongs to whom.
   subroutine the_links()
-    call check('all know their body', all(links%body(:links%n) == 1))
-    call check('each cell once', count(links%number > 0) == links%n)
-    call check('films have their centre in the box', all([(centre_in_box(m), m=1, links%n_films)]))
+    call check('all know their body', all(merged%body(:merged%n) == 1))
+    call check('each cell once', count(merged%number > 0) == merged%n)
+    call check('films have their centre in the box', all([(centre_in_box(m), m=1, merged%n_films)]))
     call check('the top layer belongs to the cells above', &
                all(master_of(4, 5, top) == [4, 5, top + 1]))
     call check('at an edge to both beside it, most to the one along the normal', &
-               links%share(:, links%number(4, 6, top)), &
+               merged%share(:, merged%number(4, 6, top)), &
                [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
-    call check('no profile at an edge', links%nearer(:, links%number(4, 6, top)), &
+    call check('no profile at an edge', merged%nearer(:, merged%number(4, 6, top)), &
                spread(0.0_wp, 1, 3), 0.0_wp)
-    call check('the normal of the top', links%normal(:, links%number(4, 5, top)), &
+    call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a film lies at half of it', &
-               1.0_wp - links%nearer(3, links%number(4, 5, top)), r, 1.0e-12_wp)
-    call check('no film is alone', .not. any([(is_alone(links, m), m=1, links%n_films)]))
-    call check('the shares of a film are one', sum(links%share(:, :links%n_films), 1), &
-               spread(1.0_wp, 1, links%n_films), 1.0e-13_wp)
-    call check('every part is in one group', links%first(links%n_groups + 1) - 1, &
-               count(links%master(:, :links%n_films) > 0))
+               1.0_wp - merged%nearer(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
+    call check('no film is alone', .not. any([(is_alone(merged, m), m=1, merged%n_films)]))
+    call check('the shares of a film are one', sum(merged%share(:, :merged%n_films), 1), &
+               spread(1.0_wp, 1, merged%n_films), 1.0e-13_wp)
+    call check('every part is in one group', merged%first(merged%n_groups + 1) - 1, &
+               count(merged%master(:, :merged%n_films) > 0))
   end subroutine the_links
 
   !> Momentum, profile, and a fluid that moves with the box.
   subroutine the_shares()
-    links%slip = 1.0_wp
+    merged%slip = 1.0_wp
     call fill(u)
     total = momentum(u)
     call share()
@@ -83,7 +83,7 @@ contains
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
     call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
                u(4, 5, top + 1, 1:2), 1.0e-12_wp)
-    links%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the film
+    merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the film
     call fill(u)
     total = momentum(u)
     before = u
@@ -117,8 +117,8 @@ contains
     real(wp) :: excess, change
     integer :: f, d
 
-    f = links%number(4, 5, top)
-    associate (m_film => mass(f), m => mass(links%master(3, f)))
+    f = merged%number(4, 5, top)
+    associate (m_film => mass(f), m => mass(merged%master(3, f)))
       do d = 1, 2
         excess = film(d) - wall(4, 5, d) - t*(master(d) - wall(4, 5, d))
         change = t*m_film*excess/(m + t**2*m_film)
@@ -134,8 +134,8 @@ contains
   end subroutine the_lever
 
   subroutine note()
-    do m = 1, links%n
-      associate (c => links%cell(:, m))
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
         noted(:, m) = u(c(1), c(2), c(3), :)
       end associate
     end do
@@ -144,7 +144,7 @@ contains
 
   subroutine share()
     call note()
-    call share_momentum(box%grid, links, mass, box%bodies, noted, u, to_wall)
+    call share_momentum(box%grid, merged, mass, box%bodies, noted, u, to_wall)
   end subroutine share
 
   !> The mean by the mass that the faces move.
@@ -155,7 +155,7 @@ contains
     box%flow%rho(4, 5, top + 1) = 1.0_wp
     call fill(u)
     before = u
-    call share_acceleration(box%grid, box%solid%open, box%flow%rho, links, u)
+    call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, u)
     w = 3.0_wp*0.5_wp   ! its lower face is closed
     call check('up: the film counts half', u(4, 5, top, 3), &
                (w*before(4, 5, top, 3) + before(4, 5, top + 1, 3))/(w + 1.0_wp), 1.0e-13_wp)
@@ -174,45 +174,45 @@ contains
     integer :: film, n
     real(wp), parameter :: change(3) = [1.0_wp, 2.0_wp, 3.0_wp]
 
-    film = links%number(4, 5, top)
+    film = merged%number(4, 5, top)
     t = r + (1.0_wp - r)*0.25_wp
     call fill(u)
     call note()
     before = u
     u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
     u(4, 5, top, :) = 99.0_wp
-    call follow_masters(box%grid, links, mass, noted, u, to_wall)
+    call follow_masters(box%grid, merged, mass, noted, u, to_wall)
     call check('films change with their master', u(4, 5, top, :) - before(4, 5, top, :), t*change, &
                1.0e-14_wp)
     call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
                1.0e-14_wp)
-    n = links%master(3, film)
+    n = merged%master(3, film)
     call check('masters, film and wall have what the group of the legs has', &
                mass(film)*t*change + to_wall(:, film), mass(film)*t**2*change, 1.0e-13_wp)
-    call check('a master of one film', count(links%master(:, :links%n_films) == n), 1)
+    call check('a master of one film', count(merged%master(:, :merged%n_films) == n), 1)
   end subroutine the_rest
 
   !> A film of water under gas is not extrapolated to the gas.
   subroutine heavy_films()
     integer :: film
 
-    film = links%number(4, 5, top)
+    film = merged%number(4, 5, top)
     box%flow%rho(4, 5, top) = 1000.0_wp
     box%flow%rho(4, 5, top + 1) = 1.0_wp
-    call match_densities(box%grid, box%flow%rho, links)
-    call check('a heavy film moves with its master', links%nearer(3, film), &
+    call match_densities(box%grid, box%flow%rho, merged)
+    call check('a heavy film moves with its master', merged%nearer(3, film), &
                1.0e-3_wp*(1.0_wp - r), 1.0e-12_wp)
-    call check('others keep their profile', links%nearer(3, links%number(5, 5, top)), 1.0_wp - r, &
+    call check('others keep their profile', merged%nearer(3, merged%number(5, 5, top)), 1.0_wp - r, &
                1.0e-12_wp)
   end subroutine heavy_films
 
   !> The share of a master goes with the open part of the face to it.
   subroutine closing_face()
-    associate (film => links%number(4, 6, top))
+    associate (film => merged%number(4, 6, top))
       box%solid%open(4, 7, top, 2) = 0.5_wp
       box%solid%poses = 0   ! another geometry
-      call link_cells(box%grid, box%solid, links)
-      call check('shares close with the face', links%share(:, film), &
+      call find_merged_cells(box%grid, box%solid, merged)
+      call check('shares close with the face', merged%share(:, film), &
                  [0.0_wp, 0.5_wp*0.2_wp, 0.8_wp]/0.9_wp, 1.0e-12_wp)
     end associate
   end subroutine closing_face
@@ -220,7 +220,7 @@ contains
   logical function centre_in_box(m)
     integer, intent(in) :: m
 
-    associate (c => links%cell(:, m))
+    associate (c => merged%cell(:, m))
       centre_in_box = box%solid%inside(c(1), c(2), c(3)) == 1
     end associate
   end function centre_in_box
@@ -230,7 +230,7 @@ contains
     integer, intent(in) :: i, j, k
     integer :: c(3)
 
-    c = links%cell(:, links%master(3, links%number(i, j, k)))
+    c = merged%cell(:, merged%master(3, merged%number(i, j, k)))
   end function master_of
 
   !> Momentum of the wall cells [kg m/s].
@@ -240,8 +240,8 @@ contains
     integer :: n
 
     p = 0.0_wp
-    do n = 1, links%n
-      associate (c => links%cell(:, n))
+    do n = 1, merged%n
+      associate (c => merged%cell(:, n))
         p = p + mass(n)*u(c(1), c(2), c(3), :)
       end associate
     end do
@@ -269,4 +269,4 @@ contains
       end do
     end do
   end subroutine fill
-end program test_linked_cells
+end program test_merged_cells

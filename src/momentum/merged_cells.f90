@@ -5,7 +5,7 @@
 !! shares that close with the face. A master and its parts of films are a group with one momentum
 !! (`group_momentum_m`). A film without such a neighbour (a gap narrower than a cell) is a group of
 !! its own. Derivation and trials: docs/decisions/cut_cells.md.
-module linked_cells_m
+module merged_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
@@ -16,7 +16,7 @@ module linked_cells_m
   use wall_profile_m, only: slip_at
   implicit none
   private
-  public :: linked_cells_t, linked_cells_init, link_cells, order_by_body
+  public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
   public :: masters_at_most, is_alone, along_share, match_densities, open_shares
   public :: velocity_at_wall
 
@@ -24,7 +24,7 @@ module linked_cells_m
   integer, parameter :: masters_at_most = 3  !! of a film
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a master.
-  type :: linked_cells_t
+  type :: merged_cells_t
     integer :: poses = 0                         !! of the bodies (`solid%poses`), 0: of none
     integer :: n = 0                             !! wall cells, films first
     integer :: n_films = 0
@@ -51,14 +51,14 @@ module linked_cells_m
     integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
     integer, allocatable :: part(:, :)           !! (2, *) film, which of its masters
     integer, allocatable :: group(:)             !! of each master while the groups are found
-  end type linked_cells_t
+  end type merged_cells_t
 
 contains
 
   !> Allocate for a grid; no cells.
-  subroutine linked_cells_init(grid, self)
+  subroutine merged_cells_init(grid, self)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(out) :: self
+    type(merged_cells_t), intent(out) :: self
     integer :: a(3), b(3)
 
     a = grid%first
@@ -72,14 +72,14 @@ contains
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-  end subroutine linked_cells_init
+  end subroutine merged_cells_init
 
   !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to;
   !! nothing is done where they are known already.
-  subroutine link_cells(grid, solid, self)
+  subroutine find_merged_cells(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer :: m, c(3)
 
     if (solid%poses > 0 .and. self%poses == solid%poses) return
@@ -101,7 +101,7 @@ contains
     call group_films(grid, self)
     call ensure_room(self%n, self%centre)
     self%centre(:self%n) = 1.0_wp
-  end subroutine link_cells
+  end subroutine find_merged_cells
 
   !> Is a cut cell a film of this process or of the halo that matters?
   pure function is_film(grid, solid, c) result(yes)
@@ -133,7 +133,7 @@ contains
   !> A wall cell more, if it is not in the list.
   subroutine add_cell(c, body, self)
     integer, intent(in) :: c(3), body
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
 
     if (self%number(c(1), c(2), c(3)) > 0) return
     self%n = self%n + 1
@@ -149,7 +149,7 @@ contains
   subroutine add_cut_cells(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     real(wp), allocatable :: most(:)
     integer :: b, m, n, c(3)
 
@@ -192,7 +192,7 @@ contains
   !> The wall cells in the order of their bodies.
   subroutine order_by_body(n_bodies, self)
     integer, intent(in) :: n_bodies
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer :: b, m
 
     call ensure_room(n_bodies + 1, self%first_of_body)
@@ -217,7 +217,7 @@ contains
   subroutine find_masters(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer :: m, n, o(3), body
 
     call ensure_room(self%n_films, self%normal)
@@ -278,7 +278,7 @@ contains
   subroutine find_middles(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer, parameter :: here(3) = 0
     real(wp) :: middle, y
     integer :: m
@@ -355,7 +355,7 @@ contains
   !! so that sums over a group do not depend on the process.
   subroutine group_films(grid, self)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer :: m, n, f, g, n_parts
 
     call ensure_room(self%n, self%group)
@@ -424,7 +424,7 @@ contains
 
   !> Is this film a group of its own?
   elemental function is_alone(self, film) result(yes)
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: film
     logical :: yes
 
@@ -434,7 +434,7 @@ contains
   !> Share of the velocity of its master number n along the wall, seen from the wall, that a film
   !! has.
   pure function along_share(self, film, n) result(share)
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: film, n
     real(wp) :: share
 
@@ -452,7 +452,7 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of the fluid [kg/m3]
-    type(linked_cells_t), intent(inout) :: self
+    type(merged_cells_t), intent(inout) :: self
     integer :: m, n
 
     !$omp parallel do private(n) schedule(static)
@@ -471,7 +471,7 @@ contains
   !> Velocity of the wall of a film [m/s].
   pure function velocity_at_wall(grid, self, film, bodies) result(v)
     type(grid_t), intent(in) :: grid
-    type(linked_cells_t), intent(in) :: self
+    type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: film
     type(rigid_motion_t), intent(in) :: bodies
     real(wp) :: v(3)
@@ -491,4 +491,4 @@ contains
     w = 0.5_wp*sum(openings(grid, open, c), 2)
   end function open_shares
 
-end module linked_cells_m
+end module merged_cells_m
