@@ -1,7 +1,7 @@
 !> The parallel layer, all that the rest of the program knows of other processes.
 !!
 !! What depends on them is in two submodules, `parallel_serial.f90` for one process and
-!! `parallel_mpi.f90` for many; the Makefile merged cells one of them. Only plain arrays pass through here.
+!! `parallel_mpi.f90` for many; the Makefile links one of them. Only plain arrays pass through here.
 module parallel_m
   use, intrinsic :: iso_c_binding, only: c_int
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads

@@ -81,7 +81,8 @@ contains
       if (.not. bodies%present(b)) cycle
       do d = 1, 3
         defect(1:3, d, b) = (displaced(b)%mass - counted(1, d, b))*unit_step(:, d)
-        defect(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) - counted(2:4, d, b)
+        defect(4:6, d, b) = cross(displaced(b)%moment, real(unit_step(:, d), wp)) &
+                            - counted(2:4, d, b)
       end do
     end do
   end function mass_defect

@@ -24,8 +24,8 @@ module monolithic_m
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use face_memory_m, only: note_deviation
-  use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, add_second_half, &
-                        add_whole
+  use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
+                         add_second_half, add_whole
   use buoyancy_m, only: displaced_force, mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
@@ -46,8 +46,8 @@ module monolithic_m
 
   type, extends(coupling_t) :: monolithic_t
     real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
-    type(rigid_motion_t) :: predicted               !! the motion at the end, by `change_predicted`
-    real(wp), allocatable :: change_predicted(:, :)
+    type(rigid_motion_t) :: predicted               !! the motion at the end, by `extrapolated`
+    real(wp), allocatable :: extrapolated(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(merged_cells_t), allocatable :: merged_before, merged
       !! of the surface at the start and at the end of the step
@@ -96,7 +96,7 @@ contains
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%defect(6, 3, n), source=0.0_wp)
-    allocate (self%dry_motion, self%from_half_kick, self%lagged, self%counted, self%change_predicted, &
+    allocate (self%dry_motion, self%from_half_kick, self%lagged, self%counted, self%extrapolated, &
               source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
@@ -114,9 +114,9 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(scratch_t), intent(inout) :: scratch
 
-    call predict_motion(case%fluid%gravity, dt, blocks, self)
+    call extrapolate_motion(case%fluid%gravity, dt, blocks, self)
     self%lagged(:, :blocks%n) = dt_before/dt*blocks%lagged_force   ! what is owed is an impulse
-    call find_links_before(grid, solid, self)
+    call find_merged_before(grid, solid, self)
     if (self%implicit_momentum) then
       call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
       call find_liquid(grid, flow, self%half_kick%takes_part)
@@ -126,14 +126,14 @@ contains
       call take(scratch, self%deviation)
       call take(scratch, self%half_kick%given)
       call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
-      call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, self%change_predicted, dt, &
-                       flow, self%acceleration, self%half_kick)
+      call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, &
+                          self%extrapolated, dt, flow, self%acceleration, self%half_kick)
     end if
   end subroutine begin
 
-  !> The merged cells of the start of the step: those of the end of the last one, or new ones if blocks
-  !! have come.
-  subroutine find_links_before(grid, solid, self)
+  !> The merged cells of the start of the step: those of the end of the last one, or new ones if
+  !! blocks have come.
+  subroutine find_merged_before(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid   !! at the start
     class(monolithic_t), intent(inout) :: self
@@ -143,26 +143,26 @@ contains
     call move_alloc(self%merged, self%merged_before)
     call move_alloc(keep, self%merged)
     call find_merged_cells(grid, solid, self%merged_before)
-  end subroutine find_links_before
+  end subroutine find_merged_before
 
   !> What the motion changes by in this step if the bodies accelerate as in the step before, like
   !! the fluid that gets the old pressure.
-  subroutine predict_motion(gravity, dt, blocks, self)
+  subroutine extrapolate_motion(gravity, dt, blocks, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
     type(blocks_t), intent(in) :: blocks
     class(monolithic_t), intent(inout) :: self
     integer :: b
 
-    self%change_predicted = 0.0_wp
+    self%extrapolated = 0.0_wp
     do b = 1, blocks%n
       if (.not. self%bodies%free(b)) cycle
-      self%change_predicted(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) + blocks%contact_force(:, b)) &
-                                          /blocks%mass(b))
-      self%change_predicted(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
+      self%extrapolated(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) &
+                                                 + blocks%contact_force(:, b))/blocks%mass(b))
+      self%extrapolated(4:6, b) = dt*matmul(self%bodies%inverse_inertia(:, :, b), &
                                       blocks%fluid_torque(:, b) + blocks%contact_torque(:, b))
     end do
-  end subroutine predict_motion
+  end subroutine extrapolate_motion
 
   !> Stage 9: films at the new places and their masters, one momentum for each group; inertia of
   !! the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
@@ -238,16 +238,16 @@ contains
       call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, self%rho, self%tension, a%face)
-      self%counted = self%at_start%motion + self%change_predicted
-      call accelerations_of_groups(grid, solid, dt, self%change_predicted, self)
+      self%counted = self%at_start%motion + self%extrapolated
+      call accelerations_of_groups(grid, solid, dt, self%extrapolated, self)
       if (self%implicit_momentum) call fill_velocity_halo(grid, flow%u)   ! groups have shared
       call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
       if (self%implicit_momentum) then
         call accelerate_cells(grid, dt, flow, self)
       else
         call add_second_half(grid, dt, a%cell, self%half_kick, flow%u)
-        call force_of_half_kick(grid, case%fluid, self%merged_before, self%merged, self%bodies, dt, &
-                               flow, a%cell, self%half_kick, self%from_half_kick)
+        call force_of_half_kick(grid, case%fluid, self%merged_before, self%merged, self%bodies, &
+                                dt, flow, a%cell, self%half_kick, self%from_half_kick)
         call give(scratch, self%half_kick%given)
       end if
       call add_product(grid, dt, by_stress, flow%u)
@@ -342,7 +342,7 @@ contains
     associate (unused => case)
     end associate
     self%predicted%x = self%bodies%x
-    self%predicted%motion = self%at_start%motion + self%change_predicted
+    self%predicted%motion = self%at_start%motion + self%extrapolated
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(self%acceleration%cell, n_halo, layers=1)
     associate (a => self%acceleration, merged => self%merged, &

@@ -164,8 +164,8 @@ contains
   end subroutine force_of_walls
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
-  !! start (`half_kick%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
-  !! surface of the end, of groups.
+  !! start (`half_kick%given`) and on that of the end differ [N, N m]; `a` is the acceleration on
+  !! the surface of the end, of groups.
   subroutine force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, half_kick, force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid

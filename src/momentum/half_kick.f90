@@ -61,13 +61,13 @@ contains
   end subroutine half_kick_init
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine add_first_half(grid, fluid, solid, merged, bodies, change_predicted, dt, flow, a, self)
+  subroutine add_first_half(grid, fluid, solid, merged, bodies, extrapolated, dt, flow, a, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
     type(merged_cells_t), intent(in) :: merged     !! likewise
     type(rigid_motion_t), intent(in) :: bodies    !! likewise
-    real(wp), intent(in) :: change_predicted(:, :)           !! (6, bodies) predicted change of their motion
+    real(wp), intent(in) :: extrapolated(:, :)   !! (6, bodies) change of motion that goes on
     real(wp), intent(in) :: dt            !! [s]
     type(flow_t), intent(inout) :: flow   !! of the start of the step
     type(acceleration_t), intent(inout) :: a      !! work
@@ -80,7 +80,7 @@ contains
                         self%takes_part, dt, a, flow%p)
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
     call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
-    call hold_in_cells(grid, solid, bodies, change_predicted/dt, a%face, a%cell)
+    call hold_in_cells(grid, solid, bodies, extrapolated/dt, a%face, a%cell)
     call change_where(grid, self%takes_part, .false., a%cell)
     call halo_exchange(a%cell, n_halo)
     call share_acceleration(grid, solid%open, flow%rho, merged, a%cell)

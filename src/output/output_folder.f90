@@ -264,7 +264,7 @@ contains
     if (.not. yes) yes = whole_path(one) == whole_path(other)
   end function is_same
 
-  !> The path from the root without merged cells and dots; the path as it is where there is nothing.
+  !> The path from the root without links and dots; the path as it is where there is nothing.
   function whole_path(path) result(whole)
     character(*), intent(in) :: path
     character(:), allocatable :: whole

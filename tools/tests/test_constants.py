@@ -23,7 +23,7 @@ NO_CONSTANTS = {
     "liquid/extended_fraction.f90": {"unknown"},
     "liquid/liquid_fill.f90": {"no_surface"},
     "grid/outflow.f90": {"elsewhere"},
-    "coupling/painting.f90": {"no_hit"},
+    "coupling/voxels.f90": {"no_hit"},
     "momentum/surface_heights.f90": {"no_height"},
 }
 

@@ -247,7 +247,7 @@ contains
     block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
     call ready()
     block%flow%p = 0.0_wp
-    coupling%change_predicted(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
+    coupling%extrapolated(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
     call begin_step(block%blocks)
     call advance()
     associate (fall => dt*block%case%fluid%gravity)
@@ -340,7 +340,7 @@ contains
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
     call coupling%begin(block%case, block%grid, block%solid, dt, 0.5_wp*dt, block%flow, &
                         block%blocks, scratch)
-    call check('predicted: dt times the last acceleration', coupling%change_predicted(:, 1), dt*gain, &
+    call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
                1.0e-12_wp)
   end subroutine goes_on_as_before
 

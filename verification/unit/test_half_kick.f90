@@ -25,7 +25,7 @@ program test_half_kick
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo, 3) :: before
   type(half_kick_t) :: half_kick
-  real(wp) :: half(3), given(3), change_predicted(6, 1) = 0.0_wp
+  real(wp) :: half(3), given(3), extrapolated(6, 1) = 0.0_wp
   integer :: i, j, k, seed
 
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
@@ -50,8 +50,9 @@ program test_half_kick
     call acceleration_init(grid, a)
     call merged_cells_init(grid, merged)
     call find_merged_cells(grid, box%solid, merged)
-    change_predicted(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
-    call add_first_half(grid, fluid, box%solid, merged, box%bodies, change_predicted, dt, flow, a, half_kick)
+    extrapolated(1:3, 1) = 2*half   ! what the box holds of the liquid gets the same
+    call add_first_half(grid, fluid, box%solid, merged, box%bodies, extrapolated, dt, flow, &
+                        a, half_kick)
     call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
     call check('a cut cell, too', box%solid%alpha(5, 3, 3) > 0.0_wp &
                .and. maxval(abs(change(5, 3, 3) - half)) < 1.0e-14_wp)

@@ -202,8 +202,8 @@ contains
     call match_densities(box%grid, box%flow%rho, merged)
     call check('a heavy film moves with its master', merged%nearer(3, film), &
                1.0e-3_wp*(1.0_wp - r), 1.0e-12_wp)
-    call check('others keep their profile', merged%nearer(3, merged%number(5, 5, top)), 1.0_wp - r, &
-               1.0e-12_wp)
+    call check('others keep their profile', merged%nearer(3, merged%number(5, 5, top)), &
+               1.0_wp - r, 1.0e-12_wp)
   end subroutine heavy_films
 
   !> The share of a master goes with the open part of the face to it.

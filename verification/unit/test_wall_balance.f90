@@ -146,13 +146,13 @@ contains
     logical :: active(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
                       1 - n_halo:cells(3) + n_halo)
     type(rigid_flux_t) :: flux
-    real(wp) :: lack(6, 3, 1), change(6)
+    real(wp) :: defect(6, 3, 1), change(6)
     integer :: d
 
     active = box%solid%alpha < 1.0_wp
     call rigid_flux_init(box%grid, 1, flux)
     call build_rigid_flux(box%grid, box%solid, box%bodies, active, flux)
-    lack = mass_defect(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
+    defect = mass_defect(box%grid, box%case%fluid, box%solid, box%bodies, flux, box%flow)
     a%face = 0.0_wp
     do d = 1, 3
       change = 0.0_wp
@@ -164,9 +164,9 @@ contains
       call note_change(box%grid, merged, dt, a%cell, balance%pushed)
       call find(change)
       call check('the part of the wall is the uncounted fluid', force(1:3, 1), &
-                 -lack(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
+                 -defect(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
     end do
-    call check('it is not nothing', maxval(abs(lack(1:3, :, 1))) > 1.0_wp)
+    call check('it is not nothing', maxval(abs(defect(1:3, :, 1))) > 1.0_wp)
   end subroutine part_of_the_wall
 
   !> What the faces give, the fluid and the bodies get: fluid that shares accelerations, and two
