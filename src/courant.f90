@@ -16,8 +16,8 @@ module courant_m
   private
   public :: courant_rate_t, courant_rate
 
-  real(wp), parameter :: least_open = 0.5_wp     !! share of a face whose velocity counts
-  real(wp), parameter :: least_liquid = 0.5_wp   !! of a cell that the step follows
+  real(wp), parameter :: min_open = 0.5_wp     !! share of a face whose velocity counts
+  real(wp), parameter :: min_liquid = 0.5_wp   !! of a cell that the step follows
   real(wp), parameter :: gas_lead = 8.0_wp
     !! gas faster than so many times what is followed shortens the step all the same
   real(wp), parameter :: past_wall = 1.5_wp
@@ -49,10 +49,10 @@ contains
     call global_max(fluid)
     rate%followed = fluid(1)
     rate%carried = fluid(2)
-    rate%has_surface = all(fluid(3:) >= least_liquid)
+    rate%has_surface = all(fluid(3:) >= min_liquid)
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      rate%followed = max(rate%followed, past_wall/grid%least_spacing()*fastest_point(blocks, b))
+      rate%followed = max(rate%followed, past_wall/grid%min_spacing()*fastest_point(blocks, b))
     end do
     rate%followed = max(rate%followed, rate%carried/gas_lead)
   end function courant_rate
@@ -93,7 +93,7 @@ contains
           gas = max(gas, 1.0_wp - c(i, j, k))
           followed = max(followed, merge(max(abs(west), abs(east), abs(front), abs(back), &
                                              abs(below), abs(above)), 0.0_wp, &
-                                         c(i, j, k) >= least_liquid))
+                                         c(i, j, k) >= min_liquid))
         end do
       end do
     end do
@@ -105,7 +105,7 @@ contains
     real(wp), intent(in) :: u, open
     real(wp) :: through
 
-    through = merge(u, 0.0_wp, open >= least_open)
+    through = merge(u, 0.0_wp, open >= min_open)
   end function through
 
 end module courant_m

@@ -12,7 +12,7 @@ module faults_m
   use deep_overlaps_m, only: overlap_fault
   implicit none
   private
-  public :: fault_t, note_places, find_fault, find_final_fault
+  public :: fault_t, store_places, find_fault, find_final_fault
 
   type :: fault_t
     integer :: code = exit_ok
@@ -30,13 +30,13 @@ module faults_m
 contains
 
   !> Where the blocks are and how fast; call it before the first step, `find_fault` does it later.
-  subroutine note_places(sim, fault)
+  subroutine store_places(sim, fault)
     type(simulation_t), intent(in) :: sim
     type(fault_t), intent(inout) :: fault
 
     fault%place = sim%blocks%x(:, :sim%blocks%n)
     fault%speed = norm2(sim%blocks%v(:, :sim%blocks%n), 1)
-  end subroutine note_places
+  end subroutine store_places
 
   !> The first fault of the step that just ended, if there is one. All processes call.
   subroutine find_fault(sim, report, fault)
@@ -64,7 +64,7 @@ contains
     call look_at_blocks(sim, fault)
     if (.not. sim%wet) return
     call look_for_jumps(sim, fault)
-    call note_places(sim, fault)
+    call store_places(sim, fault)
     if (sim%case%run%cfl_max <= 0.0_wp) call look_at_courant(sim, fault)
   end subroutine find_fault
 
@@ -81,7 +81,7 @@ contains
       associate (dt => sim%clock%dt, v => norm2(sim%blocks%v(:, b)))
         moved = norm2(sim%blocks%x(:, b) - fault%place(:, b))
         explained = dt*(fault%speed(b) + v + dt*norm2(sim%case%fluid%gravity)) &
-          + sim%grid%least_spacing()
+          + sim%grid%min_spacing()
         if (moved > explained) call set(sim, 'body '//to_text(b)//' jumped '//brief(moved) &
           //' m in a step of '//brief(dt)//' s, though its speed is '//brief(v) &
           //' m/s: its mass of '//brief(sim%blocks%mass(b))//' kg is too small for &run dt', fault)

@@ -31,7 +31,7 @@ program mics
   use diagnostics_m, only: step_report_t
   use simulation_m, only: simulation_t, simulation_init, resume, measure
   use step_m, only: take_step
-  use faults_m, only: fault_t, note_places, find_fault, find_final_fault
+  use faults_m, only: fault_t, store_places, find_fault, find_final_fault
   implicit none
   save   ! keeps the state off the stack
   type(options_t) :: options
@@ -63,7 +63,7 @@ program mics
     call write_due_output(sim%run_state_t, report, output)
   end if
   call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
-  call note_places(sim, fault)
+  call store_places(sim, fault)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)
     call find_fault(sim, report, fault)

@@ -40,12 +40,12 @@ module step_m
   use rigid_body_m, only: fastest_point
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: note_touches, warn_of_overlaps
+  use deep_overlaps_m, only: store_touches, warn_of_overlaps
   use release_m, only: release_due_blocks, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
-  use energy_m, only: note_energy, note_release, energy_excess
+  use energy_m, only: store_energy, store_release, energy_excess
   use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
-  use added_mass_m, only: know_added_mass
+  use added_mass_m, only: update_added_mass
   use courant_m, only: courant_rate_t, courant_rate
   use simulation_m, only: simulation_t, energies
   use wave_step_m, only: gravity_step, capillary_step
@@ -81,7 +81,7 @@ contains
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap, sim%deep)
       associate (touching => sim%contacts%touching)
-        if (.not. touching%exact) call note_touches(touching%touches, sim%deep)
+        if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
       end associate
       call toc(sim%timer_blocks)
       if (sim%wet) then
@@ -146,7 +146,7 @@ contains
       any_free = .true.
       speed = max(speed, fastest_point(sim%blocks, b))
     end do
-    call sim%clock%note_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
+    call sim%clock%store_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes
@@ -154,7 +154,7 @@ contains
     report%pressure_converged = stage%pressure%converged
     report%viscous_converged = stage%viscous_converged
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    call note_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
+    call store_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
     report%transport_parts = sim%transport%liquid%parts
     report%transport_converged = sim%transport%liquid%small%converged
@@ -185,7 +185,7 @@ contains
     call raise_surface(sim%grid, sim%before, sim%solid, sim%transport%liquid%extension, sim%flow)
     call mix_fluid(sim%case%fluid, sim%flow)
     fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
-    call note_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
+    call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
   end subroutine make_room
 
   !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
@@ -216,7 +216,7 @@ contains
     integer, intent(out) :: n_clipped   !! bodies whose added mass in impacts a limit cuts
 
     call copy_motion(sim%blocks, sim%coupling%bodies)
-    call know_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
+    call update_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
                          sim%blocks, n_clipped)
     call sim%coupling%begin(sim%case, sim%grid, sim%solid, sim%clock%dt, dt_before, sim%flow, &
                             sim%blocks, sim%scratch)
@@ -250,7 +250,7 @@ contains
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)
       if (rate%has_surface) then
-        h = sim%grid%least_spacing()
+        h = sim%grid%min_spacing()
         allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
       end if
     end if

@@ -3,7 +3,7 @@ module command_line_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text
   use parallel_m, only: get_threads
-  use value_text_m, only: nearest_name, parse_integer, tame, value_ok
+  use value_text_m, only: nearest_name, parse_integer, sanitise, value_ok
   implicit none
   private
   public :: options_t, argument_t, read_command_line, parse_arguments, print_help
@@ -27,7 +27,7 @@ module command_line_m
     character(:), allocatable :: text
   end type argument_t
 
-  integer, parameter :: most_threads = 1024
+  integer, parameter :: max_threads = 1024
   character(*), parameter :: allowed_threads = 'must be a whole number from 1 to 1024'
 
   character(*), parameter :: known(8) = [character(10) :: '--check', '--restart', '--output', &
@@ -46,13 +46,13 @@ contains
       call get_command_argument(i, length=length)
       allocate (character(length) :: arguments(i)%text)
       call get_command_argument(i, arguments(i)%text)
-      if (tame(arguments(i)%text) /= arguments(i)%text) call problems%add_message( &
+      if (sanitise(arguments(i)%text) /= arguments(i)%text) call problems%add_message( &
         'control characters in '//arguments(i)%text)
     end do
     call parse_arguments(arguments, options, problems)
     call get_environment_variable('OMP_NUM_THREADS', length=length)
     threads = get_threads()
-    if (options%threads == 0 .and. length > 0 .and. threads > most_threads) then
+    if (options%threads == 0 .and. length > 0 .and. threads > max_threads) then
       call problems%add('OMP_NUM_THREADS', threads, allowed_threads)
     end if
   end subroutine read_command_line
@@ -175,7 +175,7 @@ contains
 
     n = 0
     call parse_integer(value, n, info)
-    if (info /= value_ok .or. n < 1 .or. n > most_threads) then
+    if (info /= value_ok .or. n < 1 .or. n > max_threads) then
       call problems%add('--threads', value, allowed_threads)
     else
       options%threads = n
@@ -187,7 +187,7 @@ contains
     character(*), intent(in) :: value
     type(options_t), intent(inout) :: options
     type(problems_t), intent(inout) :: problems
-    integer, parameter :: most_hours = 100000
+    integer, parameter :: max_hours = 100000
     integer :: colon, again, h, m, s, info(3)
 
     info = value_ok
@@ -207,7 +207,7 @@ contains
         call parse_integer(value(again + 1:), s, info(3))
       end if
     end if
-    if (any(info /= value_ok) .or. h < 0 .or. h > most_hours .or. m < 0 .or. m > 59 &
+    if (any(info /= value_ok) .or. h < 0 .or. h > max_hours .or. m < 0 .or. m > 59 &
         .or. s < 0 .or. s > 59 .or. h + m + s == 0) then
       call problems%add('--max-wall', value, 'must be a time HH:MM or HH:MM:SS above 0:00')
     else

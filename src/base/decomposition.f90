@@ -6,9 +6,9 @@ module decomposition_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: best_pieces, last_cell, least_cells
+  public :: best_pieces, last_cell, min_cells
 
-  integer, parameter :: least_cells = 4   !! every block has so many in each direction that is cut
+  integer, parameter :: min_cells = 4   !! every block has so many in each direction that is cut
 
 contains
 
@@ -60,7 +60,7 @@ contains
 
     g = 0
     do power = 0, 4
-      if (shortest_piece(n, pieces, 2**power) < least_cells .and. pieces > 1) cycle
+      if (shortest_piece(n, pieces, 2**power) < min_cells .and. pieces > 1) cycle
       if (power > 2 .and. g > 0) then
         if (longest_piece(n, pieces, 2**power) > longest_piece(n, pieces, g)) cycle
       end if

@@ -6,7 +6,7 @@ module errors_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
   use parallel_m, only: is_root, parallel_abort, parallel_pause
-  use value_text_m, only: tame
+  use value_text_m, only: sanitise
   implicit none
   private
   public :: problems_t, fatal, to_text, brief
@@ -123,7 +123,7 @@ contains
     start = 'mics: '
     if (present(before)) start = before
     do i = 1, self%n
-      write (unit, '(a)') start//tame(self%list(i)%text)
+      write (unit, '(a)') start//sanitise(self%list(i)%text)
     end do
     flush (unit)
   end subroutine problems_report
@@ -166,7 +166,7 @@ contains
     character(len(message)) :: text
     integer :: i
 
-    text = tame(message)
+    text = sanitise(message)
     do i = 1, len(message)
       if (message(i:i) == new_line('a')) text(i:i) = new_line('a')
     end do

@@ -12,7 +12,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_INFO_NULL, MPI_Iallreduce, MPI_Test, MPI_Wtime, MPI_STATUS_IGNORE
   use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
-  use decomposition_m, only: best_pieces, last_cell, least_cells
+  use decomposition_m, only: best_pieces, last_cell, min_cells
   use exact_bins_m, only: bin_size, merge_bins
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
@@ -69,7 +69,7 @@ contains
   !> The blocks are cut z first, then y, x last.
   !!
   !! The cuts lie at multiples of a power of two of the cell index, so that coarser grids can be
-  !! cut at the same places; every process gets at least `least_cells` in a direction that is cut.
+  !! cut at the same places; every process gets at least `min_cells` in a direction that is cut.
   module procedure decompose
     integer :: pieces(3), place(3), d
 
@@ -96,7 +96,7 @@ contains
 
     if (rank == 0) write (error_unit, '(a, 2(i0, a), i0, a, i0, a, i0, a)') 'mics: ', n(1), ' x ', &
       n(2), ' x ', n(3), ' cells cannot be cut for ', n_processes, ' processes with at least ', &
-      least_cells, ' cells in each direction that is cut; use fewer processes'
+      min_cells, ' cells in each direction that is cut; use fewer processes'
     if (rank > 0) call parallel_pause(1.0_wp)
     call parallel_abort(exit_input)
   end subroutine no_room

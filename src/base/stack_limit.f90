@@ -12,7 +12,7 @@ module stack_limit_m
   public :: check_stack, stack_bytes
 
   integer(i8), parameter :: kilobyte = 1024_i8
-  integer(i8), parameter :: least_stack = 64*kilobyte    !! of the process or a thread [B]
+  integer(i8), parameter :: min_stack = 64*kilobyte    !! of the process or a thread [B]
 
   interface
     integer(c_int) function c_getrlimit(resource, limit) bind(c, name='getrlimit')
@@ -37,17 +37,17 @@ contains
 
     limit = -1
     if (c_getrlimit(rlimit_stack, limit) /= 0) limit = -1
-    if (limit(1) >= 0 .and. limit(1) < least_stack) call problems%add_message('ulimit -s ' &
+    if (limit(1) >= 0 .and. limit(1) < min_stack) call problems%add_message('ulimit -s ' &
       //to_text(int(limit(1)/kilobyte))//': the stack is too small, the program needs at least ' &
-      //to_text(int(least_stack/kilobyte))//' kB; 8192 is usual')
+      //to_text(int(min_stack/kilobyte))//' kB; 8192 is usual')
     do i = 1, size(names)
       call get_environment_variable(trim(names(i)), text, status=status)
       if (status /= 0) cycle
       bytes = stack_bytes(text)
-      if (bytes >= 0 .and. bytes < least_stack) call problems%add_message( &
+      if (bytes >= 0 .and. bytes < min_stack) call problems%add_message( &
         'environment variable '//trim(names(i))//' = '//quoted_text(trim(text)) &
         //': the stack of a thread is too small, it needs at least ' &
-        //to_text(int(least_stack/kilobyte))//'k; without the variable it has that of ulimit -s')
+        //to_text(int(min_stack/kilobyte))//'k; without the variable it has that of ulimit -s')
       return
     end do
   end subroutine check_stack

@@ -7,7 +7,7 @@ module value_text_m
   implicit none
   private
   public :: parse_real, parse_integer, parse_logical
-  public :: quoted_text, printable, tame, fixed_text
+  public :: quoted_text, printable, sanitise, fixed_text
   public :: lower_case, nearest_name, edit_distance, looks_like_name
   public :: byte_order_mark
   public :: value_ok, value_malformed, value_not_finite, value_too_large, value_not_whole
@@ -148,14 +148,14 @@ contains
         n = n - 1
       end do
     end if
-    text = tame(raw(:n))
+    text = sanitise(raw(:n))
     if (n < len(raw)) text = text//'...'
   end function printable
 
   !> A text as a terminal may see it: each control character, those that UTF-8 writes with two bytes
   !! and older terminals know as one too, is a question mark, but for tabs. A terminal would obey
   !! them: change colours, its title.
-  pure function tame(raw) result(text)
+  pure function sanitise(raw) result(text)
     character(*), intent(in) :: raw
     character(len(raw)) :: text
     integer :: i, byte, following   ! bytes that belong to the UTF-8 character begun
@@ -175,7 +175,7 @@ contains
       end if
       following = max(0, following - 1)
     end do
-  end function tame
+  end function sanitise
 
   !> Small letters for A to Z; every other byte stays.
   pure function lower_case(text) result(small)

@@ -22,7 +22,7 @@ module contact_forces_m
   !> What happened in the substeps of one fluid step.
   type :: contact_report_t
     integer :: substeps = 0
-    integer :: info = 0                 !! 1: it would take more than `most_substeps`, or NaN
+    integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
     real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
     real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m]

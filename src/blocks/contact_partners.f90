@@ -10,7 +10,7 @@ module contact_partners_m
   implicit none
   private
   public :: partners_t, inertia_t, motion_t, wrench_t
-  public :: partners_init, know_partners, know_motion, know_inertia
+  public :: partners_init, update_partners, update_motion, update_inertia
   public :: inertia_of, inverse_effective_mass, act
   public :: motion_between, relative_velocity, largest_speed
 
@@ -67,7 +67,7 @@ contains
   end subroutine partners_init
 
   !> Masses of all partners, their gravity and the velocity of the walls.
-  pure subroutine know_partners(walls, gravity, blocks, partners)
+  pure subroutine update_partners(walls, gravity, blocks, partners)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(blocks_t), intent(in) :: blocks
@@ -85,19 +85,19 @@ contains
       partners%inverse_mass(b) = merge(0.0_wp, 1.0_wp/(blocks%mass(b) &
                                                        + blocks%added_mass(b)), blocks%fixed(b))
     end do
-  end subroutine know_partners
+  end subroutine update_partners
 
   !> Velocities of the bodies as partners.
-  pure subroutine know_motion(blocks, partners)
+  pure subroutine update_motion(blocks, partners)
     type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(inout) :: partners
 
     partners%v(:, 1:) = blocks%v
     partners%omega(:, 1:) = blocks%omega
-  end subroutine know_motion
+  end subroutine update_motion
 
   !> Moments of inertia of the free bodies at their present poses.
-  pure subroutine know_inertia(blocks, partners)
+  pure subroutine update_inertia(blocks, partners)
     type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(inout) :: partners
     integer :: b
@@ -107,7 +107,7 @@ contains
       partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
         blocks%inverse_inertia(:, :, blocks%shape(b)))
     end do
-  end subroutine know_inertia
+  end subroutine update_inertia
 
   !> Inertia of a partner.
   pure function inertia_of(partners, b) result(inertia)

@@ -21,7 +21,7 @@ module contact_surface_m
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
-  use meeting_m, only: poses_t, view_t, meeting_t, know_views, way_between
+  use meeting_m, only: poses_t, view_t, meeting_t, update_views, way_between
   use near_features_m, only: near_features_t, search_t, list_features, list_bed, edge_in_view
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
@@ -345,7 +345,7 @@ contains
 
     holds = short_list_holds(now, surface_a%reach, surface_b%reach, pair%close)
     if (holds .and. n_chosen(pair%close) == 0) return
-    call know_views(now)
+    call update_views(now)
     if (.not. holds) then
       way = way_between(pair%near%when, now%poses, surface_a%reach, surface_b%reach)
       if (way > pair%near%valid) then

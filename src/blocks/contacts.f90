@@ -6,21 +6,22 @@ module contacts_m
   use kinds_m, only: wp
   use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers
   use walls_m, only: walls_t
-  use sleep_m, only: know_stillness, note_poses, note_quiet, stop_sleepers, hold_or_wake, all_still
+  use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
+                     all_still
   use lubrication_m, only: lubricate
-  use contact_partners_m, only: know_partners, know_motion
+  use contact_partners_m, only: update_partners, update_motion
   use touching_m, only: find_touches
   use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
     elastic_energy
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
-  use partners_met_m, only: note_partners, count_partners
+  use partners_met_m, only: store_partners, count_partners
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep, rouse
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
 
-  integer, parameter :: most_substeps = 1000000   !! of a fluid step; beyond, something went wrong
+  integer, parameter :: max_substeps = 1000000   !! of a fluid step; beyond, something went wrong
 
 contains
 
@@ -38,13 +39,13 @@ contains
     real(wp) :: left, dt_b, limit
 
     call begin_step(blocks)
-    if (contacts%sleep%active) call note_poses(blocks, contacts%sleep)
+    if (contacts%sleep%active) call store_poses(blocks, contacts%sleep)
     call share_with_fluid(blocks, contacts%share, contacts%steady)
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
     contacts%met%n = 0
-    call know_partners(walls, gravity, blocks, contacts%touching%partners)
-    if (contacts%sleep%active) call know_stillness(blocks)
+    call update_partners(walls, gravity, blocks, contacts%touching%partners)
+    if (contacts%sleep%active) call update_stillness(blocks)
     call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
     left = dt
@@ -55,7 +56,7 @@ contains
     end if
     do while (left > 0.0_wp)
       limit = substep_limit(walls, contacts%touching, blocks, dt, contacts%limits)
-      if (.not. left < limit*real(most_substeps, wp)) then
+      if (.not. left < limit*real(max_substeps, wp)) then
         report%info = 1
         return
       end if
@@ -66,7 +67,7 @@ contains
     end do
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
-    if (contacts%sleep%active) call note_quiet(gravity, dt, blocks, contacts%sleep)
+    if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
     call count_partners(contacts%met, blocks)
     call find_touches(walls, blocks, 0.0_wp, contacts%touching)
@@ -117,12 +118,12 @@ contains
 
     associate (touching => contacts%touching, springs => contacts%springs, loads => contacts%loads)
       associate (touch => touching%touches%item(:touching%touches%n))
-        call note_partners(touch%a, touch%b, contacts%met)
+        call store_partners(touch%a, touch%b, contacts%met)
       end associate
       call match_springs(touching, contacts%before, springs)
       call stretch_springs(0.5_wp*dt_b, touching, springs)
       call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
-      call know_motion(blocks, touching%partners)
+      call update_motion(blocks, touching%partners)
       call sum_forces(dt_b, touching, springs, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
         loads%force)
@@ -136,7 +137,7 @@ contains
       call kick(none, dt_b, loads%force(:, 1:), loads%torque(:, 1:), blocks)
       call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
       call stop_sleepers(blocks)
-      call know_motion(blocks, touching%partners)
+      call update_motion(blocks, touching%partners)
       call stretch_springs(0.5_wp*dt_b, touching, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)

@@ -9,7 +9,7 @@ module deep_overlaps_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, note_overlap, note_touches
+  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_touches
   public :: size_of_pair, warn_of_overlaps, overlap_fault, noted_share
 
   real(wp), parameter :: noted_share = 0.05_wp   !! overlap over size from which a body is told
@@ -57,7 +57,7 @@ contains
   end function size_of_pair
 
   !> Note an overlap of body a and its partner b with both, where it is the deepest of either.
-  pure subroutine note_overlap(a, b, depth, deep)
+  pure subroutine store_overlap(a, b, depth, deep)
     integer, intent(in) :: a, b         !! body; body, or below 1: wall or bed
     real(wp), intent(in) :: depth       !! [m]
     type(deep_overlaps_t), intent(inout) :: deep
@@ -67,7 +67,7 @@ contains
     if (.not. share > noted_share) return
     call keep_deepest(a, b, depth, share, deep)
     if (b > 0) call keep_deepest(b, a, depth, share, deep)
-  end subroutine note_overlap
+  end subroutine store_overlap
 
   !> Note an overlap with one body, where it is its deepest.
   pure subroutine keep_deepest(body, partner, depth, share, deep)
@@ -82,16 +82,16 @@ contains
   end subroutine keep_deepest
 
   !> Note the overlaps of touches: of contact spheres, where the true shapes overlap at rest.
-  pure subroutine note_touches(touches, deep)
+  pure subroutine store_touches(touches, deep)
     type(touches_t), intent(in) :: touches
     type(deep_overlaps_t), intent(inout) :: deep
     integer :: t
 
     call forget_overlaps(deep)
     do t = 1, touches%n
-      call note_overlap(touches%item(t)%a, touches%item(t)%b, touches%item(t)%depth, deep)
+      call store_overlap(touches%item(t)%a, touches%item(t)%b, touches%item(t)%depth, deep)
     end do
-  end subroutine note_touches
+  end subroutine store_touches
 
   !> Warn once of each body that reaches deep into another one, a wall or the bed, or into which one
   !! reaches.

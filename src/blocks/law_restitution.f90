@@ -7,11 +7,11 @@ module law_restitution_m
   implicit none
   private
   public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
-  public :: least_restitution
+  public :: min_restitution
 
   !> Smaller values act as this: contact ends at zero force, so a block comes out of its support
   !! with some speed, and the less, the longer it takes.
-  real(wp), parameter :: least_restitution = 1.0e-2_wp   !! [-]
+  real(wp), parameter :: min_restitution = 1.0e-2_wp   !! [-]
 
   type, extends(contact_law_t) :: law_restitution_t
     real(wp) :: frequency = 0.0_wp         !! sqrt(k/m*) [1/s]
@@ -38,7 +38,7 @@ contains
     type(law_restitution_t) :: law
     real(wp), parameter :: critical = 1.0_wp   ! damping ratio [-]
 
-    law%damping_ratio = damping_ratio_of(max(input%restitution, least_restitution))
+    law%damping_ratio = damping_ratio_of(max(input%restitution, min_restitution))
     law%frequency = impact_duration(min(law%damping_ratio, critical))/input%contact_time
   end function law_restitution
 

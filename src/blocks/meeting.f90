@@ -5,7 +5,7 @@ module meeting_m
   implicit none
   private
   public :: poses_t, view_t, meeting_t
-  public :: know_views, inverse_view, seen_from, box_in_view, way_between
+  public :: update_views, inverse_view, seen_from, box_in_view, way_between
 
   !> Poses of a pair of bodies.
   type :: poses_t
@@ -25,20 +25,20 @@ module meeting_m
     real(wp) :: to_b(3) = 0.0_wp       !! from the centre of a to that of b, space [m]
     real(wp) :: speed = 0.0_wp         !! of any two points against one another, at most [m/s]
     real(wp) :: gap = 0.0_wp           !! still taken as a touch [m]
-    type(view_t) :: a_in_b, b_in_a     !! see `know_views`
+    type(view_t) :: a_in_b, b_in_a     !! see `update_views`
   end type meeting_t
 
 contains
 
   !> Each body seen from the other.
-  pure subroutine know_views(now)
+  pure subroutine update_views(now)
     type(meeting_t), intent(inout) :: now
 
     now%a_in_b%turn = matmul(transpose(now%turn_b), now%turn_a)
     now%a_in_b%x = matmul(-now%to_b, now%turn_b)
     now%b_in_a%turn = transpose(now%a_in_b%turn)
     now%b_in_a%x = matmul(now%to_b, now%turn_a)
-  end subroutine know_views
+  end subroutine update_views
 
   !> The other body seen from the one.
   pure function inverse_view(view) result(inverse)

@@ -6,7 +6,7 @@ module near_features_m
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
   use surface_search_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
-    gather_facets, search_surface, least_distance, segment_distance2, nowhere
+    gather_facets, search_surface, min_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view
   implicit none
@@ -43,7 +43,7 @@ module near_features_m
     type(found_t) :: found
   end type search_t
 
-  real(wp), parameter :: most_skin = 4.0_wp      !! largest skin over the least
+  real(wp), parameter :: max_skin = 4.0_wp      !! largest skin over the least
 
 contains
 
@@ -115,7 +115,7 @@ contains
     type(search_t), intent(in) :: search
     real(wp) :: skin
 
-    skin = min(max(search%skin, speed*search%lasting), most_skin*search%skin)
+    skin = min(max(search%skin, speed*search%lasting), max_skin*search%skin)
   end function skin_for
 
   !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
@@ -138,7 +138,7 @@ contains
     do m = 1, search%guests%n
       place = seen_from(guest_in_host, guest%probe(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
-      if (least_distance(host, place) > margin) cycle
+      if (min_distance(host, place) > margin) cycle
       call search_surface(host, place, margin, search%found, distance, outward)
       if (distance > margin) cycle
       call append_near(host, search%guests%item(m), place, &

@@ -14,7 +14,7 @@ module overlap_m
   use surface_search_m, only: found_t, gather_edges
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
-  use deep_overlaps_m, only: deep_overlaps_t, forget_overlaps, note_overlap, size_of_pair, &
+  use deep_overlaps_m, only: deep_overlaps_t, forget_overlaps, store_overlap, size_of_pair, &
     noted_share
   implicit none
   private
@@ -168,7 +168,7 @@ contains
           overlap%turn(:, :, a), walls, found)
         if (walls%bed%there) call deepen_bed(solid, blocks%x(:, a), overlap%turn(:, :, a), &
           walls%bed, overlap%found, found)
-        call note_overlap(a, wall, found, deep)
+        call store_overlap(a, wall, found, deep)
         depth = max(depth, found)
       end associate
     end do
@@ -181,7 +181,7 @@ contains
       call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
         overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &
         blocks%x(:, a) - blocks%x(:, b) - overlap%pairs%shift(:, p), found)
-      call note_overlap(a, b, found, deep)
+      call store_overlap(a, b, found, deep)
       depth = max(depth, found)
     end do
   end subroutine max_overlap

@@ -7,7 +7,7 @@ module partners_met_m
   use springs_m, only: comes_before
   implicit none
   private
-  public :: met_t, note_partners, count_partners
+  public :: met_t, store_partners, count_partners
 
   !> Pairs that touched, sorted.
   type :: met_t
@@ -18,7 +18,7 @@ module partners_met_m
 contains
 
   !> Add pairs that touch to those that touched in this step.
-  subroutine note_partners(touches_a, touches_b, met)
+  subroutine store_partners(touches_a, touches_b, met)
     integer, intent(in) :: touches_a(:), touches_b(:)     !! (touches) sorted
     type(met_t), intent(inout) :: met
     integer :: t, m, a, b
@@ -43,7 +43,7 @@ contains
       met%b(m) = b
       met%n = met%n + 1
     end do
-  end subroutine note_partners
+  end subroutine store_partners
 
   !> Whether entry m of the pairs met is the pair (a, b).
   pure function is_met(met, m, a, b) result(yes)

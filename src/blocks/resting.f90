@@ -6,14 +6,14 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use springs_m, only: move_springs
-  use sleep_m, only: know_loads, is_tired, balanced, put_to_sleep, hold_or_wake, &
+  use sleep_m, only: update_loads, is_tired, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
-  use contact_partners_m, only: partners_t, wrench_t, know_motion, motion_between
+  use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
   use touching_m, only: find_touches
   use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
   use substep_limits_m, only: substep_limit, equal_part
-  use partners_met_m, only: note_partners
+  use partners_met_m, only: store_partners
   use contact_state_m, only: contacts_t
   implicit none
   private
@@ -33,7 +33,7 @@ contains
     logical :: changed
     integer :: b
 
-    call know_loads(contacts%sleep)
+    call update_loads(contacts%sleep)
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
@@ -54,7 +54,7 @@ contains
     contacts%woken = .false.
     if (changed) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     associate (rest => contacts%sleep%rest)
-      call note_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
+      call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
   end subroutine wake_or_sleep
 
@@ -73,7 +73,7 @@ contains
     call match_springs(contacts%touching, contacts%before, contacts%springs)
     call foresee_motion(gravity, dt_b, blocks, contacts)
     call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
-    call know_supported(blocks, contacts)
+    call update_supported(blocks, contacts)
     changed = .false.
     associate (sleep => contacts%sleep, loads => contacts%loads)
       do b = 1, blocks%n
@@ -99,7 +99,7 @@ contains
     type(contacts_t), intent(inout) :: contacts
     integer :: b
 
-    call know_motion(blocks, contacts%touching%partners)
+    call update_motion(blocks, contacts%touching%partners)
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       associate (v => contacts%touching%partners%v(:, b), &
@@ -115,7 +115,7 @@ contains
 
   !> Which blocks are held up: they touch a wall, the bed, a body that is fixed or asleep, or others
   !! that are held up. Those are not tired that touch what is moved at a given rate.
-  subroutine know_supported(blocks, contacts)
+  subroutine update_supported(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
     logical :: changed
@@ -146,7 +146,7 @@ contains
         end do
       end do
     end associate
-  end subroutine know_supported
+  end subroutine update_supported
 
   !> Whether a partner is moved at a given rate.
   pure function is_carried(blocks, partners, b) result(yes)
@@ -191,7 +191,7 @@ contains
         end do
       end do
       call move_springs(sleep%chosen, springs, sleep%rest)
-      call know_loads(sleep)
+      call update_loads(sleep)
     end associate
   end subroutine lay_down
 
@@ -207,7 +207,7 @@ contains
         sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
       end do
       call move_springs(sleep%chosen, sleep%rest, contacts%springs)
-      call know_loads(sleep)
+      call update_loads(sleep)
     end associate
   end subroutine rouse
 

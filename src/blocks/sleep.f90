@@ -15,7 +15,7 @@ module sleep_m
   use springs_m, only: springs_t, reserve_springs
   implicit none
   private
-  public :: sleep_t, sleep_init, know_stillness, know_loads, note_poses, note_quiet, is_tired
+  public :: sleep_t, sleep_init, update_stillness, update_loads, store_poses, store_quiet, is_tired
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
@@ -50,7 +50,7 @@ contains
   end subroutine sleep_init
 
   !> Which bodies do not move: sleepers, and fixed ones without a given velocity.
-  pure subroutine know_stillness(blocks)
+  pure subroutine update_stillness(blocks)
     type(blocks_t), intent(inout) :: blocks
     integer :: b
 
@@ -58,7 +58,7 @@ contains
       blocks%still(b) = blocks%asleep(b) .or. (blocks%fixed(b) .and. &
         all(abs(blocks%given%v(:, b)) <= 0.0_wp) .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp))
     end do
-  end subroutine know_stillness
+  end subroutine update_stillness
 
   !> Whether no body moves.
   pure function all_still(blocks) result(yes)
@@ -69,7 +69,7 @@ contains
   end function all_still
 
   !> Force and torque on each body of the touches at rest.
-  pure subroutine know_loads(sleep)
+  pure subroutine update_loads(sleep)
     type(sleep_t), intent(inout) :: sleep
     integer :: i, a, b
 
@@ -84,23 +84,23 @@ contains
       sleep%load(:, b) = sleep%load(:, b) - sleep%rest%force(:, i)
       sleep%load_torque(:, b) = sleep%load_torque(:, b) + sleep%rest%torque_b(:, i)
     end do
-  end subroutine know_loads
+  end subroutine update_loads
 
   !> Note where the blocks are when a fluid step begins.
-  pure subroutine note_poses(blocks, sleep)
+  pure subroutine store_poses(blocks, sleep)
     type(blocks_t), intent(in) :: blocks
     type(sleep_t), intent(inout) :: sleep
 
     sleep%x = blocks%x
     sleep%q = blocks%q
-  end subroutine note_poses
+  end subroutine store_poses
 
   !> Count the time for which each block has been slow, by a fluid step.
   !!
   !! What counts is how far it has come in the step. The velocity at the end of a step has the
   !! change of the fluid force in it, to which contact answers only in the next one: under waves a
   !! block that its supports hold has 50 times the velocity with which it moves.
-  pure subroutine note_quiet(gravity, dt, blocks, sleep)
+  pure subroutine store_quiet(gravity, dt, blocks, sleep)
     real(wp), intent(in) :: gravity(3), dt     !! [m/s2], the fluid step [s]
     type(blocks_t), intent(in) :: blocks
     type(sleep_t), intent(inout) :: sleep
@@ -117,7 +117,7 @@ contains
         sleep%quiet(b) = 0.0_wp
       end if
     end do
-  end subroutine note_quiet
+  end subroutine store_quiet
 
   !> Whether a block has been slow for long: several times that of a fall by its size.
   pure function is_tired(gravity, b, blocks, sleep) result(yes)

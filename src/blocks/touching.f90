@@ -11,7 +11,7 @@ module touching_m
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
-  use contact_partners_m, only: partners_t, partners_init, know_motion, know_inertia
+  use contact_partners_m, only: partners_t, partners_init, update_motion, update_inertia
   use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
     bound_by_sums
   implicit none
@@ -82,9 +82,9 @@ contains
     self%frequency2 = 0.0_wp
     self%sum_frequency2 = 0.0_wp
     self%damping = 0.0_wp
-    call know_motion(blocks, self%partners)
+    call update_motion(blocks, self%partners)
     if (self%touches%n + self%soon%n == 0) return
-    call know_inertia(blocks, self%partners)
+    call update_inertia(blocks, self%partners)
     call respond(self%touches, self%law, self%partners, self%response)
     if (self%soon%n > 0) then
       call respond(self%soon, self%law, self%partners, self%response_soon)

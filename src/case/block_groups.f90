@@ -14,7 +14,7 @@ module block_groups_m
   private
   public :: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
 
-  integer, parameter :: most_drops = 100000, finest_shape = 8
+  integer, parameter :: max_drops = 100000, finest_shape = 8
 
 contains
 
@@ -195,7 +195,7 @@ contains
     call visit_shape_name(v, drop%shape, shapes)
     call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
       example='0.15, 0.05, 0.16', required=.true.)
-    call v%integer('count', drop%count, between(1, most_drops), 'how many blocks', example='6')
+    call v%integer('count', drop%count, between(1, max_drops), 'how many blocks', example='6')
     call v%real('first_time', drop%first_time, not_negative('s'), 'when the first is let go', &
       example='0.5')
     call v%real('interval', drop%interval, not_negative('s'), 'time from one to the next', &

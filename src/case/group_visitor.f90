@@ -19,13 +19,13 @@ module group_visitor_m
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
-    edit_distance, quoted_text, printable, tame, value_ok, value_not_finite, value_too_large, &
+    edit_distance, quoted_text, printable, sanitise, value_ok, value_not_finite, value_too_large, &
     value_not_whole, looks_like_name
   implicit none
   private
   public :: group_visitor_t
 
-  integer, parameter :: most_variables = 64   !! of one group
+  integer, parameter :: max_variables = 64   !! of one group
   integer, parameter :: slip_of_pen = 2       !! letters by which a misspelt name may differ
 
   type :: group_visitor_t
@@ -36,7 +36,7 @@ module group_visitor_m
     type(problems_t) :: passed_over        !! and what it passes over, for warnings
     type(group_text_t) :: group            !! the group being read
     integer, private :: n_known = 0
-    character(name_length), private :: known(most_variables) = ''
+    character(name_length), private :: known(max_variables) = ''
     character(:), allocatable, private :: left_out   !! not written: they have no meaning
     character(:), allocatable, private :: unsure   !! required and missing, or misspelt, it seems
   contains
@@ -81,7 +81,7 @@ contains
     self%describing = .true.
     self%unsure = ' '
     self%told = group_description_t(name=group)
-    allocate (self%told%variable(most_variables))
+    allocate (self%told%variable(max_variables))
   end subroutine start_describing
 
   !> What the group is about, in a line.
@@ -376,7 +376,7 @@ contains
     call self%read_text(i, ok)
     if (.not. ok) return
     text = self%group%assignment(i)%value(1)%text
-    if (tame(text) /= text) call self%fault(i, 'must hold no control characters')
+    if (sanitise(text) /= text) call self%fault(i, 'must hold no control characters')
   end subroutine text_value
 
   !> The name of something the user made up: letters, digits and `_ - .`, at most `name_length`.

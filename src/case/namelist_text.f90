@@ -52,8 +52,8 @@ module namelist_text_m
     type(group_text_t), allocatable :: group(:)
   end type namelist_text_t
 
-  integer, parameter :: most_values = 1000     !! values of one variable
-  integer, parameter :: most_variables = 1000  !! assignments in one group
+  integer, parameter :: max_values = 1000     !! values of one variable
+  integer, parameter :: max_variables = 1000  !! assignments in one group
 
 contains
 
@@ -205,8 +205,8 @@ contains
     new%name = printable(lower_case(take_run(cursor, name_characters)))
     allocate (new%value(4))
     same = group%find(new%name)
-    if (group%n == most_variables .and. .not. group%faulty) then
-      call problems%add_message('&'//group%name//': more than '//to_text(most_variables) &
+    if (group%n == max_variables .and. .not. group%faulty) then
+      call problems%add_message('&'//group%name//': more than '//to_text(max_variables) &
                                 //' variables in one group', new%line)
       group%faulty = .true.
     end if
@@ -281,10 +281,10 @@ contains
 
     count = 0
     call parse_integer(cursor%text(cursor%at:cursor%at + digits - 1), count, info)
-    if (info /= value_ok .or. count < 1 .or. count > most_values) then
+    if (info /= value_ok .or. count < 1 .or. count > max_values) then
       call report(cursor, group, 'repeat count ' &
                   //printable(cursor%text(cursor%at:cursor%at + digits - 1)) &
-                  //' must be 1 to '//to_text(most_values), problems)
+                  //' must be 1 to '//to_text(max_values), problems)
       count = 1
     end if
     cursor%at = cursor%at + digits + 1
@@ -365,8 +365,8 @@ contains
     integer :: i
 
     associate (last => group%assignment(group%n))
-      if (last%n + count > most_values) then
-        call report(cursor, group, 'more than '//to_text(most_values)//' values', problems)
+      if (last%n + count > max_values) then
+        call report(cursor, group, 'more than '//to_text(max_values)//' values', problems)
         return
       end if
       if (last%n + count > size(last%value)) then
@@ -436,7 +436,7 @@ contains
     type(assignment_t), intent(in) :: new
     type(assignment_t), allocatable :: longer(:)
 
-    if (group%n == most_variables) then   ! told once; what follows is read over, in the last place
+    if (group%n == max_variables) then   ! told once; what follows is read over, in the last place
       group%assignment(group%n) = new
       group%assignment(group%n)%faulty = .true.
       return

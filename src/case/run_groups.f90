@@ -11,8 +11,8 @@ module run_groups_m
   private
   public :: visit_run, visit_grid, visit_boundary, side_name, shortest
 
-  real(wp), parameter :: most_cells = real(huge(0), wp)   !! cells are counted in default integers
-  real(wp), parameter :: most_steps = 1.0e9_wp
+  real(wp), parameter :: max_cells = real(huge(0), wp)   !! cells are counted in default integers
+  real(wp), parameter :: max_steps = 1.0e9_wp
   real(wp), parameter :: farthest_origin = 1.0e8_wp       !! in cells; beyond, digits are lost
 
   !> Volumes and inertias of lengths from this to its inverse stay in the number range [m].
@@ -61,8 +61,8 @@ contains
       example='stop_when_settled = .true.  rest_time = 1')
 
     if (is_given(run%t_end) .and. v%good('dt')) then
-      call v%require('t_end', run%t_end <= most_steps*run%dt, 'must be at most ' &
-                     //to_text(most_steps)//' steps of dt = '//to_text(run%dt)//' s')
+      call v%require('t_end', run%t_end <= max_steps*run%dt, 'must be at most ' &
+                     //to_text(max_steps)//' steps of dt = '//to_text(run%dt)//' s')
     end if
     call v%require('output', len_trim(run%output) > 0, 'must name a folder')
   end subroutine visit_run
@@ -81,7 +81,7 @@ contains
       'the corner of the tank with the lowest x, y and z', example='-0.15, 0, 0')
 
     if (.not. (v%given('cells') .and. v%given('length') .and. v%good('cells'))) return
-    call v%require('cells', product(real(grid%cells, wp)) <= most_cells, &
+    call v%require('cells', product(real(grid%cells, wp)) <= max_cells, &
                    'too many cells, at most '//to_text(huge(0))//' in all')
     if (.not. (v%good('cells') .and. v%good('length'))) return
     call v%require('origin', &

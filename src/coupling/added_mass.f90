@@ -9,7 +9,7 @@ module added_mass_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: know_added_mass
+  public :: update_added_mass
 
 contains
 
@@ -18,7 +18,7 @@ contains
   !!
   !! Bodies that rest on others push with no more than a few times their weight; there the fluid has
   !! no part. Too large a mass would swing from step to step, hence the limit.
-  subroutine know_added_mass(grid, fluid, solid, bodies, c, blocks, n_clipped)
+  subroutine update_added_mass(grid, fluid, solid, bodies, c, blocks, n_clipped)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid
@@ -48,6 +48,6 @@ contains
       blocks%added_mass(b) = min(coefficient*displaced(b)%mass, largest*blocks%mass(b))
       if (coefficient*displaced(b)%mass > largest*blocks%mass(b)) n_clipped = n_clipped + 1
     end do
-  end subroutine know_added_mass
+  end subroutine update_added_mass
 
 end module added_mass_m

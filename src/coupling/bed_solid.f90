@@ -16,7 +16,7 @@ module bed_solid_m
   private
   public :: make_bed_solid
 
-  real(wp), parameter :: least_tet = 1.0e-15_wp   !! smaller parts are dropped [cells]
+  real(wp), parameter :: min_tet = 1.0e-15_wp   !! smaller parts are dropped [cells]
 
   !> Polygons of the surface, one after the other, and tetrahedra, four corners each; those of
   !! facets that look down have negative volumes.
@@ -52,7 +52,7 @@ contains
       call add_facet(p(:, :n), parts)
       call add_floor(p(:, :n), low(3), parts)
       call add_walls(p(:, :n), low, high, parts)
-      call add_prism(p(:, :n), low(3), least_tet*grid%volume, parts)
+      call add_prism(p(:, :n), low(3), min_tet*grid%volume, parts)
     end do
     call make_shape_of(parts, centre, solid)
   end subroutine make_bed_solid

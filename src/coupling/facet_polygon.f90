@@ -1,13 +1,13 @@
 !> Flat polygons cut along grid planes, and where lines pass cells. Lengths are in cells.
 module facet_polygon_m
   use kinds_m, only: wp
-  use tet_mesh_m, only: most_facet_corners
+  use tet_mesh_m, only: max_facet_corners
   implicit none
   private
   public :: polygon_t, clip_to_cells, cut_by_plane
   public :: cells_between, centres_between, value_on_line, point_at
 
-  integer, parameter :: max_polygon = most_facet_corners + 12   !! corners of a facet cut to a cell
+  integer, parameter :: max_polygon = max_facet_corners + 12   !! corners of a facet cut to a cell
 
   !> Flat polygon.
   type :: polygon_t

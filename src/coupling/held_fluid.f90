@@ -17,7 +17,7 @@ module held_fluid_m
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, openings
   use rigid_flux_m, only: closed_side
-  use wall_edges_m, only: least_normal, round_edge
+  use wall_edges_m, only: min_normal, round_edge
   implicit none
   private
   public :: hold_fluid, more_inertia
@@ -75,7 +75,7 @@ contains
 
     more = 0.0_wp
     normal = w(:, 2) - w(:, 1)
-    if (maxval(abs(normal)) < least_normal) return
+    if (maxval(abs(normal)) < min_normal) return
     r = 1.0_wp + max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
     depth = 1.0_wp - alpha/max(abs(normal), least)
     more = min(r**power - 1.0_wp, normal**2/(1.5_wp*max(depth, thinnest)))

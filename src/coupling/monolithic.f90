@@ -23,7 +23,7 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use face_memory_m, only: note_deviation
+  use face_memory_m, only: store_deviation
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
                          add_second_half, add_whole
   use buoyancy_m, only: displaced_force, mass_defect
@@ -31,8 +31,8 @@ module monolithic_m
   use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
-                            note_velocity, force_of_walls, force_of_half_kick
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
+                            store_velocity, force_of_walls, force_of_half_kick
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
   use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
@@ -45,7 +45,7 @@ module monolithic_m
   public :: monolithic_t, monolithic_init
 
   type, extends(coupling_t) :: monolithic_t
-    real(wp), allocatable :: dry_motion(:, :)      !! (6, n) by weight and contact only
+    real(wp), allocatable :: unforced_motion(:, :)      !! (6, n) by weight and contact only
     type(rigid_motion_t) :: predicted               !! the motion at the end, by `extrapolated`
     real(wp), allocatable :: extrapolated(:, :)
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
@@ -96,8 +96,8 @@ contains
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%defect(6, 3, n), source=0.0_wp)
-    allocate (self%dry_motion, self%from_half_kick, self%lagged, self%counted, self%extrapolated, &
-              source=self%total)
+    allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
+              self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine monolithic_init
 
@@ -125,7 +125,7 @@ contains
     else
       call take(scratch, self%deviation)
       call take(scratch, self%half_kick%given)
-      call note_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
+      call store_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
       call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, &
                           self%extrapolated, dt, flow, self%acceleration, self%half_kick)
     end if
@@ -178,13 +178,13 @@ contains
 
     associate (unused => dt, unused_too => scratch)
     end associate
-    self%dry_motion = self%bodies%motion
+    self%unforced_motion = self%bodies%motion
     call find_merged_cells(grid, solid, self%merged)
     call begin_balance(case%fluid, self%merged, flow, self%balance)
     call find_inertia(grid, self%merged, self%balance%mass, flow, self%rho)
     call match_densities(grid, self%rho, self%merged)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
-    call note_velocity(grid, self%merged, flow%u, self%balance%before)
+    call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
                         flow%u, self%balance%to_wall)
     call find_wall_speeds(grid, solid, self%at_start, flow%u, self%wall_speed)
@@ -204,7 +204,7 @@ contains
     real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
     type(flow_t), intent(in) :: flow
     real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), parameter :: least_room = 1.0e-3_wp   !! of a cell with a density of its own
+    real(wp), parameter :: min_room = 1.0e-3_wp   !! of a cell with a density of its own
     integer :: k, m
 
     !$omp parallel do schedule(static)
@@ -214,7 +214,7 @@ contains
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
         associate (room => flow%room(c(1), c(2), c(3)))
-          if (room > least_room*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/room
+          if (room > min_room*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/room
         end associate
       end associate
     end do
@@ -268,10 +268,10 @@ contains
     associate (a => self%acceleration, balance => self%balance)
       call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
       call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
-      call note_change(grid, self%merged, dt, a%cell, balance%pushed)
+      call store_change(grid, self%merged, dt, a%cell, balance%pushed)
       call halo_exchange(a%cell, n_halo)
       call share_acceleration(grid, solid%open, self%rho, self%merged, a%cell)
-      call note_change(grid, self%merged, dt, a%cell, balance%gained)
+      call store_change(grid, self%merged, dt, a%cell, balance%gained)
     end associate
   end subroutine accelerations_of_groups
 
@@ -310,7 +310,7 @@ contains
     associate (bodies => self%bodies, viscous => self%viscous, merged => self%merged, &
                balance => self%balance)
       call fill_velocity_halo(grid, flow%u)
-      call note_velocity(grid, merged, flow%u, balance%before)
+      call store_velocity(grid, merged, flow%u, balance%before)
       if (.not. self%implicit_momentum) then   ! that carries the mean in the same solve
         call find_centres(grid, solid, self%at_start, flow%u, merged)
         call to_centres(grid, merged, self%at_start, flow%u)
@@ -322,7 +322,7 @@ contains
       call fill_velocity_halo(grid, flow%u, layers=1)
       call follow_masters(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
-      bodies%motion = self%dry_motion
+      bodies%motion = self%unforced_motion
       call push_bodies(dt, self%from_pressure + self%from_level + viscous%force, bodies)
       call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
     end associate
@@ -471,7 +471,7 @@ contains
       do b = 1, bodies%n
         if (.not. bodies%free(b)) cycle
         self%total(:, b) = self%total(:, b) + &
-          matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%dry_motion(:, b))/dt
+          matmul(bodies%defect(:, :, b), bodies%motion(:, b) - self%unforced_motion(:, b))/dt
       end do
     end associate
   end subroutine sum_forces

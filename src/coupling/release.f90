@@ -83,13 +83,13 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer, intent(inout) :: due(:)
     logical, intent(inout) :: free(:)   !! (due) there is room beside the blocks that are there
-    integer, parameter :: most_compared = 100   ! of each block, with those next to it in the list
+    integer, parameter :: max_compared = 100   ! of each block, with those next to it in the list
     integer :: conflicts(size(due)), i, j, place
 
     conflicts = 0
     do i = 1, size(due)
       if (.not. free(i)) cycle
-      do j = max(1, i - most_compared), i - 1
+      do j = max(1, i - max_compared), i - 1
         if (.not. (free(j) .and. same_moment(due(i), due(j)))) cycle
         if (.not. exclude(walls, blocks, due(i), due(j), overlap)) cycle
         conflicts([i, j]) = conflicts([i, j]) + 1

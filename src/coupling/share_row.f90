@@ -12,7 +12,7 @@ module share_row_m
   public :: share_row_t, ensure_row, sum_row, close_columns, close_full_cells, list_row
   public :: hits_along_y
 
-  real(wp), parameter :: least_share = 1.0e-13_wp     !! smaller shares are dropped
+  real(wp), parameter :: min_share = 1.0e-13_wp     !! smaller shares are dropped
 
   !> The corners and facets of the body, and the sums over one row, for one thread.
   type :: share_row_t
@@ -310,11 +310,11 @@ contains
 
     do k = self%low(3), self%high(3)
       do i = self%low(1), self%high(1)
-        if (work%volume(1, i, k) > least_share) then
+        if (work%volume(1, i, k) > min_share) then
           call add_cell([i, j, k], work%volume(1:4, i, k), work%crossings(i, k) > 0, self)
         end if
         do d = 1, 3
-          if (work%area(1, i, k, d) > least_share) then
+          if (work%area(1, i, k, d) > min_share) then
             call add_face([i, j, k, d], work%area(1:3, i, k, d), self)
           end if
         end do

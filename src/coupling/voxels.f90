@@ -10,7 +10,7 @@ module voxels_m
   public :: voxels_t, voxels_init, find_images, ensure_lists, place_bodies
   public :: voxelise_cells, voxelise_faces, voxelise_legs, shorten_leg
 
-  real(wp), parameter :: least_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
+  real(wp), parameter :: min_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
   real(wp), parameter :: no_hit = 2.0_wp            !! longer than any leg
 
   !> What is painted where.
@@ -295,8 +295,8 @@ contains
         solid%leg(:, m) = f
         solid%leg_length(:, m) = no_hit
       end if
-      where (max([at, 1.0_wp - at], least_leg) < solid%leg_length(:, m))
-        solid%leg_length(:, m) = max([at, 1.0_wp - at], least_leg)
+      where (max([at, 1.0_wp - at], min_leg) < solid%leg_length(:, m))
+        solid%leg_length(:, m) = max([at, 1.0_wp - at], min_leg)
         solid%leg_body(:, m) = b
       end where
     end associate

@@ -26,7 +26,7 @@ module wall_balance_m
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   implicit none
   private
-  public :: wall_balance_t, wall_balance_init, begin_balance, note_change, note_velocity
+  public :: wall_balance_t, wall_balance_init, begin_balance, store_change, store_velocity
   public :: force_of_walls, force_of_half_kick
 
   integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
@@ -76,7 +76,7 @@ contains
   end subroutine begin_balance
 
   !> Add dt a of each wall cell to a change of velocity.
-  subroutine note_change(grid, merged, dt, a, change)
+  subroutine store_change(grid, merged, dt, a, change)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
     real(wp), intent(in) :: dt   !! [s]
@@ -91,10 +91,10 @@ contains
         change(:, m) = change(:, m) + dt*a(c(1), c(2), c(3), :)
       end associate
     end do
-  end subroutine note_change
+  end subroutine store_change
 
   !> Velocity of each wall cell.
-  subroutine note_velocity(grid, merged, u, velocity)
+  subroutine store_velocity(grid, merged, u, velocity)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -108,7 +108,7 @@ contains
         velocity(:, m) = u(c(1), c(2), c(3), :)
       end associate
     end do
-  end subroutine note_velocity
+  end subroutine store_velocity
 
   !> Force and torque on each body of what faces and masses disagree about [N, N m].
   subroutine force_of_walls(grid, solid, merged, bodies, at_start, dt, rho, self, force)

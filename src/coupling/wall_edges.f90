@@ -11,11 +11,11 @@ module wall_edges_m
   use plic_m, only: unit_constant, unit_volume
   implicit none
   private
-  public :: find_edges, openings_of_plane, least_normal, round_edge
+  public :: find_edges, openings_of_plane, min_normal, round_edge
 
   real(wp), parameter :: round_edge = 0.1_wp, sharp_edge = 0.2_wp
     !! excess of openings up to which a wall counts as plane, and from which it has an edge [faces]
-  real(wp), parameter :: least_normal = 1.0e-6_wp   !! of a normal or its parts that count
+  real(wp), parameter :: min_normal = 1.0e-6_wp   !! of a normal or its parts that count
 
 contains
 
@@ -37,7 +37,7 @@ contains
         plane = 2.0_wp
         if (any(c >= grid%last)) cycle
         w = openings(grid, solid%open, c)
-        if (maxval(abs(w(:, 2) - w(:, 1))) < least_normal) cycle
+        if (maxval(abs(w(:, 2) - w(:, 1))) < min_normal) cycle
         plane = openings_of_plane(w(:, 2) - w(:, 1), solid%alpha(c(1), c(2), c(3)))
         if (solid%inside(c(1), c(2), c(3)) == 0) cycle
         excess = maxval(sum(w, 2) - plane)
@@ -61,7 +61,7 @@ contains
     do d = 1, 3
       across = n
       across(d) = 0.0_wp
-      if (sum(abs(across)) < least_normal) cycle
+      if (sum(abs(across)) < min_normal) cycle
       both(d) = 2.0_wp - unit_volume(across, at) - unit_volume(across, at - n(d))
     end do
   end function openings_of_plane

@@ -15,13 +15,13 @@ module face_memory_m
   use mixture_m, only: face_mean
   implicit none
   private
-  public :: note_deviation
+  public :: store_deviation
 
 contains
 
   !> theta (u_f - mean of u) at the lower faces lo..hi+1 at the start of a step [m/s]; zero in one
   !! fluid, at the sides and beside bodies.
-  subroutine note_deviation(grid, alpha, rho, u, uf, deviation)
+  subroutine store_deviation(grid, alpha, rho, u, uf, deviation)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
       alpha, rho
@@ -59,6 +59,6 @@ contains
         end do
       end do
     end do
-  end subroutine note_deviation
+  end subroutine store_deviation
 
 end module face_memory_m

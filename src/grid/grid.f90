@@ -45,7 +45,7 @@ module grid_m
     procedure :: side_of_face => grid_side_of_face
     procedure :: side_faces => grid_side_faces
     procedure :: side_cells => grid_side_cells
-    procedure :: least_spacing => grid_least_spacing
+    procedure :: min_spacing => grid_least_spacing
   end type grid_t
 
 contains

@@ -14,7 +14,7 @@ module cut_cell_m
   public :: cut_cell_t, cut_cell_init, load_cut_cell
   public :: open_below, open_constant, open_slab_below, tet_share_below
 
-  real(wp), parameter :: least_piece = 1.0e-20_wp   !! of pieces that count [share]
+  real(wp), parameter :: min_piece = 1.0e-20_wp   !! of pieces that count [share]
   real(wp), parameter :: round_off = 1.0e-15_wp     !! volume below a found plane [share]
 
   type :: cut_cell_t
@@ -113,7 +113,7 @@ contains
     corner(:, 3) = q
     corner(:, 4) = r
     share = tet_volume(corner)
-    if (share < least_piece) return
+    if (share < min_piece) return
     if (self%n == size(self%share)) call grow(self)
     self%n = self%n + 1
     self%share(self%n) = sense*share

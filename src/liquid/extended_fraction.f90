@@ -23,7 +23,7 @@ module extended_fraction_m
   public :: extended_fraction_t, extended_fraction_init, extend_fraction, liquid_share, nearly_pure
 
   real(wp), parameter :: unknown = -1.0_wp           !! C^ not found yet
-  real(wp), parameter :: least_open_volume = 0.02_wp !! open share of a cell with a value of its own
+  real(wp), parameter :: min_open_volume = 0.02_wp !! open share of a cell with a value of its own
   !> Liquid that the row's value may miss [V]: more than the divergence left by the pressure solve
   !! moves in many steps (1e-8 in a step at the default tolerance), far less than shows.
   real(wp), parameter :: same_liquid = 1.0e-6_wp
@@ -320,7 +320,7 @@ contains
     integer, intent(in) :: at(3)
     logical :: yes
 
-    yes = 1.0_wp - solid%alpha(at(1), at(2), at(3)) <= least_open_volume
+    yes = 1.0_wp - solid%alpha(at(1), at(2), at(3)) <= min_open_volume
   end function nearly_solid
 
   !> Cells almost or fully solid lose their value again, to get that of the finished row.

@@ -24,7 +24,7 @@ module liquid_sweep_m
   public :: liquid_sweep_t, liquid_sweep_init, sweep_volumes
 
   real(wp), parameter :: immobile = 1.0e-14_wp      !! share of liquid or gas that does not move
-  real(wp), parameter :: least_open = 1.0e-6_wp     !! open share of a cut cell that has a plane
+  real(wp), parameter :: min_open = 1.0e-6_wp     !! open share of a cut cell that has a plane
 
   type :: liquid_sweep_t
     type(vertical_t) :: vertical
@@ -220,7 +220,7 @@ contains
     real(wp) :: a, limit, part, axis(3)
 
     liquid = out*share
-    if (cut%open < least_open) return
+    if (cut%open < min_open) return
     axis = real(unit_step(:, d), wp)
     call open_constant(cut, m, share*cut%open, a)
     if (out(1) > 0.0_wp) then

@@ -31,7 +31,7 @@ module open_flux_m
   private
   public :: open_flux_t, open_flux_init, find_open_flux
 
-  real(wp), parameter :: least_open = 1.0e-9_wp   !! mean open share below which a face is closed
+  real(wp), parameter :: min_open = 1.0e-9_wp   !! mean open share below which a face is closed
 
   real(wp), parameter :: excess_max = 5.0e-7_wp
     !! of fluid that a part of the band may keep, over the cells beside it [open volumes]
@@ -191,7 +191,7 @@ contains
         do j = a(2), b(2)
           do i = a(1), b(1)
             q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
-              0.5_wp*(old%open(i, j, k, d) + new_open(i, j, k, d)) >= least_open)
+              0.5_wp*(old%open(i, j, k, d) + new_open(i, j, k, d)) >= min_open)
           end do
         end do
       end do
@@ -236,7 +236,7 @@ contains
         do j = a(2), b(2)
           do i = a(1), b(1)
             w = 0.5_wp*(old_open(i, j, k, d) + new_open(i, j, k, d))
-            band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, w >= least_open .and. &
+            band%k(i, j, k, d) = merge(w*size_of_face, 0.0_wp, w >= min_open .and. &
               band%marked(i, j, k) + band%marked(i - e(1), j - e(2), k - e(3)) == cells)
           end do
         end do

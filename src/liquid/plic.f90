@@ -15,7 +15,7 @@ module plic_m
   private
   public :: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
 
-  real(wp), parameter :: least_component = 1.0e-13_wp   !! of a normal, relative; below it is zero
+  real(wp), parameter :: min_component = 1.0e-13_wp   !! of a normal, relative; below it is zero
 
 contains
 
@@ -223,7 +223,7 @@ contains
       end if
     end do
     m = flatter(m, best, youngs(c))
-    where (abs(m) < least_component) m = 0.0_wp
+    where (abs(m) < min_component) m = 0.0_wp
     if (any(abs(m) > 0.0_wp)) m = m/sum(abs(m))
   end function unit_normal
 

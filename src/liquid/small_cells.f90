@@ -18,8 +18,8 @@ module small_cells_m
   public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells
   public :: renew_shares, late_values, move_late
 
-  real(wp), parameter :: most_outflow = 0.98_wp     !! share of its volume a cell may give
-  real(wp), parameter :: least_volume = 1.0e-6_wp   !! of a cell that is not small [V]
+  real(wp), parameter :: max_outflow = 0.98_wp     !! share of its volume a cell may give
+  real(wp), parameter :: min_volume = 1.0e-6_wp   !! of a cell that is not small [V]
   integer, parameter :: max_late_iterations = 10000
   real(wp), parameter :: late_tolerance = 1.0e-14_wp
     !! change of a pass, of the largest value; on closed rings rounding alone makes some 1e-15
@@ -92,8 +92,8 @@ contains
                     + max(volumes%q(i, j + 1, k, 2), 0.0_wp) + max(-volumes%q(i, j, k, 2), 0.0_wp) &
                     + max(volumes%q(i, j, k + 1, 3), 0.0_wp) + max(-volumes%q(i, j, k, 3), 0.0_wp)
           open = min(volumes%v(i, j, k), grid%volume*(1.0_wp - old%alpha(i, j, k)))
-          mark(i, j, k) = merge(0, 1, outflow <= most_outflow*open &
-                                      .and. open >= least_volume*grid%volume)
+          mark(i, j, k) = merge(0, 1, outflow <= max_outflow*open &
+                                      .and. open >= min_volume*grid%volume)
         end do
       end do
     end do

@@ -8,7 +8,7 @@ module surface_normal_m
   private
   public :: vertical_t, vertical_of, surface_normal, passable
 
-  real(wp), parameter :: least_open = 1.0e-6_wp   !! open share of a face that can be looked through
+  real(wp), parameter :: min_open = 1.0e-6_wp   !! open share of a face that can be looked through
 
   !> Which way is up: rows of cells with equal height lie normal to it.
   type :: vertical_t
@@ -41,7 +41,7 @@ contains
     real(wp), intent(in) :: open
     logical :: yes
 
-    yes = open > least_open
+    yes = open > min_open
   end function passable
 
   !> Normal from liquid to gas on the unit cube of a cell (see `plic_m`); up where nothing shows

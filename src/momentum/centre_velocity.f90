@@ -25,9 +25,9 @@ module centre_velocity_m
   private
   public :: find_centres, to_centres, to_means
 
-  real(wp), parameter :: least_share = 1.0e-3_wp
+  real(wp), parameter :: min_share = 1.0e-3_wp
     !! T_c of a centre on the wall: what it has of the velocity means nothing, its leg holds it
-  real(wp), parameter :: most_slip = 0.5_wp
+  real(wp), parameter :: max_slip = 0.5_wp
     !! s of a layer as thick as the middle of the fluid is far from the wall
 
 contains
@@ -48,8 +48,8 @@ contains
       merged%centre(m) = 1.0_wp
       if (merged%middle(m) <= 0.0_wp) cycle
       associate (r => merged%ratio(m))
-        slip = slip_at(min(most_slip, slip_beside(m, merged%normal(:, m), merged%middle(m))), r)
-        merged%centre(m) = max(r + (1.0_wp - r)*slip, least_share)
+        slip = slip_at(min(max_slip, slip_beside(m, merged%normal(:, m), merged%middle(m))), r)
+        merged%centre(m) = max(r + (1.0_wp - r)*slip, min_share)
       end associate
     end do
   contains

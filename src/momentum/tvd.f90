@@ -146,8 +146,8 @@ contains
     d_m1 = q_0 - q_m1
     d_p1 = q_1 - q_0
     d_p3 = q_2 - q_1
-    middle = 0.5_wp*(d_p1 - least_curvature(d_p1 - d_m1, d_p3 - d_p1))
-    large = 0.5_wp*d_m1 + 4.0_wp/3.0_wp*least_curvature(d_m1 - d_m3, d_p1 - d_m1)
+    middle = 0.5_wp*(d_p1 - min_curvature(d_p1 - d_m1, d_p3 - d_p1))
+    large = 0.5_wp*d_m1 + 4.0_wp/3.0_wp*min_curvature(d_m1 - d_m3, d_p1 - d_m1)
     low = max(min(0.0_wp, d_p1, middle), min(0.0_wp, steepest*d_m1, large))
     high = min(max(0.0_wp, d_p1, middle), max(0.0_wp, steepest*d_m1, large))
     q = (24.0_wp*d_p1 + 11.0_wp*d_m1 - 2.0_wp*d_m3 - 3.0_wp*d_p3)/60.0_wp
@@ -156,13 +156,13 @@ contains
 
   !> Second difference at a face, from those of the cells beside it: the smallest of a, b, 4a - b
   !! and 4b - a, zero if their signs differ.
-  elemental function least_curvature(a, b) result(c)
+  elemental function min_curvature(a, b) result(c)
     real(wp), intent(in) :: a, b
     real(wp) :: c
 
     c = max(0.0_wp, min(a, b, 4.0_wp*a - b, 4.0_wp*b - a)) &
         + min(0.0_wp, max(a, b, 4.0_wp*a - b, 4.0_wp*b - a))
-  end function least_curvature
+  end function min_curvature
 
   !> Limited third difference about the middle face, from three neighbouring differences.
   elemental function third_difference(a, b, c) result(t)

@@ -22,7 +22,7 @@ module viscous_m
   public :: apply_viscous, force_of_legs, velocity_scale, inertial_momentum   ! for C-ISMAC
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
-  real(wp), parameter :: most_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
+  real(wp), parameter :: max_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
   real(wp), parameter :: smallest_rate = 1.0e-3_wp  !! at which a sweep is taken to converge
   integer, parameter :: max_iterations = 500        !! sweeps included
   integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
@@ -113,7 +113,7 @@ contains
     if (s >= 1.0_wp) return
     if (any(grid%periodic .and. grid%n > 1 .and. modulo(grid%n, 2) == 1) .and. s**2 > 0.5_wp) return
     rate = max((s/(1.0_wp + sqrt(1.0_wp - s**2)))**2, smallest_rate)
-    if (log(tolerance)/log(rate) > most_sweeps) return
+    if (log(tolerance)/log(rate) > max_sweeps) return
     sweeps_allowed = 2*ceiling(log(tolerance)/log(rate)) + 3
   end function sweeps_allowed
 

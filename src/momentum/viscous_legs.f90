@@ -24,7 +24,7 @@ module viscous_legs_m
   public :: build_viscous
 
   integer, parameter :: worth_threads = 1000        !! fewer wall legs are the work of one thread
-  real(wp), parameter :: least_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
+  real(wp), parameter :: min_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
 
 contains
 
@@ -106,7 +106,7 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           self%mass(i, j, k) = &
-            merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), least_mass)*grid%volume/dt, &
+            merge(rho(i, j, k)*max(1.0_wp - solid%alpha(i, j, k), min_mass)*grid%volume/dt, &
                   0.0_wp, solid%inside(i, j, k) == 0)
         end do
       end do

@@ -17,10 +17,10 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp) :: n(3)
-    real(wp), parameter :: least_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
+    real(wp), parameter :: min_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
 
     n = wall_area(grid, solid, c)
-    if (norm2(n) > least_wall*minval(grid%area)) then
+    if (norm2(n) > min_wall*minval(grid%area)) then
       n = n/norm2(n)
     else
       n = 0.0_wp

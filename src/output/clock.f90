@@ -24,7 +24,7 @@ module clock_m
     real(wp) :: t_next = 0.0_wp     !! where the present step ends [s]
     type(run_t) :: run              !! intervals and the rule for settling
   contains
-    procedure :: choose_step, advance, finished, settled, note_speed
+    procedure :: choose_step, advance, finished, settled, store_speed
     procedure :: row_due, frame_due, restart_due, row_done, frame_done, restart_done
   end type clock_t
 
@@ -113,7 +113,7 @@ contains
   end function settled
 
   !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
-  pure subroutine note_speed(self, speed, all_there)
+  pure subroutine store_speed(self, speed, all_there)
     class(clock_t), intent(inout) :: self
     real(wp), intent(in) :: speed       !! largest of all points of free blocks [m/s]
     logical, intent(in) :: all_there
@@ -124,7 +124,7 @@ contains
     else if (self%rest_began < 0.0_wp) then
       self%rest_began = self%t
     end if
-  end subroutine note_speed
+  end subroutine store_speed
 
   !> Is a row due now?
   pure function row_due(self) result(yes)

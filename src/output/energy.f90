@@ -17,7 +17,7 @@ module energy_m
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: energy_t, energy_parts_t, energy_init, begin_energy, note_energy, note_release, &
+  public :: energy_t, energy_parts_t, energy_init, begin_energy, store_energy, store_release, &
             energy_excess
 
   !> What is not known of an energy: that of the surface in a cell so high, and of the fall of the
@@ -101,16 +101,16 @@ contains
   end subroutine begin_energy
 
   !> A release has changed the energy since the last step: velocity given, liquid lifted.
-  subroutine note_release(parts, self)
+  subroutine store_release(parts, self)
     type(energy_parts_t), intent(in) :: parts   !! after it
     type(energy_t), intent(inout) :: self
 
     self%put_in = self%put_in + sum_of(parts) - sum_of(self%parts)
     self%parts = parts
-  end subroutine note_release
+  end subroutine store_release
 
   !> After a step.
-  subroutine note_energy(parts, self)
+  subroutine store_energy(parts, self)
     type(energy_parts_t), intent(in) :: parts
     type(energy_t), intent(inout) :: self
 
@@ -118,7 +118,7 @@ contains
                   - self%put_in
     self%set_free = max(self%set_free, self%put_in - parts%potential)
     self%parts = parts
-  end subroutine note_energy
+  end subroutine store_energy
 
   pure real(wp) function sum_of(parts)
     type(energy_parts_t), intent(in) :: parts

@@ -23,7 +23,7 @@ module output_m
   use write_vtkhdf_m, only: block_file_t, create_block_file, reopen_block_file, &
     continue_block_file, write_block_frame
   use restart_m, only: write_restart
-  use progress_m, only: progress_t, progress_start, line_due, note_clips, write_line, &
+  use progress_m, only: progress_t, progress_start, line_due, store_clips, write_line, &
     write_summary
   implicit none
   private
@@ -250,7 +250,7 @@ contains
     if (output%code /= exit_ok) return
     call tic(output%phase)
     output%progress%warnings = output%progress%warnings + report%warnings
-    call note_clips(state%clock%t, report%inertia_clips, output%progress)
+    call store_clips(state%clock%t, report%inertia_clips, output%progress)
     row_wanted = state%clock%row_due() .and. output%row_step /= state%clock%step
     frame_wanted = state%clock%frame_due() .and. output%frame_step /= state%clock%step
     line_wanted = line_due(output%progress)

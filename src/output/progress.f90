@@ -11,7 +11,7 @@ module progress_m
   use diagnostics_m, only: row_t
   implicit none
   private
-  public :: progress_t, progress_start, line_due, note_clips, write_line, write_summary
+  public :: progress_t, progress_start, line_due, store_clips, write_line, write_summary
 
   integer, parameter :: lines_per_header = 25
   real(wp), parameter :: line_interval = 1.0_wp   !! of wall time [s]
@@ -57,7 +57,7 @@ contains
   end function line_due
 
   !> Count what the limits of added inertia cut in a step, and warn of the first that do.
-  subroutine note_clips(time, clips, self)
+  subroutine store_clips(time, clips, self)
     real(wp), intent(in) :: time    !! [s]
     integer, intent(in) :: clips    !! of the step
     type(progress_t), intent(inout) :: self
@@ -72,7 +72,7 @@ contains
       end if
     end if
     self%clips = self%clips + clips
-  end subroutine note_clips
+  end subroutine store_clips
 
   !> Write one line, if this step has none yet; the header first where it is time for it.
   subroutine write_line(self, clock, row, blocks)

@@ -24,7 +24,7 @@ module state_m
   character(*), parameter :: state_groups(*) = &
     [character(9) :: '/clock', '/energy', '/flow', '/blocks', '/contacts']
 
-  integer, parameter :: most_springs = 100000000
+  integer, parameter :: max_springs = 100000000
 
   type, abstract :: state_visitor_t
   contains
@@ -191,7 +191,7 @@ contains
     type(springs_t), intent(inout) :: s
 
     call visitor%whole_number(name//'n', s%n)
-    if (s%n < 0 .or. s%n > most_springs) s%n = 0   ! a damaged file: its checksum will tell
+    if (s%n < 0 .or. s%n > max_springs) s%n = 0   ! a damaged file: its checksum will tell
     call reserve_springs(max(1, s%n), s)
     call visitor%integers(name//'a', [s%n], s%a)
     call visitor%integers(name//'b', [s%n], s%b)

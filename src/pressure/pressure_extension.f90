@@ -31,7 +31,7 @@ contains
     integer, allocatable, intent(inout) :: cell(:, :)   !! work: those without open faces, grows
     real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [Pa]
-    real(wp), parameter :: least_fluid = 0.1_wp   ! share of a cell that lends its pressure
+    real(wp), parameter :: min_fluid = 0.1_wp   ! share of a cell that lends its pressure
     integer :: k, l, n, pass, n_found, round
     integer(i8) :: left(1)
     logical :: sideways
@@ -43,7 +43,7 @@ contains
     call list_marked(grid, lbound(known), known, cell, n)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
-      known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - least_fluid)
+      known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - min_fluid)
     end do
     sideways = .true.
     round = 1

@@ -25,9 +25,9 @@ module case_check_m
   private
   public :: make_shapes, check_case
 
-  integer, parameter :: most_reported = 20     !! pairs of overlapping bodies named one by one
-  integer, parameter :: most_counted = 1000    !! pairs of overlapping bodies looked for
-  real(wp), parameter :: most_samples = 1.0e7_wp   !! points on a shape that measure its overlap
+  integer, parameter :: max_reported = 20     !! pairs of overlapping bodies named one by one
+  integer, parameter :: max_counted = 1000    !! pairs of overlapping bodies looked for
+  real(wp), parameter :: max_samples = 1.0e7_wp   !! points on a shape that measure its overlap
 
   !> The bodies of a case in their starting places, and one place more to try drops in.
   type :: scene_t
@@ -60,9 +60,9 @@ contains
       call make_shape(case%shape(s), shapes(s), message)
       if (len(message) == 0) then
         samples = expected_samples(shapes(s))
-        if (samples > most_samples) message = given_size(case%shape(s))//': so slender a ' &
+        if (samples > max_samples) message = given_size(case%shape(s))//': so slender a ' &
           //'block would need '//brief(samples)//' points on its surface, at most ' &
-          //brief(most_samples)//', as of a box 400 times as long as it is thick'
+          //brief(max_samples)//', as of a box 400 times as long as it is thick'
       end if
       if (len(message) == 0) cycle
       shapes(s) = empty
@@ -324,20 +324,20 @@ contains
       call add_partners(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
       do p = 1, pairs%n
         a = pairs%b(p)
-        if (n == most_counted .or. .not. together(scene, a, b)) cycle
+        if (n == max_counted .or. .not. together(scene, a, b)) cycle
         depth = pair_depth(scene, a, b)
         if (depth <= 0.0_wp) cycle
         n = n + 1
-        if (n > most_reported) cycle
+        if (n > max_reported) cycle
         call problems%add_message('&body position = '//to_text(scene%blocks%x(:, b)) &
           //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth, 3) &
           //' m; bodies must lie apart at the start', scene%line(b))
       end do
-      if (n == most_counted) exit
+      if (n == max_counted) exit
     end do
-    if (n > most_reported) then
-      more = to_text(n - most_reported)//' more pairs of bodies overlap'
-      if (n == most_counted) more = 'at least '//more
+    if (n > max_reported) then
+      more = to_text(n - max_reported)//' more pairs of bodies overlap'
+      if (n == max_counted) more = 'at least '//more
       call problems%add_message('&body: '//more)
     end if
   end subroutine check_pairs

@@ -17,13 +17,13 @@ module case_oddities_m
   private
   public :: find_oddities
 
-  real(wp), parameter :: least_density = 10.0_wp     !! of a block [kg/m3]
+  real(wp), parameter :: min_density = 10.0_wp     !! of a block [kg/m3]
   real(wp), parameter :: largest_block = 10.0_wp     !! [m]
-  real(wp), parameter :: least_cells = 10.0_wp       !! along a block
+  real(wp), parameter :: min_cells = 10.0_wp       !! along a block
   integer, parameter :: few_tets = 50                !! of a round shape
   integer, parameter :: many_tets = 250000           !! of one shape
   real(wp), parameter :: far_above = 0.5_wp          !! over the top of the tank, over its height
-  integer, parameter :: most_bodies = 5              !! warned of one by one
+  integer, parameter :: max_bodies = 5              !! warned of one by one
 
 contains
 
@@ -182,7 +182,7 @@ contains
     end do
     n = 0
     do i = 1, size(case%body)
-      if (n < most_bodies) call look_at(as_drop(case%body(i)), '&body')
+      if (n < max_bodies) call look_at(as_drop(case%body(i)), '&body')
     end do
   contains
     subroutine look_at(drop, group)
@@ -240,17 +240,17 @@ contains
     type(shape_t), intent(in) :: shape
     type(problems_t), intent(inout) :: oddities
     character(:), allocatable :: name
-    real(wp) :: extent, cells, least_turning   ! [m], [cells], [kg/m3]
+    real(wp) :: extent, cells, min_turning   ! [m], [cells], [kg/m3]
     real(wp) :: lowest, highest                ! contact spheres over the surface [m]
 
     name = trim(input%name)
     extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
-    if (input%density < least_density) call oddities%add('&shape density', input%density, &
+    if (input%density < min_density) call oddities%add('&shape density', input%density, &
       'of '//name//' is in kg/m3; concrete has about 2300', input%line)
-    least_turning = turning_share*case%fluid%liquid_density
-    if (case%run%physics == 'coupled' .and. input%density < least_turning) then
+    min_turning = turning_share*case%fluid%liquid_density
+    if (case%run%physics == 'coupled' .and. input%density < min_turning) then
       call oddities%add('&shape density', input%density, 'of '//name//': it turns with the ' &
-        //'inertia of '//brief(least_turning, 3)//' kg/m3, for the liquid that it drags along', &
+        //'inertia of '//brief(min_turning, 3)//' kg/m3, for the liquid that it drags along', &
         input%line)
     end if
     if (extent > largest_block) then
@@ -264,8 +264,8 @@ contains
     end if
     if (case%run%physics == 'coupled') then
       cells = extent/maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
-      if (cells < least_cells) call oddities%add_message('&shape '//name//' is ' &
-        //brief(cells, 3)//' cells long; below '//to_text(nint(least_cells)) &
+      if (cells < min_cells) call oddities%add_message('&shape '//name//' is ' &
+        //brief(cells, 3)//' cells long; below '//to_text(nint(min_cells)) &
         //' the water around it is coarse: more &grid cells', input%line)
     end if
     if (case%contact%model == 'spheres') then

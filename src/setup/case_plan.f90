@@ -302,10 +302,10 @@ contains
     type(case_t), intent(in) :: case
     character(:), allocatable :: text
     real(wp) :: seconds
-    integer, parameter :: least_substeps = 100   !! a history step of a dry run
+    integer, parameter :: min_substeps = 100   !! a history step of a dry run
 
     seconds = seconds_per_block*real(size(case%body) + sum(case%drop%count), wp)
-    if (.not. wet) seconds = 0.1_wp*least_substeps*seconds
+    if (.not. wet) seconds = 0.1_wp*min_substeps*seconds
     if (wet) seconds = seconds + seconds_per_cell*product(real(case%grid%cells, wp))
     seconds = seconds*case%run%t_end/case%run%dt
     if (seconds < 100.0_wp) then
@@ -375,7 +375,7 @@ contains
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     logical, intent(in) :: wet
-    real(wp), parameter :: least_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
+    real(wp), parameter :: min_bytes = 6.0e5_wp     ! of run.h5: first blocks of all datasets
     real(wp), parameter :: series_bytes = 19*8.0_wp   ! nineteen series
     real(wp), parameter :: body_bytes = 27*8.0_wp     ! pose, motion, forces, contacts
     real(wp), parameter :: cell_bytes = 6*4.0_wp      ! liquid, solid, pressure, velocity
@@ -388,7 +388,7 @@ contains
     rows = written(case%run%history_interval)
     call heading(unit, 'Files in '//case%run%output)
     call entry(unit, 'run.h5', 'history of '//to_text(n)//' bodies, '//count_text(rows) &
-               //' rows or more, '//size_text(least_bytes &
+               //' rows or more, '//size_text(min_bytes &
                + rows*(series_bytes + body_bytes*real(n, wp))))
     if (frames > 0.0_wp .and. wet) then
       call entry(unit, 'fields.vtkhdf', count_text(frames)//' frames, at most ' &

@@ -11,7 +11,7 @@ module fall_plan_m
   private
   public :: print_falls
 
-  integer, parameter :: most_told = 20   !! groups &drop
+  integer, parameter :: max_told = 20   !! groups &drop
 
 contains
 
@@ -36,11 +36,11 @@ contains
     call heading(unit, 'Falls')
     under_water = .false.
     if (b > 0) call print_fall('&body', as_drop(case%body(b)))
-    do i = 1, min(size(case%drop), most_told)
+    do i = 1, min(size(case%drop), max_told)
       call print_fall('&drop', case%drop(i))
     end do
-    if (size(case%drop) > most_told) call entry(unit, '', 'and of ' &
-      //to_text(size(case%drop) - most_told)//' more groups &drop')
+    if (size(case%drop) > max_told) call entry(unit, '', 'and of ' &
+      //to_text(size(case%drop) - max_told)//' more groups &drop')
     if (gravity_down(case%fluid%gravity) <= 0.0_wp) return
     call entry(unit, 'in air', 'v^2 = v_0^2 + 2 g h, without drag')
     if (.not. under_water) return

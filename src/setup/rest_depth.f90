@@ -7,7 +7,7 @@ module rest_depth_m
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest, give_share
-  use law_restitution_m, only: least_restitution
+  use law_restitution_m, only: min_restitution
   implicit none
   private
   public :: look_at_rest, heaviest_mass
@@ -26,9 +26,9 @@ contains
     integer :: s
 
     if (size(case%body) + size(case%drop) == 0) return
-    if (case%contact%law == 'restitution' .and. case%contact%restitution < least_restitution) then
+    if (case%contact%law == 'restitution' .and. case%contact%restitution < min_restitution) then
       call oddities%add('&contact restitution', case%contact%restitution, 'acts as ' &
-        //brief(least_restitution)//': blocks leave their supports with that share of the speed ' &
+        //brief(min_restitution)//': blocks leave their supports with that share of the speed ' &
         //'of an impact at least')
     end if
     call choose_law(case%contact, law)

@@ -24,7 +24,7 @@ module bed_file_m
   private
   public :: bed_form_t, read_bed_file
 
-  integer, parameter :: most_points = 20000000
+  integer, parameter :: max_points = 20000000
   integer, parameter :: stl_head = 84, stl_facet = 50   !! bytes of a binary STL file
   real(real32), parameter :: farthest = 1.0e20_real32   !! coordinate, as in text files [m]
   real(wp), parameter :: coarse = 1.0e3_wp   !! steps of single precision along a form, too few [-]
@@ -97,8 +97,8 @@ contains
     end do
     if (any(n < 2)) call complain(words, 'a map of heights needs two points at least in x and y')
     if (.not. all(spacing > 0.0_wp)) call complain(words, 'the spacing must be positive')
-    if (real(n(1), wp)*real(n(2), wp) > real(most_points, wp)) then
-      call complain(words, 'more than '//to_text(most_points)//' points')
+    if (real(n(1), wp)*real(n(2), wp) > real(max_points, wp)) then
+      call complain(words, 'more than '//to_text(max_points)//' points')
     else if (n(1)*n(2) > len(words%text) - words%at + 1) then   ! a character each at least
       call complain(words, 'the file does not hold '//to_text(n(1)*n(2))//' heights')
     end if

@@ -10,7 +10,7 @@ module dense_spheres_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use vectors_m, only: cross, norm
-  use tet_mesh_m, only: shape_t, most_facet_corners
+  use tet_mesh_m, only: shape_t, max_facet_corners
   implicit none
   private
   public :: place_densely
@@ -19,7 +19,7 @@ module dense_spheres_m
   real(wp), parameter :: largest = 2.0_wp        !! radius of the largest ball [spacing]
   real(wp), parameter :: smallest = 0.1_wp       !! smaller balls are left out [spacing]
   real(wp), parameter :: alike = 0.3_wp          !! difference of balls that are one [spacing]
-  integer, parameter :: most_corners = 2*most_facet_corners
+  integer, parameter :: most_corners = 2*max_facet_corners
 
   !> The facets as loose polygons.
   type :: facets_t
@@ -156,12 +156,12 @@ contains
     type(facets_t), intent(in) :: facets
     real(wp) :: radius
     real(wp), parameter :: tolerance = 1.0e-9_wp
-    integer, parameter :: most_rounds = 60
+    integer, parameter :: max_rounds = 60
     real(wp) :: c(3), q(3), nearest(3), d, least, height
     integer :: round, f
 
     radius = limit
-    do round = 1, most_rounds
+    do round = 1, max_rounds
       c = p - radius*facets%normal(:, m)
       least = radius*(1.0_wp - tolerance)
       nearest = p

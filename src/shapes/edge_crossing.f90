@@ -28,11 +28,11 @@ module edge_crossing_m
     real(wp) :: place(3) = 0.0_wp        !! half way between the lines [m]
   end type crossing_t
 
-  real(wp), parameter :: least_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
+  real(wp), parameter :: min_sine2 = 1.0e-4_wp   !! edges nearer to parallel never cross
   real(wp), parameter :: beside = 0.15_wp   !! sine of the angle by which n may leave a fan
   real(wp), parameter :: share = 1.0_wp    !! of the depth: width in which an end fades
-  real(wp), parameter :: least_weight = 1.0e-12_wp   !! what is below is nothing
-  real(wp), parameter :: least_share = 0.01_wp   !! of the edge: the least such width
+  real(wp), parameter :: min_weight = 1.0e-12_wp   !! what is below is nothing
+  real(wp), parameter :: min_share = 0.01_wp   !! of the edge: the least such width
 
 contains
 
@@ -51,7 +51,7 @@ contains
       n(2) = u(3)*w(1) - u(1)*w(3)
       n(3) = u(1)*w(2) - u(2)*w(1)
       sine2 = n(1)*n(1) + n(2)*n(2) + n(3)*n(3)
-      if (sine2 < least_sine2) return
+      if (sine2 < min_sine2) return
       depth = d(1)*n(1) + d(2)*n(2) + d(3)*n(3)
       if (dot_product(n, host%outward) < 0.0_wp) depth = -depth
       if (depth <= 0.0_wp .and. depth**2 >= least**2*sine2) return
@@ -70,7 +70,7 @@ contains
         between_ends(peak_t, host%extent, depth) &
         *between_ends(s + cosine*(peak_t - t), guest%extent, depth)]
       crossing%weight = crossing%weight*either(ends)
-      if (crossing%weight < least_weight) crossing%weight = 0.0_wp
+      if (crossing%weight < min_weight) crossing%weight = 0.0_wp
       crossing%depth = depth
       crossing%normal = n
       crossing%place = guest%start + s*u - 0.5_wp*depth*n
@@ -103,17 +103,17 @@ contains
     type(edge_t), intent(in) :: guest, host   !! in the same axes
     real(wp), intent(in) :: angle             !! by which the edges may turn [rad]
     real(wp) :: way
-    real(wp), parameter :: least_sine = 0.3_wp, most_angle = 0.1_wp, least_cosine = 0.5_wp
+    real(wp), parameter :: min_sine = 0.3_wp, max_angle = 0.1_wp, min_cosine = 0.5_wp
     real(wp), parameter :: lever = 3.0_wp     !! way of the nearest places over that of the bodies
     real(wp) :: n(3), d(3), sine, s, t
 
     way = 0.0_wp
-    if (angle > most_angle) return
+    if (angle > max_angle) return
     n = cross(guest%along, host%along)
     sine = norm(n)
-    if (sine < least_sine) return
+    if (sine < min_sine) return
     n = n/sign(sine, -dot_product(n, host%outward))
-    if (-dot_product(n, host%outward) < least_cosine*norm(host%outward)) return
+    if (-dot_product(n, host%outward) < min_cosine*norm(host%outward)) return
     d = host%start - guest%start
     s = dot_product(cross(d, host%along), cross(guest%along, host%along))/sine**2
     t = dot_product(cross(d, guest%along), cross(guest%along, host%along))/sine**2
@@ -188,7 +188,7 @@ contains
     real(wp), intent(in) :: extent, depth   !! [m]
     real(wp) :: width
 
-    width = max(share*depth, least_share*extent)
+    width = max(share*depth, min_share*extent)
   end function fade_width
 
   !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
@@ -298,7 +298,7 @@ contains
     by_depth = 0.0_wp
     slope = fade_slope(x)/width
     by_place = sign(slope, 0.5_wp*extent - place)
-    if (share*depth > least_share*extent) by_depth = -share*x*slope
+    if (share*depth > min_share*extent) by_depth = -share*x*slope
   end subroutine end_slope
 
   !> From changes of log(parts(which)) to those of log(`either`).

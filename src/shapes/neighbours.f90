@@ -33,13 +33,13 @@ contains
 
   !> Sort the boxes low(:, i) <= x <= high(:, i) into bins of about the given size.
   !!
-  !! The size grows where the block would hold more than `most_bins`, or where large boxes would be
+  !! The size grows where the block would hold more than `max_bins`, or where large boxes would be
   !! listed in too many bins.
   subroutine bins_build(low, high, size_wanted, bins)
     real(wp), intent(in) :: low(:, :), high(:, :)   !! (3, items) [m]
     real(wp), intent(in) :: size_wanted             !! [m]
     type(bins_t), intent(out) :: bins
-    integer, parameter :: most_bins = 200000
+    integer, parameter :: max_bins = 200000
     integer(i8), parameter :: often = 100_i8             !! entries of a box on average
     integer(i8), parameter :: few = 10000000_i8, most = 1000000000_i8   !! entries in all
     real(wp) :: extent(3), edge
@@ -53,9 +53,9 @@ contains
     bins%low = minval(low, 2)
     bins%high = maxval(high, 2)
     extent = bins%high - bins%low
-    edge = max(size_wanted, maxval(extent)/real(most_bins, wp))
+    edge = max(size_wanted, maxval(extent)/real(max_bins, wp))
     if (.not. edge > 0.0_wp) edge = 1.0_wp   ! all in one place
-    do while (product(extent/edge + 1.0_wp) > real(most_bins, wp))
+    do while (product(extent/edge + 1.0_wp) > real(max_bins, wp))
       edge = 1.25_wp*edge
     end do
     call set_size(extent, edge, bins)

@@ -24,9 +24,9 @@ module shapes_builtin_m
 
   integer, parameter :: max_refinement = 8
   real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
-  real(wp), parameter :: most_slender = 300.0_wp   !! height over diameter, refinement 1
+  real(wp), parameter :: max_slender = 300.0_wp   !! height over diameter, refinement 1
   real(wp), parameter :: shortest = 1.0e-6_wp, longest = 1.0e6_wp   !! block from a file [m]
-  real(wp), parameter :: most_spheres = 2.0e4_wp, dense_spacing = 0.1_wp   !! [-], [smallest edge]
+  real(wp), parameter :: max_spheres = 2.0e4_wp, dense_spacing = 0.1_wp   !! [-], [smallest edge]
   integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
 
   !> Places along one direction of a lattice.
@@ -92,9 +92,9 @@ contains
       if (spacing <= 0.0_wp) spacing = dense_spacing*shape%smallest_edge
       expected = max(surface_area(shape%point, shape%triangle)/spacing**2, &
                      real(size(shape%facet), wp))
-      if (expected > most_spheres) then
+      if (expected > max_spheres) then
         message = 'sphere_spacing = '//to_text(spacing)//': about '//to_text(nint(min(expected, &
-          1.0e9_wp)))//' contact spheres, at most '//to_text(nint(most_spheres))
+          1.0e9_wp)))//' contact spheres, at most '//to_text(nint(max_spheres))
       else if (spacing > shape%smallest_edge) then
         message = 'sphere_spacing = '//to_text(spacing)//': leaves gaps as wide as the block, ' &
           //'must be at most its smallest edge, '//to_text(shape%smallest_edge)//' m'
@@ -231,7 +231,7 @@ contains
         //to_text(parts)//' cubes, at most '//to_text(nint(most))//' with refinement = ' &
         //to_text(input%refinement)
     case ('cylinder')
-      most = aint(most_slender/sqrt(real(input%refinement, wp)))
+      most = aint(max_slender/sqrt(real(input%refinement, wp)))
       if (input%size(2) > most*input%size(1)) message = given_size(input)//': so slender a ' &
         //'cylinder would be cut too finely, its height must be at most '//to_text(nint(most)) &
         //' diameters with refinement = '//to_text(input%refinement)

@@ -22,7 +22,7 @@ module surface_features_m
 
 contains
 
-  !> Features of a shape. `least_distance` needs the net of distances; a bed does without.
+  !> Features of a shape. `min_distance` needs the net of distances; a bed does without.
   subroutine surface_init(shape, surface, with_net)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(out) :: surface
@@ -335,12 +335,12 @@ contains
   !> Signed distance at the nodes of a net over the bounding box.
   subroutine make_net(surface)
     type(surface_t), intent(inout) :: surface
-    integer, parameter :: most_steps = 24   ! along the longest side
+    integer, parameter :: max_steps = 24   ! along the longest side
     type(found_t) :: found
     real(wp) :: x(3), outward(3), step
     integer :: n(3), i, j, k
 
-    step = maxval(surface%high - surface%low)/real(most_steps, wp)
+    step = maxval(surface%high - surface%low)/real(max_steps, wp)
     n = max(1, ceiling((surface%high - surface%low)/step))
     surface%net_step = max((surface%high - surface%low)/real(n, wp), tiny(1.0_wp))
     allocate (surface%net(0:n(1), 0:n(2), 0:n(3)))

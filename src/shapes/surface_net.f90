@@ -3,7 +3,7 @@
 module surface_net_m
   use kinds_m, only: wp
   use vectors_m, only: cross, norm
-  use tet_mesh_m, only: most_facet_corners
+  use tet_mesh_m, only: max_facet_corners
   implicit none
   private
   public :: merge_flat_facets, edge_twins
@@ -322,7 +322,7 @@ contains
       e = g
       if (e == net%start(label)) exit
     end do
-    yes = corners >= 3 .and. corners <= most_facet_corners
+    yes = corners >= 3 .and. corners <= max_facet_corners
   end function is_convex
 
   !> Do two edges that follow each other lie on one line?

@@ -11,7 +11,7 @@ module surface_search_m
   implicit none
   private
   public :: surface_t, near_list_t, found_t, gather_probes, gather_edges, gather_facets
-  public :: nearest_on_surface, search_surface, least_distance, segment_distance2, nowhere
+  public :: nearest_on_surface, search_surface, min_distance, segment_distance2, nowhere
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
@@ -230,7 +230,7 @@ contains
   end subroutine search_surface
 
   !> The signed distance of a point from the surface is not below this [m].
-  pure function least_distance(surface, x) result(least)
+  pure function min_distance(surface, x) result(least)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: x(3)   !! body axes [m]
     real(wp) :: least
@@ -239,7 +239,7 @@ contains
     n = nint(min(max((x - surface%low)/surface%net_step, 0.0_wp), real(ubound(surface%net), wp)))
     ! it changes by no more than the way from the node to the point
     least = surface%net(n(1), n(2), n(3)) - norm(x - surface%low - surface%net_step*real(n, wp))
-  end function least_distance
+  end function min_distance
 
   !> Square of the distance of two segments from p along u (unit) for a, from q along w for b [m2].
   pure function segment_distance2(p, u, a, q, w, b) result(square)

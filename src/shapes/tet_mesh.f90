@@ -5,9 +5,9 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, surface_of_tets, chain_of, opposite, most_facet_corners
+  public :: shape_t, surface_of_tets, chain_of, opposite, max_facet_corners
 
-  integer, parameter :: most_facet_corners = 48   !! of one polygon of the surface
+  integer, parameter :: max_facet_corners = 48   !! of one polygon of the surface
 
   type :: shape_t
     character(name_length) :: name = '', kind = ''

@@ -1,7 +1,7 @@
 !> Fluid that moves along in an impact: of what is displaced, limited, and none at rest.
 program test_added_mass
   use kinds_m, only: wp
-  use added_mass_m, only: know_added_mass
+  use added_mass_m, only: update_added_mass
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -43,7 +43,7 @@ contains
     block%blocks%contacts = merge(1, 0, weights > 0.0_wp)
     if (present(touched)) block%blocks%contacts = touched
     block%blocks%contact_force(:, 1) = weights*weight*[0.6_wp, 0.0_wp, 0.8_wp]
-    call know_added_mass(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
+    call update_added_mass(block%grid, block%case%fluid, block%solid, block%bodies, block%flow%c, &
                          block%blocks, n_clipped)
     n = 0
     if (present(clips)) n = clips

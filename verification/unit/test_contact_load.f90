@@ -10,7 +10,7 @@ program test_contact_load
   use contact_load_m, only: load_of, hard_depth, depth_at_rest
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t
-  use contact_partners_m, only: partners_t, partners_init, know_partners
+  use contact_partners_m, only: partners_t, partners_init, update_partners
   implicit none
 
   real(wp), parameter :: g = 9.81_wp, size(2) = [0.02_wp, 0.3_wp]
@@ -81,18 +81,18 @@ contains
     end do
     call blocks_init(case, shapes, blocks)
     call partners_init(blocks, partners)
-    call know_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
+    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
     load = load_of(blocks%mass(2), g)
     call check('the heaviest', partners%load%mass, blocks%mass(2), 0.0_wp)
     call check('its weight', partners%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
     call check('may give way', partners%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
     case%body(2)%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call know_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
+    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
     call check('nobody carries a held one', partners%load%mass, blocks%mass(1), 0.0_wp)
     case%body%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call know_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
+    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
     call check('all held: no load', partners%load%mass, 0.0_wp, 0.0_wp)
   end subroutine check_heaviest
 

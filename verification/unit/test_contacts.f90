@@ -9,7 +9,7 @@ program test_contacts
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: blocks_t, blocks_init, kinetic_energy, potential_energy, release_body
   use walls_m, only: walls_t, walls_init
-  use law_restitution_m, only: least_restitution
+  use law_restitution_m, only: min_restitution
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -140,7 +140,7 @@ contains
         world%case%body(1)%velocity(3) = -0.8_wp
         call start(world)
         call run(world, 4)
-        worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - max(e(m), least_restitution)))
+        worst = max(worst, abs(world%blocks%v(3, 1)/0.8_wp - max(e(m), min_restitution)))
       end do
       call check('restitution of a ball', worst, 0.0_wp, 0.004_wp)
       call check('no spin', maxval(abs(world%blocks%omega)), 0.0_wp, 0.0_wp)

@@ -1,6 +1,6 @@
 !> Cutting a domain into blocks: at multiples of powers of two, none too thin, little surface.
 program test_decomposition
-  use decomposition_m, only: best_pieces, last_cell, least_cells
+  use decomposition_m, only: best_pieces, last_cell, min_cells
   use check_m, only: check, finish_checks
   implicit none
 
@@ -32,7 +32,7 @@ contains
       last(i) = last_cell(n, pieces, i)
     end do
     call check('from the first to the last cell', last(0) == 0 .and. last(pieces) == n)
-    call check('thick enough', all(last(1:) - last(:pieces - 1) >= least_cells))
+    call check('thick enough', all(last(1:) - last(:pieces - 1) >= min_cells))
     call check('cuts at multiples of 4', all(modulo(last(1:pieces - 1), 4) == 0))
   end subroutine cuts
 

@@ -7,7 +7,7 @@ program test_deep_overlaps
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use touches_m, only: touch_t, touches_t, add_touch
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, note_overlap, note_touches, &
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, store_overlap, store_touches, &
     warn_of_overlaps, overlap_fault, size_of_pair
   implicit none
 
@@ -20,10 +20,10 @@ program test_deep_overlaps
   call make_cubes()
   call check('the smaller counts', size_of_pair(2, 1, deep), size(1), 0.0_wp)
   call check('a wall has no size', size_of_pair(2, floor, deep), size(2), 0.0_wp)
-  call note_overlap(2, 1, 0.0009_wp, deep)
+  call store_overlap(2, 1, 0.0009_wp, deep)
   call check('4.5 % are not noted', maxval(deep%share), 0.0_wp, 0.0_wp)
-  call note_overlap(2, 1, 0.0011_wp, deep)
-  call note_overlap(2, floor, 0.024_wp, deep)
+  call store_overlap(2, 1, 0.0011_wp, deep)
+  call store_overlap(2, floor, 0.024_wp, deep)
   call check('shares of both', deep%share(:3), [0.055_wp, 0.08_wp, 0.0_wp], 1.0e-12_wp)
   call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp], 0.0_wp)
   call check('with whom', deep%partner(1) == 2 .and. deep%partner(2) == floor)
@@ -36,7 +36,7 @@ program test_deep_overlaps
   call check('told once', warnings, 4)
   call add_touch(touch_t(3, 2, 1, depth=0.0039_wp), touches)
   call add_touch(touch_t(3, 2, 2, depth=0.0041_wp), touches)
-  call note_touches(touches, deep)
+  call store_touches(touches, deep)
   call check('touches, those before forgotten', deep%share(:3), [0.0_wp, 0.205_wp, 0.205_wp], &
     1.0e-12_wp)
   call check('a fault from a fifth on', index(overlap_fault(deep), &

@@ -2,8 +2,8 @@
 program test_energy
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use kinds_m, only: wp
-  use energy_m, only: energy_t, energy_parts_t, energy_init, begin_energy, note_energy, &
-    note_release, energy_excess
+  use energy_m, only: energy_t, energy_parts_t, energy_init, begin_energy, store_energy, &
+    store_release, energy_excess
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -33,7 +33,7 @@ contains
       z = z + dt*v
       v = v - dt*g
       if (step == 49) v = v - 1.0_wp
-      call note_energy(energy_parts_t(0.5_wp*m*v**2, 0.0_wp, m*g*z), book)
+      call store_energy(energy_parts_t(0.5_wp*m*v**2, 0.0_wp, m*g*z), book)
       if (step < 50) call check('free fall makes nothing', book%excess, 0.0_wp, tolerance*m*g)
     end do
     v = v + dt*g
@@ -49,10 +49,10 @@ contains
 
     book%known = .true.
     call begin_energy(energy_parts_t(1.0_wp, 0.0_wp, 10.0_wp), 0.0_wp, book)
-    call note_energy(energy_parts_t(0.5_wp, 0.25_wp, 10.0_wp), book)
-    call note_release(energy_parts_t(3.5_wp, 0.25_wp, 11.0_wp), book)
+    call store_energy(energy_parts_t(0.5_wp, 0.25_wp, 10.0_wp), book)
+    call store_release(energy_parts_t(3.5_wp, 0.25_wp, 11.0_wp), book)
     call check('put in', book%put_in, 15.0_wp, tolerance)
-    call note_energy(energy_parts_t(2.0_wp, 0.0_wp, 11.0_wp), book)
+    call store_energy(energy_parts_t(2.0_wp, 0.0_wp, 11.0_wp), book)
     call check('a loss is no excess', book%excess, -0.25_wp, tolerance)
     call check('set free', book%set_free, 4.0_wp, tolerance)
   end subroutine release

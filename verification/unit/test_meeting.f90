@@ -4,7 +4,7 @@ program test_meeting
   use check_m, only: check, finish_checks
   use vectors_m, only: rotation_matrix, quaternion_from_axis, quaternion_product
   use random_counter_m, only: uniform, random_rotation
-  use meeting_m, only: poses_t, view_t, meeting_t, know_views, inverse_view, seen_from, &
+  use meeting_m, only: poses_t, view_t, meeting_t, update_views, inverse_view, seen_from, &
     box_in_view, way_between
   implicit none
 
@@ -25,7 +25,7 @@ contains
       now%turn_a = rotation_matrix(random_rotation(1, i))
       now%turn_b = rotation_matrix(random_rotation(2, i))
       now%to_b = vector(i, 1)
-      call know_views(now)
+      call update_views(now)
       p = vector(i, 2)
       seen = matmul(matmul(now%turn_a, p) - now%to_b, now%turn_b)
       call check('a seen from b', seen_from(now%a_in_b, p), seen, 1.0e-15_wp)

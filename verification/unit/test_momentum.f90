@@ -109,8 +109,8 @@ contains
   end function psi
 
   !> Largest change of a velocity that was uniform, in cells that hold more than the given share.
-  function deviation(least_room) result(worst)
-    real(wp), intent(in) :: least_room   !! [V]
+  function deviation(min_room) result(worst)
+    real(wp), intent(in) :: min_room   !! [V]
     real(wp) :: worst
     integer :: d
 
@@ -118,7 +118,7 @@ contains
     associate (n => grid%n)
       do d = 1, 3
         worst = max(worst, maxval(abs(flow%u(1:n(1), 1:n(2), 1:n(3), d) - stream(d)), &
-                                  mask=flow%room(1:n(1), 1:n(2), 1:n(3)) > least_room*grid%volume))
+                                  mask=flow%room(1:n(1), 1:n(2), 1:n(3)) > min_room*grid%volume))
       end do
     end associate
   end function deviation

@@ -7,8 +7,8 @@ program test_resting
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use sleep_m, only: know_stillness
-  use contact_partners_m, only: know_partners
+  use sleep_m, only: update_stillness
+  use contact_partners_m, only: update_partners
   use touching_m, only: find_touches
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep
@@ -77,8 +77,8 @@ contains
     call blocks_init(case, shapes, world%blocks)
     call walls_init(case%grid, case%boundary, world%walls)
     call contacts_init(case%contact, world%blocks, world%contacts)
-    call know_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
-    call know_stillness(world%blocks)
+    call update_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
+    call update_stillness(world%blocks)
     call find_touches(world%walls, world%blocks, 0.0_wp, world%contacts%touching)
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin

@@ -11,7 +11,7 @@ program test_sleep
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
   use springs_m, only: reserve_springs
-  use sleep_m, only: sleep_t, sleep_init, balanced, note_poses, note_quiet, is_tired, know_loads
+  use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, is_tired, update_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -126,11 +126,11 @@ contains
     type(sleep_t), intent(inout) :: sleep
 
     associate (blocks => world%blocks)
-      call note_poses(blocks, sleep)
+      call store_poses(blocks, sleep)
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
         turn*way/sleep%reach(2)), blocks%q(:, 2))
-      call note_quiet(world%gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
+      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
     end associate
   end subroutine creep
 
@@ -147,7 +147,7 @@ contains
     sleep%rest%force(:, :3) = reshape([5*x, 2*x, 3*x], [3, 3])
     sleep%rest%torque_a(:, :3) = reshape([7*x, 20*x, 30*x], [3, 3])
     sleep%rest%torque_b(:, :3) = reshape([1000*x, 100*x, 300*x], [3, 3])
-    call know_loads(sleep)
+    call update_loads(sleep)
     call check('forces at rest', sleep%load(1, :), [5.0_wp - 2 - 3, 2.0_wp, 3.0_wp], 0.0_wp)
     call check('torques at rest', sleep%load_torque(1, :), [407.0_wp, 20.0_wp, 30.0_wp], 0.0_wp)
   end subroutine check_loads

@@ -5,7 +5,7 @@ program test_springs
   use touches_m, only: touch_t, touches_t, add_touch, set_apart
   use touch_groups_m, only: groups_t, form_groups
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair, move_springs
-  use partners_met_m, only: met_t, note_partners
+  use partners_met_m, only: met_t, store_partners
   implicit none
 
   call check_order()
@@ -125,8 +125,8 @@ contains
   subroutine check_met()
     type(met_t) :: met
 
-    call note_partners([3, 3, 4], [1, 1, -5], met)
-    call note_partners([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
+    call store_partners([3, 3, 4], [1, 1, -5], met)
+    call store_partners([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
     call check('each pair once', met%n, 5)
     call check('sorted', all(met%a(:5) == [2, 3, 3, 4, 5]))
     call check('with their partners', all(met%b(:5) == [1, -1, 1, -5, 1]))

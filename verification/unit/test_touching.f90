@@ -8,7 +8,7 @@ program test_touching
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use contact_partners_m, only: know_partners
+  use contact_partners_m, only: update_partners
   use substep_limits_m, only: longest_substep_of
   use touching_m, only: touching_t, touching_init, find_touches
   implicit none
@@ -55,7 +55,7 @@ contains
     call blocks_init(case, shapes, blocks)
     call walls_init(case%grid, case%boundary, walls)
     call touching_init(case%contact, longest_substep_of(case%contact), blocks, touching)
-    call know_partners(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, touching%partners)
+    call update_partners(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, touching%partners)
     call check(model//': the model', touching%exact .eqv. model == 'surface')
     call find_touches(walls, blocks, 0.0_wp, touching)
     call check(model//': nothing touches', touching%touches%n + touching%soon%n, 0)

@@ -14,7 +14,7 @@ program test_wall_balance
     open_shares
   use group_momentum_m, only: share_acceleration
   use half_kick_m, only: half_kick_t, half_kick_init
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, note_change, &
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
     force_of_walls, force_of_half_kick
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -82,9 +82,9 @@ contains
       call begin()
       call check('mass of the fluid that is there', balance%mass(merged%number(4, 4, 7)), &
                  0.85_wp*fluid%liquid_density*grid%volume, 1.0e-9_wp)
-      call note_change(grid, merged, dt, a%cell, balance%pushed)
+      call store_change(grid, merged, dt, a%cell, balance%pushed)
       call share_acceleration(grid, box%solid%open, box%flow%rho, merged, a%cell)
-      call note_change(grid, merged, dt, a%cell, balance%gained)
+      call store_change(grid, merged, dt, a%cell, balance%gained)
       call find(spread(0.0_wp, 1, 6))
       call check('still water: no force', norm2(force), 0.0_wp, &
                  1.0e-12_wp*fluid%liquid_density*norm2(fluid%gravity)*product(tank))
@@ -161,7 +161,7 @@ contains
       a%cell = 0.0_wp
       call hold_in_cells(box%grid, box%solid, box%bodies, reshape(change/dt, [6, 1]), a%face, &
                          a%cell)
-      call note_change(box%grid, merged, dt, a%cell, balance%pushed)
+      call store_change(box%grid, merged, dt, a%cell, balance%pushed)
       call find(change)
       call check('the part of the wall is the uncounted fluid', force(1:3, 1), &
                  -defect(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
@@ -177,7 +177,7 @@ contains
 
     call begin()
     call fill(a%cell)
-    call note_change(box%grid, merged, dt, a%cell, balance%pushed)
+    call store_change(box%grid, merged, dt, a%cell, balance%pushed)
     from_faces = 0.0_wp
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
@@ -188,7 +188,7 @@ contains
     end do
     call order_by_body(2, merged)
     call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, a%cell)
-    call note_change(box%grid, merged, dt, a%cell, balance%gained)
+    call store_change(box%grid, merged, dt, a%cell, balance%gained)
     of_fluid = matmul(balance%gained(:, :merged%n), balance%mass(:merged%n))
     call rigid_motion_init(2, two)
     two%x = spread(middle, 2, 2)

@@ -9,7 +9,7 @@ module two_cubes_m
   use shapes_builtin_m, only: make_shape
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t
-  use meeting_m, only: poses_t, meeting_t, know_views
+  use meeting_m, only: poses_t, meeting_t, update_views
   implicit none
   private
   public :: make_solid, random_poses, moved, meeting_at, distance_from_cube
@@ -70,7 +70,7 @@ contains
     now%turn_a = rotation_matrix(poses%q_a)
     now%turn_b = rotation_matrix(poses%q_b)
     now%to_b = poses%x_b - poses%x_a
-    call know_views(now)
+    call update_views(now)
   end function meeting_at
 
   !> Signed distance of a point from the cube, in its axes [m].
