@@ -95,7 +95,7 @@ contains
     call solid_geometry_init(sim%grid, sim%before, n_solids)
     call solid_fraction_init(sim%grid, sim%blocks, sim%fraction, subcells_of(case%numerics), bed)
     call scratch_init(sim%grid, sim%scratch)
-    call fluid_transport_init(case, sim%grid, sim%scratch, sim%transport)
+    call fluid_transport_init(case, sim%grid, sim%transport)
     call choose_coupling(case, n_solids, sim)
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_liquid(sim%grid, case%fluid, case%water, sim%solid, sim%flow)
@@ -129,9 +129,9 @@ contains
     case default; error stop 'simulation: unknown coupling'
     end select
     select type (coupling => sim%coupling)
-    type is (monolithic_t); call monolithic_init(sim%grid, n_solids, case, sim%scratch, coupling)
+    type is (monolithic_t); call monolithic_init(sim%grid, n_solids, case, coupling)
     type is (mass_average_t)
-      call mass_average_init(sim%grid, n_solids, case, sim%scratch, coupling)
+      call mass_average_init(sim%grid, n_solids, case, coupling)
     end select
   end subroutine choose_coupling
 

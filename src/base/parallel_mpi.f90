@@ -1,6 +1,6 @@
 !> The parallel layer of a run on many processes, the only file that knows MPI.
 submodule (parallel_m) parallel_mpi_m
-  use, intrinsic :: iso_c_binding, only: c_int8_t, c_ptr, c_f_pointer
+  use, intrinsic :: iso_c_binding, only: c_int8_t, c_ptr, c_f_pointer, c_char, c_null_char
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_Init_thread, MPI_Finalize, MPI_Abort, MPI_Comm_size, MPI_Comm_rank
   use mpi_f08, only: MPI_Type_contiguous, MPI_Type_commit, MPI_Type_free, MPI_Op_create, MPI_Op_free
@@ -35,6 +35,7 @@ contains
   module procedure parallel_init
     integer :: provided
 
+    call yield_while_waiting()
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
@@ -42,6 +43,23 @@ contains
     call MPI_Type_commit(bins_type)
     call MPI_Op_create(add_bins, .true., bins_sum)
   end procedure parallel_init
+
+  !> Let a process that waits give its core away, unless the user has it otherwise: with more
+  !! processes than cores Open MPI else waits for those that it keeps from running. Open MPI reads
+  !! this variable of the environment when it begins.
+  subroutine yield_while_waiting()
+    integer(c_int) :: status
+    interface
+      integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
+        import :: c_int, c_char
+        implicit none
+        character(kind=c_char), intent(in) :: name(*), value(*)
+        integer(c_int), value :: overwrite
+      end function c_setenv
+    end interface
+
+    status = c_setenv('OMPI_MCA_mpi_yield_when_idle'//c_null_char, '1'//c_null_char, 0_c_int)
+  end subroutine yield_while_waiting
 
   module procedure parallel_final
     call free_buffers()

@@ -108,7 +108,7 @@ contains
       warnings = warnings + 1
       if (.not. is_root()) cycle
       write (error_unit, '(5a)') 'mics: warning: ', overlap_text(b, deep), ', t = ', &
-        to_text(time), ' s'
+        brief(time, 5), ' s'
       flush (error_unit)
     end do
   end subroutine warn_of_overlaps

@@ -7,12 +7,12 @@
 module coupling_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use scratch_m, only: scratch_t, take, give, give_faces, clear
+  use scratch_m, only: scratch_t, take, give
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use case_types_m, only: case_t, numerics_t, fluid_t
   use fields_m, only: flow_t, add_product
-  use viscous_system_m, only: viscous_t, viscous_init, take_arrays, give_arrays
+  use viscous_system_m, only: viscous_t, viscous_init
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor
   use pressure_m, only: pressure_t, pressure_report_t, pressure_init
@@ -127,28 +127,23 @@ module coupling_m
 
 contains
 
-  !> Allocate what both couplings need, for a grid and n bodies; work arrays go to the pool.
-  subroutine coupling_init(grid, n, case, scratch, self)
+  !> Allocate what both couplings need, for a grid and n bodies, but the work arrays of the pool.
+  subroutine coupling_init(grid, n, case, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
     type(case_t), intent(in) :: case
-    type(scratch_t), intent(inout) :: scratch
     class(coupling_t), intent(inout) :: self
 
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
-    call viscous_init(grid, n, self%viscous)
-    call give_arrays(scratch, self%viscous)
-    call clear(scratch)
+    call viscous_init(grid, n, self%viscous, pooled=.true.)
     select case (case%numerics%momentum)
     case ('c_ismac'); self%implicit_momentum = .true.
     case ('conservative'); self%implicit_momentum = .false.
     case default; error stop 'coupling_init: no such momentum'
     end select
     if (self%implicit_momentum) call c_ismac_init(grid, n, case%numerics%advection, self%c_ismac)
-    call pressure_init(grid, n, case%numerics, self%pressure)
-    call give_faces(scratch, self%pressure%system%operator%cf)
-    call clear(scratch)
+    call pressure_init(grid, n, case%numerics, self%pressure, pooled=.true.)
     call acceleration_init(grid, self%acceleration)
     call surface_tension_init(grid, case%fluid, self%tension)
     allocate (self%from_pressure(6, n), source=0.0_wp)

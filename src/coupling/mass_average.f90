@@ -58,16 +58,15 @@ module mass_average_m
 
 contains
 
-  !> Allocate for a grid and n bodies; work arrays go to the pool.
-  subroutine mass_average_init(grid, n, case, scratch, self)
+  !> Allocate for a grid and n bodies.
+  subroutine mass_average_init(grid, n, case, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
     type(case_t), intent(in) :: case
-    type(scratch_t), intent(inout) :: scratch
     type(mass_average_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    call coupling_init(grid, n, case, scratch, self)
+    call coupling_init(grid, n, case, self)
     a = grid%first
     b = grid%last
     call solid_geometry_init(grid, self%whole, n)

@@ -9,7 +9,7 @@ module monolithic_m
   use kinds_m, only: wp
   use case_types_m, only: case_t
   use grid_m, only: grid_t, n_halo
-  use scratch_m, only: scratch_t, take, give, take_faces, give_faces, clear
+  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity
@@ -74,25 +74,22 @@ module monolithic_m
 
 contains
 
-  !> Allocate for a grid and n bodies; work arrays go to the pool.
-  subroutine monolithic_init(grid, n, case, scratch, self)
+  !> Allocate for a grid and n bodies.
+  subroutine monolithic_init(grid, n, case, self)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n
     type(case_t), intent(in) :: case
-    type(scratch_t), intent(inout) :: scratch
     type(monolithic_t), intent(out) :: self
     integer :: a(3), b(3)
 
-    call coupling_init(grid, n, case, scratch, self)
+    call coupling_init(grid, n, case, self)
     a = grid%first
     b = grid%last
     call rigid_motion_init(n, self%predicted)
     allocate (self%merged_before, self%merged)
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
-    call half_kick_init(grid, self%half_kick)
-    call give(scratch, self%half_kick%given)
-    call clear(scratch)
+    call half_kick_init(grid, self%half_kick, pooled=.true.)
     call wall_balance_init(self%balance)
     allocate (self%wall_speed(0))
     allocate (self%defect(6, 3, n), source=0.0_wp)

@@ -8,7 +8,7 @@ module scratch_m
   use grid_m, only: grid_t
   implicit none
   private
-  public :: scratch_t, scratch_init, take, give, take_faces, give_faces, clear
+  public :: scratch_t, scratch_init, take, give, take_faces, give_faces
 
   type :: scalar_t
     real(wp), allocatable :: a(:, :, :)
@@ -51,25 +51,6 @@ contains
     self%hi = grid%hi
     allocate (self%scalars(most), self%vectors(most), self%faces(most))
   end subroutine scratch_init
-
-  !> Free the arrays that nobody has, which were made one by one before the first step.
-  subroutine clear(self)
-    type(scratch_t), intent(inout) :: self
-    integer :: n
-
-    do n = 1, self%n_scalars
-      deallocate (self%scalars(n)%a)
-    end do
-    do n = 1, self%n_vectors
-      deallocate (self%vectors(n)%a)
-    end do
-    do n = 1, self%n_faces
-      deallocate (self%faces(n)%a)
-    end do
-    self%n_scalars = 0
-    self%n_vectors = 0
-    self%n_faces = 0
-  end subroutine clear
 
   subroutine take_scalar(self, a)
     type(scratch_t), intent(inout) :: self

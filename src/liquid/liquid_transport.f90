@@ -48,14 +48,15 @@ module liquid_transport_m
 contains
 
   !> Allocate the work arrays once.
-  subroutine liquid_transport_init(grid, gravity, self)
+  subroutine liquid_transport_init(grid, gravity, self, pooled)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     type(liquid_transport_t), intent(out) :: self
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: m(3)
 
-    call open_flux_init(grid, self%flux)
-    call carried_volumes_init(grid, self%volumes)
+    call open_flux_init(grid, self%flux, pooled)
+    if (.not. present(pooled)) call carried_volumes_init(grid, self%volumes)
     call liquid_sweep_init(grid, gravity, self%sweeps)
     call small_cells_init(grid, self%small)
     call extended_fraction_init(gravity, self%extension)

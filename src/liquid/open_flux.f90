@@ -48,11 +48,12 @@ module open_flux_m
 contains
 
   !> Allocate the work arrays.
-  subroutine open_flux_init(grid, self)
+  subroutine open_flux_init(grid, self, pooled)
     type(grid_t), intent(in) :: grid
     type(open_flux_t), intent(out) :: self
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
 
-    call flux_band_init(grid, self%band)
+    call flux_band_init(grid, self%band, pooled)
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].

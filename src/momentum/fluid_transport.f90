@@ -3,7 +3,7 @@ module fluid_transport_m
   use kinds_m, only: wp
   use case_types_m, only: case_t, fluid_t
   use grid_m, only: grid_t
-  use scratch_m, only: scratch_t, take, give, take_faces, give_faces, clear
+  use scratch_m, only: scratch_t, take, give, take_faces, give_faces
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
@@ -34,23 +34,21 @@ module fluid_transport_m
 
 contains
 
-  !> Allocate, and tell what enters through the sides; work arrays go to the pool.
-  subroutine fluid_transport_init(case, grid, scratch, self)
+  !> Allocate but the work arrays of the pool; what enters through the sides.
+  subroutine fluid_transport_init(case, grid, self)
     type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
-    type(scratch_t), intent(inout) :: scratch
     type(fluid_transport_t), intent(out) :: self
 
-    call liquid_transport_init(grid, case%fluid%gravity, self%liquid)
+    call liquid_transport_init(grid, case%fluid%gravity, self%liquid, pooled=.true.)
     if (case%fluid%single_phase) then
       self%liquid%sweeps%incoming = 1.0_wp
     else
       self%liquid%sweeps%level = case%fluid%water_level
     end if
     self%carries_momentum = case%numerics%momentum /= 'c_ismac'
-    if (self%carries_momentum) call momentum_init(grid, self%momentum, case%numerics%advection)
-    call give_arrays(scratch, self)
-    call clear(scratch)
+    if (.not. self%carries_momentum) return
+    call momentum_init(grid, self%momentum, case%numerics%advection, pooled=.true.)
   end subroutine fluid_transport_init
 
   !> Arrays over the cells from the pool, which nobody needs after the transport.

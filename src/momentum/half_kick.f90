@@ -48,16 +48,19 @@ module half_kick_m
 contains
 
   !> Allocate for a grid; nothing given.
-  subroutine half_kick_init(grid, self)
+  subroutine half_kick_init(grid, self, pooled)
     type(grid_t), intent(in) :: grid
     type(half_kick_t), intent(out) :: self
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3)
 
     a = grid%first
     b = grid%last
     allocate (self%takes_part(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
     allocate (self%in_liquid, source=self%takes_part)
-    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    if (.not. present(pooled)) then
+      allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    end if
   end subroutine half_kick_init
 
   !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.

@@ -39,16 +39,19 @@ module momentum_conservative_m
 contains
 
   !> Allocate the work arrays.
-  subroutine momentum_init(grid, self, advection)
+  subroutine momentum_init(grid, self, advection, pooled)
     type(grid_t), intent(in) :: grid
     type(momentum_t), intent(out) :: self
     character(*), intent(in), optional :: advection   !! name of the scheme, else 'mp5'
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3)
 
     if (present(advection)) self%scheme = scheme_of(advection)
     a = grid%first
     b = grid%last
-    allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    if (.not. present(pooled)) then
+      allocate (self%momentum(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+    end if
     allocate (self%carried(grid%lo(1):grid%hi(1) + 1, grid%lo(2):grid%hi(2) + 1, 3, 0:1, &
                            0:omp_get_max_threads() - 1), source=0.0_wp)
     allocate (self%late(0), self%late_mass(0))

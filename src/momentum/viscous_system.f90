@@ -58,10 +58,11 @@ module viscous_system_m
 contains
 
   !> Allocate the work arrays.
-  subroutine viscous_init(grid, n_bodies, self)
+  subroutine viscous_init(grid, n_bodies, self, pooled)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_bodies
     type(viscous_t), intent(out) :: self
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3), m(3), n
 
     a = grid%first
@@ -70,9 +71,11 @@ contains
     n = 2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))
     if (.not. any(abs(grid%side_velocity) > 0.0_wp)) n = 0
     allocate (self%sides%cell(3, n), self%sides%pull(3, n))
-    allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (self%leg(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (self%diagonal, self%r, self%s, self%y, source=self%leg)
+    if (.not. present(pooled)) then
+      allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
+      allocate (self%leg(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+      allocate (self%diagonal, self%r, self%s, self%y, source=self%leg)
+    end if
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%force(6, n_bodies), source=0.0_wp)
     allocate (self%spin_drag(n_bodies), source=0.0_wp)

@@ -67,7 +67,7 @@ contains
       if (is_root()) then
         write (error_unit, '(a)') 'mics: warning: the inertia of the fluid that moves with light ' &
           //'blocks was cut at its limit, '//to_text(clips)//' time(s) in the step to t = ' &
-          //to_text(time)//' s; /series/inertia_clips of run.h5 counts it in each step'
+          //fixed_text(time, 5)//' s; /series/inertia_clips of run.h5 counts it in each step'
         flush (error_unit)
       end if
     end if

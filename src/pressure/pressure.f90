@@ -43,16 +43,17 @@ module pressure_m
 contains
 
   !> Allocate the system and what the loop needs.
-  subroutine pressure_init(grid, n_bodies, numerics, self)
+  subroutine pressure_init(grid, n_bodies, numerics, self, pooled)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_bodies
     type(numerics_t), intent(in) :: numerics
     type(pressure_t), intent(out) :: self
+    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer :: a(3), b(3)
 
     self%tolerance = numerics%divergence_tolerance
     self%max_passes = numerics%max_pressure_passes
-    call pressure_system_init(grid, n_bodies, numerics, self%system)
+    call pressure_system_init(grid, n_bodies, numerics, self%system, pooled)
     a = grid%first
     b = grid%last
     allocate (self%known(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)

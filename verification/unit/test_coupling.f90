@@ -66,7 +66,7 @@ contains
     block%flow%room = (1.0_wp - block%solid%alpha)*block%grid%volume
     block%flow%liquid = block%flow%room
     call scratch_init(block%grid, scratch)
-    call monolithic_init(block%grid, 1, block%case, scratch, coupling)
+    call monolithic_init(block%grid, 1, block%case, coupling)
     call copy_motion(block%blocks, coupling%bodies)
     call start_flow(block%case, block%grid, block%solid, block%flow, scratch, coupling, &
                     converged)
