@@ -15,7 +15,6 @@ program test_unknown_names
   use tvd_m, only: scheme_of
   use fluid_transport_m, only: fluid_transport_t, fluid_transport_init
   use pressure_system_m, only: pressure_system_t, pressure_system_init
-  use scratch_m, only: scratch_t, scratch_init
   use monolithic_m, only: monolithic_t, monolithic_init
   use solid_fraction_m, only: subcells_of
   implicit none
@@ -58,7 +57,6 @@ contains
     type(touching_t) :: touching
     type(fluid_transport_t) :: transport
     type(pressure_system_t) :: system
-    type(scratch_t) :: scratch
     type(monolithic_t) :: coupling
     character(:), allocatable :: message
     real(wp) :: x(3), q(4)
@@ -96,9 +94,8 @@ contains
       if (scheme_of(numerics%advection) == 0) error stop 'test_unknown_names: scheme 0'
       subcells = subcells_of(numerics)
       call pressure_system_init(grid, 1, numerics, system)
-      call scratch_init(grid, scratch)
-      call fluid_transport_init(case, grid, scratch, transport)
-      call monolithic_init(grid, 1, case, scratch, coupling)
+      call fluid_transport_init(case, grid, transport)
+      call monolithic_init(grid, 1, case, coupling)
     end associate
   end subroutine choose
 
