@@ -2,7 +2,7 @@
 module progress_m
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp, i8
-  use errors_m, only: to_text
+  use errors_m, only: to_text, brief
   use value_text_m, only: fixed_text
   use parallel_m, only: is_root, spins_for_long
   use timers_m, only: wall_clock
@@ -67,7 +67,7 @@ contains
       if (is_root()) then
         write (error_unit, '(a)') 'mics: warning: the inertia of the fluid that moves with light ' &
           //'blocks was cut at its limit, '//to_text(clips)//' time(s) in the step to t = ' &
-          //fixed_text(time, 5)//' s; /series/inertia_clips of run.h5 counts it in each step'
+          //brief(time, 5)//' s; /series/inertia_clips of run.h5 counts it in each step'
         flush (error_unit)
       end if
     end if
