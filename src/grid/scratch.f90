@@ -70,14 +70,7 @@ contains
     type(scratch_t), intent(inout) :: self
     real(wp), allocatable, intent(inout) :: a(:, :, :, :)
 
-    if (self%n_vectors > 0) then
-      call move_alloc(self%vectors(self%n_vectors)%a, a)
-      self%n_vectors = self%n_vectors - 1
-    else
-      associate (f => self%first, l => self%last)
-        allocate (a(f(1):l(1), f(2):l(2), f(3):l(3), 3), source=0.0_wp)
-      end associate
-    end if
+    call take_from(self%vectors, self%n_vectors, self%first, self%last, a)
   end subroutine take_vector
 
   !> Three numbers a cell with one layer of the halo, as coefficients of the lower faces.
@@ -85,15 +78,23 @@ contains
     type(scratch_t), intent(inout) :: self
     real(wp), allocatable, intent(inout) :: a(:, :, :, :)
 
-    if (self%n_faces > 0) then
-      call move_alloc(self%faces(self%n_faces)%a, a)
-      self%n_faces = self%n_faces - 1
-    else
-      associate (f => self%lo - 1, l => self%hi + 1)
-        allocate (a(f(1):l(1), f(2):l(2), f(3):l(3), 3), source=0.0_wp)
-      end associate
-    end if
+    call take_from(self%faces, self%n_faces, self%lo - 1, self%hi + 1, a)
   end subroutine take_faces
+
+  !> The last of the n free arrays over cells first..last, or a new one if there is none.
+  subroutine take_from(free, n, first, last, a)
+    type(vector_t), intent(inout) :: free(:)
+    integer, intent(inout) :: n
+    integer, intent(in) :: first(3), last(3)
+    real(wp), allocatable, intent(inout) :: a(:, :, :, :)
+
+    if (n > 0) then
+      call move_alloc(free(n)%a, a)
+      n = n - 1
+    else
+      allocate (a(first(1):last(1), first(2):last(2), first(3):last(3), 3), source=0.0_wp)
+    end if
+  end subroutine take_from
 
   subroutine give_faces(self, a)
     type(scratch_t), intent(inout) :: self
