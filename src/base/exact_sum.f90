@@ -114,9 +114,10 @@ contains
   subroutine exact_totals(bins, s)
     integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, sums); all processes after
     real(wp), intent(out) :: s(:)
-    integer :: m, phase
+    integer, save :: phase = 0   ! its number, once named
+    integer :: m
 
-    phase = timer('sums over processes')
+    if (phase == 0) phase = timer('sums over processes')
     call tic(phase)
     call global_sum_bins(bins)
     call toc(phase)
