@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from micstools import command  # noqa: E402
 from micstools.bench.dry_pile import case, measure  # noqa: E402
 from micstools.bench.timing import timed  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -6,7 +6,7 @@ usage: python tools/draw_rooms.py [--out FILE]
 import argparse
 from pathlib import Path
 
-from micstools import rooms
+import rooms
 
 ROOT = Path(__file__).parents[1]
 

@@ -22,8 +22,8 @@ from matplotlib import pyplot as plt  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.ticker import LogLocator, MaxNLocator  # noqa: E402
 
-from micstools.checks import Checks, Figure, Result, Study  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, Figure, Result, Study  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 
 CASES = Path(__file__).resolve().parent / "cases"
 OURS = ("#0b5394", "#c55a11", "#38761d", "#741b47", "#7f6000", "#134f5c")

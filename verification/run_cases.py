@@ -29,8 +29,8 @@ import f90nml
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from micstools.checks import Checks  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 
 CASES = ROOT / "verification" / "cases"
 MPI_SETTINGS = {

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools.initial_state import write_initial_state
-from micstools.reader import Run
+from micstools.cases.initial_state import write_initial_state
+from micstools.reading.reader import Run
 from test_input import mics
 
 CASE = """&run t_end = 0.001 dt = 0.001 physics = 'fluid' field_interval = 1 /

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools.initial_state import write_initial_state
-from micstools.reader import Run
+from micstools.cases.initial_state import write_initial_state
+from micstools.reading.reader import Run
 from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, prepare
 
 INPUT = sorted((ROOT / "input").glob("*.nml"))

@@ -12,8 +12,8 @@ import f90nml
 import numpy as np
 import pytest
 
-from micstools.initial_state import write_initial_state
-from micstools.reader import Run
+from micstools.cases.initial_state import write_initial_state
+from micstools.reading.reader import Run
 from run_cases import ROOT
 from test_input import GOOD, mics
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from micstools.reader import Run
+from micstools.reading.reader import Run
 from run_cases import CASES, ROOT, Machine, run
 from same_bits import contents, differences
 from shared_runs import SharedRun

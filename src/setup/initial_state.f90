@@ -8,7 +8,7 @@
 !! `liquid` takes the place of `water_level` and `&water` (beside inflows and outflows
 !! `water_level` stays, as their level), `velocity` that of `&fluid velocity`. The
 !! velocity of the faces is the mean of the two cells, made free of divergence by the first
-!! projection. `micstools.initial_state` writes such a file.
+!! projection. `micstools.cases.initial_state` writes such a file.
 module initial_state_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp

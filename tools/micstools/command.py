@@ -8,8 +8,8 @@ from pathlib import Path
 
 import h5py
 
-from micstools import settings
-from micstools.reader import BadRun, Run
+from micstools.cases import settings
+from micstools.reading.reader import BadRun, Run
 
 OUTPUT = "mics-out"
 """Folder of a case that names none."""

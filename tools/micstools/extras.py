@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-from micstools.reader import BadRun
+from micstools.reading.reader import BadRun
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {

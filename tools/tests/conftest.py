@@ -7,7 +7,7 @@ import pytest
 
 sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parent)]
 
-from micstools.reader import Run  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 from synthetic import write_run  # noqa: E402
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from micstools.geometry import Array, place, quaternion_from_axis, quaternion_product
-from micstools.shapes import Shape, hexapod
+from micstools.shapes.geometry import Array, place, quaternion_from_axis, quaternion_product
+from micstools.shapes.shape import Shape, hexapod
 
 THREE_LEGS = np.array([0.540625, 0.455768, -0.060003, -0.704554])  # leg towards -y
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

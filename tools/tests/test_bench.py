@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools import program
 from micstools.bench import jobs, parts, peer_interfoam, pressure_dump, table
 from micstools.bench.jobs import DAM, Job
 from micstools.bench.timing import Timing, timed
-from micstools.reader import BadRun
+from micstools.cases import program
+from micstools.reading.reader import BadRun
 
 
 def test_the_pressure_system_is_the_published_one() -> None:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from micstools import balance, buoyancy
-from micstools.checks import Checks
-from micstools.overlap import Placed
-from micstools.reader import Grid, Run
-from micstools.shapes import box
+from measures import balance, buoyancy
+from measures.checks import Checks
+from micstools.reading.overlap import Placed
+from micstools.reading.reader import Grid, Run
+from micstools.shapes.shape import box
 
 
 def test_checks_hold_fail_and_are_never_empty(capsys) -> None:

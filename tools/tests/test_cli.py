@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from micstools import cli, settings
-from micstools import program as program_of_tools
-from micstools.reader import BadRun
+from micstools import cli
+from micstools.cases import program as program_of_tools
+from micstools.cases import settings
+from micstools.reading.reader import BadRun
 
 ROOT = Path(__file__).parents[2]
 CASE = """\

@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from micstools import command
-from micstools.reader import BadRun, Run
+from micstools.reading.reader import BadRun, Run
 from synthetic import Motion, write_run
 
 ROOT = Path(__file__).parents[2]

@@ -8,11 +8,12 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli, comparison
+from micstools import cli
+from micstools.cases.convergence import converge
 from micstools.commands.study import finer
-from micstools.convergence import converge
-from micstools.geometry import quaternion_from_axis
-from micstools.reader import BadRun, Run
+from micstools.reading import comparison
+from micstools.reading.reader import BadRun, Run
+from micstools.shapes.geometry import quaternion_from_axis
 from synthetic import UPRIGHT, Motion, write_run
 
 END = np.array([0.2, 0.05, 0.1])
@@ -127,7 +128,7 @@ if "--check" in words:
 import h5py
 import numpy as np
 from synthetic import UPRIGHT, Motion, write_run
-from micstools import settings
+from micstools.cases import settings
 n = settings.value(Path(words[-1]).read_text(), "grid", "cells")[0]
 folder = Path(words[words.index("--output") + 1])
 height = 0.08 + 0.4 / n**2

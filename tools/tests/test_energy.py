@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools.energy import largest_made, made_by_contact
+from micstools.reading.energy import largest_made, made_by_contact
 
 MASS, SPIN, G, STEP = 2.0, 0.3, 9.81, 0.1
 LIMIT = np.ones(8)  # [J]

@@ -13,10 +13,13 @@ from pathlib import Path
 
 import pytest
 
-from micstools import cli, ensemble, ensemble_engine, ensemble_fields, settings, shares, slurm
-from micstools.ensemble import Plan
-from micstools.program import find as find_program
-from micstools.reader import BadRun, Run
+from micstools import cli
+from micstools.cases import settings
+from micstools.cases.program import find as find_program
+from micstools.ensembles import ensemble, ensemble_engine, ensemble_fields, slurm
+from micstools.ensembles.ensemble import Plan
+from micstools.piles import shares
+from micstools.reading.reader import BadRun, Run
 from synthetic import Motion, write_run
 
 CASE = """\

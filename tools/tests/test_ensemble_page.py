@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from browser import MISSING, Browser
-from micstools import cli, pile_ensemble
-from micstools.page import charts, ensemble_page
+from micstools import cli
+from micstools.pages import charts, ensemble_page
+from micstools.piles import pile_ensemble
 from test_page import OUT_OF_TILES
 from test_pile_ensemble import ENDS, HALF, HEXAPOD, WAITING, write_ensemble
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from micstools import cli, exports, scene
-from micstools.reader import Run
+from micstools import cli
+from micstools.pictures import exports, scene
+from micstools.reading.reader import Run
 from synthetic import Motion
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from micstools import extras
-from micstools.reader import BadRun
+from micstools.reading.reader import BadRun
 
 
 @pytest.fixture

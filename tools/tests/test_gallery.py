@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from fences import fences
-from micstools import settings
+from micstools.cases import settings
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "gallery.md"

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from micstools import geometry as g
-from micstools.shapes import box, hexapod
+from micstools.shapes import geometry as g
+from micstools.shapes.shape import box, hexapod
 
 TILTED = g.quaternion_from_axis(np.array([0.3, -0.5, 0.8]), 37.0)
 

@@ -11,7 +11,7 @@ import pytest
 
 from fences import fences
 from micstools import cli
-from micstools.reader import Run
+from micstools.reading.reader import Run
 
 ROOT = Path(__file__).parents[2]
 TEXTS = ["README.md", "docs/guide.md", "docs/gallery.md"]

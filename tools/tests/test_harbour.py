@@ -7,8 +7,9 @@ from pathlib import Path
 import f90nml
 import pytest
 
-from micstools import cli, harbour
-from micstools.reader import BadRun
+from micstools import cli
+from micstools.cases import harbour
+from micstools.reading.reader import BadRun
 
 MICS = Path(__file__).parents[2] / "mics"
 

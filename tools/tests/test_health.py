@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools import health, kicks, units
-from micstools.health import Check
-from micstools.reader import Run
+from micstools.reading import health, kicks, units
+from micstools.reading.health import Check
+from micstools.reading.reader import Run
 from synthetic import UPRIGHT, Motion
 
 APART = Motion(places=[(np.array([0.03, 0.05, 0.12]), UPRIGHT)], t_end=2.0,

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image, TiffImagePlugin
 
-from micstools import cli, height_maps
-from micstools.reader import BadRun
+from micstools import cli
+from micstools.reading.reader import BadRun
+from micstools.shapes import height_maps
 
 ROOT = Path(__file__).parents[2]
 # From y_min to y_max, x in each row.

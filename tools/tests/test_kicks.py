@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools import kicks, pile, plots
-from micstools.page import run_page
-from micstools.reader import Run
+from micstools.pages import run_page
+from micstools.pictures import plots
+from micstools.piles import pile
+from micstools.reading import kicks
+from micstools.reading.reader import Run
 from synthetic import Motion
 
 G, LENGTH, LEVEL = 10.0, 0.1, 1.0

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools import cli, meshing
-from micstools.shapes import hexapod
+from micstools import cli
+from micstools.shapes import meshing
+from micstools.shapes.shape import hexapod
 
 trimesh = pytest.importorskip("trimesh")
 ROOT = Path(__file__).parents[2]

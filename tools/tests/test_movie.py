@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from micstools import cli, movie, reel, scene
-from micstools.movie import Film
-from micstools.reader import BadRun, Run
+from micstools import cli
+from micstools.pictures import movie, reel, scene
+from micstools.pictures.movie import Film
+from micstools.reading.reader import BadRun, Run
 
 ROOT = Path(__file__).parents[2]
 

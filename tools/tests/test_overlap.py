@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools.geometry import quaternion_from_axis
-from micstools.overlap import Placed, bed_gap, depth, gap, near_pairs, wall_gaps
-from micstools.shapes import cube, hexapod
+from micstools.reading.overlap import Placed, bed_gap, depth, gap, near_pairs, wall_gaps
+from micstools.shapes.geometry import quaternion_from_axis
+from micstools.shapes.shape import cube, hexapod
 
 UPRIGHT = np.array([1.0, 0, 0, 0])
 WALLS = {f"{axis}_{end}": "no_slip" for axis in "xyz" for end in ("min", "max")}

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from micstools import cli, extras
-from micstools.page import run_words
-from micstools.reader import Run
+from micstools.pages import run_words
+from micstools.reading.reader import Run
 
 ROOT = Path(__file__).parents[2]
 IMPORTED_AS = {"dask_jobqueue": "dask-jobqueue", "imageio_ffmpeg": "imageio-ffmpeg",

@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 
 from browser import MISSING, Browser
-from micstools import block_numbers, cli, pile_numbers, shapes
-from micstools.overlap import Placed
-from micstools.page import charts, html, motion, run_page, run_words, views
-from micstools.page.charts import Curve
-from micstools.reader import Run
+from micstools import cli
+from micstools.pages import charts, html, motion, run_page, run_words, views
+from micstools.pages.charts import Curve
+from micstools.piles import pile_numbers
+from micstools.reading import block_numbers
+from micstools.reading.overlap import Placed
+from micstools.reading.reader import Run
+from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion, write_run
 
 TITLE = "<b>Reef</b> & \"co\" </script><script>document.title = 'x'</script>"

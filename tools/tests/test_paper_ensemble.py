@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from micstools import paper_ensemble, pile_ensemble, program, settings
+from micstools.cases import program, settings
 from micstools.cli import script
 from micstools.commands import paper
-from micstools.geometry import rotation_matrix
-from micstools.paper_ensemble import CHOICES
-from micstools.reader import BadRun
+from micstools.ensembles import paper_ensemble
+from micstools.ensembles.paper_ensemble import CHOICES
+from micstools.piles import pile_ensemble
+from micstools.reading.reader import BadRun
+from micstools.shapes.geometry import rotation_matrix
 from test_pile_ensemble import write_ensemble
 
 CASE = paper.CASE.read_text()

@@ -10,9 +10,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from micstools import cli, labels, plots, scene
-from micstools.reader import Run
-from micstools.shapes import hexapod
+from micstools import cli
+from micstools.pictures import labels, plots, scene
+from micstools.reading.reader import Run
+from micstools.shapes.shape import hexapod
 from synthetic import UPRIGHT, Motion
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())

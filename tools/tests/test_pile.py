@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import pile
-from micstools.reader import BadRun, Run
-from micstools.units import LABORATORY
+from micstools.piles import pile
+from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import LABORATORY
 from synthetic import UPRIGHT, Motion
 
 

@@ -9,8 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli, pile_ensemble, pile_numbers, shapes, shares
-from micstools.reader import BadRun, Run
+from micstools import cli
+from micstools.piles import pile_ensemble, pile_numbers, shares
+from micstools.reading.reader import BadRun, Run
+from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion, write_run
 
 EDGE, HALF, HEXAPOD = 0.02, 0.01, 0.03

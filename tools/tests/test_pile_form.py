@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from micstools import pile_form, shapes
-from micstools.geometry import quaternion_from_axis
-from micstools.overlap import Placed
-from micstools.pile_numbers import height_map
+from micstools.piles import pile_form
+from micstools.piles.pile_numbers import height_map
+from micstools.reading.overlap import Placed
+from micstools.shapes import shape as shapes
+from micstools.shapes.geometry import quaternion_from_axis
 from synthetic import UPRIGHT
 
 EDGE, STEP = 0.02, 0.001

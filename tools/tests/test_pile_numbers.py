@@ -6,9 +6,11 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools import cli, pile_numbers, shapes
-from micstools.overlap import Placed, present_bodies, sphere_gap, touches
-from micstools.reader import BadRun, Run
+from micstools import cli
+from micstools.piles import pile_numbers
+from micstools.reading.overlap import Placed, present_bodies, sphere_gap, touches
+from micstools.reading.reader import BadRun, Run
+from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion
 
 EDGE = 0.02

@@ -14,9 +14,9 @@ from PIL import Image
 
 from browser import MISSING, Browser
 from micstools import cli
-from micstools.geometry import Array
-from micstools.page import motion, parts, run_page
-from micstools.reader import Run
+from micstools.pages import motion, parts, run_page
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 from synthetic import UPRIGHT, Motion, write_run
 
 in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)

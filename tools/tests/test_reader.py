@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from micstools.profiles import along_line, table
-from micstools.reader import Run
+from micstools.reading.profiles import along_line, table
+from micstools.reading.reader import Run
 from synthetic import THREE_LEGS, Motion, write_run
 
 

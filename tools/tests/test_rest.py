@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools import rest, scales
+from micstools.reading import rest, scales
 
 G = 9.81
 

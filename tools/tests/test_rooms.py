@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from micstools import rooms
+import rooms
 
 ROOT = Path(__file__).parents[2]
 

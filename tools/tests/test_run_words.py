@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools.page import run_words
-from micstools.reader import Run
-from micstools.units import LABORATORY, SITE
+from micstools.pages import run_words
+from micstools.reading.reader import Run
+from micstools.reading.units import LABORATORY, SITE
 from synthetic import Motion
 
 

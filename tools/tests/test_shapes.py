@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from micstools.geometry import tet_volumes
-from micstools.shapes import box, hexapod
+from micstools.shapes.geometry import tet_volumes
+from micstools.shapes.shape import box, hexapod
 
 
 @pytest.mark.parametrize("refinement", [1, 2, 3])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from micstools import units
+from micstools.reading import units
 
 
 @pytest.mark.parametrize(

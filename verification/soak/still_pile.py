@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from micstools.reader import Run  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 
 MOST_CREEP = 1.0e-6  # m/s
 MOST_DRIFT = 1.0e-9  # of the liquid, relative

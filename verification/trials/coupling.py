@@ -20,10 +20,10 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "verification" / "cases" / "free_sphere")]
 
 from check import acceleration, added_mass  # noqa: E402, I001
-from micstools.balance import divergence  # noqa: E402
-from micstools.buoyancy import displaced  # noqa: E402
-from micstools.overlap import present_bodies  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.balance import divergence  # noqa: E402
+from measures.buoyancy import displaced  # noqa: E402
+from micstools.reading.overlap import present_bodies  # noqa: E402
+from micstools.reading.reader import Run  # noqa: E402
 
 G = 9.81  # [m/s2]
 WATER, GAS = 998.2, 1.204  # [kg/m3]

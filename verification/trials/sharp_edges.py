@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.reader import Run
+from micstools.reading.reader import Run
 
 ROOT = Path(__file__).resolve().parents[2]
 EDGE, G = 0.02, 9.81  # [m], [m/s2]

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.geometry import Array, place
-from micstools.reader import Run
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array, place
 
 EDGE, DENSITY, BOX = 0.02, 2300.0, 0.3  # of a cube [m], [kg/m3], side of the tank [m]
 REACH = EDGE * float(np.sqrt(2.75))  # of a corner from the centroid

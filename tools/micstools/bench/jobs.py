@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import settings
 from micstools.bench import dry_pile
 from micstools.bench.timing import Timing, mpirun, timed
-from micstools.ensemble import NO_ROOM
-from micstools.geometry import Array
-from micstools.reader import Run
+from micstools.cases import settings
+from micstools.ensembles.ensemble import NO_ROOM
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 INPUT = Path(__file__).parents[3] / "input"
 _NOT_STEPPING = ("output", "restart files")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from micstools.bench.pressure_dump import read
-from micstools.geometry import Array
+from micstools.shapes.geometry import Array
 
 _RELAXATION = {"jacobi": 1, "red_black": 2}  # weighted; symmetric
 _OFFSETS = ((0, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1))

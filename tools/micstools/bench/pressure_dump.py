@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.geometry import Array
+from micstools.shapes.geometry import Array
 
 LENGTH = np.array([0.3, 0.1, 0.2])  # of the tank [m]
 EDGE = 0.02  # of a cube of a block [m]

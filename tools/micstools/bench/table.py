@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from micstools.bench.parts import KEYS, Row
-from micstools.reader import BadRun
+from micstools.reading.reader import BadRun
 
 HEAD = (
     f"{'part':9}{'job':12}{'by':16}{'crew':>6}{'size':>9}{'steps':>7}{'wall s':>10}{'CPU s':>10}"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import height_maps
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.reading.reader import BadRun
+from micstools.shapes import height_maps
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,10 +3,12 @@
 import argparse
 from pathlib import Path
 
-from micstools import command, comparison, pile_ensemble, pile_numbers, units
+from micstools import command
 from micstools.commands.base import Command
-from micstools.reader import BadRun, Run
-from micstools.units import Units, figure
+from micstools.piles import pile_ensemble, pile_numbers
+from micstools.reading import comparison, units
+from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import Units, figure
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

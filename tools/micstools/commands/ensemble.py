@@ -12,20 +12,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, NoReturn
 
-from micstools import (
+from micstools.cases import program, settings
+from micstools.commands.base import Command
+from micstools.ensembles import (
     ensemble,
     ensemble_engine,
     ensemble_fields,
     ensemble_queue,
     ensemble_table,
-    program,
-    settings,
     slurm,
 )
-from micstools.commands.base import Command
-from micstools.ensemble import Member, Plan, State
-from micstools.ensemble_engine import Engine
-from micstools.reader import BadRun
+from micstools.ensembles.ensemble import Member, Plan, State
+from micstools.ensembles.ensemble_engine import Engine
+from micstools.reading.reader import BadRun
 
 STOPPED = 130
 """Exit code after Ctrl-C."""

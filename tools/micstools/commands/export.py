@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import command, exports, extras
+from micstools import command, extras
 from micstools.commands.base import Command
-from micstools.reader import BadRun, Run
+from micstools.pictures import exports
+from micstools.reading.reader import BadRun, Run
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from micstools import harbour
+from micstools.cases import harbour
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.reading.reader import BadRun
 
 PLAIN = harbour.Harbour()
 

@@ -5,9 +5,10 @@ import signal
 from pathlib import Path
 from typing import NoReturn
 
-from micstools import command, movie, scene
+from micstools import command
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.pictures import movie, scene
+from micstools.reading.reader import BadRun
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,12 +6,13 @@ import os
 from pathlib import Path
 from typing import Any
 
-from micstools import paper_ensemble, program
+from micstools.cases import program
 from micstools.commands.base import Command
 from micstools.commands.ensemble import ENSEMBLE
 from micstools.commands.pile import PILE
 from micstools.commands.report import REPORT
-from micstools.paper_ensemble import CHOICES, Choice
+from micstools.ensembles import paper_ensemble
+from micstools.ensembles.paper_ensemble import CHOICES, Choice
 
 CASE = Path(__file__).parents[3] / "input" / "blocks.nml"
 COARSE = "grid.cells=60,10,20"  # a fifth of the time

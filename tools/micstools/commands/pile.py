@@ -10,23 +10,16 @@ from typing import Any
 import h5py
 import numpy as np
 
-from micstools import (
-    block_numbers,
-    command,
-    pile,
-    pile_ensemble,
-    pile_form,
-    pile_numbers,
-    placing,
-    units,
-)
+from micstools import command
 from micstools.commands.base import Command
-from micstools.geometry import Array
-from micstools.pile_ensemble import Ensemble
-from micstools.placing import Area
-from micstools.reader import BadRun
-from micstools.shares import in_words
-from micstools.units import ascii_of
+from micstools.piles import pile, pile_ensemble, pile_form, pile_numbers, placing
+from micstools.piles.pile_ensemble import Ensemble
+from micstools.piles.placing import Area
+from micstools.piles.shares import in_words
+from micstools.reading import block_numbers, units
+from micstools.reading.reader import BadRun
+from micstools.reading.units import ascii_of
+from micstools.shapes.geometry import Array
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,9 +3,11 @@
 import argparse
 from pathlib import Path
 
-from micstools import command, pile, plots, scene
+from micstools import command
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.pictures import plots, scene
+from micstools.piles import pile
+from micstools.reading.reader import BadRun
 
 
 def picture_arguments(parser: argparse.ArgumentParser) -> None:

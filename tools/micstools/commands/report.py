@@ -3,11 +3,12 @@
 import argparse
 from pathlib import Path
 
-from micstools import command, pile_ensemble
+from micstools import command
 from micstools.commands.base import Command
 from micstools.commands.pile import add_area, area_of
-from micstools.page import ensemble_page, run_page
-from micstools.reader import BadRun
+from micstools.pages import ensemble_page, run_page
+from micstools.piles import pile_ensemble
+from micstools.reading.reader import BadRun
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

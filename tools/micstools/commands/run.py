@@ -6,7 +6,7 @@ import subprocess
 from contextlib import suppress
 from pathlib import Path
 
-from micstools import program
+from micstools.cases import program
 from micstools.commands.base import Command
 
 

@@ -4,9 +4,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from micstools import command, extras, meshing, scene, shapes
+from micstools import command, extras
 from micstools.commands.base import Command
-from micstools.reader import BadRun
+from micstools.pictures import scene
+from micstools.reading.reader import BadRun
+from micstools.shapes import meshing
+from micstools.shapes import shape as shapes
 
 BUILT_IN = {"hexapod": shapes.hexapod, "cube": shapes.cube}
 

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools import case_copy, pile_ensemble, pile_numbers, program, settings, units
+from micstools.cases import case_copy, program, settings
+from micstools.cases.convergence import Convergence, converge
 from micstools.commands.base import Command
-from micstools.convergence import Convergence, converge
-from micstools.reader import BadRun, Run
-from micstools.units import Unit, Units, ascii_of
+from micstools.piles import pile_ensemble, pile_numbers
+from micstools.reading import units
+from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import Unit, Units, ascii_of
 
 _ENDED = (0, 3)  # codes of a run that would end in the same way again
 

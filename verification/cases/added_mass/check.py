@@ -3,8 +3,8 @@
 import numpy as np
 from potential import circle_in_square, sphere_in_cube
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 VARIES = ("numerics coupling",)
 

@@ -1,7 +1,7 @@
 """Added mass of blocks that touch a wall, along its normal."""
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 TOUCHING = 0.803  # of the displaced mass: a sphere, Lamb, Hydrodynamics, art. 98
 """As `src/coupling/added_mass.f90` takes it for every shape."""

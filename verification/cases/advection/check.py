@@ -4,16 +4,14 @@ The driver `advect_surface` moves the liquid with the transport of the program; 
 """
 
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tools"))
+from measures.checks import Checks
+from micstools.reading.reader import Run
 
-from micstools.checks import Checks  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+ROOT = Path(__file__).resolve().parents[3]
 
 COST = 360.0
 """Seconds on one core; `make verify` asks."""

@@ -3,15 +3,10 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Array, Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.reader import Array, Run
 
 VARIES = ("contact wall_friction", "contact sleep", "contact model")
 THETA = np.radians(20.0)

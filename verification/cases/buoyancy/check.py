@@ -3,14 +3,9 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.buoyancy import buoyancy_rows  # noqa: E402
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.buoyancy import buoyancy_rows
+from measures.checks import Checks, main, sound
+from micstools.reading.reader import Run
 
 
 def check(runs: list[Run]) -> Checks:

@@ -3,16 +3,11 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
-from micstools.waves import prosperetti_two_fluids, standing_amplitude  # noqa: E402
+from measures.checks import Checks, main, sound
+from measures.waves import prosperetti_two_fluids, standing_amplitude
+from micstools.reading.reader import Run
 
 RMS_BAND = 0.02  # of the initial amplitude
 COUNTS_FROM = 32  # cells per wavelength

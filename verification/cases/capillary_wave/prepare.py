@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
 
 for cells in (16, 32, 64):  # per wavelength
     x = np.arange(cells // 2 + 1) / cells

@@ -3,16 +3,13 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.profiles import Array, cubic, table, with_ends  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.profiles import Array, cubic, table, with_ends
+from micstools.reading.reader import Run
 
 BANDS = {100: 0.01 * 64, 1000: 0.03 * 128}  # lid speeds, times the cells along a side
 MIDDLE = np.array([0.5])

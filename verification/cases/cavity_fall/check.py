@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from micstools import kicks
-from micstools.checks import Checks, sound
-from micstools.geometry import Array
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading import kicks
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 VARIES = ("contact contact_time",)
 """It goes with the size of the block."""

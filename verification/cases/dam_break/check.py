@@ -4,16 +4,13 @@ what must hold whatever an experiment does: the exact force at the start, and en
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.reader import Run
 
 BAND = 0.05  # of the position of the front
 HEIGHT_BAND = 0.05  # of the initial height

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 G = 9.81
 FREE_FALL_BAND, COUPLING_BAND, GRID_BAND = 0.005, 0.05, 0.05

@@ -3,16 +3,11 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.geometry import place, volume_in_box  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import place, volume_in_box
 
 VARIES = ("contact friction", "contact wall_friction")  # none in `smooth`
 ENERGY_BAND = 1e-3

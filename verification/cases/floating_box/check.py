@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 DRAFT_BAND, ARM_BAND = 0.01, 1e-6
 G = 9.81

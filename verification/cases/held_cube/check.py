@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 HOERNER = {"face on": 1.05, "edge on": 0.80}  # on the projected area
 BLOCKAGE = 2.5  # Maskell (1963): the dynamic pressure rises by 2.5 C_d S/C

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.geometry import Array
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 DRAG = {"sphere": 0.40, "finite cylinder": 0.68, "cylinder": 1.15}  # in a wide stream
 DRAG_AT_1E3 = 0.45  # of the sphere

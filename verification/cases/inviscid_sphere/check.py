@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 BAND = {"sphere": 0.04, "cylinder": 0.06}
 """A tenth of the drag of a sphere at Reynolds numbers of 1e3 to 1e5; a cylinder drags more."""

@@ -3,16 +3,13 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
+import numpy as np
 
-import numpy as np  # noqa: E402
-
-from micstools.checks import Checks, main  # noqa: E402
-from micstools.impact_pressure import Experiment  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main
+from measures.impact_pressure import Experiment
+from micstools.reading.reader import Run
 
 FRONT = 2.3955  # of the box [m]
 

@@ -3,16 +3,12 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.balance import EXCESS_LIMIT, excess  # noqa: E402
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Fields, Run  # noqa: E402
+from measures.balance import excess
+from measures.checks import Checks, main, sound
+from micstools.reading.health import EXCESS_LIMIT
+from micstools.reading.reader import Fields, Run
 
 LEVEL_BAND = 1e-3  # of the rise
 FRAME_BAND = 1e-6  # of the volume of the liquid

@@ -3,13 +3,10 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import main  # noqa: E402
-from micstools.impact_pressure import Experiment  # noqa: E402
+from measures.checks import main
+from measures.impact_pressure import Experiment
 
 WALL = Experiment(
     title="dam break against a wall",

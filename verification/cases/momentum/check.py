@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 BAND, DRAG_BAND = 1e-3, 0.01
 WALLS = ("no_slip", "slip")

@@ -7,8 +7,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.geometry import Array  # noqa: E402
-from micstools.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.shapes.geometry import Array  # noqa: E402
 
 DEPTHS = {"long": (0.0513, 0.2), "medium": (0.1013, 0.1), "short": (0.1513, 0.06)}
 COSTS = {"long": 8, "medi": 21, "shor": 21}  # [s]

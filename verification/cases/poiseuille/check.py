@@ -3,17 +3,14 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.geometry import Array  # noqa: E402
-from micstools.profiles import cubic, table, with_ends  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.profiles import cubic, table, with_ends
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 BAND, BAND_CELLS = 0.01, 20  # of the largest velocity of the profile
 THIN = 3.0  # cells: a thinner layer at the wall is shown for information

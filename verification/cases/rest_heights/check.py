@@ -3,16 +3,11 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.geometry import Array  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 EDGE = 20.0  # of a cube [mm]
 HEIGHTS = (1.5 * EDGE, np.sqrt(2.0) * EDGE, 2.5 / np.sqrt(3.0) * EDGE)

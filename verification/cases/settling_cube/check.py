@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 BAND = 0.1
 CUBE = (np.pi / 6) ** (1 / 3)  # sphericity

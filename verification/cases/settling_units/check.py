@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 BANDS = {12.0: 0.15, 24.0: 0.10}  # of the speed with half the cells, by the finer grid
 MASKELL = 2.5  # rise of the dynamic pressure over C_d S/C

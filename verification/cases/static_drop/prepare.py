@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.initial_state import ball_shares, disc_shares, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import ball_shares, disc_shares, write_initial_state  # noqa: E402
 
 plane = np.linspace(0.0, 0.01, 33)
 write_initial_state(Path("plane.h5"), disc_shares((0.0, 0.0), 0.004, plane, plane))

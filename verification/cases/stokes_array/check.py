@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from micstools.balance import faces
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.balance import faces
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 DRAG_BAND, SCATTER_BAND, BALANCE_BAND = 0.015, 0.01, 1e-3
 

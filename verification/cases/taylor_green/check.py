@@ -3,16 +3,13 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.profiles import table  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.profiles import table
+from micstools.reading.reader import Run
 
 VARIES = ("numerics momentum",)
 AMPLITUDE_BAND, BAND_CELLS = 0.01, 32

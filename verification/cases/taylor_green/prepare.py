@@ -7,7 +7,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.initial_state import write_initial_state  # noqa: E402
+from micstools.cases.initial_state import write_initial_state  # noqa: E402
 
 COSTS = {16: 1, 32: 2, 64: 3, 128: 100}  # cells: [s]
 SIDE = 2.0 * np.pi

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
 CURVE_BAND = 0.05  # of the measured largest speed

@@ -3,17 +3,12 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.balance import EXCESS_LIMIT  # noqa: E402
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.energy import made_by_contact  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.checks import Checks, main, sound
+from micstools.reading.energy import made_by_contact
+from micstools.reading.health import EXCESS_LIMIT
+from micstools.reading.reader import Run
 
 VARIES = ("contact contact_time", "contact wall_friction")
 HEIGHT = 2.0  # of a tetrapod [m]

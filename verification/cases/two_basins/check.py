@@ -3,16 +3,11 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.balance import liquid_between  # noqa: E402
-from micstools.checks import DRIFT_BAND, Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
+from measures.balance import liquid_between
+from measures.checks import DRIFT_BAND, Checks, main, sound
+from micstools.reading.reader import Run
 
 
 def check(runs: list[Run]) -> Checks:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.geometry import Array
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import Array
 
 VARIES = ("numerics momentum", "numerics coupling")
 """In rows that do not count."""

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
 BANDS = {8: 0.05, 12: 0.03, 15: 0.02}  # of the speed, by least cells per diameter

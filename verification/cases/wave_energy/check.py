@@ -3,16 +3,11 @@
 usage: python check.py RUN [RUN ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
-
-from micstools.checks import Checks, main, sound  # noqa: E402
-from micstools.reader import Run  # noqa: E402
-from micstools.waves import period, standing_amplitude  # noqa: E402
+from measures.checks import Checks, main, sound
+from measures.waves import period, standing_amplitude
+from micstools.reading.reader import Run
 
 BAND = 0.05  # of the height, in nine periods
 GRAVITY, WAVENUMBER, SPACING = (9.81, 4.0 * np.pi / 0.3, 0.3 / 32.0)

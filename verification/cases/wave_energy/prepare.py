@@ -7,8 +7,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "tools"))
 
-from micstools.geometry import Array  # noqa: E402
-from micstools.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.cases.initial_state import below_surface, write_initial_state  # noqa: E402
+from micstools.shapes.geometry import Array  # noqa: E402
 
 CELLS, ROWS, LENGTH = (32, 21, 0.3)
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from micstools.checks import Checks, sound
-from micstools.reader import Run
+from measures.checks import Checks, sound
+from micstools.reading.reader import Run
 
 VARIES = ("contact restitution",)
 BAND = 0.05

@@ -1,0 +1,1 @@
+"""Case files: settings, copies, the program that runs them, cases made by rule."""

@@ -1,0 +1,81 @@
+"""The table of an ensemble, for a spreadsheet and for programs; it knows no machine, no clock."""
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from micstools.ensembles.ensemble import OUTCOMES, Member, Plan, State
+from micstools.piles.shares import in_words, wilson
+
+Table = Mapping[Member, State]
+
+
+def rows(table: Table) -> list[dict[str, Any]]:
+    """A row per run."""
+    return [
+        {"run": m.number, "seed": m.seed}
+        | {s.name: s.value for s in m.choice}
+        | {
+            "outcome": end.outcome,
+            "exit_code": "" if end.code is None else end.code,
+            "time_end": f"{end.time:.9g}" if end.time == end.time else "",
+            "folder": m.folder.name,
+        }
+        for m, end in table.items()
+    ]
+
+
+def shares(table: Table) -> dict[str, dict[str, Any]]:
+    """Count, share and its 95 % interval for each outcome, of the runs that are done."""
+    counted = Counter(end.outcome for end in table.values() if end.counts)
+    total = counted.total()
+    return {
+        name: {
+            "count": counted[name],
+            "share": counted[name] / total if total else None,
+            "interval_95": list(wilson(counted[name], total)),
+        }
+        for name in OUTCOMES
+    }
+
+
+def sentence(table: Table) -> str:
+    """The outcomes in words."""
+    counted = Counter(end.outcome for end in table.values())
+    total = sum(counted[name] for name in OUTCOMES)
+    said = [f"{name} {in_words(counted[name], total)}" for name in OUTCOMES if counted[name]]
+    left = [f"{counted[k]} {k}" for k in ("failed", "interrupted", "missing") if counted[k]]
+    return ", ".join(said + left)
+
+
+def write(plan: Plan, table: Table) -> None:
+    """Write `ensemble.csv` and `ensemble.json`, each as a whole or not at all."""
+    found = rows(table)
+    new = plan.folder / "ensemble.csv.new"
+    with new.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(found[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(found)
+    new.replace(plan.folder / "ensemble.csv")
+    content = {
+        "format": "mics-ensemble",
+        "format_version": 1,
+        "runs": plan.runs,
+        "seed": plan.seed,
+        "spread": plan.spread,
+        "tilt_deg": plan.tilt,
+        "choices": [{s.name: s.value for s in choice} for choice in plan.choices],
+        "case": plan.text,
+        "outcomes": shares(table),
+        "table": found,
+    }
+    _replace(plan.folder / "ensemble.json", json.dumps(content, indent=2) + "\n")
+
+
+def _replace(path: Path, text: str) -> None:
+    new = path.with_name(path.name + ".new")
+    new.write_text(text)
+    new.replace(path)

@@ -1,0 +1,103 @@
+"""Text as markup: whatever is not markup already is escaped, so titles stay text."""
+
+import base64
+import html
+import json
+from importlib.resources import files
+from typing import Any
+
+# The page may load nothing at all; the browser itself refuses what this does not allow.
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_SCRIPTS = (
+    "vectors",
+    "water",
+    "block_map",
+    "stage",
+    "overlay",
+    "hands",
+    "player",
+)  # each uses those before
+_EMPTY = ("img", "input", "meta")  # have no end
+
+
+class Markup(str):
+    """Text that is markup."""
+
+    __slots__ = ()
+
+
+def markup(*content: object) -> Markup:
+    """Everything in a row, escaped where it is not markup yet; None is left out."""
+    said = [c for c in content if c is not None]
+    return Markup("".join(c if isinstance(c, Markup) else html.escape(str(c)) for c in said))
+
+
+def tag(name: str, /, *content: object, **attributes: object) -> Markup:
+    """An element, as in `tag("p", "text", class_="note")`; an attribute that is None is left out,
+    one that is True has no value."""
+    said = [name]
+    for key, value in attributes.items():
+        word = key.rstrip("_").replace("_", "-")
+        if value is True:
+            said.append(word)
+        elif value is not None:
+            said.append(f'{word}="{html.escape(str(value))}"')
+    opened = f"<{' '.join(said)}>"
+    return Markup(opened if name in _EMPTY else f"{opened}{markup(*content)}</{name}>")
+
+
+def section(name: str, title: str, *content: object) -> Markup:
+    """A part of the page under a heading."""
+    return tag("section", tag("h2", title, id=f"{name}-title"), *content, id=name,
+               aria_labelledby=f"{name}-title")  # fmt: skip
+
+
+def table(heads: list[object], rows: list[list[object]], numbers: bool = True) -> Markup:
+    """A table that scrolls by itself where it is wider than the window; `numbers`: all columns but
+    the first are figures."""
+    head = tag("thead", tag("tr", *(tag("th", h, scope="col") for h in heads)))
+    body = [
+        tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:]))
+        for row in rows
+    ]
+    kind = "figures" if numbers else None
+    return tag("div", tag("table", head, tag("tbody", *body), class_=kind), class_="scroll",
+               tabindex=0)  # fmt: skip
+
+
+def facts(pairs: list[tuple[str, object, str]]) -> Markup:
+    """The few figures that matter: name, value and a word on it."""
+    return tag("dl", *(
+        tag("div", tag("dt", name), tag("dd", tag("b", value), " ", tag("span", note)))
+        for name, value, note in pairs
+    ), class_="facts")  # fmt: skip
+
+
+def download(name: str, kind: str, content: str, words: str) -> Markup:
+    """A link that saves a text; it is in the page already."""
+    data = base64.b64encode(content.encode()).decode()
+    return tag("a", words, href=f"data:{kind};base64,{data}", download=name)
+
+
+def data(name: str, content: Any) -> Markup:
+    """Numbers for a script; no `<` in them can end it."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return Markup(f'<script type="application/json" id="{name}">{text}</script>')
+
+
+def document(title: str, *content: object, script: str = "") -> str:
+    """The whole page with its style and scripts, `script` the one that starts them."""
+    style = (files("micstools.pages") / "page.css").read_text()
+    player = "".join((files("micstools.pages") / f"{name}.js").read_text() for name in _SCRIPTS)
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", name="color-scheme", content="light dark"),
+        tag("title", title),
+        Markup(f"<style>\n{style}</style>"),
+    )
+    scripts = Markup(f"<script>\n{player}{script}\n</script>")
+    body = tag("body", tag("main", *content), scripts)
+    return f'<!doctype html>\n<html lang="en">\n{head}\n{body}\n</html>\n'

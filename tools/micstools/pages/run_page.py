@@ -1,0 +1,304 @@
+"""The page of a run: the fall to play, the pile to scale, what the blocks felt, whether the numbers
+can be trusted, and how to get them again."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from micstools.pages import charts, motion, run_words
+from micstools.pages.charts import Curve
+from micstools.pages.html import (
+    Markup,
+    data,
+    document,
+    download,
+    facts,
+    markup,
+    section,
+    table,
+    tag,
+)
+from micstools.pages.parts import north_note, number, player, swatch
+from micstools.pages.run_words import count
+from micstools.pages.views import Sheet, bed_of, block_colours
+from micstools.piles import pile, pile_numbers
+from micstools.piles.pile_numbers import PileNumbers
+from micstools.reading import block_numbers, health, scales, units
+from micstools.reading.block_numbers import BlockNumbers
+from micstools.reading.health import Check
+from micstools.reading.overlap import Placed, present_bodies
+from micstools.reading.reader import Run
+from micstools.reading.units import Units, figure
+from micstools.shapes.geometry import Array
+
+_START = """
+const runPlayer = startPlayer(document.getElementById('player'));
+if (runPlayer) runPlayer.load(read('scene'));
+"""
+_MANY = 16  # blocks with a curve of their own
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the parts of the page share."""
+
+    numbers: PileNumbers
+    blocks: list[BlockNumbers]
+    units: Units
+
+
+def page(run: Run, north: float | None = None) -> str:
+    """The page of a run as text; without blocks it tells of the case and of the numbers only.
+    `north`: its direction in the plan, degrees from +y towards +x."""
+    title = run_words.title(run)
+    chosen = units.of_run(run)
+    case = section("case", "The case", *(tag("p", words) for words in run_words.case(run, chosen)))
+    last = (_settings(run), _provenance(run))
+    if not run.bodies.n:
+        lead = (
+            f"A run of {run.series.time[-1]:.3g} s without blocks; mics-tools plot draws its water."
+        )
+        return document(title, tag("h1", title), tag("p", lead, class_="lead"), case,
+                        _health(run, chosen), *last, script="")  # fmt: skip
+    numbers = pile_numbers.numbers(run, pile_numbers.usual_step(run))
+    found = Found(numbers, block_numbers.of_blocks(run), chosen)
+    return document(
+        title,
+        tag("h1", title),
+        tag("p", outcome(run, found), class_="lead"),
+        player("player", "the fall of the blocks; arrow keys turn it, + and - zoom, space plays"),
+        north_note(north),
+        _facts(run, found),
+        case,
+        _pile(run, chosen),
+        _blocks(run, found),
+        _health(run, chosen),
+        *last,
+        data("scene", motion.scene(run, north)),
+        script=_START,
+    )
+
+
+def outcome(run: Run, found: Found) -> str:
+    """How the run ended, in a sentence or two."""
+    b = run.bodies
+    n, end = len(found.blocks), f"After {figure(float(b.time[-1]))} s "
+    missing = int((~b.fixed).sum()) - n
+    moving = sum(k.at_rest != k.at_rest for k in found.blocks)
+    if missing:
+        said = f"{end}{count(missing, 'block is', 'blocks are')} still to come and "
+        said += f"{count(n, 'block was', 'blocks were')} let go"
+    elif moving:
+        of_all = f"{count(moving, 'of', 'of')} {count(n, 'free block')}"
+        said = end + (of_all if n > moving else count(n, "free block"))
+        said += " still moves" if moving == 1 else " still move"
+    elif n:
+        said = f"After {figure(found.numbers.time_to_rest)} s {count(n, 'free block')} "
+        said += "lies still" if n == 1 else "lie still"
+    else:
+        said = "All blocks are fixed"
+    low, ground = found.numbers.on_floor, _ground(run)
+    return (
+        f"{said}; the pile reaches {found.units.length.text(found.numbers.height)} above the "
+        f"{ground} under it, and {count(low, 'free block touches', 'free blocks touch')} the "
+        f"{ground}."
+    )
+
+
+def _ground(run: Run) -> str:
+    """What blocks lie on."""
+    return "bed" if len(run.bed[1]) else "floor"
+
+
+def _facts(run: Run, found: Found) -> Markup:
+    n, b, shown = found.numbers, run.bodies, found.units
+    hardest = max(found.blocks, key=lambda k: np.nan_to_num(k.contact_force), default=None)
+    blow = f"block {hardest.block}, mean of a step" if hardest else ""
+    mass = float(b.mass[b.present(-1)].sum())
+    return facts(
+        [
+            ("blocks", n.blocks, f"{shown.mass.text(mass)} in all"),
+            ("height of the pile", shown.length.text(n.height), f"above the {_ground(run)}"),
+            ("layer thickness", shown.length.text(n.layer_thickness),
+             f"mean; {percent(n.layer_porosity)} void"),
+            ("plan covered", shown.area.text(n.plan_area),
+             f"{percent(n.plan_area / n.footprint)} of a footprint of "
+             f"{shown.area.text(n.footprint)}"),
+            ("time to rest", shown.time.text(n.time_to_rest), f"of {shown.time.text(b.time[-1])}"),
+            ("contacts per block", f"{n.coordination:.2f}", "with other blocks"),
+            ("fastest first impact", shown.speed.text(n.impact_speed), "of a free block"),
+            ("hardest contact", shown.force.text(n.contact_force), blow),
+        ]
+    )  # fmt: skip
+
+
+def percent(share: float) -> str:
+    """A share in percent; a dash where it is not known."""
+    return "–" if share != share else f"{100 * share:.0f} %"
+
+
+def _pile(run: Run, shown: Units) -> Markup:
+    """The pile of the end from three sides."""
+    bodies = present_bodies(run, -1)
+    level = _last_level(run)
+    sheet = Sheet(run.grid.low, _upper_corner(run, bodies, level), bed_of(run))
+    colours = block_colours(run.bodies.dropped, run.bodies.n)
+    drawn = [
+        sheet.drawing(bodies, colours, view, shown.length, level)
+        for view in ("front", "side", "top")
+    ]
+    words = "All views have one scale; blocks bear their numbers, fixed ones are grey."
+    words += " The dashed line is the water level." if level is not None else ""
+    return section("pile", "The pile at the end", tag("div", *drawn, class_="views"),
+                   tag("p", words, class_="note"))  # fmt: skip
+
+
+def _upper_corner(run: Run, bodies: dict[int, Placed], level: float | None) -> Array:
+    """Of what is shown: the tank, but for much air above the pile and the water."""
+    tops = [float(body.points[:, 2].max()) for body in bodies.values()]
+    low, high = run.grid.low, np.array(run.grid.high)
+    needed = max([*tops, *([level] if level is not None else [])], default=float(high[2]))
+    high[2] = min(high[2], max(needed, low[2]) + 0.1 * float((high - low).max()))
+    return high
+
+
+def _last_level(run: Run) -> float | None:
+    """The mean level of the water at the end; the one it should have where no field was written."""
+    return pile.water_level(run).found if pile.has_level(run) else pile.still_level(run)
+
+
+def _blocks(run: Run, found: Found) -> Markup:
+    colours = block_colours(run.bodies.dropped, run.bodies.n)
+    length, force = found.units.length, found.units.force
+    heads: list[object] = ["block", "released [s]", "at rest [s]", "first impact [m/s]",
+                           f"largest contact force [{force.name}]", "in weights",
+                           f"largest force of water [{force.name}]", "turned [°]",
+                           f"x, y, z at the end [{length.name}]"]  # fmt: skip
+    rows: list[list[object]] = [
+        [
+            swatch(colours[k.block], k.block),
+            figure(k.released),
+            figure(k.at_rest),
+            figure(k.impact_speed),
+            force.figure(k.contact_force),
+            figure(k.contact_force / k.weight) if k.weight else "–",
+            force.figure(k.fluid_force),
+            number(k.turned, ".0f"),
+            ", ".join(length.figure(v, 4) for v in k.place),
+        ]
+        for k in found.blocks
+    ]
+    note = "At rest: the time after which a block stays where it ends. Forces are means over a "
+    note += "time step; the force of the water includes buoyancy."
+    return section("blocks", "Fall and forces of each block", table(heads, rows),
+                   tag("p", note, class_="note"), *_curves(run, found.units))  # fmt: skip
+
+
+def _curves(run: Run, shown: Units) -> list[Markup]:
+    """Charts against time and their key, of the first blocks where there are many."""
+    b, force = run.bodies, shown.force
+    chosen = [int(k) for k in b.dropped if b.present(-1)[k]][:_MANY]
+    if not chosen:
+        return []
+    wanted = [
+        (shown.length.of(b.position[..., 2] - run.grid.low[2]),
+         f"height of the centroid over the floor of the tank [{shown.length.name}]"),
+        (np.linalg.norm(b.velocity, axis=2), "speed [m/s]"),
+        (force.of(b.fluid_force[..., 2]), f"vertical force of the water [{force.name}]"),
+        (force.of(np.linalg.norm(b.contact_force, axis=2)), f"contact force [{force.name}]"),
+    ]  # fmt: skip
+    drawn = [
+        charts.lines(_each(run, chosen, values), "time [s]", name)
+        for values, name in wanted
+        if np.isfinite(values).any()
+    ]
+    few = f"The first {_MANY} of {b.dropped.size} blocks." if b.dropped.size > _MANY else ""
+    names = [(order, f"block {k + 1}") for order, k in enumerate(chosen)]
+    return [tag("div", *drawn, class_="charts"), charts.key(names), tag("p", few, class_="note")]
+
+
+def _each(run: Run, shown: list[int], values: Array) -> list[Curve]:
+    """A curve for each block from its release on."""
+    b = run.bodies
+    found = []
+    for order, k in enumerate(shown):
+        here = b.time >= b.release_time[k] - 1e-12
+        found.append(Curve(b.time[here], values[here, k], order))
+    return found
+
+
+def _health(run: Run, shown: Units) -> Markup:
+    """Whether the numbers can be trusted, those of the blocks, too, where there are any."""
+    s = run.series
+    rows = [check_row(check) for check in health.checks(run, shown)]
+    drawn = []
+    if run.bodies.n:
+        share = 100 * s.max_overlap / scales.smallest(run)
+        name = "largest overlap [% of the smallest block's length]"
+        drawn.append(charts.lines([Curve(s.time, share, 6)], "time [s]", name))
+    if np.isfinite(s.liquid_volume_drift).any():
+        drawn.append(charts.lines([Curve(s.time, s.liquid_volume_drift, 2)], "time [s]",
+                                  "drift of the liquid volume [-]"))  # fmt: skip
+    return section(
+        "health",
+        "Health of the computation",
+        table(["", "found", "wanted", ""], rows, numbers=False),
+        tag("div", *drawn, class_="charts"),
+    )
+
+
+def check_row(check: Check) -> list[object]:
+    """A check as a row of a table; below what was found stands what to do where it needs that."""
+    todo = tag("div", f"→ {check.todo}", class_="todo") if check.todo else None
+    return [check.name, markup(_whole(check.found), todo), _whole(check.wanted), mark(check.good)]
+
+
+def _whole(text: str) -> str:
+    """Text whose times and percentages stay on one line."""
+    text = re.sub(r"t = ([\d.e+-]+) s", "t\u00a0=\u00a0\\1\u00a0s", text)
+    return text.replace(" %", "\u00a0%")
+
+
+def mark(good: bool | None) -> Markup:
+    """Is a number as it should be? None: it is not known."""
+    if good is None:
+        return tag("span", "–")
+    return tag("span", "✓ good", class_="good") if good else tag("span", "! look", class_="look")
+
+
+def _settings(run: Run) -> Markup:
+    rows: list[list[object]] = [list(row) for row in run_words.differing(run)]
+    if not rows:
+        said = tag("p", "Nothing: all else is at its default.")
+    else:
+        said = table(["variable", "here", "default"], rows, numbers=False)
+    note = "Tank, cells, shapes and places of the blocks have no defaults and stand in the case."
+    return section("settings", "What differs from the defaults", said,
+                   tag("p", note, class_="note"))  # fmt: skip
+
+
+def _provenance(run: Run) -> Markup:
+    p = run.provenance
+    threads, ranks = p.get("threads", 1), int(p.get("ranks", 1))
+    seconds = float(run.series.wall_time[-1])
+    pairs = [
+        ("program", f"mics {p.get('version', '?')}, git revision {p.get('git_revision', '?')}"),
+        ("compiled by", f"{p.get('compiler', '?')} {p.get('flags', '')}"),
+        ("run on", f"{count(int(ranks), 'process', 'processes')} of "
+         f"{count(int(threads), 'thread')}, {seconds:.0f} s"),
+        ("started, finished", f"{p.get('started', '?')}, {p.get('finished', '') or '–'}"),
+    ]  # fmt: skip
+    rows: list[list[object]] = [[name, value] for name, value in pairs]
+    text = str(p["namelist"])
+    repeat = f"./mics --threads {threads} --output again case.nml"
+    return section(
+        "again",
+        "Where this comes from, and how to get it again",
+        table(["", ""], rows, numbers=False),
+        tag("p", "Save ", download("case.nml", "text/plain", text, "case.nml"),
+            " and run the same version of the program; the results have the same bits on any "
+            "number of threads."),
+        tag("pre", repeat),
+        tag("details", tag("summary", "The case file as it was read"), tag("pre", markup(text))),
+    )  # fmt: skip

@@ -1,0 +1,259 @@
+"""A pile seen from the front, the side and the top, in parallel and to one scale, as an engineer
+draws it; and maps of the plan. No OpenGL is needed."""
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from micstools.pages.charts import colour
+from micstools.pages.html import Markup, tag
+from micstools.pictures.labels import round_below
+from micstools.piles.pile_numbers import under
+from micstools.reading.overlap import Placed
+from micstools.reading.reader import Run
+from micstools.reading.units import Unit
+from micstools.shapes.geometry import Array, IntArray
+
+# What runs to the right, what runs up, what comes towards the viewer; as the pictures of `scene`.
+VIEWS = {
+    "front": (np.array([1, 0, 0]), np.array([0, 0, 1]), np.array([0, -1, 0])),
+    "side": (np.array([0, 1, 0]), np.array([0, 0, 1]), np.array([1, 0, 0])),
+    "top": (np.array([1, 0, 0]), np.array([0, 1, 0]), np.array([0, 0, 1])),
+}
+NAMES = {
+    "front": ("x", "z"),
+    "side": ("y", "z"),
+    "top": ("x", "y"),
+}
+_LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
+FIXED = "#8d8d8d"
+BED = "#b7a78c"
+_MANY = 20  # blocks: more have smaller numbers
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of the blocks on squares of `step` [m], the first row at the bottom."""
+
+    block: IntArray  # (rows, columns) number of the block, from 1; 0: none
+    light: Array  # (rows, columns) 0 dark to 1
+    depth: Array  # (rows, columns) towards the viewer [m]
+    low: Array  # (2) corner [m]
+    step: float
+
+
+def look(surfaces: dict[int, Array], view: str, low: Array, high: Array, step: float) -> Seen:
+    """What is seen of surfaces, triangles (m, 3, 3) by the number of their block from 0, in the
+    box from `low` to `high` (3)."""
+    axes = np.array(VIEWS[view], float)
+    corner = np.minimum(axes @ low, axes @ high)
+    far = np.maximum(axes @ low, axes @ high)
+    n = np.maximum(1, np.ceil((far[:2] - corner[:2]) / step - 1e-9).astype(int))
+    depth = np.full((n[1], n[0]), -np.inf)
+    block, light = np.zeros(depth.shape, dtype=np.int64), np.zeros(depth.shape)
+    towards = _LIGHT / np.linalg.norm(_LIGHT)
+    for number, surface in surfaces.items():
+        triangles = surface @ axes.T
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals *= np.sign(normals[:, 2:])  # an open surface is seen from behind, too
+        for triangle, normal in zip(triangles, normals, strict=True):
+            patch = under(triangle, corner, step, depth.shape)
+            if patch is None:
+                continue
+            rows, columns, heights = patch
+            here = heights > depth[rows, columns]
+            depth[rows, columns][here] = heights[here]
+            block[rows, columns][here] = number + 1
+            shade = float(normal @ towards / np.linalg.norm(normal))
+            light[rows, columns][here] = 0.5 + 0.5 * max(0.0, shade)
+    return Seen(block, light, depth, corner[:2], step)
+
+
+def surfaces_of(bodies: dict[int, Placed]) -> dict[int, Array]:
+    """Triangles (m, 3, 3) of each block."""
+    return {k: body.triangles for k, body in bodies.items()}
+
+
+def ground(bed: Array, view: str, low: Array, high: Array, step: float) -> Image.Image:
+    """The bed, triangles (m, 3, 3): from the top as it is, from a side its highest outline."""
+    seen = look({0: bed}, "top", low, high, step)
+    if view != "top":
+        outline = seen.depth.max(axis=0 if view == "front" else 1)
+        rows = max(1, int(np.ceil((high[2] - low[2]) / step - 1e-9)))
+        middle = low[2] + (np.arange(rows)[:, None] + 0.5) * step
+        filled = (middle < outline).astype(np.int64)
+        corner = np.array([low[0 if view == "front" else 1], low[2]])
+        seen = Seen(filled, 0.95 * filled, np.zeros(filled.shape), corner, step)
+    return paint(seen, {1: BED}, edges=False)
+
+
+def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Image:
+    """The picture: colours by the number of the block from 1, edges dark, nothing elsewhere."""
+    pixels = np.zeros((*seen.block.shape, 4))
+    for number in np.unique(seen.block[seen.block > 0]):
+        here = seen.block == number
+        rgb = [int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)]
+        pixels[here] = [*rgb, 255]
+        pixels[here, :3] = 255 - (255 - pixels[here, :3]) * 0.92
+    pixels[..., :3] *= seen.light[..., None]
+    if edges:
+        pixels[_edges(seen)] = (28, 32, 38, 255)
+    flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
+    return Image.fromarray(flipped, "RGBA")
+
+
+def _edges(seen: Seen) -> NDArray[np.bool_]:
+    """Where one block ends before another or a face bends."""
+    found = np.zeros(seen.block.shape, dtype=bool)
+    for axis in (0, 1):
+        other = np.diff(seen.block, axis=axis) != 0
+        bend = np.abs(np.diff(seen.light, axis=axis)) > 0.02
+        with np.errstate(invalid="ignore"):
+            jump = np.abs(np.diff(seen.depth, axis=axis)) > 12 * seen.step
+        line = other | bend | jump
+        first, second = [slice(None)] * 2, [slice(None)] * 2
+        first[axis], second[axis] = slice(None, -1), slice(1, None)
+        found[tuple(first)] |= line & (seen.block[tuple(first)] > 0)
+        found[tuple(second)] |= other & (seen.block[tuple(first)] == 0)
+    return np.asarray(found & (seen.block > 0))
+
+
+def uri(picture: Image.Image, colours: int = 96) -> str:
+    """A picture as an address that holds it, with few colours to keep it small."""
+    file = io.BytesIO()
+    clear = picture.mode == "RGBA"
+    method = Image.Quantize.FASTOCTREE if clear else Image.Quantize.MEDIANCUT
+    picture.quantize(colours, method).save(file, "PNG", optimize=True)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode()
+
+
+def block_colours(dropped: IntArray, n: int) -> dict[int, str]:
+    """Colour of each of `n` blocks, by its number from 1: grey where it is fixed, else by its
+    turn."""
+    order = {int(k): place for place, k in enumerate(dropped)}
+    return {k + 1: colour(order[k]) if k in order else FIXED for k in range(n)}
+
+
+def bed_of(run: Run) -> Array:
+    """Triangles (m, 3, 3) of the bed; none without one."""
+    points, triangles = run.bed
+    return np.asarray(points[triangles]) if len(triangles) else np.empty((0, 3, 3))
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The views of one pile: one scale for all of them."""
+
+    low: Array  # corner of what is shown (3) [m]
+    high: Array
+    bed: Array  # triangles (m, 3, 3) [m]
+    pixels: float = 900.0  # of the longest side
+
+    @property
+    def step(self) -> float:
+        """A pixel [m]."""
+        return float((self.high - self.low).max()) / self.pixels
+
+    def picture(
+        self, bodies: dict[int, Placed], colours: dict[int, str], view: str
+    ) -> tuple[Image.Image, Seen]:
+        """One view without words, and what is seen in it."""
+        seen = look(surfaces_of(bodies), view, self.low, self.high, self.step)
+        picture = paint(seen, colours)
+        if len(self.bed):
+            below = ground(self.bed, view, self.low, self.high, self.step)
+            picture = Image.alpha_composite(below, picture)
+        return picture, seen
+
+    def drawing(self, bodies: dict[int, Placed], colours: dict[int, str], view: str,
+                unit: Unit, level: float | None = None) -> Markup:  # fmt: skip
+        """One view with the numbers of the blocks, the tank, the water level and a length in a
+        unit."""
+        picture, seen = self.picture(bodies, colours, view)
+        rows, columns = seen.block.shape
+        image = tag("image", href=uri(picture), width=columns, height=rows)
+        drawn = [image, tag("rect", class_="tank", x=0, y=0, width=columns, height=rows)]
+        if level is not None and view != "top":
+            at = f"{rows - (level - seen.low[1]) / self.step:.1f}"
+            drawn.append(tag("line", class_="level", x1=0, x2=columns, y1=at, y2=at))
+        drawn += _numbers(seen)
+        drawn += self._bar(rows, unit)
+        across, up = NAMES[view]
+        margin = 8
+        box = f"{-margin} {-margin} {columns + 2 * margin} {rows + 2 * margin + 46}"
+        svg = tag("svg", *drawn, viewBox=box, role="img",
+                  aria_label=f"the pile from the {view}")  # fmt: skip
+        size = f"--share:{(columns + 2 * margin) / (self.pixels + 2 * margin):.4f}"
+        words = f"{view}: {across} to the right, {up} up"
+        return tag("figure", svg, tag("figcaption", words), class_="view", style=size)
+
+    def _bar(self, rows: int, unit: Unit) -> list[Markup]:
+        """A bar of a round length under a view."""
+        length = round_below(0.3 * float((self.high - self.low)[:2].min()))
+        long, y = length / self.step, rows + 22
+        text = unit.text(length)
+        return [
+            tag("path", class_="scale", d=f"M0 {y - 7}V{y + 7}M0 {y}H{long:.1f}M{long:.1f} "
+                f"{y - 7}V{y + 7}"),
+            tag("text", text, x=f"{long + 12:.1f}", y=y + 9, class_="large"),
+        ]  # fmt: skip
+
+
+def _numbers(seen: Seen) -> list[Markup]:
+    """The number of each block where it is seen, unless too little of it is."""
+    found = []
+    rows, shown = seen.block.shape[0], np.unique(seen.block[seen.block > 0])
+    kind = "number" if len(shown) <= _MANY else "number many"
+    for number in shown:
+        y, x = np.nonzero(seen.block == number)
+        if len(x) < 500:
+            continue
+        nearest = int(((x - x.mean()) ** 2 + (y - y.mean()) ** 2).argmin())
+        found.append(tag("text", number, x=x[nearest], y=rows - y[nearest] + 10, class_=kind,
+                         text_anchor="middle"))  # fmt: skip
+    return found
+
+
+_MAP_WIDTH = 300.0
+"""Units of a drawing along the longer side of a map, whatever its points: words keep their size."""
+
+
+def plan_map(values: Array, top: float, name: str, unit: str) -> Markup:
+    """A map of the plan (ny, nx) in colours from 0 to `top`, which can be told apart in grey, with
+    their key."""
+    share = np.clip(values / (top or 1.0), 0, 1)
+    picture = Image.fromarray(_ramp(share[::-1]), "RGB")
+    step = _MAP_WIDTH / max(values.shape)
+    rows, columns = (round(step * n, 1) for n in values.shape)
+    strip = Image.fromarray(_ramp(np.linspace(0, 1, 64)[None]), "RGB")
+    bar = rows + 6
+    drawn = [
+        tag("image", href=uri(picture, 128), width=columns, height=rows,
+            preserveAspectRatio="none"),
+        tag("rect", class_="tank thin", x=0, y=0, width=columns, height=rows),
+        tag("image", href=uri(strip, 128), x=0, y=bar, width=columns / 2, height=7,
+            preserveAspectRatio="none"),
+    ]  # fmt: skip
+    for at, value in ((0.0, 0.0), (0.25, top / 2), (0.5, top)):
+        anchor = "start" if at == 0 else "middle"
+        words = f"{value:.3g} {unit}" if at == 0.5 else f"{value:.3g}"
+        drawn.append(tag("text", words, x=round(at * columns, 1), y=bar + 18,
+                         text_anchor=anchor, class_="little"))  # fmt: skip
+    size = f"width:{100 * columns / max(rows, columns):.0f}%"
+    svg = tag("svg", *drawn, viewBox=f"-1 -1 {columns + 2} {rows + 30}", role="img",
+              aria_label=name, style=size)  # fmt: skip
+    return tag("figure", tag("figcaption", f"{name} [{unit}]"), svg, class_="map")
+
+
+_RAMP = np.array([[250, 250, 247], [186, 222, 213], [96, 176, 184], [38, 110, 150], [22, 42, 92]])
+
+
+def _ramp(share: Array) -> NDArray[np.uint8]:
+    """Colours (..., 3) of shares from 0, nearly white, to 1, dark blue."""
+    at = share * (len(_RAMP) - 1)
+    parts = [np.interp(at, np.arange(len(_RAMP)), _RAMP[:, k]) for k in range(3)]
+    return np.round(np.stack(parts, axis=-1)).astype(np.uint8)

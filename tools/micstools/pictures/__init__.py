@@ -1,0 +1,1 @@
+"""Diagrams, pictures, films and exports of a run."""

@@ -1,0 +1,138 @@
+"""A run in the formats of other programs: a named object per block, SI units, z up."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from micstools.pictures import gltf, vtk_data
+from micstools.reading.overlap import present_bodies
+from micstools.reading.reader import BadRun, Run
+from micstools.shapes.geometry import Array, IntArray
+
+FILMED = 30  # frames a second
+Writer = Callable[[Run, int, Path], Path]
+
+
+def to_csv(run: Run, _row: int, folder: Path) -> Path:
+    """Place, attitude, velocity and forces of every block at every row."""
+    return run.to_csv(folder / "blocks.csv")
+
+
+def to_final_csv(run: Run, row: int, folder: Path) -> Path:
+    """Place and attitude of every released block at a row; blocks count from 1."""
+    b, path = run.bodies, folder / "final.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"])
+        for k in np.flatnonzero(b.present(row)):
+            pose = [*b.position[row, k].tolist(), *b.quaternion[row, k].tolist()]
+            writer.writerow([int(k) + 1, b.shape[k], int(b.fixed[k]), *pose])
+    return path
+
+
+def to_stl(run: Run, row: int, folder: Path) -> Path:
+    """The released blocks at a row, a solid each, as text."""
+    path = folder / "pile.stl"
+    with path.open("w") as file:
+        for k, body in present_bodies(run, row).items():
+            corners = body.triangles
+            normals = _normals(corners)
+            file.write(f"solid block-{k + 1}\n")
+            for normal, triangle in zip(normals, corners, strict=True):
+                file.write(f"facet normal {_words(normal)}\nouter loop\n")
+                file.writelines(f"vertex {_words(corner)}\n" for corner in triangle)
+                file.write("endloop\nendfacet\n")
+            file.write(f"endsolid block-{k + 1}\n")
+    return path
+
+
+def to_obj(run: Run, row: int, folder: Path) -> Path:
+    """The released blocks at a row, an object each."""
+    path, first = folder / "pile.obj", 1
+    with path.open("w") as file:
+        for k, body in present_bodies(run, row).items():
+            points = body.points
+            file.write(f"o block-{k + 1}\n")
+            file.writelines(f"v {_words(point)}\n" for point in points)
+            for triangle in body.shape.triangles + first:
+                file.write(f"f {' '.join(map(str, triangle))}\n")
+            first += len(points)
+    return path
+
+
+def to_glb(run: Run, _row: int, folder: Path) -> Path:
+    """The fall of all blocks."""
+    path = folder / "fall.glb"
+    gltf.write(run, _film_rows(run), path)
+    return path
+
+
+def to_pvd(run: Run, _row: int, folder: Path) -> Path:
+    """Blocks and water for ParaView before 5.12: a .vtp file, and a .vti file where there are
+    fields, for each time, and a list of each."""
+    times = run.field_times if run.field_times.size else run.bodies.time[_film_rows(run)]
+    parts: dict[str, list[tuple[float, str]]] = {}
+    for frame, time in enumerate(times):
+        if run.bodies.n:
+            name = f"blocks-{frame:05d}.vtp"
+            vtk_data.all_blocks(run, run.bodies.row(time)).save(folder / name)
+            parts.setdefault("blocks", []).append((float(time), name))
+        if run.field_times.size:
+            name = f"fields-{frame:05d}.vti"
+            vtk_data.cells(run, run.fields(time)).save(folder / name)
+            parts.setdefault("fields", []).append((float(time), name))
+    for what, files in parts.items():
+        (folder / f"{what}.pvd").write_text(_collection(files))
+    return folder / f"{next(iter(parts))}.pvd"
+
+
+def _film_rows(run: Run) -> IntArray:
+    """Rows evenly in time, first and last among them."""
+    time = run.bodies.time
+    wanted = np.linspace(time[0], time[-1], int(FILMED * (time[-1] - time[0])) + 2)
+    return np.unique(np.searchsorted(time, wanted).clip(0, len(time) - 1))
+
+
+def _collection(files: list[tuple[float, str]]) -> str:
+    """The text of a .pvd file."""
+    lines = [
+        f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n'
+        for time, name in files
+    ]
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        + "".join(lines)
+        + "  </Collection>\n</VTKFile>\n"
+    )
+
+
+def _normals(corners: Array) -> Array:
+    """Unit normals (m, 3) of triangles (m, 3, 3)."""
+    found = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
+def _words(values: Array) -> str:
+    return " ".join(f"{v:.9g}" for v in values)
+
+
+FORMATS: dict[str, Writer] = {
+    "glb": to_glb,
+    "stl": to_stl,
+    "obj": to_obj,
+    "csv": to_csv,
+    "pvd": to_pvd,
+}
+"""What can be written, by its ending."""
+
+
+def parse_formats(word: str) -> list[str]:
+    """The formats of a list such as `glb,csv`."""
+    wanted = [name.strip().lower() for name in word.split(",")]
+    unknown = [name for name in wanted if name not in FORMATS]
+    if unknown:
+        raise BadRun(f"--to {word}: '{unknown[0]}' is none of {', '.join(FORMATS)}")
+    return wanted

@@ -1,0 +1,104 @@
+"""Blocks, bed and water of a run as pyvista objects, for pictures, exports and the reader.
+
+pyvista is imported when the first of them is made: it takes a second that most callers never need.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from micstools.reading.overlap import present_bodies
+from micstools.reading.reader import Fields, Run
+from micstools.shapes.geometry import Array, IntArray
+
+PolyData = Any  # pyvista.PolyData and its like, which are imported late
+ImageData = Any
+MultiBlock = Any
+
+
+def triangles_of(points: Array, triangles: IntArray) -> PolyData:
+    """Points (n, 3) [m] and triangles (m, 3)."""
+    import pyvista as pv
+
+    threes = np.full((len(triangles), 1), 3)
+    return pv.PolyData(points, faces=np.hstack([threes, triangles]).ravel())
+
+
+def blocks(run: Run, row: int) -> dict[int, PolyData]:
+    """The surface of each block that is released at a row, by its number from 0; on each face
+    `body`, the number from 1."""
+    found = {}
+    for k, body in present_bodies(run, row).items():
+        found[k] = triangles_of(body.points, body.shape.triangles)
+        found[k].cell_data["body"] = np.full(len(body.shape.triangles), k + 1)
+    return found
+
+
+def all_blocks(run: Run, row: int) -> PolyData:
+    """The blocks that are released at a row in one; empty where there are none."""
+    import pyvista as pv
+
+    return pv.PolyData().append_polydata(*blocks(run, row).values())
+
+
+def cells(run: Run, fields: Fields) -> ImageData:
+    """The grid with the fields of one time as values of its cells."""
+    import pyvista as pv
+
+    grid = run.grid
+    points = [len(faces) for faces in grid.faces]
+    image = pv.ImageData(dimensions=points, spacing=grid.spacing, origin=grid.low)
+    for name in ("liquid", "solid", "pressure"):
+        image.cell_data[name] = getattr(fields, name).ravel()
+    image.cell_data["velocity"] = fields.velocity.reshape(-1, 3)
+    return image
+
+
+def shares_at_points(run: Run, fields: Fields) -> Any:
+    """The shares of liquid and solid on points: the centres of the cells and the sides of the tank
+    (a pyvista.RectilinearGrid)."""
+    import pyvista as pv
+
+    faces = zip(run.grid.faces, run.grid.centres, strict=True)
+    grid = pv.RectilinearGrid(*(np.concatenate([f[:1], c, f[-1:]]) for f, c in faces))
+    for name in ("liquid", "solid"):
+        grid.point_data[name] = np.pad(getattr(fields, name), 1, mode="edge").ravel()
+    return grid
+
+
+def water_surface(points: Any) -> PolyData:
+    """Where the share of liquid is one half, outside of solids; `points` as `shares_at_points` has
+    them. Empty where all is water, or none."""
+    import pyvista as pv
+
+    liquid = points.point_data["liquid"]
+    if not liquid.min() < 0.5 < liquid.max():
+        return pv.PolyData()
+    surface = points.contour([0.5], scalars="liquid")
+    if surface.n_points:
+        surface = surface.clip_scalar(scalars="solid", value=0.5)
+    return surface
+
+
+def at(run: Run, t: float) -> MultiBlock:
+    """What `Run.vtk` tells."""
+    import pyvista as pv
+
+    span = run.bodies.time
+    if not span.size:
+        raise ValueError(f"{run.folder} holds no rows yet")
+    if not span[0] <= t <= span[-1]:
+        raise ValueError(f"t = {t:g} s: the run goes from {span[0]:g} to {span[-1]:g} s")
+    fields = run.fields(t) if run.field_times.size else None
+    row = run.bodies.row(t if fields is None else fields.time)
+    found = pv.MultiBlock()
+    for k, block in blocks(run, row).items():
+        found.append(block, f"block {k + 1}")
+    if len(run.bed[1]):
+        found.append(triangles_of(*run.bed), "bed")
+    if fields is not None:
+        water = water_surface(shares_at_points(run, fields))
+        if water.n_points:
+            found.append(water, "water")
+    found.field_data["time"] = [run.bodies.time[row]]
+    return found

@@ -1,0 +1,1 @@
+"""Numbers of piles, of one run and of an ensemble."""

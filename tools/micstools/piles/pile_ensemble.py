@@ -1,0 +1,334 @@
+"""Piles of an ensemble: the numbers of each, shares of the patterns, and maps of the mean pile."""
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools.ensembles.ensemble import OUTCOMES
+from micstools.piles import pile_numbers
+from micstools.piles.pile import has_papers_blocks, still_level
+from micstools.piles.pile_numbers import PileNumbers
+from micstools.piles.placing import Area, Placing, drop_area, placing
+from micstools.piles.shares import wilson
+from micstools.reading import block_numbers, units
+from micstools.reading.block_numbers import BlockNumbers
+from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import Units
+from micstools.shapes.geometry import Array
+
+PATTERNS = ("A", "B", "neither")
+MEANING = {
+    "A": "every dropped block off the floor",
+    "B": "at least one more block on the floor",
+    "neither": "a block found no room or stays above the water",
+}
+_PARTS = {
+    "centre": ("x", "y", "z"),
+    "spread": ("x", "y"),
+    "slopes": ("x_min", "x_max", "y_min", "y_max"),
+    "box": ("x_min", "y_min", "z_min", "x_max", "y_max", "z_max"),
+}
+
+
+@dataclass(frozen=True)
+class Pile:
+    """The pile of one run of an ensemble."""
+
+    row: dict[str, Any]  # of the table of the ensemble: run, seed, choices, outcome, folder
+    run: Run
+    pattern: str  # one of PATTERNS
+    numbers: PileNumbers
+    blocks: list[BlockNumbers]
+    top: Array  # height map (ny, nx) [m], nan where there is no block
+    ground: Array  # height of the bed or floor under it (ny, nx) [m]
+
+    @property
+    def height(self) -> Array:
+        """Height of its top above the ground (ny, nx) [m], 0 where there is no block."""
+        return np.nan_to_num(self.top - self.ground, nan=0.0)
+
+    @property
+    def number(self) -> int:
+        """Number of the run, from 1."""
+        return int(self.row["run"])
+
+    @property
+    def complete(self) -> bool:
+        """Are all blocks in it?"""
+        return bool(self.run.bodies.present(-1).all())
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """An ensemble and its piles."""
+
+    folder: Path
+    about: dict[str, Any]  # what ensemble.json says
+    piles: list[Pile]
+    step: float  # of the maps [m]
+    left_out: dict[int, str]  # runs without an outcome, and what they are instead
+    area: Area  # of the plan, in which blocks should lie
+
+    @property
+    def placing(self) -> Placing | None:
+        """Where the released free blocks of all runs lie."""
+        return placing([p.run for p in self.piles], self.area)
+
+    @property
+    def has_patterns(self) -> bool:
+        """Do the paper's patterns A and B mean anything here?"""
+        return has_papers_blocks(self.example.run)
+
+    @property
+    def units(self) -> Units:
+        """The units of its figures."""
+        return units.of_run(self.example.run)
+
+    @property
+    def whole(self) -> list[Pile]:
+        """The piles with all their blocks: mean and spread are of these."""
+        return [p for p in self.piles if p.complete]
+
+    @property
+    def example(self) -> Pile:
+        """The one that stands for what all have in common: the first with all its blocks, if any
+        has."""
+        return next(iter(self.whole), self.piles[0])
+
+    @property
+    def choices(self) -> list[dict[str, Any]]:
+        """The varied variables, a dictionary for each choice."""
+        found: list[dict[str, Any]] = self.about["choices"]
+        return found
+
+    def of(self, choice: dict[str, Any]) -> list[Pile]:
+        """The piles of a choice."""
+        return [p for p in self.piles if all(p.row[k] == v for k, v in choice.items())]
+
+    @property
+    def parts(self) -> list["Ensemble"]:
+        """An ensemble of each choice: the runs of different choices have the same drops, so they
+        are not independent, and numbers over all of them tell nothing."""
+        return [
+            replace(self, about=self.about | {"choices": [choice]}, piles=self.of(choice))
+            for choice in self.choices
+        ]
+
+    @property
+    def name(self) -> str:
+        """The choice of an ensemble that has one, in words; empty where nothing is varied."""
+        return ", ".join(f"{k} = {v}" for k, v in self.choices[0].items())
+
+
+@dataclass(frozen=True)
+class Maps:
+    """The mean pile over the plan, (ny, nx) each; where there is no block its height is 0."""
+
+    x: Array  # (nx) middles [m]
+    y: Array  # (ny)
+    cover: Array  # probability that a block lies over the point
+    mean: Array  # height above the floor or bed [m]
+    low: Array  # 10 % of the piles are lower [m]
+    high: Array  # 10 % are higher [m]
+
+
+def is_ensemble(path: Path) -> bool:
+    """Is it the folder of an ensemble?"""
+    return (path / "ensemble.json").is_file()
+
+
+def open_ensemble(
+    folder: Path,
+    step: float | None = None,
+    box: tuple[Array, Array] | None = None,
+    area: Area | None = None,
+) -> Ensemble:
+    """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
+    the tank; `box` is that of the porosity, by default the one around each pile; blocks should lie
+    in the `area`, by default that of the drops."""
+    about = _about(folder / "ensemble.json")
+    table = about["table"]
+    done = [row for row in table if row["outcome"] in OUTCOMES]
+    left = {int(row["run"]): str(row["outcome"]) for row in table if row not in done}
+    if not done:
+        raise BadRun(f"{folder} holds no run that came to its end")
+    if step is None:
+        step = pile_numbers.usual_step(Run(folder / str(done[0]["folder"]) / "result"))
+    piles = [_pile(folder, row, step, box) for row in done]
+    return Ensemble(folder, about, piles, step, left, area or drop_area([p.run for p in piles]))
+
+
+def _about(path: Path) -> dict[str, Any]:
+    """What an ensemble says of itself."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text())
+        if found["format"] != "mics-ensemble":
+            raise KeyError("format")
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadRun(
+            f"{path}: cannot be read; the same `mics-tools ensemble` writes it anew"
+        ) from error
+    return found
+
+
+def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
+    run = Run(folder / str(row["folder"]) / "result")
+    found = pile_numbers.numbers(run, step, box=box)
+    top = pile_numbers.top_of(run, step)
+    ground = pile_numbers.ground_map(run, run.grid.low, run.grid.high, step)
+    return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top, ground)
+
+
+def pattern(run: Run, found: PileNumbers) -> str:
+    """The pattern of a pile by its contacts, see MEANING."""
+    b = run.bodies
+    if not b.present(-1).all():
+        return "neither"
+    level = still_level(run)
+    if level is not None and (b.position[-1, b.dropped, 2] > level).any():
+        return "neither"
+    return "B" if found.on_floor else "A"
+
+
+def pattern_shares(piles: Sequence[Pile]) -> dict[str, dict[str, Any]]:
+    """Count, share and its 95 % interval of each pattern."""
+    counted, total = Counter(p.pattern for p in piles), len(piles)
+    return {
+        name: {
+            "count": counted[name],
+            "share": counted[name] / total if total else None,
+            "interval_95": list(wilson(counted[name], total)),
+        }
+        for name in PATTERNS
+    }
+
+
+def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, float, float]]:
+    """After each run: how many there were, the share of a pattern, and its 95 % interval."""
+    count = 0
+    for total, p in enumerate(piles, start=1):
+        count += p.pattern == name
+        yield total, count / total, *wilson(count, total)
+
+
+def maps(ensemble: Ensemble) -> Maps:
+    """The mean pile of the complete ones, its spread, and where blocks are likely."""
+    whole = ensemble.whole
+    if not whole:
+        raise BadRun(f"{ensemble.folder} holds no pile with all its blocks")
+    tops = np.array([p.top for p in whole])
+    grid = whole[0].run.grid
+    height = np.array([p.height for p in whole])
+    low, high = np.percentile(height, [10, 90], axis=0)
+    x, y = (grid.low[d] + (np.arange(tops.shape[2 - d]) + 0.5) * ensemble.step for d in (0, 1))
+    return Maps(x, y, np.isfinite(tops).mean(axis=0), height.mean(axis=0), low, high)
+
+
+def remarkable(ensemble: Ensemble) -> dict[int, list[str]]:
+    """What is special of some complete piles, by the number of their run: the one nearest to the
+    mean pile, the one farthest from it, the highest and the lowest."""
+    whole = ensemble.whole
+    if len(whole) < 3:
+        return {}
+    mean = maps(ensemble).mean
+    away = np.array([np.sqrt(((p.height - mean) ** 2).mean()) for p in whole])
+    tops = np.array([p.numbers.top for p in whole])
+    marks = {"most typical": away.argmin(), "least typical": away.argmax(),
+             "highest": tops.argmax(), "lowest": tops.argmin()}  # fmt: skip
+    found: dict[int, list[str]] = {}
+    for words, k in marks.items():
+        found.setdefault(whole[int(k)].number, []).append(words)
+    return found
+
+
+def spread_of(values: Sequence[float]) -> dict[str, float] | None:
+    """Median, 5 and 95 % of the known ones of some values; none where none is known."""
+    known = [v for v in values if v == v]
+    if not known:
+        return None
+    low, median, high = (float(v) for v in np.percentile(known, [5, 50, 95]))
+    return {"median": median, "5 %": low, "95 %": high, "known": len(known)}
+
+
+def median_interval(values: Sequence[float]) -> tuple[float, float]:
+    """95 % interval of the median of what the values are drawn from, whatever its form, from their
+    order; nan for fewer than six. Source: Conover, Practical nonparametric statistics, 3.2."""
+    n, ordered = len(values), sorted(values)
+    below, rank, weight = 0, 0, 1  # times 0.5**n
+    while 40 * (below + weight) <= 2**n:  # 2.5 %
+        below += weight
+        rank += 1
+        weight = weight * (n - rank + 1) // rank  # binomial coefficients
+    if rank == 0:
+        return float("nan"), float("nan")
+    return ordered[rank - 1], ordered[n - rank]
+
+
+def rows(ensemble: Ensemble) -> list[dict[str, Any]]:
+    """A row for each run with an outcome, its numbers included."""
+    return [
+        p.row | {"pattern": p.pattern, "complete": p.complete} | flat(p.numbers)
+        for p in ensemble.piles
+    ]
+
+
+def flat(found: PileNumbers) -> dict[str, float | str]:
+    """The numbers, each for itself; empty where one is not known."""
+    values: dict[str, float] = {}
+    for name, value in asdict(found).items():
+        if isinstance(value, tuple):
+            values |= {f"{name}_{part}": v for part, v in zip(_PARTS[name], value, strict=True)}
+        else:
+            values[name] = value
+    return {name: "" if v != v else v for name, v in values.items()}
+
+
+def summary(ensemble: Ensemble) -> dict[str, Any]:
+    """What `pile.json` holds of an ensemble, the estimates for each choice of the varied variables;
+    nan is left to the writer."""
+    return {
+        "format": "mics-ensemble-piles",
+        "format_version": 1,
+        "runs": len(ensemble.piles),
+        "complete": len(ensemble.whole),
+        "left_out": {str(k): v for k, v in ensemble.left_out.items()},
+        "step": ensemble.step,
+        "units": pile_numbers.si_units(flat(ensemble.example.numbers)),
+        "patterns": [
+            {
+                "choice": part.choices[0],
+                "meaning": MEANING,
+                "shares": pattern_shares(part.piles),
+                **_estimates(part),
+            }
+            for part in ensemble.parts
+        ],
+        **(_estimates(ensemble) if len(ensemble.choices) == 1 else {}),
+        "table": rows(ensemble),
+    }
+
+
+def _estimates(part: Ensemble) -> dict[str, Any]:
+    """Of the runs of one choice: how the shares converge, the spread of the numbers of the complete
+    piles, and which runs are remarkable."""
+    return {
+        "convergence": {name: list(running(part.piles, name)) for name in PATTERNS},
+        "placing": asdict(part.placing) if part.placing else None,
+        "numbers": spreads(part),
+        "remarkable": {str(k): v for k, v in remarkable(part).items()},
+    }
+
+
+def spreads(part: Ensemble) -> dict[str, dict[str, float]]:
+    """The spread of each number of the complete piles that is known."""
+    found = [flat(p.numbers) for p in part.whole]
+    known = {
+        name: spread_of([float(row[name]) for row in found if row[name] != ""])
+        for name in (found[0] if found else {})
+    }
+    return {name: spread for name, spread in known.items() if spread}

@@ -1,0 +1,122 @@
+"""Where the blocks of an ensemble end: their centre, how far they scatter, and how many lie outside
+of an area."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from micstools.reading.reader import Run
+from micstools.reading.units import Unit, Units
+from micstools.shapes.geometry import Array
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle of the plan."""
+
+    low: tuple[float, float]  # corner [m]
+    high: tuple[float, float]
+    given: bool  # by the user; else it is that of the drops
+
+    def share_outside(self, places: Array) -> float:
+        """Share of some places (n, 2) [m] that are not in it; nan without a place."""
+        out = ((places < self.low) | (places > self.high)).any(axis=1)
+        return float(out.mean()) if out.size else float("nan")
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where the released free blocks of some runs lie at the end, seen from above."""
+
+    blocks: int
+    centre: tuple[float, float]  # mean of the centroids [m]
+    spread: tuple[float, float]  # their standard deviation in x and y [m]
+    half_within: float  # so far from the centre lie half of them at most [m]
+    most_within: float  # and 90 % [m]
+    area: Area
+    outside: float  # share of the centroids outside of the area
+    outside_of_runs: tuple[float, float]  # 5 and 95 % of that share in single runs
+
+
+def ends(run: Run) -> Array:
+    """Centroids (n, 2) [m] of the released free blocks at the end."""
+    return np.asarray(run.into_tank(run.bodies.position[-1])[_released(run), :2])
+
+
+def _released(run: Run) -> Array:
+    b = run.bodies
+    return np.array([int(k) for k in b.dropped if b.present(-1)[k]], dtype=int)
+
+
+def drop_area(runs: Sequence[Run]) -> Area:
+    """The rectangle around all places where blocks are let go, half a block larger on each side."""
+    starts, margin = [], 0.0
+    for run in runs:
+        b = run.bodies
+        for k in _released(run):
+            row = min(int(np.searchsorted(b.time, b.release_time[k] - 1e-12)), b.time.size - 1)
+            starts.append(run.into_tank(b.position[row, k])[:2])
+            margin = max(margin, run.shapes[b.shape[k]].length / 2)
+    if not starts:
+        return Area((np.nan, np.nan), (np.nan, np.nan), False)
+    low, high = np.min(starts, axis=0) - margin, np.max(starts, axis=0) + margin
+    return Area((float(low[0]), float(low[1])), (float(high[0]), float(high[1])), False)
+
+
+def placing(runs: Sequence[Run], area: Area) -> Placing | None:
+    """Of all blocks of the runs; none without a block."""
+    each = [places for run in runs if len(places := ends(run))]
+    if not each:
+        return None
+    places = np.concatenate(each)
+    centre, spread = places.mean(axis=0), places.std(axis=0)
+    away = np.linalg.norm(places - centre, axis=1)
+    half, most = np.percentile(away, [50, 90])
+    shares = [area.share_outside(one) for one in each]
+    low, high = np.percentile(shares, [5, 95])
+    return Placing(
+        blocks=len(places),
+        centre=(float(centre[0]), float(centre[1])),
+        spread=(float(spread[0]), float(spread[1])),
+        half_within=float(half),
+        most_within=float(most),
+        area=area,
+        outside=area.share_outside(places),
+        outside_of_runs=(float(low), float(high)),
+    )
+
+
+def words(found: Placing, units: Units) -> str:
+    """Where blocks lie, in a sentence or two."""
+    length = units.length
+    point = _at("x", found.centre[:1], length) + ", " + _at("y", found.centre[1:], length)
+    point += f"\u00a0{length.name}"
+    sx, sy = (length.figure(v) for v in found.spread)
+    if found.blocks == 1:
+        place = f"One block lies at {point}."
+        return place + _outside(found, length)
+    said = (
+        f"{found.blocks} blocks lie around {point}, with a standard "
+        f"deviation of {sx} and {sy} {length.name} along x and y; half of them within "
+        f"{length.text(found.half_within)} of that point, 90 % within "
+        f"{length.text(found.most_within)}."
+    )
+    return said + _outside(found, length)
+
+
+def _outside(found: Placing, length: Unit) -> str:
+    """The share of blocks outside of the area."""
+    area = found.area
+    low, high = (f"{100 * v:.0f}" for v in found.outside_of_runs)
+    x, y = (_at("xy"[d], (area.low[d], area.high[d]), length) for d in (0, 1))
+    which = "wanted area" if area.given else "area of the drops"
+    return (
+        f" {100 * found.outside:.0f} % of them ({low} to {high} % in 90 % of the runs) lie "
+        f"outside the {which}, {x}, {y}\u00a0{length.name}."
+    )
+
+
+def _at(axis: str, values: Sequence[float], length: Unit) -> str:
+    """As in `x = 16.3 to 23.7`."""
+    return f"{axis}\u00a0=\u00a0" + " to ".join(length.figure(v) for v in values)

@@ -1,0 +1,1 @@
+"""What a run says: its files as arrays, units, rest, energy, overlaps, health."""

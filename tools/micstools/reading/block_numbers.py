@@ -1,0 +1,63 @@
+"""What happened to each free block of a run: when it came and lay still, how hard it was struck."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from micstools.reading import rest
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import attitude_change_deg
+
+
+@dataclass(frozen=True)
+class BlockNumbers:
+    """One block; nan where something did not happen."""
+
+    block: int  # number, from 1
+    released: float  # [s]
+    at_rest: float  # after which it stays where it ends [s]
+    impact_speed: float  # in the row before its first touch [m/s]
+    contact_force: float  # the largest, a mean over a step [N]
+    fluid_force: float  # the largest, buoyancy included [N]
+    weight: float  # [N]
+    turned: float  # from its attitude at the release to that at the end [degrees]
+    place: tuple[float, float, float]  # of its centroid at the end [m]
+
+
+def of_blocks(run: Run) -> list[BlockNumbers]:
+    """The numbers of every free block that was released, in the order of their release."""
+    b = run.bodies
+    present = b.present(-1)
+    return [_of_block(run, int(k)) for k in b.dropped if present[k]]
+
+
+def _of_block(run: Run, k: int) -> BlockNumbers:
+    b = run.bodies
+    start = int(np.searchsorted(b.time, b.release_time[k] - 1e-12))
+    x, y, z = (float(v) for v in b.position[-1, k])
+    return BlockNumbers(
+        block=k + 1,
+        released=float(b.release_time[k]),
+        at_rest=rest.of_block(run, k).time,
+        impact_speed=impact_speed(run, k),
+        contact_force=_largest(b.contact_force[start:, k]),
+        fluid_force=_largest(b.fluid_force[start:, k]),
+        weight=float(b.mass[k] * np.linalg.norm(run.gravity)),
+        turned=float(attitude_change_deg(b.quaternion[-1, k], b.quaternion[start, k])),
+        place=(x, y, z),
+    )
+
+
+def impact_speed(run: Run, k: int) -> float:
+    """Speed [m/s] of a block (from 0) in the row before its first touch; nan without one."""
+    b = run.bodies
+    touched = np.flatnonzero(b.contacts[:, k] > 0)
+    if not touched.size or touched[0] == 0:
+        return float("nan")
+    return float(np.linalg.norm(b.velocity[touched[0] - 1, k]))
+
+
+def _largest(force: np.ndarray) -> float:
+    """The largest of vectors (T, 3); nan where none is known."""
+    size = np.linalg.norm(force, axis=1)
+    return float(np.nanmax(size)) if np.isfinite(size).any() else float("nan")

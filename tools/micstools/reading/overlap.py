@@ -1,0 +1,281 @@
+"""How near the true shapes of blocks and walls come to one another, and how deep they overlap.
+
+Distances and depths are those of the tetrahedra and their surface triangles, whatever the contact
+model of a run; but blocks that collide by spheres, which reach beyond their surface, touch where
+these do. All lengths in metres.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from micstools.reading import scales
+from micstools.reading.reader import Run
+from micstools.shapes.geometry import (
+    Array,
+    distance_between_segments,
+    distance_to_triangles,
+    inside_tets,
+    place,
+)
+from micstools.shapes.shape import Shape
+
+WALL_KINDS = ("no_slip", "slip")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A block at its place in space."""
+
+    shape: Shape
+    position: Array  # (3) [m]
+    quaternion: Array  # (4) w, x, y, z
+
+    def moved(self, way: Array) -> "Placed":
+        """The block moved by `way` (3) [m]."""
+        return replace(self, position=self.position + way)
+
+    @property
+    def points(self) -> Array:
+        """Corners (n, 3) [m]."""
+        return place(self.shape.points, self.position, self.quaternion)
+
+    @property
+    def tets(self) -> Array:
+        """Corners of the tetrahedra (k, 4, 3) [m]."""
+        return self.points[self.shape.tets]
+
+    @property
+    def triangles(self) -> Array:
+        """Corners of the surface triangles (m, 3, 3) [m]."""
+        return self.points[self.shape.triangles]
+
+    @property
+    def sphere_centres(self) -> Array:
+        """Centres of the contact spheres (s, 3) [m]."""
+        return place(self.shape.sphere_centre, self.position, self.quaternion)
+
+    @property
+    def samples(self) -> Array:
+        """Many points of the surface (n, 3) [m]."""
+        return place(self.shape.samples, self.position, self.quaternion)
+
+
+def present_bodies(run: Run, row: int) -> dict[int, Placed]:
+    """The released bodies of a run at a row, by their number; with their centroids in the tank
+    where a direction is periodic."""
+    b = run.bodies
+    position = run.into_tank(b.position[row])
+    return {
+        int(k): Placed(run.shapes[b.shape[k]], position[k], b.quaternion[row, k])
+        for k in np.flatnonzero(b.present(row))
+    }
+
+
+def images(run: Run, bodies: Iterable[Placed]) -> list[Placed]:
+    """Bodies as the tank shows them: with the images of those that cross a periodic side."""
+    found = list(bodies)
+    for d in np.flatnonzero(run.period):
+        for body in list(found):
+            for side in (-1.0, 1.0):
+                moved = body.moved(side * run.period[d] * np.eye(3)[d])
+                reach = moved.position[d] + np.array([-1.0, 1.0]) * body.shape.radius
+                if reach[1] > run.grid.low[d] and reach[0] < run.grid.high[d]:
+                    found.append(moved)
+    return found
+
+
+def nearest(run: Run, body: Placed, to: Placed) -> Placed:
+    """The periodic image of a body that is nearest to another one."""
+    if not any(run.periodic):
+        return body
+    way = np.zeros(3)
+    for d in np.flatnonzero(run.period):
+        periods = np.round((body.position[d] - to.position[d]) / run.period[d])
+        way[d] = -periods * run.period[d]
+    return body.moved(way)
+
+
+def near_pairs(
+    run: Run, bodies: dict[int, Placed], reach: float = 0.0, out: dict[int, float] | None = None
+) -> Iterator[tuple[int, int]]:
+    """Pairs of blocks, the lower number first, whose spheres around them come nearer than `reach`
+    [m], through periodic sides, too; `out` is how much farther than that some of them stick out."""
+    numbers = list(bodies)
+    place = np.array([body.position for body in bodies.values()])
+    radius = np.array([body.shape.radius + (out or {}).get(k, 0.0) for k, body in bodies.items()])
+    period = np.where(run.period > 0, run.period, np.inf)
+    for n, i in enumerate(numbers):
+        way = place[n + 1 :] - place[n]
+        way -= run.period * np.round(way / period)
+        close = np.linalg.norm(way, axis=1) < radius[n] + radius[n + 1 :] + reach
+        for k in np.flatnonzero(close):
+            yield i, numbers[n + 1 + int(k)]
+
+
+def gap(a: Placed, b: Placed) -> float:
+    """Least distance between the surfaces of two blocks [m]; exact where they do not overlap.
+
+    Between two polyhedra that do not overlap the nearest points are a corner and a face or two
+    edges, and only corners and edges at which the surface bends count.
+    """
+    pa, pb = a.points, b.points
+    corners_a, corners_b = np.unique(a.shape.edges), np.unique(b.shape.edges)
+    return min(
+        float(distance_to_triangles(pa[corners_a], b.triangles).min()),
+        float(distance_to_triangles(pb[corners_b], a.triangles).min()),
+        distance_between_segments(pa[a.shape.edges], pb[b.shape.edges]),
+    )
+
+
+def depth(a: Placed, b: Placed) -> float:
+    """Depth of two blocks in one another [m]: the deepest surface point of one below the surface
+    of the other; zero where none of the sample points lies inside."""
+    deepest = 0.0
+    for one, other in ((a, b), (b, a)):
+        samples = one.samples
+        inside = samples[inside_tets(samples, other.tets)]
+        if len(inside):
+            deepest = max(deepest, float(distance_to_triangles(inside, other.triangles).max()))
+    return deepest
+
+
+def sphere_gap(a: Placed, b: Placed) -> float:
+    """Least distance between the contact spheres of two blocks [m]; negative: depth."""
+    apart = np.linalg.norm(a.sphere_centres[:, None] - b.sphere_centres[None], axis=2)
+    return float((apart - a.shape.sphere_radius[:, None] - b.shape.sphere_radius).min())
+
+
+def wall_gaps(
+    body: Placed, low: Array, high: Array, sides: dict[str, str], spheres: bool = False
+) -> dict[str, float]:
+    """Distance of a block, or of its contact `spheres`, to each side that is a contact wall [m];
+    negative: depth in the wall."""
+    points = body.sphere_centres if spheres else body.points
+    radius: Array | float = body.shape.sphere_radius if spheres else 0.0
+    gaps = {}
+    for axis, name in enumerate("xyz"):
+        if sides[f"{name}_min"] in WALL_KINDS:
+            gaps[f"{name}_min"] = float((points[:, axis] - radius).min() - low[axis])
+        if sides[f"{name}_max"] in WALL_KINDS:
+            gaps[f"{name}_max"] = float(high[axis] - (points[:, axis] + radius).max())
+    return gaps
+
+
+def bed_gap(body: Placed, facets: Array, reach: float, spheres: bool = False) -> float:
+    """Least distance between the surface of a block, or its contact `spheres`, and a bed (n, 3, 3)
+    [m]; infinite where no facet comes within `reach` of the sphere around the block."""
+    margin = body.shape.radius + reach + (body.shape.sphere_radius.max() if spheres else 0.0)
+    low, high = body.position - margin, body.position + margin
+    beside = (facets.min(axis=1) <= high) & (facets.max(axis=1) >= low)
+    facets = facets[beside.all(axis=1)]
+    if not len(facets):
+        return float("inf")
+    if spheres:
+        distance = distance_to_triangles(body.sphere_centres, facets)
+        return float((distance - body.shape.sphere_radius).min())
+    points = body.points
+    edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
+    return min(
+        float(distance_to_triangles(points[np.unique(body.shape.edges)], facets).min()),
+        float(distance_to_triangles(facets.reshape(-1, 3), body.triangles).min()),
+        distance_between_segments(points[body.shape.edges], edges),
+    )
+
+
+@dataclass(frozen=True)
+class Touches:
+    """What touches what at one row, by the true shapes."""
+
+    blocks: dict[tuple[int, int], float]  # gap of each touching pair, first number the lower [m]
+    walls: dict[tuple[int, str], float]  # gap of each touching block and side [m]
+    bed: dict[int, float]  # gap of each block that touches the bed [m]
+
+    def of(self, body: int) -> list[int]:
+        """Blocks that touch a block."""
+        return [j if i == body else i for i, j in self.blocks if body in (i, j)]
+
+    def walls_of(self, body: int) -> list[str]:
+        """Sides that touch a block."""
+        return [side for k, side in self.walls if k == body]
+
+    def on_floor(self, body: int) -> bool:
+        """Whether a block touches the floor of the tank or the bed."""
+        return body in self.bed or (body, "z_min") in self.walls
+
+
+def touches(run: Run, row: int) -> Touches:
+    """What is within the reach of `scales` of each other: pairs of released blocks, and they and
+    walls or the bed."""
+    reach = scales.reach(run)
+    bodies = present_bodies(run, row)
+    balls = {k: _stick_out(body) for k, body in bodies.items() if by_spheres(run, body)}
+    blocks = {}
+    for i, j in near_pairs(run, bodies, reach, balls):
+        a = bodies[i]
+        b = nearest(run, bodies[j], a)
+        distance = gap(a, b)
+        if distance > reach and depth(a, b) > 0:
+            distance = 0.0
+        if distance > reach and i in balls and j in balls:
+            distance = sphere_gap(a, b)
+        if distance <= reach:
+            blocks[i, j] = distance
+    gaps = _all_wall_gaps(run, bodies)
+    corners, facets = run.bed
+    beds = {k: bed_gap(body, corners[facets], reach) for k, body in bodies.items()}
+    for k in balls:
+        around = wall_gaps(bodies[k], run.grid.low, run.grid.high, run.sides, spheres=True)
+        gaps |= {(k, side): min(g, gaps[k, side]) for side, g in around.items()}
+        beds[k] = min(beds[k], bed_gap(bodies[k], corners[facets], reach, spheres=True))
+    walls = {key: g for key, g in gaps.items() if g <= reach}
+    return Touches(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
+
+
+def _stick_out(body: Placed) -> float:
+    """How far contact spheres reach beyond the sphere around a block, at most [m]."""
+    reach = np.linalg.norm(body.shape.sphere_centre, axis=1) + body.shape.sphere_radius
+    return max(0.0, float(reach.max()) - body.shape.radius)
+
+
+def by_spheres(run: Run, body: Placed) -> bool:
+    """Does a block collide by spheres: by contact spheres, or as the ball that it is?"""
+    if str(run.value("contact", "model", "surface")).strip() == "spheres":
+        return True
+    kinds = {s.get("name"): s.get("kind") for s in run.parameters.get("shape", [])}
+    return str(kinds.get(body.shape.name)).strip() == "sphere"
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Depth of true shapes in one another at one row [m]."""
+
+    blocks: dict[tuple[int, int], float]  # each overlapping pair
+    walls: dict[tuple[int, str], float]  # each block that is in a wall
+
+    @property
+    def largest(self) -> float:
+        """The largest depth [m]."""
+        return max([0.0, *self.blocks.values(), *self.walls.values()])
+
+
+def overlap(run: Run, row: int = -1) -> Overlap:
+    """True overlap of all released blocks at a row."""
+    bodies = present_bodies(run, row)
+    blocks = {}
+    for i, j in near_pairs(run, bodies):
+        found = depth(bodies[i], nearest(run, bodies[j], bodies[i]))
+        if found > 0:
+            blocks[i, j] = found
+    gaps = _all_wall_gaps(run, bodies)
+    return Overlap(blocks, {key: -g for key, g in gaps.items() if g < 0})
+
+
+def _all_wall_gaps(run: Run, bodies: dict[int, Placed]) -> dict[tuple[int, str], float]:
+    low, high, sides = run.grid.low, run.grid.high, run.sides
+    return {
+        (k, side): g
+        for k, body in bodies.items()
+        for side, g in wall_gaps(body, low, high, sides).items()
+    }

@@ -1,0 +1,490 @@
+"""The result files of a run as plain arrays; hides HDF5, VTKHDF stepping and growing files.
+
+    run = Run("mics-out")
+    run.bodies.position      # (T, N, 3) [m]
+    run.fields(2.0).liquid   # (nz, ny, nx)
+
+Everything is read when it is first asked for. The files may still be growing: rows that are not
+complete yet are left out, and `refresh` forgets what was read.
+"""
+
+import csv
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeVar
+
+import f90nml
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from micstools.reading.profiles import along_line
+from micstools.shapes.geometry import Array, IntArray, place
+from micstools.shapes.shape import Shape
+
+T = TypeVar("T")
+
+_DEFAULT_SIDES = {"z_max": "open"}
+_SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
+
+
+class BadRun(Exception):
+    """What was given is not the results that are wanted; the text says what is wrong."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Face coordinates of the cells [m]."""
+
+    x: Array  # (nx + 1)
+    y: Array  # (ny + 1)
+    z: Array  # (nz + 1)
+
+    @property
+    def faces(self) -> tuple[Array, Array, Array]:
+        """Face coordinates in the three directions [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def centres(self) -> tuple[Array, Array, Array]:
+        """Coordinates of the cell centres in the three directions [m]."""
+        x, y, z = ((f[1:] + f[:-1]) / 2 for f in self.faces)
+        return x, y, z
+
+    @property
+    def spacing(self) -> Array:
+        """Edges of a cell (3) [m]."""
+        return np.array([(f[-1] - f[0]) / (len(f) - 1) for f in self.faces])
+
+    @property
+    def low(self) -> Array:
+        """Lower corner of the tank (3) [m]."""
+        return np.array([f[0] for f in self.faces])
+
+    @property
+    def high(self) -> Array:
+        """Upper corner of the tank (3) [m]."""
+        return np.array([f[-1] for f in self.faces])
+
+
+_LOADS = {
+    "fluid_f": "fluid_force",
+    "fluid_t": "fluid_torque",
+    "contact_f": "contact_force",
+    "contact_t": "contact_torque",
+}
+"""Columns of a table, and what they hold."""
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Poses, velocities and forces of the N bodies in T rows; space frame."""
+
+    shape: list[str]  # names of the shapes (N)
+    mass: Array  # (N) [kg]
+    fixed: NDArray[np.bool_]  # (N)
+    release_time: Array  # (N) true time of release, infinite for blocks not released yet [s]
+    time: Array  # (T) [s]
+    position: Array  # (T, N, 3) [m]
+    quaternion: Array  # (T, N, 4) w, x, y, z
+    velocity: Array  # (T, N, 3) [m/s]
+    angular_velocity: Array  # (T, N, 3) [rad/s]
+    fluid_force: Array  # (T, N, 3) with buoyancy, without weight [N]
+    fluid_torque: Array  # (T, N, 3) about the centroid [N m]
+    contact_force: Array  # (T, N, 3) [N]
+    contact_torque: Array  # (T, N, 3) [N m]
+    contacts: IntArray  # (T, N) different partners touched
+    on_floor: IntArray  # (T, N)
+
+    @property
+    def n(self) -> int:
+        """Number of bodies."""
+        return len(self.shape)
+
+    @property
+    def dropped(self) -> IntArray:
+        """Numbers of the bodies that are not fixed, in the order of their release."""
+        free = np.flatnonzero(~self.fixed)
+        return free[np.argsort(self.release_time[free], kind="stable")]
+
+    def row(self, t: float) -> int:
+        """Row whose time is nearest to `t` [s]."""
+        return int(np.abs(self.time - t).argmin())
+
+    def present(self, row: int) -> NDArray[np.bool_]:
+        """Which bodies are released at a row (N)."""
+        return np.asarray(self.release_time <= self.time[row] + 1e-12)
+
+
+@dataclass(frozen=True)
+class Series:
+    """One number per row (T); names and units as in the result file."""
+
+    time: Array
+    dt: Array
+    cfl: Array
+    divergence_max: Array
+    pressure_passes: Array
+    solver_iterations: Array
+    liquid_volume: Array
+    liquid_volume_drift: Array
+    volume_excess_max: Array
+    kinetic_energy_fluid: Array
+    kinetic_energy_bodies: Array
+    potential_energy_fluid: Array
+    potential_energy_bodies: Array
+    contact_energy: Array
+    energy_excess: Array
+    max_overlap: Array
+    contact_courant_max: Array
+    substeps: Array
+    sleeping: Array
+    curvature_fallback: Array
+    transport_parts: Array
+    inertia_clips: Array
+    wall_time: Array
+
+
+@dataclass(frozen=True)
+class Fields:
+    """The fluid at one time; arrays run z, y, x."""
+
+    time: float  # [s]
+    liquid: Array  # (nz, ny, nx) share of liquid in the fluid of the cell
+    solid: Array  # (nz, ny, nx) share of solid in the cell
+    pressure: Array  # (nz, ny, nx) [Pa]
+    velocity: Array  # (nz, ny, nx, 3) [m/s]
+
+
+class Run:
+    """The output folder of a run."""
+
+    def __init__(self, folder: str | Path) -> None:
+        """Point at a folder; nothing is read yet."""
+        self.folder = Path(folder)
+        if not (self.folder / "run.h5").is_file():
+            raise FileNotFoundError(f"{self.folder} holds no run.h5: is it the output of a run?")
+
+    def __str__(self) -> str:
+        """What there is, a line each; numbers of blocks count from 1."""
+        b, times = self.bodies, self.field_times
+        title = str(self.value("run", "title", "")).strip()
+        cells = " x ".join(str(len(f) - 1) for f in self.grid.faces)
+        size = " x ".join(f"{edge:g}" for edge in self.grid.high - self.grid.low)
+        fixed = ", ".join(str(k + 1) for k in np.flatnonzero(b.fixed)) or "none"
+        span = f"{b.time[0]:g} to {b.time[-1]:g} s" if b.time.size else "none yet"
+        frames = f"{times.size}, {times[0]:g} to {times[-1]:g} s" if times.size else "none"
+        names = ", ".join(f.name for f in fields(Fields) if f.name != "time")
+        lines = [
+            f"{self.folder}: {title or 'no title'}",
+            f"grid    {cells} cells, {size} m",
+            f"blocks  {b.n}, fixed: {fixed}; shapes: {', '.join(self.shapes) or 'none'}",
+            f"rows    {b.time.size}, {span}",
+            f"fields  {frames}" + (f" ({names})" if times.size else ""),
+        ]
+        return "\n".join(lines)
+
+    def refresh(self) -> None:
+        """Forget what was read, so that rows written since then are seen."""
+        folder = self.folder
+        self.__dict__.clear()
+        self.folder = folder
+
+    @cached_property
+    def provenance(self) -> dict[str, Any]:
+        """How the run was made: the case, the version, the machine settings."""
+        return self._read("run.h5", lambda h5: {k: _plain(v) for k, v in _attributes(h5)})
+
+    @cached_property
+    def parameters(self) -> dict[str, list[dict[str, Any]]]:
+        """All parameters of the case after defaults: for each group its occurrences in order."""
+        text = self.provenance.get("parameters") or self.provenance["namelist"]
+        found: dict[str, list[dict[str, Any]]] = {}
+        for name, group in f90nml.Parser().reads(str(text)).items():
+            found.setdefault(str(name).lower(), []).append(dict(group))
+        return found
+
+    def value(self, group: str, name: str, default: T) -> T:
+        """A parameter of the case, or `default` where the case does not give it."""
+        found = self.parameters.get(group, [{}])[0].get(name)
+        return default if found is None else found
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Acceleration of gravity (3) [m/s2]."""
+        return np.array(self.value("fluid", "gravity", [0.0, 0.0, -9.81]), float)
+
+    @cached_property
+    def sides(self) -> dict[str, str]:
+        """Kind of boundary on each of the six sides."""
+        kinds = {s: self.value("boundary", s, _DEFAULT_SIDES.get(s, "no_slip")) for s in _SIDES}
+        return {side: kind.strip() for side, kind in kinds.items()}
+
+    @cached_property
+    def periodic(self) -> tuple[bool, ...]:
+        """Which of the three directions are periodic."""
+        return tuple(self.sides[f"{axis}_min"] == "periodic" for axis in "xyz")
+
+    @cached_property
+    def period(self) -> Array:
+        """Length of the tank in each periodic direction (3) [m], zero in the others."""
+        return np.where(self.periodic, self.grid.high - self.grid.low, 0.0)
+
+    def into_tank(self, place: Array) -> Array:
+        """Places (..., 3) [m], which results hold unwrapped, moved by whole periods into the
+        tank."""
+        found = np.array(place, float)
+        for d in np.flatnonzero(self.period):
+            low = self.grid.low[d]
+            found[..., d] = low + (found[..., d] - low) % self.period[d]
+        return found
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The cells."""
+        return self._read("run.h5", lambda h5: Grid(*(h5[f"grid/{d}"][:] for d in "xyz")))
+
+    @cached_property
+    def shapes(self) -> dict[str, Shape]:
+        """Every shape of the case by name."""
+        return self._read("run.h5", _read_shapes)
+
+    @cached_property
+    def bed(self) -> tuple[Array, IntArray]:
+        """Corners (n, 3) [m] and triangles (m, 3) of the bed; none of them without a bed."""
+        return self._read("run.h5", _read_bed)
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The bodies at every complete row."""
+        placed = len(self.parameters.get("body", []))
+        return self._read("run.h5", lambda h5: _read_bodies(h5, placed))
+
+    @cached_property
+    def series(self) -> Series:
+        """The numbers of every complete row."""
+        return self._read("run.h5", _read_series)
+
+    @cached_property
+    def timers(self) -> dict[str, tuple[float, int]]:
+        """Seconds and calls of each phase; empty while the run goes on."""
+        return self._read("run.h5", _read_timers)
+
+    @cached_property
+    def field_times(self) -> Array:
+        """Times [s] at which the fluid was written; empty for a run without fluid."""
+        if not (self.folder / "fields.vtkhdf").is_file():
+            return np.empty(0)
+        return self._read("fields.vtkhdf", _frame_times)
+
+    def fields(self, t: float) -> Fields:
+        """The fluid at the written time nearest to `t` [s]."""
+        if self.field_times.size == 0:
+            raise ValueError(f"{self.folder} holds no fields of the fluid")
+        frame = int(np.abs(self.field_times - t).argmin())
+        return self._read("fields.vtkhdf", lambda h5: _read_fields(h5, frame))
+
+    def profile(
+        self, p: Sequence[float], q: Sequence[float], name: str, t: float, n: int = 101
+    ) -> tuple[Array, Array]:
+        """Distance from `p` (n) [m] and a field (n, ...) at `n` places from `p` to `q` (3) [m], at
+        the written time nearest to `t` [s]; linear between the cell centres."""
+        known = [f.name for f in fields(Fields) if f.name != "time"]
+        if name not in known:
+            raise ValueError(f"{name}: no such field, there are {', '.join(known)}")
+        ends = np.array([p, q], dtype=float)
+        if (ends < self.grid.low).any() or (ends > self.grid.high).any():
+            low, high = self.grid.low.tolist(), self.grid.high.tolist()
+            raise ValueError(f"the line leaves the tank, which reaches from {low} to {high} m")
+        share = np.linspace(0.0, 1.0, n)
+        points = ends[0] + share[:, None] * (ends[1] - ends[0])
+        values = along_line(self.grid.faces, getattr(self.fields(t), name), points)
+        return share * float(np.linalg.norm(ends[1] - ends[0])), values
+
+    def vtk(self, t: float) -> Any:
+        """The scene at time `t` [s] as a pyvista.MultiBlock, to plot, clip and save: a surface
+        `block 1`, `block 2`, ... for each released block, the `bed` and the surface of the
+        `water` where there are any. All are those of the written time of the fields nearest to
+        `t`, of the nearest row in a run without; `field_data["time"]` tells which."""
+        from micstools.pictures import vtk_data
+
+        return vtk_data.at(self, t)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write time, number, place, attitude, velocities, forces [N] and torques [N m] of every
+        block at every row as a table; blocks count from 1."""
+        b = self.bodies
+        heads = ["time", "block", "shape", "released", "x", "y", "z", "qw", "qx", "qy", "qz"]
+        heads += [f"{name}{axis}" for name in ("v", "w", *_LOADS) for axis in "xyz"]
+        with Path(path).open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(heads)
+            for row, time in enumerate(b.time.tolist()):
+                parts = [b.position, b.quaternion, b.velocity, b.angular_velocity]
+                parts += [getattr(b, name) for name in _LOADS.values()]
+                values = np.concatenate([part[row] for part in parts], axis=1).tolist()
+                present = b.present(row)
+                for k in range(b.n):
+                    writer.writerow([time, k + 1, b.shape[k], int(present[k]), *values[k]])
+        return Path(path)
+
+    def series_to_csv(self, path: str | Path) -> Path:
+        """Write the numbers of every row as a table with the names of the result file."""
+        names = [f.name for f in fields(Series)]
+        with Path(path).open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(names)
+            columns = [getattr(self.series, name).tolist() for name in names]
+            writer.writerows(zip(*columns, strict=True))
+        return Path(path)
+
+    @property
+    def restart_files(self) -> list[str]:
+        """Names of the restart files, the oldest first."""
+        found = [p for p in self.folder.glob("restart-[ab].h5") if p.is_file()]
+        return [p.name for p in sorted(found, key=lambda p: p.stat().st_mtime_ns)]
+
+    def restart(self, name: str | None = None) -> dict[str, Any]:
+        """Every dataset of a restart file, by default the newest, by its path; doubles stay so."""
+        if name is None and not self.restart_files:
+            raise FileNotFoundError(f"{self.folder} holds no restart file")
+        return self._read(name or self.restart_files[-1], _everything)
+
+    def points(self, body: int, row: int) -> Array:
+        """Corners of a body in space (n, 3) [m]."""
+        b = self.bodies
+        shape = self.shapes[b.shape[body]]
+        return place(shape.points, b.position[row, body], b.quaternion[row, body])
+
+    def _read(self, name: str, extract: Callable[[h5py.File], T]) -> T:
+        """Open a file, take something out of it and close it; a file may be caught mid-write."""
+        for wait in (0.1, 0.3, 1.0, 2.0):
+            try:
+                with h5py.File(self.folder / name, "r", locking=False) as h5:
+                    return extract(h5)
+            except (OSError, RuntimeError):
+                time.sleep(wait)
+            except KeyError as error:
+                text = str(error).strip("'\"")
+                raise BadRun(f"{self.folder / name}: not a whole result file ({text})") from error
+        try:
+            with h5py.File(self.folder / name, "r", locking=False) as h5:
+                return extract(h5)
+        except (OSError, RuntimeError) as error:
+            raise BadRun(f"{self.folder / name}: cannot be read ({error})") from error
+
+
+def _plain(value: Any) -> Any:
+    """A scalar or a text instead of what h5py hands out for an attribute."""
+    if isinstance(value, bytes):
+        return value.decode()
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return _plain(value.reshape(-1)[0])
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _attributes(h5: h5py.File) -> list[tuple[str, Any]]:
+    return list(h5["provenance"].attrs.items())
+
+
+def _text(value: Any) -> str:
+    return (value.decode() if isinstance(value, bytes) else str(value)).strip("\0 ")
+
+
+def _read_shapes(h5: h5py.File) -> dict[str, Shape]:
+    return {name: _read_shape(name, group) for name, group in h5.get("shapes", {}).items()}
+
+
+def _read_shape(name: str, group: h5py.Group) -> Shape:
+    return Shape(
+        name=name,
+        points=group["points"][:],
+        triangles=group["triangles"][:].astype(np.int64),
+        tets=group["tets"][:].astype(np.int64),
+        sphere_centre=group["sphere_centre"][:],
+        sphere_radius=group["sphere_radius"][:],
+        volume=float(_plain(group.attrs["volume"])),
+        inertia=np.asarray(group.attrs["inertia"]).reshape(3, 3),
+        density=float(_plain(group.attrs["density"])),
+    )
+
+
+def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
+    if "bed" not in h5:
+        return np.empty((0, 3)), np.empty((0, 3), dtype=int)
+    return h5["bed/points"][:], h5["bed/triangles"][:].astype(int)
+
+
+def _read_bodies(h5: h5py.File, placed: int) -> Bodies:
+    """The bodies; the first `placed` of them are those of `&body`, the others drops."""
+    group = h5["bodies"]
+    per_body = ("shape", "mass", "fixed", "release_time")
+    rows = [f.name for f in fields(Bodies) if f.name not in per_body]
+    complete = min(len(group[name]) for name in rows)
+    values = {name: group[name][:complete] for name in rows}
+    return Bodies(
+        shape=[_text(name) for name in group["shape"][:]],
+        mass=group["mass"][:],
+        fixed=group["fixed"][:].astype(bool),
+        release_time=_true_release(group["release_time"][:], values, placed),
+        **values,
+    )
+
+
+def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:
+    """Release times (N) [s]; infinite for a block that is due but not let go yet, which shows in
+    that it has neither moved nor felt a force since. Those `placed` at the start do not wait."""
+    if not len(rows["time"]):
+        return due
+    signs = [rows[name] for name in ("velocity", "fluid_force", "contact_force")]
+    alive = np.any([(np.nan_to_num(sign) != 0).any(axis=(0, 2)) for sign in signs], axis=0)
+    may_wait = (due > 0) | (np.arange(len(due)) >= placed)
+    return np.where(may_wait & (due <= rows["time"][-1]) & ~alive, np.inf, due)
+
+
+def _read_series(h5: h5py.File) -> Series:
+    group = h5["series"]
+    names = {f.name for f in fields(Series)}
+    complete = min(len(group[name]) for name in names & set(group))
+    missing = {name: np.full(complete, np.nan) for name in names - set(group)}  # of older versions
+    return Series(**missing, **{name: group[name][:complete] for name in names & set(group)})
+
+
+def _read_timers(h5: h5py.File) -> dict[str, tuple[float, int]]:
+    group = h5.get("timers")
+    if group is None or "name" not in group:
+        return {}
+    rows = zip(group["name"][:], group["seconds"][:], group["calls"][:], strict=True)
+    return {_text(name): (float(seconds), int(calls)) for name, seconds, calls in rows}
+
+
+def _frame_times(h5: h5py.File) -> Array:
+    steps = h5["VTKHDF/Steps"]
+    return np.asarray(steps["Values"][: int(_plain(steps.attrs["NSteps"]))])
+
+
+def _read_fields(h5: h5py.File, frame: int) -> Fields:
+    data, steps = h5["VTKHDF/CellData"], h5["VTKHDF/Steps"]
+
+    def at_frame(name: str) -> Array:
+        offsets = steps.get(f"CellDataOffsets/{name}")
+        return np.asarray(data[name][frame if offsets is None else int(offsets[frame])])
+
+    return Fields(
+        time=float(steps["Values"][frame]),
+        **{name: at_frame(name) for name in ("liquid", "solid", "pressure", "velocity")},
+    )
+
+
+def _everything(h5: h5py.File) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+
+    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
+    h5.visititems(visit)
+    return found

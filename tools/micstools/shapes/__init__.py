@@ -1,0 +1,1 @@
+"""Blocks and beds: geometry, shapes made of tetrahedra, meshing, maps of heights."""

@@ -1,0 +1,1 @@
+"""What verification cases measure: checks with bands, balances, exact solutions."""
