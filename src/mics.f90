@@ -22,6 +22,7 @@ program mics
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
   use case_oddities_m, only: find_oddities
+  use set_up_file_m, only: write_set_up
   use memory_plan_m, only: require_memory, require_memory_to_start
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t, make_bed
@@ -144,7 +145,7 @@ contains
   !> The case with its shapes; every problem with them is reported at once.
   subroutine read_and_check()
     type(problems_t) :: problems, warnings
-    character(:), allocatable :: text
+    character(:), allocatable :: text, message
     integer :: n
 
     if (is_root()) call read_text(options%case_file, text, problems)   ! mpirun gives it the input
@@ -159,6 +160,7 @@ contains
     call check_case(case, shapes, bed, problems)
     call check_initial_state(case, problems)
     call check_output(case, options, problems)
+    call check_plan_file(problems)
     if (problems%n > 0) call refuse(problems)
     if (.not. options%check) then
       call warnings%report(error_unit, 'mics: warning: ')
@@ -168,8 +170,23 @@ contains
     call find_oddities(case, shapes, bed, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
+    message = ''
+    if (is_root() .and. len(options%plan) > 0) call write_set_up(options%plan, case, parameters(), &
+      shapes, bed, message)
+    call broadcast(message)
+    if (len(message) > 0) call fatal(exit_files, message)
     call finish()
   end subroutine read_and_check
+
+  !> The file of `--plan` must be new.
+  subroutine check_plan_file(problems)
+    type(problems_t), intent(inout) :: problems
+    logical :: there
+
+    if (len(options%plan) == 0) return
+    inquire (file=options%plan, exist=there)
+    if (there) call problems%add('--plan', options%plan, 'is there already, must be a new file')
+  end subroutine check_plan_file
 
   !> State from a restart file in place of the initial one.
   subroutine go_on()

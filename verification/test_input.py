@@ -106,6 +106,23 @@ def test_good_case_is_planned(case: Path, tmp_path: Path) -> None:
     assert sorted(tmp_path.iterdir()) == before
 
 
+def test_a_set_up_goes_to_a_new_file(tmp_path: Path) -> None:
+    """--plan writes where nothing is, with --check alone."""
+    words = ["--check", "--plan", "plan.h5"]
+    text = (ROOT / "input" / "blocks.nml").read_text()
+    assert mics(words, tmp_path, text).returncode == 0
+    before = (tmp_path / "plan.h5").read_bytes()
+    done = mics(words, tmp_path, text)
+    assert done.returncode == 2
+    assert done.stderr == "mics: --plan = 'plan.h5': is there already, must be a new file\n"
+    assert (tmp_path / "plan.h5").read_bytes() == before
+    done = mics(words[1:], tmp_path, text)
+    assert (done.returncode, done.stderr) == (2, "mics: --plan = 'plan.h5': goes with --check\n")
+    done = mics([*words[:2], "no/plan.h5"], tmp_path, text)
+    assert done.returncode == 4 and "no/plan.h5" in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["plan.h5"]
+
+
 def test_plan_tells_the_numbers(tmp_path: Path) -> None:
     """The plan of the paper's tank: cells, tetrahedra, volume and weight of the block."""
     plan = mics(["--check"], tmp_path, (ROOT / "input" / "blocks.nml").read_text()).stdout

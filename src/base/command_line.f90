@@ -11,6 +11,7 @@ module command_line_m
 
   type :: options_t
     logical :: check = .false.       !! read, validate, print the plan, write nothing
+    character(:), allocatable :: plan        !! file of the set-up that --check writes, empty: none
     logical :: quiet = .false.       !! no progress table
     logical :: version = .false.
     logical :: help = .false.
@@ -30,8 +31,8 @@ module command_line_m
   integer, parameter :: max_threads = 1024
   character(*), parameter :: allowed_threads = 'must be a whole number from 1 to 1024'
 
-  character(*), parameter :: known(8) = [character(10) :: '--check', '--restart', '--output', &
-    '--threads', '--max-wall', '--quiet', '--version', '--help']
+  character(*), parameter :: known(9) = [character(10) :: '--check', '--plan', '--restart', &
+    '--output', '--threads', '--max-wall', '--quiet', '--version', '--help']
 
 contains
 
@@ -67,6 +68,7 @@ contains
     logical :: has_value
 
     options%case_file = ''
+    options%plan = ''
     options%restart = ''
     options%output = ''
     options%topic = ''
@@ -93,6 +95,8 @@ contains
       end if
       call take_option(word, has_value, value, options, problems)
     end do
+    if (len(options%plan) > 0 .and. .not. options%check) call problems%add('--plan', options%plan, &
+      'goes with --check')
   end subroutine parse_arguments
 
   !> Does the option need a word behind it?
@@ -100,7 +104,7 @@ contains
     character(*), intent(in) :: word
 
     select case (word)
-    case ('--restart', '--output', '--threads', '--max-wall'); wants_value = .true.
+    case ('--plan', '--restart', '--output', '--threads', '--max-wall'); wants_value = .true.
     case default; wants_value = .false.
     end select
   end function wants_value
@@ -142,6 +146,7 @@ contains
     end if
     select case (word)
     case ('--check'); options%check = .true.
+    case ('--plan'); options%plan = value
     case ('--quiet'); options%quiet = .true.
     case ('--version'); options%version = .true.
     case ('--help')
@@ -160,7 +165,7 @@ contains
     character(:), allocatable :: what
 
     select case (word)
-    case ('--restart'); what = 'a file name'
+    case ('--plan', '--restart'); what = 'a file name'
     case ('--output'); what = 'a folder'
     case ('--max-wall'); what = 'hours and minutes, HH:MM,'
     case default; what = 'a number'
@@ -283,6 +288,7 @@ contains
       '                                      standard input: mics < case.nml', &
       '', &
       '  --check         read and validate the case, print the plan, write nothing', &
+      '  --plan FILE     with --check: write the set-up there, laid out as run.h5', &
       '  --restart FILE  go on from a restart file', &
       '  --output DIR    folder for the results, instead of the one named in the case', &
       '  --threads N     threads (default OMP_NUM_THREADS, else all cores;', &

@@ -11,7 +11,7 @@ from micstools.commands.base import Command, Parser
 # Where each command is; only the one that is called is loaded: `--help` draws nothing.
 COMMANDS = {
     "run": ("run", "RUN", "run a case"),
-    "check": ("run", "CHECK", "check a case and print its plan"),
+    "check": ("check", "CHECK", "check a case: its plan in words, or as a page"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
     "report": ("report", "REPORT", "make one page of a run or an ensemble"),

@@ -28,6 +28,7 @@ program test_command_line
     .and. options%threads == 3 .and. options%case_file == 'case.nml' .and. problems%n == 0)
   call parse('-')
   call check('standard input', options%case_file == '' .and. problems%n == 0)
+  call refused('--plan a.h5', "--plan = 'a.h5': goes with --check")
   call refused('--chek', "unknown option '--chek'; the nearest is --check (see --help)")
   call refused('--thread=2', "unknown option '--thread'; the nearest is --threads (see --help)")
   call refused('-output', "unknown option '-output'; the nearest is --output (see --help)")

@@ -10,19 +10,26 @@ from micstools.pages import ensemble_page, run_page
 from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun
 
+NORTH_HELP = """direction of north in the plan, from +y towards +x; default: +y is taken as north,
+and the page says so"""
+
+
+def check_north(degrees: float | None) -> None:
+    """Raise BadRun where `--north` is no direction."""
+    if degrees is not None and not abs(degrees) <= 360:
+        raise BadRun(f"--north {degrees}: must be degrees from -360 to 360")
+
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
-    add("--north", type=float, metavar="DEGREES", help="direction of north in the plan, from +y "
-        "towards +x; default: +y is taken as north, and the page says so")  # fmt: skip
+    add("--north", type=float, metavar="DEGREES", help=NORTH_HELP)
     add_area(parser)
     add("--out", type=Path, help="the file, default report.html in the folder")
 
 
 def _report(given: argparse.Namespace) -> int:
-    if given.north is not None and not abs(given.north) <= 360:
-        raise BadRun(f"--north {given.north}: must be degrees from -360 to 360")
+    check_north(given.north)
     if pile_ensemble.is_ensemble(given.run):
         folder = given.run
         found = pile_ensemble.open_ensemble(folder, area=area_of(given.area))

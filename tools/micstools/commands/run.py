@@ -1,4 +1,4 @@
-"""Run a case, or check it."""
+"""Run a case."""
 
 import argparse
 import os
@@ -20,7 +20,7 @@ def _run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no table")
 
 
-def _call(given: argparse.Namespace, options: list[str]) -> int:
+def call(given: argparse.Namespace, options: list[str]) -> int:
     """The program on the case; it reads the case as it is where nothing was set."""
     text = program.case_text(given.case, given.settings)
     path = program.find(given.program, given.case)
@@ -50,7 +50,7 @@ def _run(given: argparse.Namespace) -> int:
     options += ["--threads", str(given.threads)] if given.threads is not None else []
     options += ["--restart", str(given.restart)] if given.restart else []
     options += ["--max-wall", given.max_wall] if given.max_wall is not None else []
-    return _call(given, options + (["--quiet"] if given.quiet else []))
+    return call(given, options + (["--quiet"] if given.quiet else []))
 
 
 RUN = Command(
@@ -64,11 +64,4 @@ RUN = Command(
     ),
     _run_arguments,
     _run,
-)
-CHECK = Command(
-    "check",
-    "Read and check a case, print its plan; nothing is written.",
-    ("check input/blocks.nml", "check input/blocks.nml --set grid.cells=120,40,80"),
-    program.add_case,
-    lambda given: _call(given, ["--check"]),
 )

@@ -13,7 +13,7 @@ class BlockMap {
     this.number = new Int32Array(this.w * this.h); // from 1; 0: none
     this.depth = new Float32Array(this.w * this.h).fill(Infinity);
     const pixels = high / (2 * stage.half);
-    stage.each(false, k => {
+    stage.numbered(k => {
       const { place, turn } = stage.pose(k), shape = stage.meshes[stage.scene.bodies[k].shape];
       const middle = seenAt(stage.matrix, place), near = stage.flat ? 1 : stage.distance / middle.w;
       const radius = shape.radius * pixels * near;

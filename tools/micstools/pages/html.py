@@ -85,10 +85,13 @@ def data(name: str, content: Any) -> Markup:
     return Markup(f'<script type="application/json" id="{name}">{text}</script>')
 
 
-def document(title: str, *content: object, script: str = "") -> str:
-    """The whole page with its style and scripts, `script` the one that starts them."""
+def document(title: str, *content: object, script: str = "", more: tuple[str, ...] = ()) -> str:
+    """The whole page with its style and scripts, `more` of them, `script` the one that starts
+    them."""
     style = (files("micstools.pages") / "page.css").read_text()
-    player = "".join((files("micstools.pages") / f"{name}.js").read_text() for name in _SCRIPTS)
+    player = "".join(
+        (files("micstools.pages") / f"{name}.js").read_text() for name in (*_SCRIPTS, *more)
+    )
     head = tag(
         "head",
         tag("meta", charset="utf-8"),

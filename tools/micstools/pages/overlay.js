@@ -5,6 +5,7 @@
 const AXES = [['x', '#d1495b'], ['y', '#3f9b5b'], ['z', '#4a8fd9']];
 const LEAST = 5; // squares of the map of blocks that a number needs
 const MOST = 20000; // points of all paths
+const LONG = 46, HIGH = 13; // room of a label [pixels]
 const FONT = '12px system-ui, "Liberation Sans", sans-serif';
 
 class Overlay {
@@ -40,6 +41,7 @@ class Overlay {
     this.drawNorth();
     this.drawBar();
     if (stage.flat) this.drawMeasured();
+    stage.layers.forEach(layer => layer.write(this));
   }
 
   at(point) {
@@ -83,8 +85,9 @@ class Overlay {
       if (sum.n < LEAST) continue;
       let x = sum.x / sum.n, y = sum.y / sum.n;
       if (seen.at(Math.round(x), Math.round(y)) !== k) [x, y] = this.nearest(k, sum);
-      const number = scene.bodies[k - 1].number;
+      const number = scene.bodies[k - 1].label || scene.bodies[k - 1].number;
       const place = [(x + 0.5) / seen.w * this.wide, (y + 0.5) / seen.h * this.high];
+      if (scene.bodies[k - 1].label) this.giveRoom(place);
       this.labels.push([number, ...place]);
       this.pen.lineWidth = 3;
       this.pen.textAlign = 'center';
@@ -95,6 +98,13 @@ class Overlay {
       this.pen.fillText(number, ...place);
     }
     this.pen.font = FONT;
+  }
+
+  // Moves a long label down until it stands on no other.
+  giveRoom(place) {
+    const taken = () => this.labels.some(([, x, y]) =>
+      Math.abs(x - place[0]) < LONG && Math.abs(y - place[1]) < HIGH);
+    for (let tries = 0; tries < 12 && taken(); tries++) place[1] += HIGH;
   }
 
   // The place at which a block is seen that is nearest to the middle of all of them.

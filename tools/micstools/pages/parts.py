@@ -19,8 +19,9 @@ def north_note(north: float | None) -> Markup | None:
     return tag("p", NORTH_IS_Y, class_="note no-print") if north is None else None
 
 
-def player(name: str, label: str) -> Markup:
-    """A stage and its buttons; `name` is that of the element."""
+def player(name: str, label: str, plan: bool = False) -> Markup:
+    """A stage and its buttons; `name` is that of the element. `plan`: of a set-up, in which nothing
+    has moved yet, but the cells are shown."""
     moving = tag(
         "div",
         tag("button", "Play", class_="play", type="button"),
@@ -44,13 +45,17 @@ def player(name: str, label: str) -> Markup:
         "div",
         views,
         zoom,
-        tag("label", "colour by", _select("colouring", _COLOURINGS, "block")),
-        tag("label", "follow", _select("follow", (("", "whole tank"),), ""), class_="moving"),
+        tag("label", "colour by", _select("colouring", _COLOURINGS, "block"), hidden=plan or None),
+        tag("label", "follow", _select("follow", (("", "whole tank"),), ""), class_="moving",
+            hidden=plan or None),
         tag("label", "water", _select("wet", _WATERS, "clear")),
         tag("label", numbers, "numbers"),
-        tag("label", paths, "path", class_="moving"),
+        tag("label", paths, "path", class_="moving", hidden=plan or None),
+        tag("label", tag("input", type="checkbox", class_="cells", checked=True), "cells")
+        if plan
+        else None,
         class_="row",
-    )
+    )  # fmt: skip
     canvas = tag("canvas", class_="stage", tabindex=0, role="img", aria_label=label)
     picture = tag("div", canvas, tag("canvas", class_="over"), class_="picture")
     legend, hint = tag("ul", class_="legend"), tag("p", _HINT, class_="hint")

@@ -90,6 +90,7 @@ class Stage {
     this.followed = null;
     this.water = new Water(this);
     this.overlay = new Overlay(this, over);
+    this.layers = []; // what a page draws besides, with load, paint, write
     new Hands(this);
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
@@ -98,8 +99,7 @@ class Stage {
   // Takes a scene, frees the one before.
   load(scene) {
     const gl = this.gl;
-    for (const mesh of [...(this.meshes || []), this.bed, this.frame, this.floor])
-      if (mesh) [mesh.faces, mesh.lines].forEach(part => part && gl.deleteBuffer(part.buffer));
+    for (const mesh of [...(this.meshes || []), this.bed, this.frame, this.floor]) this.free(mesh);
     this.scene = scene;
     this.times = unpack(scene.times, Float32Array);
     this.place = unpack(scene.place, Float32Array);
@@ -114,9 +114,14 @@ class Stage {
     this.buildTank();
     this.water.load(scene);
     this.overlay.load(scene);
+    this.layers.forEach(layer => layer.load(scene));
     this.followed = null;
     this.view('corner');
     this.set(this.times[0]);
+  }
+
+  free(mesh) {
+    if (mesh) [mesh.faces, mesh.lines].forEach(part => part && this.gl.deleteBuffer(part.buffer));
   }
 
   buffer(values, count) {
@@ -282,6 +287,7 @@ class Stage {
     gl.depthMask(true);
     gl.disable(gl.BLEND);
     gl.disable(gl.STENCIL_TEST);
+    this.layers.forEach(layer => layer.paint(colour));
     if (this.water.shown && this.wet !== 'none') this.water.paint(this.matrix, this.wet === 'speed');
     this.overlay.paint(this.matrix, wide / scale, high / scale, scale, style);
   }
@@ -289,6 +295,12 @@ class Stage {
   // Every block that is there: the walls among them, or the others.
   each(walls, work) {
     this.scene.bodies.forEach((body, k) => { if (body.wall === walls && this.shown(k)) work(k); });
+  }
+
+  // Every block that bears a number: ghosts of those to come, too.
+  numbered(work) {
+    this.each(false, work);
+    if (this.scene.plan) this.scene.bodies.forEach((body, k) => { if (!this.shown(k)) work(k); });
   }
 
   paintBlock(k, opacity) {

@@ -1,0 +1,100 @@
+!> The set-up of a checked case as a file, for pages and other programs: `--check --plan FILE`.
+!!
+!! Laid out as `run.h5`. Its rows are the starting poses; with fixed bodies that move, these poses
+!! over the run. The group `/plan` has what a run does not keep: the line of each body in the case,
+!! its place before the random shift, and how far that reaches.
+module set_up_file_m
+  use kinds_m, only: wp
+  use errors_m, only: exit_ok
+  use case_types_m, only: case_t, drop_input_t
+  use tet_mesh_m, only: shape_t
+  use bed_m, only: bed_t
+  use grid_m, only: grid_init
+  use drops_m, only: draw_drop
+  use rigid_body_m, only: blocks_t, blocks_init, drift
+  use clock_m, only: clock_init
+  use run_state_m, only: run_state_t
+  use diagnostics_m, only: step_report_t, row_t, make_row
+  use write_run_m, only: run_file_t, create_run_file, write_row, close_run_file
+  implicit none
+  private
+  public :: write_set_up
+
+  integer, parameter :: n_poses = 60   !! of bodies that move as prescribed
+
+contains
+
+  !> Write the set-up of a case; `message` tells what went wrong, empty: nothing. The root calls.
+  subroutine write_set_up(path, case, parameters, shapes, bed, message)
+    character(*), intent(in) :: path         !! of the new file
+    type(case_t), intent(in) :: case         !! checked
+    character(*), intent(in) :: parameters   !! all values of the case as text
+    type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
+    type(bed_t), intent(in) :: bed
+    character(:), allocatable, intent(out) :: message
+    type(run_state_t) :: state
+    type(step_report_t) :: report
+    type(run_file_t) :: file
+    type(row_t) :: row
+    integer :: i, n
+
+    call grid_init(case%grid, case%boundary, state%grid)
+    call clock_init(case%run, state%clock)
+    call blocks_init(case, shapes, state%blocks)
+    call create_run_file(path, case%text, parameters, state%grid, state%blocks, bed, file)
+    call write_places(case, state%blocks, file)
+    n = 0
+    if (any(moves(state%blocks))) n = n_poses
+    state%blocks%present = moves(state%blocks)   ! nothing else is moved below
+    do i = 0, n
+      call make_row(case%fluid, 0.0_wp, state, report, row)
+      call write_row(file, i, row, state%blocks)
+      call drift(case%run%t_end/n_poses, state%blocks)
+      state%clock%t = (i + 1)*case%run%t_end/n_poses
+    end do
+    call close_run_file(file, exit_ok)
+    message = ''
+    if (file%file%info /= 0) message = file%file%message
+  end subroutine write_set_up
+
+  !> Fixed bodies with a prescribed velocity.
+  pure function moves(blocks) result(yes)
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes(blocks%n)
+
+    yes = blocks%fixed .and. (any(abs(blocks%given%v) > 0.0_wp, 1) &
+      .or. any(abs(blocks%given%omega) > 0.0_wp, 1))
+  end function moves
+
+  !> Of each body its line in the case, its place without and with the reach of the random shift.
+  subroutine write_places(case, blocks, run)
+    type(case_t), intent(in) :: case
+    type(blocks_t), intent(in) :: blocks
+    type(run_file_t), intent(inout) :: run
+    type(drop_input_t) :: unshifted
+    real(wp) :: place(3, blocks%n), spread(3, blocks%n), q(4)
+    integer :: line(blocks%n), b, i, k
+
+    place = blocks%x
+    spread = 0.0_wp
+    line(:size(case%body)) = case%body%line
+    b = size(case%body)
+    do i = 1, size(case%drop)
+      do k = 1, case%drop(i)%count
+        b = b + 1
+        line(b) = case%drop(i)%line
+        spread(:, b) = case%drop(i)%spread
+        unshifted = case%drop(i)
+        unshifted%spread = 0.0_wp
+        call draw_drop(unshifted, k, place(:, b), q)
+      end do
+    end do
+    associate (file => run%file)
+      call file%group('/plan')
+      call file%store('/plan/line', '1', line)
+      call file%store('/plan/place', 'm', place)
+      call file%store('/plan/spread', 'm', spread)
+    end associate
+  end subroutine write_places
+
+end module set_up_file_m

@@ -1,0 +1,127 @@
+'use strict';
+// What a page draws of a case before it is computed: the faces of the cells, boxes of liquid, blocks
+// to come as ghosts with the reach of their random shift, the way of crane and barge, and marks at
+// the places that the warnings of the program concern.
+
+const GHOST = 0.4; // how much of a block is seen before its time
+const LIQUID = rgb('#2f86c6');
+const MARK = 9; // radius [pixels]
+const BLINKS = 1600; // a mark that was asked for [ms]
+
+class PlanLayer {
+  constructor(stage) {
+    this.stage = stage;
+    this.cells = true;
+    stage.layers.push(this);
+  }
+
+  load({ plan, low, high }) {
+    [...(this.faces || []), this.reach, this.boxes].forEach(mesh => this.stage.free(mesh));
+    this.plan = plan;
+    const corner = (k, box) => [0, 1, 2].map(c => box[k >> c & 1][c]);
+    const edges = box => [0, 1, 2].flatMap(c => [...Array(8).keys()].filter(k => !(k >> c & 1))
+      .flatMap(k => [corner(k, box), corner(k | 1 << c, box)]));
+    const strips = boxes => ({ lines: this.stage.strips(boxes.flatMap(edges)) });
+    this.reach = strips(plan.reach);
+    this.boxes = strips(plan.liquid);
+    // For each side of the tank the lines on it between two cells, and the way it faces.
+    this.faces = [0, 1, 2].flatMap(d => [0, 1].map(end => {
+      const at = [low, high][end][d], ends = [];
+      for (const [e, f] of [[(d + 1) % 3, (d + 2) % 3], [(d + 2) % 3, (d + 1) % 3]])
+        for (const v of plan.cells[e]) for (const w of [low, high]) {
+          const p = [0, 0, 0];
+          [p[d], p[e], p[f]] = [at, v, w[f]];
+          ends.push(p);
+        }
+      return { lines: this.stage.strips(ends), d, outward: 2 * end - 1 };
+    }));
+  }
+
+  paint(colour) {
+    const { stage, plan } = this, { gl, scene } = stage;
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    stage.put([0, 0, 0], [1, 0, 0, 0]);
+    if (this.cells) for (const { lines, d, outward } of this.faces)
+      if (outward * stage.axes.away[d] < -1e-6) stage.draft(lines, colour('--stage-line'), 0.22);
+    stage.draft(this.boxes.lines, LIQUID, 0.9);
+    gl.enable(gl.CULL_FACE);
+    scene.bodies.forEach((body, k) => { if (!stage.shown(k)) stage.paintBlock(k, GHOST); });
+    gl.disable(gl.CULL_FACE);
+    gl.disable(gl.DEPTH_TEST); // a reach is mostly within the blocks that it is of
+    stage.put([0, 0, 0], [1, 0, 0, 0]);
+    stage.draft(this.reach.lines, rgb(plan.colour));
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  // Ways and marks over the picture.
+  write(overlay) {
+    const { stage, plan } = this, pen = overlay.pen;
+    for (const { way, name } of plan.ways) {
+      const seen = way.map(p => overlay.at(p)).filter(({ w }) => w > 0).map(({ x, y }) => [x, y]);
+      if (seen.length < 2) continue;
+      overlay.line(seen, overlay.paper, 4);
+      pen.setLineDash([7, 4]);
+      overlay.line(seen, plan.colour, 2);
+      pen.setLineDash([]);
+      const [[x0, y0], [x1, y1]] = seen.slice(-2), long = Math.hypot(x1 - x0, y1 - y0);
+      if (long > 1) {
+        const [ux, uy] = [(x1 - x0) / long, (y1 - y0) / long];
+        const back = s => [x1 - 9 * ux - 4 * s * uy, y1 - 9 * uy + 4 * s * ux];
+        overlay.line([back(1), [x1, y1], back(-1)], plan.colour, 2);
+      }
+      overlay.write(name, seen[0][0], seen[0][1] - 12, 'center', plan.colour);
+    }
+    this.marks = [];
+    for (const mark of plan.marks) for (const k of [...mark.bodies, ...mark.at.map(p => p)]) {
+      const { x, y, w } = overlay.at(typeof k === 'number' ? stage.pose(k).place : k);
+      if (w > 0) this.drawMark(overlay, mark.number, x + 14, y - 14);
+    }
+  }
+
+  drawMark(overlay, number, x, y) {
+    const pen = overlay.pen, big = this.asked === number ? 1.7 : 1, r = big * MARK;
+    const near = () => this.marks.filter(m => Math.hypot(m.x - x, m.y - y) < 1.8 * MARK);
+    if (near().some(m => m.number === number)) return;
+    while (near().length) x += MARK;
+    this.marks.push({ number, x, y });
+    pen.beginPath();
+    pen.arc(x, y, r, 0, 2 * Math.PI);
+    pen.fillStyle = '#b3322f';
+    pen.fill();
+    pen.strokeStyle = overlay.paper;
+    pen.lineWidth = 1.5;
+    pen.stroke();
+    pen.font = `bold ${FONT}`;
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    pen.fillStyle = '#ffffff';
+    pen.fillText(number, x, y + 0.5);
+    pen.font = FONT;
+  }
+
+  // Makes the marks of a warning larger for a moment.
+  ask(number) {
+    this.asked = number;
+    this.stage.draw();
+    clearTimeout(this.asking);
+    this.asking = setTimeout(() => { this.asked = null; this.stage.draw(); }, BLINKS);
+  }
+}
+
+// A player of a set-up, with the buttons of its page.
+function startPlan(root) {
+  const player = startPlayer(root);
+  if (!player) return null;
+  player.plan = new PlanLayer(player.stage);
+  const cells = root.querySelector('.cells');
+  cells.addEventListener('change', () => { player.plan.cells = cells.checked; player.stage.draw(); });
+  document.addEventListener('click', event => {
+    const asked = event.target.closest('[data-mark]');
+    if (asked) player.plan.ask(+asked.dataset.mark);
+  });
+  return player;
+}

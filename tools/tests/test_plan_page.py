@@ -1,0 +1,176 @@
+"""The page of a case before it is computed: what comes where and when, marks of the warnings, and
+that it works in a browser without a network."""
+
+import base64
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from browser import MISSING, Browser
+from micstools import cli
+from micstools.pages import plan_page, set_up
+from micstools.pages.set_up import SetUp
+from test_page import scene_of
+
+ROOT = Path(__file__).parents[2]
+MICS = ROOT / "mics"
+in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+pytestmark = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
+CASE = """&run t_end = 8  dt = 0.02  title = '<i>Crane</i> and pusher' /
+&grid cells = 48, 24, 16  length = 24, 12, 8 /
+&fluid water_level = 9 /
+&water min = 0, 0, 0  max = 2, 30, 1 /
+&shape name = 'cube'  kind = 'cube'  size = 1.0 /
+&body shape = 'cube'  position = 2, 6, 0.51  fixed = .true.  velocity = 1, 0, 0 /
+&body shape = 'cube'  position = 20, 6, 0.51 /
+&drop shape = 'cube'  position = 6, 3, 5  count = 2  interval = 2  spread = 0.5, 0.3, 0 /
+&drop shape = 'cube'  position = 12, 3, 5  count = 2  first_time = 3  interval = 7
+  orientation = 'random' /
+"""
+
+
+@pytest.fixture(scope="module")
+def found() -> Iterator[SetUp]:
+    with set_up.read(MICS, CASE) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    case = tmp_path_factory.mktemp("plan") / "crane.nml"
+    case.write_text(CASE)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check", str(case), "--program", str(MICS), "--page"])
+    assert end.value.code == 0
+    assert sorted(p.name for p in case.parent.iterdir()) == ["check.html", "crane.nml"]
+    return case.with_name("check.html")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+def test_the_program_tells_what_comes(found: SetUp) -> None:
+    """Due times also of blocks that have not moved; random shifts about the places that are
+    planned; where fixed bodies go."""
+    assert found.run.bodies.release_time.tolist() == [0, 0, 0, 2, 3, 10]
+    assert found.line.tolist() == [6, 7, 8, 8, 9, 9]
+    assert found.place[2].tolist() == [6, 3, 5] and found.spread[2].tolist() == [0.5, 0.3, 0]
+    shift = found.run.bodies.position[0] - found.place
+    assert (np.abs(shift) <= found.spread).all() and (shift[2:4, :2] != 0).all()
+    way = found.run.bodies.position[:, 0]
+    assert way[-1] == pytest.approx([10, 6, 0.51]) and found.run.bodies.time[-1] == 8
+    assert np.ptp(found.run.bodies.position[:, 1:], axis=0).max() == 0
+
+
+def test_warnings_find_their_places(found: SetUp) -> None:
+    by_group = {w.group: n for n, w in enumerate(found.warnings, 1)}
+    assert {"fluid", "drop", "shape"} <= set(by_group)
+    late = found.warnings[by_group["drop"] - 1]
+    assert (late.variable, late.occurrence, late.line) == ("count", 1, 9)
+    assert "line" not in late.text
+    places = {mark["number"]: mark for mark in plan_page.marks(found)}
+    assert places[by_group["drop"]]["bodies"] == [4, 5]
+    assert places[by_group["shape"]]["bodies"] == [0]
+    assert places[by_group["fluid"]]["at"] == [[12, 6, 8]]
+
+
+def test_the_scene_has_what_comes(found: SetUp, page: Path) -> None:
+    scene = scene_of(page)
+    plan, bodies = scene["plan"], scene["bodies"]
+    assert [body["release"] for body in bodies] == [0, 0, 1e-6, 2, 3, 10]
+    assert [body.get("label") for body in bodies[1:4]] == [None, "3: 0 s", "4: 2 s"]
+    assert plan["reach"] == [[[5.5, 2.7, 5], [6.5, 3.3, 5]]]
+    assert plan["liquid"] == [[[0, 0, 0], [2, 12, 1]]]
+    ways = {way["name"]: way["way"] for way in plan["ways"]}
+    assert [p[0] for p in ways["drops 3–6"]] == [6, 6, 12, 12]
+    assert [ways["body 1"][k][0] for k in (0, -1)] == pytest.approx([2, 10])
+    assert [len(faces) for faces in plan["cells"]] == [47, 23, 15]
+    times = np.frombuffer(base64.b64decode(scene["times"]), "<f4")
+    assert times[0] == 0 and times[-1] == 8
+    assert scene["water"] == {"level": 8}
+
+
+def test_faces_of_many_cells_are_thinned() -> None:
+    faces = np.linspace(0, 1, 1001)
+    assert len(plan_page._faces(faces)) < 160 and plan_page._faces(faces)[0] == 0.007
+    assert plan_page._faces(np.array([0.0, 1.0])) == []
+
+
+def test_the_plan_is_told_in_words(found: SetUp, page: Path) -> None:
+    text = page.read_text()
+    assert found.entry("Tank", "cells") == "48 x 24 x 16 = 18432" and "18432" in text
+    time, memory = found.entry("Time steps", "time of the run"), found.entry("Memory", "about")
+    said = [time.split(" or ")[0][6:], memory.split(" of ")[0], "±0.5, ±0.3, 0", "3 to 4"]
+    for words in (*said, "<h1>&lt;i&gt;Crane&lt;/i&gt; and pusher</h1>"):
+        assert words in text, words
+    assert "http" not in text.replace("http-equiv", "")
+
+
+def test_a_refused_case_is_told_and_nothing_written(tmp_path: Path, capfd) -> None:
+    case = tmp_path / "case.nml"
+    case.write_text(CASE.replace("size = 1.0", "size = -1.0"))
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check", str(case), "--program", str(MICS), "--page"])
+    said = capfd.readouterr().err
+    assert end.value.code == 2
+    assert said.startswith("mics: &shape size = -1") and "(line 5)" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["case.nml"]
+    remark = set_up.Refused(said, case.read_text()).remarks[0]
+    assert (remark.group, remark.variable, remark.occurrence) == ("shape", "size", 0)
+
+
+def test_out_goes_with_page(tmp_path: Path, capsys) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check", "case.nml", "--out", str(tmp_path / "a.html")])
+    assert end.value.code == 2 and "--out: goes with --page" in capsys.readouterr().err
+
+
+def drag(browser: Browser, p: tuple[float, float], q: tuple[float, float]) -> None:
+    """Presses, moves and lets go the left button."""
+    browser.mouse("mousePressed", *p, button="left", buttons=1, clickCount=1)
+    browser.mouse("mouseMoved", *q, button="left", buttons=1)
+    browser.mouse("mouseReleased", *q, button="left")
+    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+@in_browser
+def test_the_page_works_in_a_browser(browser: Browser, page: Path) -> None:
+    """It turns, marks a warning, lets blocks come; it loads nothing, and nothing fails."""
+    browser.open(page)
+    yaw = browser.run("planPlayer.stage.yaw")
+    x, y = browser.run(
+        "(r => [r.x + r.width / 2, r.y + r.height / 2])"
+        "(document.querySelector('.stage').getBoundingClientRect())"
+    )
+    drag(browser, (x, y), (x + 80, y))
+    assert browser.run("planPlayer.stage.yaw") == pytest.approx(yaw - 0.5)
+    numbers = browser.run("planPlayer.plan.marks.map(m => m.number)")
+    assert set(numbers) == {mark["number"] for mark in scene_of(page)["plan"]["marks"]}
+    browser.run("document.querySelector('[data-mark=\"2\"]').click()")
+    assert browser.run("planPlayer.plan.asked") == 2
+    ghosts = "planPlayer.stage.scene.bodies.filter((b, k) => !planPlayer.stage.shown(k)).length"
+    assert browser.run(ghosts) == 4
+    browser.run("planPlayer.show(3)")
+    assert browser.run(ghosts) == 1
+    labels = browser.run("planPlayer.stage.overlay.labels.map(l => l[0])")
+    assert "3: 0 s" in labels
+    before = browser.picture()
+    browser.run("document.querySelector('.cells').click()")
+    browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert browser.picture() != before
+    assert browser.errors == []
+    assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
+
+
+@in_browser
+@pytest.mark.parametrize("dark", [False, True])
+def test_it_fits_a_phone(browser: Browser, page: Path, dark: bool) -> None:
+    browser.open(page, 360, 740, dark)
+    assert browser.run("document.documentElement.scrollWidth") <= 360
+    assert browser.errors == []
