@@ -14,6 +14,7 @@ COMMANDS = {
     "check": ("check", "CHECK", "check a case: its plan in words, or as a page"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
+    "places": ("places", "PLACES", "write where units lie: csv, geojson, dxf"),
     "report": ("report", "REPORT", "make one page of a run or an ensemble"),
     "export": ("export", "EXPORT", "write a run for other programs: glb, stl, obj, csv, pvd"),
     "movie": ("movie", "MOVIE", "make a film of a run: mp4 or gif"),

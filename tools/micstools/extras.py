@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
     "ensemble": ("dask", "dask_jobqueue", "distributed"),
+    "survey": ("ezdxf",),
     "pictures": ("pyvista", "vtk"),
 }
 _OF_A_FIRST_RUN = "pictures"  # `make deps` installs them, whatever it is asked for

@@ -157,6 +157,17 @@ def _read(group: str) -> f90nml.Namelist:
         raise BadRun(f"{words[:60]}: cannot be understood ({type(error).__name__})") from error
 
 
+def variables(group: str) -> dict[str, Any]:
+    """What the text of one group gives."""
+    (found,) = _read(group).values()
+    return dict(found)
+
+
+def group_text(name: str, variables: dict[str, Any]) -> str:
+    """The text of a group that gives variables."""
+    return str(f90nml.Namelist({name: variables}))
+
+
 def value(text: str, group: str, variable: str, occurrence: int = 0) -> Any:
     """A variable of one of the groups of a name; none where the case does not give it."""
     places = [(start, end) for name, start, end in groups(text) if name == group]

@@ -100,7 +100,7 @@ def _of_run(given: argparse.Namespace) -> int:
     found["units"] = pile_numbers.si_units(found)
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
-    _write_json(run.folder / "pile.json", found)
+    write_json(run.folder / "pile.json", found)
     return 0
 
 
@@ -117,7 +117,7 @@ def _of_ensemble(ensemble: Ensemble) -> int:
     if ensemble.whole:
         _write_maps(ensemble)
     print(f"{ensemble.folder / 'pile.csv'}")
-    _write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
+    write_json(ensemble.folder / "pile.json", pile_ensemble.summary(ensemble))
     return 0
 
 
@@ -156,17 +156,17 @@ def _write_h5(path: Path, found: dict[str, Array]) -> None:
     print(path)
 
 
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(_known(content), indent=2, allow_nan=False) + "\n")
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(known(content), indent=2, allow_nan=False) + "\n")
     print(path)
 
 
-def _known(value: Any) -> Any:
+def known(value: Any) -> Any:
     """The same without nan, which JSON has not."""
     if isinstance(value, dict):
-        return {k: _known(v) for k, v in value.items()}
+        return {k: known(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_known(v) for v in value]
+        return [known(v) for v in value]
     return None if value != value else value
 
 

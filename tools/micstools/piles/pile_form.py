@@ -42,12 +42,12 @@ def footprint(top: Array, step: float) -> float:
     if not x.size:
         return 0.0
     corners = np.concatenate([np.stack([x + i, y + j], axis=1) for i in (0, 1) for j in (0, 1)])
-    hull = _hull(np.unique(corners, axis=0))
-    (a, b), (c, d) = hull.T, np.roll(hull, -1, axis=0).T
+    line = hull(np.unique(corners, axis=0))
+    (a, b), (c, d) = line.T, np.roll(line, -1, axis=0).T
     return 0.5 * abs(float((a * d - b * c).sum())) * step**2
 
 
-def _hull(points: Array) -> Array:
+def hull(points: Array) -> Array:
     """Corners (k, 2) of the convex hull of points (n, 2) that are sorted by their first, then their
     second coordinate: A. M. Andrew (1979), two chains."""
     chains = []

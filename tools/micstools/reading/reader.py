@@ -84,6 +84,7 @@ class Bodies:
     """Poses, velocities and forces of the N bodies in T rows; space frame."""
 
     shape: list[str]  # names of the shapes (N)
+    name: list[str]  # of the bodies in the plan (N), empty without one
     mass: Array  # (N) [kg]
     fixed: NDArray[np.bool_]  # (N)
     release_time: Array  # (N) true time of release, infinite for blocks not released yet [s]
@@ -421,12 +422,13 @@ def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
 def _read_bodies(h5: h5py.File, placed: int) -> Bodies:
     """The bodies; the first `placed` of them are those of `&body`, the others drops."""
     group = h5["bodies"]
-    per_body = ("shape", "mass", "fixed", "release_time")
+    per_body = ("shape", "name", "mass", "fixed", "release_time")
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
     complete = min(len(group[name]) for name in rows)
     values = {name: group[name][:complete] for name in rows}
     return Bodies(
         shape=[_text(name) for name in group["shape"][:]],
+        name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
         release_time=_true_release(group["release_time"][:], values, placed),

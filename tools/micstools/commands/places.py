@@ -1,0 +1,215 @@
+"""Where units lie, as a survey hands it over."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from contourpy import contour_generator
+
+from micstools import command, extras
+from micstools.commands.base import Command
+from micstools.commands.pile import area_of, write_json
+from micstools.piles import handover, layer, pile_ensemble, places
+from micstools.piles.handover import Handover
+from micstools.piles.layer import Corners
+from micstools.piles.pile_ensemble import Ensemble
+from micstools.piles.places import Place, Survey, Within
+from micstools.piles.shares import in_words
+from micstools.reading import units
+from micstools.reading.reader import BadRun, Run
+from micstools.reading.units import Units, ascii_of
+
+FORMATS = (*handover.WRITERS, "asc")
+CONTOURS = (0.1, 0.5, 0.9)
+"""Probabilities of cover that lines are drawn around."""
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("run", type=Path, help=command.RUN_HELP + "; or the folder of an ensemble")
+    add("--to", default="csv", metavar="FORMATS", help="of " + ",".join(FORMATS) + ", default csv")
+    add("--origin", default="0,0,0", metavar="E,N,LEVEL", help="of 0,0,0 of the case in the survey "
+        "[m]; --origin=-5,2,0 with a sign first")  # fmt: skip
+    add("--north", type=float, default=0.0, metavar="DEGREES", help="direction of north in the "
+        "plan, from +y towards +x, default 0")  # fmt: skip
+    add("--crs", metavar="EPSG:CODE", help="of the survey, for geojson")
+    add("--tolerance", type=float, metavar="M", help="of the deviation, default 0.5 D_n50")
+    add("--layers", type=int, metavar="N", help="default: the thickness in D_n, rounded")
+    add("--area", type=float, nargs=4, metavar=("X0", "Y0", "X1", "Y1"), help="of the layer, in "
+        "the tank [m]; default: where it stands above the bed")  # fmt: skip
+    add("--out", type=Path, help="folder for the files, default that of the results")
+
+
+def survey_of(origin: str, north: float) -> Survey:
+    """The coordinates of a survey as a user gives them."""
+    try:
+        east, northing, level = (float(word) for word in origin.split(","))
+    except ValueError:
+        raise BadRun(f"--origin {origin}: must be E,N,LEVEL in m") from None
+    if not np.isfinite([east, northing, level]).all():
+        raise BadRun(f"--origin {origin}: must be E,N,LEVEL in m")
+    if not abs(north) <= 360:
+        raise BadRun(f"--north {north}: must be degrees from -360 to 360")
+    return Survey((east, northing, level), north)
+
+
+def _places(given: argparse.Namespace) -> int:
+    formats = [word.strip().lower() for word in given.to.split(",")]
+    for word in formats:
+        if word not in FORMATS:
+            raise BadRun(f"--to {given.to}: '{word}' is none of {', '.join(FORMATS)}")
+    survey = survey_of(given.origin, given.north)
+    if given.crs:
+        handover.crs_name(given.crs)
+    if given.tolerance is not None and not given.tolerance > 0:
+        raise BadRun(f"--tolerance {given.tolerance}: must be positive [m]")
+    if given.layers is not None and given.layers < 1:
+        raise BadRun(f"--layers {given.layers}: must be 1 or more")
+    if "asc" in formats and survey.north:
+        raise BadRun("--to asc: a raster has its rows along east; with --north there is none")
+    if "dxf" in formats:
+        extras.need("survey")
+    if pile_ensemble.is_ensemble(given.run):
+        if given.area or given.layers:
+            raise BadRun("--area, --layers: for one run, not for an ensemble")
+        return _of_ensemble(given, formats, survey)
+    return _of_run(given, formats, survey)
+
+
+def _corners(values: list[float] | None, run: Run) -> Corners | None:
+    area = area_of(values)
+    if area is None:
+        return None
+    low, high = run.grid.low[:2], run.grid.high[:2]
+    if (np.array(area.low) < low).any() or (np.array(area.high) > high).any():
+        raise BadRun(f"--area {' '.join(f'{v:g}' for v in values or [])}: the tank reaches from "
+                     f"{low.tolist()} to {high.tolist()} m")  # fmt: skip
+    return area.low, area.high
+
+
+def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
+    run = command.open_run(given.run)
+    if not run.bodies.n:
+        raise BadRun(f"{run.folder} holds no blocks: there are no places")
+    area = _corners(given.area, run)
+    folder = given.out or run.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    found = places.places(run, survey)
+    measured = layer.of_run(run, layers=given.layers, area=area)
+    maps = measured[0] if measured else None
+    handed, shown = Handover(run, survey, found, maps), units.of_run(run)
+    about: dict[str, Any] = {"survey": asdict(survey), "columns": places.MEANING}
+    tell_rest(found)
+    if measured:
+        about["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
+        within = places.within(found, _tolerance(given, measured[1].nominal_diameter))
+        about["within"] = asdict(within) | {"share": within.share}
+        print(ascii_of(share_words(within, shown)))
+        print(ascii_of("\n".join(layer.words(measured[1], shown))))
+    for name in formats:
+        path = folder / f"places.{name}"
+        if name == "asc":
+            if maps is not None:
+                print(
+                    handover.raster(path, maps.ball + survey.origin[2], survey, maps.low, maps.step)
+                )
+        elif name == "geojson":
+            print(handover.to_geojson(handed, path, given.crs))
+        else:
+            print(handover.WRITERS[name](handed, path))
+    write_json(folder / "places.json", about)
+    return 0
+
+
+def tell_rest(found: list[Place]) -> None:
+    """How many units lie still."""
+    free = [p for p in found if not p.fixed]
+    out = [str(p.unit) for p in free if p.x != p.x]
+    moving = [str(p.unit) for p in free if p.x == p.x and not p.at_rest]
+    print(f"{len(free)} free units, {sum(p.at_rest for p in free)} of them at rest"
+          + (f"; moving: {', '.join(moving)}" if moving else "")
+          + (f"; not released: {', '.join(out)}" if out else ""))  # fmt: skip
+
+
+def share_words(found: Within, shown: Units) -> str:
+    """The share within a tolerance, in words."""
+    return (f"{in_words(found.count, found.units)} of the free units lie within "
+            f"{shown.length.text(found.tolerance)} of their place in the plan")  # fmt: skip
+
+
+def _tolerance(given: argparse.Namespace, diameter: float) -> float:
+    return float(given.tolerance or places.TOLERANCE * diameter)
+
+
+def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
+    """A table of all places, one of the landings of each unit; the other files for each choice."""
+    whole = pile_ensemble.open_ensemble(given.run)
+    folder = given.out or whole.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    all_places, all_landings, about = [], [], []
+    for number, part in enumerate(whole.parts, start=1):
+        stem = "places" if len(whole.parts) == 1 else f"places-{number}"
+        each = [places.places(p.run, survey) for p in part.piles]
+        bodies, _ = layer.parted(part.example.run)
+        tolerance = _tolerance(given, layer.nominal_diameter(bodies.values()))
+        found = places.landings(each, tolerance)
+        within = places.within([p for one in each for p in one], tolerance)
+        print((f"{part.name}: " if part.name else "") + ascii_of(share_words(within, part.units)))
+        choice = part.choices[0]
+        all_places += [{"run": p.number} | choice | places.row_of(row)
+                       for p, one in zip(part.piles, each, strict=True) for row in one]  # fmt: skip
+        all_landings += [choice | handover.landing_row(one) for one in found]
+        about.append({"choice": choice, "within": asdict(within) | {"share": within.share},
+                      "landings": [asdict(one) for one in found]})  # fmt: skip
+        _draw(given, formats, survey, part, folder / stem, found)
+    if "csv" in formats:
+        print(handover.table(folder / "places.csv", all_places))
+        print(handover.table(folder / "landings.csv", all_landings))
+    write_json(folder / "places.json", {"survey": asdict(survey), "columns": places.MEANING,
+               "ellipse": places.ELLIPSE, "choices": about})  # fmt: skip
+    return 0
+
+
+def _draw(given: argparse.Namespace, formats: list[str], survey: Survey, part: Ensemble,
+          stem: Path, found: list[places.Landing]) -> None:  # fmt: skip
+    """The ellipses of a choice, and the probability that a unit covers a point."""
+    cover = np.isfinite([p.top for p in part.piles]).mean(axis=0)
+    lines = contours(cover, part.example.run.grid.low, part.step, survey)
+    for name in formats:
+        path = stem.with_name(f"{stem.name}.{name}")
+        if name == "geojson":
+            print(handover.landings_to_geojson(found, lines, path, given.crs))
+        elif name == "dxf":
+            print(handover.landings_to_dxf(found, lines, path))
+        elif name == "asc":
+            low = part.example.run.grid.low
+            print(handover.raster(path, cover, survey, low, part.step))
+
+
+def contours(cover: Any, low: Any, step: float, survey: Survey) -> dict[float, list[Any]]:
+    """Lines (k, 2) in the survey around where the cover (ny, nx) is at least a probability."""
+    lines = contour_generator(z=np.pad(cover, 1))
+    return {
+        p: [survey.of(low[:2] + (np.asarray(line, float) - 0.5) * step) for line in lines.lines(p)]
+        for p in CONTOURS
+    }
+
+
+PLACES = Command(
+    "places",
+    "Write where units lie: place, attitude, deviation from the plan, rest and contacts of each\n"
+    "(places.csv), with plans and the outline of the layer (places.geojson, places.dxf); the\n"
+    "surface of the layer, or the probability of cover in an ensemble (places.asc). Thickness,\n"
+    "coefficient, porosity and packing of the layer, with their definitions, go into places.json,\n"
+    "the ellipses in which units of an ensemble land into landings.csv.",
+    (
+        "places mics-coarse",
+        "places mics-coarse --to csv,geojson,dxf --origin 354200,5621080,-12.5 --crs EPSG:25832",
+        "places mics-slope --layers 2 --area 4 2 16 10",
+        "places mics-ensemble-blocks_coarse --to csv,geojson,asc --tolerance 0.5",
+    ),
+    _arguments,
+    _places,
+)

@@ -1,0 +1,217 @@
+"""The places of units in the files that a survey takes: a table, GeoJSON, DXF and a raster."""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools.piles import pile_form, places
+from micstools.piles.layer import Maps, parted
+from micstools.piles.places import Landing, Place, Survey, row_of
+from micstools.reading.overlap import Placed
+from micstools.reading.reader import BadRun, Run
+from micstools.shapes.geometry import Array
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What is handed over of one run."""
+
+    run: Run
+    survey: Survey
+    places: list[Place]
+    maps: Maps | None  # of the layer; none without units
+
+    @property
+    def outlines(self) -> list[tuple[str, Array]]:
+        """Outlines of the layer, closed lines (k, 2) in coordinates of the survey [m]."""
+        found = self.maps.outlines() if self.maps else {}
+        return [(name, self.survey.of(line)) for name, lines in found.items() for line in lines]
+
+    @property
+    def bodies(self) -> dict[int, Placed]:
+        """The released bodies by their number from 0."""
+        units, others = parted(self.run)
+        return dict(sorted((units | others).items()))
+
+    def hull(self, body: Placed) -> Array:
+        """The smallest convex plan that holds a body: a closed line (k, 2) [m]."""
+        corners = pile_form.hull(np.unique(body.points[:, :2], axis=0))
+        return self.survey.of(np.concatenate([corners, corners[:1]]))
+
+
+def to_csv(given: Handover, path: Path) -> Path:
+    """A row per unit."""
+    return table(path, [row_of(p) for p in given.places])
+
+
+def table(path: Path, rows: Sequence[dict[str, object]]) -> Path:
+    """A table of rows with the same names."""
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def to_geojson(given: Handover, path: Path, crs: str | None = None) -> Path:
+    """Per unit a point, and its plan as a polygon; outlines of the layer as lines."""
+    found = []
+    for p in given.places:
+        if p.x == p.x:
+            found.append(_feature("Point", [p.x, p.y, p.z], "unit", row_of(p)))
+    for k, body in given.bodies.items():
+        place, line = given.places[k], given.hull(body).tolist()
+        found.append(_feature("Polygon", [line], "plan", {"unit": place.unit, "name": place.name}))
+    for surface, line in given.outlines:
+        found.append(_feature("LineString", line.tolist(), "outline", {"surface": surface}))
+    return _collection(path, found, crs)
+
+
+def landings_to_geojson(found: Iterable[Landing], contours: dict[float, list[Array]], path: Path,
+                        crs: str | None = None) -> Path:  # fmt: skip
+    """Per unit the middle and the ellipse of its landings; lines around where a unit covers the
+    ground with a probability."""
+    features = []
+    for one in found:
+        about: dict[str, object] = {name: "" if value != value else value
+                                    for name, value in landing_row(one).items()}  # fmt: skip
+        features.append(_feature("Point", [one.x, one.y], "landing", about))
+        if one.long == one.long:
+            middle = np.array([one.x, one.y])
+            line = places.ellipse_line(middle, one.long, one.short, one.heading_deg)
+            features.append(_feature("Polygon", [line.tolist()], "ellipse", about))
+    for probability, lines in contours.items():
+        for line in lines:
+            about = {"probability": probability}
+            features.append(_feature("LineString", line.tolist(), "cover", about))
+    return _collection(path, features, crs)
+
+
+def landing_row(one: Landing) -> dict[str, object]:
+    """A landing as a row of a table."""
+    low, high = one.within.interval_95
+    return {
+        "unit": one.unit, "name": one.name, "landings": one.landings, "x": one.x, "y": one.y,
+        "ellipse_long": one.long, "ellipse_short": one.short,
+        "ellipse_heading_deg": one.heading_deg, "within": one.within.count,
+        "share": one.within.share, "share_low": low, "share_high": high,
+    }  # fmt: skip
+
+
+def _feature(kind: str, where: Any, what: str, about: dict[str, object]) -> dict[str, Any]:
+    about = {name: None if value == "" else value for name, value in about.items()}
+    return {
+        "type": "Feature",
+        "geometry": {"type": kind, "coordinates": where},
+        "properties": {"kind": what, **about},
+    }
+
+
+def _collection(path: Path, found: list[dict[str, Any]], crs: str | None) -> Path:
+    content: dict[str, Any] = {"type": "FeatureCollection"}
+    if crs:
+        content["crs"] = {"type": "name", "properties": {"name": crs_name(crs)}}
+    path.write_text(json.dumps(content | {"features": found}, allow_nan=False) + "\n")
+    return path
+
+
+def crs_name(word: str) -> str:
+    """The name of a system of coordinates, as EPSG:25832."""
+    code = word.upper().removeprefix("EPSG:")
+    if not code.isdigit():
+        raise BadRun(f"--crs {word}: must be as EPSG:25832")
+    return f"urn:ogc:def:crs:EPSG::{code}"
+
+
+def to_dxf(given: Handover, path: Path) -> Path:
+    """The true shapes as meshes, plans, numbers, ways from the planned places and outlines, a layer
+    each, in m."""
+    from ezdxf.render.mesh import MeshBuilder
+
+    drawing, space = _drawing()
+    for k, body in given.bodies.items():
+        p = given.places[k]
+        here = {"layer": "UNITS"}
+        mesh = MeshBuilder()
+        mesh.vertices = [tuple(v) for v in given.survey.of(body.points).tolist()]
+        mesh.faces = body.shape.triangles.tolist()
+        mesh.render_mesh(space, dxfattribs=here)
+        space.add_lwpolyline(given.hull(body).tolist(), dxfattribs={"layer": "PLANS"})
+        space.add_point((p.x, p.y, p.z), dxfattribs={"layer": "CENTROIDS"})
+        size = 0.2 * body.shape.length
+        text = space.add_text(p.name or str(p.unit), height=size, dxfattribs={"layer": "NAMES"})
+        text.set_placement((p.x, p.y, p.z))
+        if p.plan_x == p.plan_x and not p.fixed:
+            ends = (p.plan_x, p.plan_y, p.z), (p.x, p.y, p.z)
+            space.add_line(*ends, dxfattribs={"layer": "DEVIATIONS"})
+    for surface, line in given.outlines:
+        layer = f"OUTLINE_{surface.upper()}"
+        space.add_lwpolyline(line.tolist(), dxfattribs={"layer": layer})
+    drawing.saveas(path)
+    return path
+
+
+def landings_to_dxf(found: Iterable[Landing], contours: dict[float, list[Array]],
+                    path: Path) -> Path:  # fmt: skip
+    """The ellipses of landing with the numbers of their units, and lines of cover."""
+    drawing, space = _drawing()
+    for one in found:
+        text = space.add_text(one.name or str(one.unit), dxfattribs={"layer": "NAMES"})
+        text.set_placement((one.x, one.y))
+        if one.long == one.long:
+            middle = np.array([one.x, one.y])
+            line = places.ellipse_line(middle, one.long, one.short, one.heading_deg)
+            space.add_lwpolyline(line.tolist(), dxfattribs={"layer": "ELLIPSES"})
+            text.dxf.height = 0.3 * one.long
+    for probability, lines in contours.items():
+        for line in lines:
+            layer = f"COVER_{100 * probability:.0f}"
+            space.add_lwpolyline(line.tolist(), dxfattribs={"layer": layer})
+    drawing.saveas(path)
+    return path
+
+
+def _drawing() -> tuple[Any, Any]:
+    """An empty drawing in m, and its model space."""
+    from ezdxf.filemanagement import new
+    from ezdxf.units import M
+
+    drawing = new("R2010", units=M)
+    for name, colour in _LAYERS.items():
+        drawing.layers.add(name, color=colour)
+    return drawing, drawing.modelspace()
+
+
+_LAYERS = {
+    "UNITS": 8, "PLANS": 7, "CENTROIDS": 1, "NAMES": 3, "DEVIATIONS": 1, "OUTLINE_BALL": 5,
+    "OUTLINE_MEAN": 4, "ELLIPSES": 2, "COVER_10": 4, "COVER_50": 5, "COVER_90": 6,
+}  # fmt: skip
+"""Layers of a drawing and their colours, as AutoCAD numbers them."""
+
+
+def raster(path: Path, values: Array, survey: Survey, low: Array, step: float) -> Path:
+    """A map (ny, nx) on squares of `step` [m] from the corner `low` (2) as an Esri raster."""
+    if survey.north:
+        raise BadRun("a raster has its rows along east: with --north there is none")
+    corner = survey.of(np.asarray(low[:2], float))
+    rows, columns = values.shape
+    head = {"ncols": columns, "nrows": rows, "xllcorner": repr(float(corner[0])),
+            "yllcorner": repr(float(corner[1])), "cellsize": repr(step),
+            "NODATA_value": -9999}  # fmt: skip
+    lines = [f"{name} {value}" for name, value in head.items()]
+    lines += [" ".join(f"{v:.9g}" for v in row) for row in np.nan_to_num(values[::-1], nan=-9999)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+WRITERS: dict[str, Callable[..., Path]] = {
+    "csv": to_csv,
+    "geojson": to_geojson,
+    "dxf": to_dxf,
+}
+"""What can be written of one run, by its ending."""
