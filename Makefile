@@ -161,7 +161,7 @@ run: deps
 	$(PYTHON) -m micstools.cli report $(CASE)
 
 test:
-	@$(deps) test shape ensemble survey
+	@$(deps) test shape ensemble survey serve
 	+@verification/run_tests
 
 verify: deps
@@ -169,7 +169,7 @@ verify: deps
 	@$(PYTHON) verification/verify.py
 
 mutate:
-	@$(deps) test shape ensemble survey
+	@$(deps) test shape ensemble survey serve
 	@$(PYTHON) verification/mutate.py
 
 # Every script of the folder, though one finds a fault.

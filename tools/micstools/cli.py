@@ -12,6 +12,8 @@ from micstools.commands.base import Command, Parser
 COMMANDS = {
     "run": ("run", "RUN", "run a case"),
     "check": ("check", "CHECK", "check a case: its plan in words, or as a page"),
+    "watch": ("watch", "WATCH", "watch a run or an ensemble while it goes on, on a page"),
+    "studio": ("studio", "STUDIO", "edit, check, run and watch a case on a page"),
     "plot": ("plot", "PLOT", "draw blocks, water and history of a run"),
     "pile": ("pile", "PILE", "tell the pile of a run, or the piles of an ensemble"),
     "places": ("places", "PLACES", "write where units lie: csv, geojson, dxf"),

@@ -21,6 +21,14 @@ def results_of(path: Path) -> Path:
 
     The folder a case file names is taken from where we are, as the program does.
     """
+    folder = output_of(path)
+    if folder != path and not (folder / "run.h5").is_file():
+        raise BadRun(f"{folder}, the output of {path}, holds no run.h5: run the case first")
+    return folder
+
+
+def output_of(path: Path) -> Path:
+    """The same where the case may not have been run yet."""
     if path.is_dir():
         return path
     if not path.exists():
@@ -34,10 +42,7 @@ def results_of(path: Path) -> Path:
         raise BadRun(f"{path}: neither a folder of results nor a case file ({error})") from error
     if "grid" not in (name for name, _, _ in settings.groups(case)):
         raise BadRun(f"{path}: neither a folder of results nor a case file (it has no &grid)")
-    folder = Path(str(output or OUTPUT).strip())
-    if not (folder / "run.h5").is_file():
-        raise BadRun(f"{folder}, the output of {path}, holds no run.h5: run the case first")
-    return folder
+    return Path(str(output or OUTPUT).strip())
 
 
 def open_run(path: Path) -> Run:

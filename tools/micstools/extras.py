@@ -14,6 +14,7 @@ PACKAGES = {
     "ensemble": ("dask", "dask_jobqueue", "distributed"),
     "survey": ("ezdxf",),
     "pictures": ("pyvista", "vtk"),
+    "serve": ("aiohttp",),
 }
 _OF_A_FIRST_RUN = "pictures"  # `make deps` installs them, whatever it is asked for
 

@@ -122,15 +122,19 @@ class Browser:
 
     def open(self, page: Path, width: int = 1100, height: int = 800, dark: bool = False) -> None:
         """Open a file in a window of a size."""
+        self.visit(page.resolve().as_uri(), width, height, dark)
+
+    def visit(self, url: str, width: int = 1100, height: int = 800, dark: bool = False) -> None:
+        """Open an address in a window of a size."""
         self.look(width, height, dark)
         self.errors.clear()
         self.requests.clear()
-        self.call("Page.navigate", url=page.resolve().as_uri())
+        self.call("Page.navigate", url=url)
         for _ in range(200):
             if self.run("document.readyState") == "complete":
                 return
             time.sleep(0.05)
-        raise RuntimeError(f"{page} does not come up")
+        raise RuntimeError(f"{url} does not come up")
 
     def look(self, width: int, height: int, dark: bool = False, media: str = "screen") -> None:
         """Size of the window, light or dark, screen or paper."""

@@ -11,6 +11,8 @@ from micstools.cases import case_copy, settings
 from micstools.reading.reader import BadRun
 
 CASE_HELP = "case file"
+PROGRAM_HELP = """default: that of the environment variable MICS, else the mics that make has built,
+on the PATH, beside the case or in the folder above it"""
 VARIABLE = "MICS"
 """Environment variable that names the program."""
 BUILT = Path(__file__).parents[3] / "mics"
@@ -56,9 +58,7 @@ def add_case(parser: argparse.ArgumentParser) -> None:
         help="set a variable of the case, as often as wanted; in each group of a repeated name; "
         "with several &drop, drop.seed=7 gives them the seeds 7, 8, ...",
     )
-    where = "default: that of the environment variable MICS, else the mics that make has built, "
-    where += "on the PATH, beside the case or in the folder above it"
-    parser.add_argument("--program", type=Path, help=where)
+    parser.add_argument("--program", type=Path, help=PROGRAM_HELP)
 
 
 def case_text(case: Path, words: list[str]) -> str:

@@ -125,6 +125,34 @@ def set_group(
     return text
 
 
+def unset(text: str, name: str, variable: str, occurrence: int = 0) -> str:
+    """Take a variable out of one of the groups of a name, so that it has its default."""
+    places = [(start, end) for group, start, end in groups(text) if group == name]
+    if occurrence >= len(places):
+        return text
+    start, end = places[occurrence]
+    return text[:start] + _without(text[start:end], name, variable) + text[end:]
+
+
+def _without(group: str, name: str, variable: str) -> str:
+    """A group without a variable; its remarks stay if the variable stands on lines of its own."""
+    wanted = _read(group)
+    if wanted[name].pop(variable, None) is None:
+        return group
+    plain = _STRINGS.sub(lambda found: " " * len(found[0]), group)  # no `=` in texts and remarks
+    found = re.search(rf"(?<![\w%]){variable}\s*=", plain, re.IGNORECASE)
+    if found:
+        ends = re.search(r"[A-Za-z]\w*\s*(\([^)]*\)\s*)?=|/|!", plain[found.end() :])
+        stop = found.end() + (ends.start() if ends else 0)
+        text = group[: found.start()] + group[stop:].lstrip(" ,")
+        try:
+            if _read(text) == wanted:
+                return re.sub(r"\n[ \t]*\n", "\n", text)
+        except BadRun:
+            pass
+    return str(wanted).rstrip("\n")
+
+
 def _patched(group: str, name: str, variables: dict[str, Any]) -> str:
     """A group with variables set. f90nml keeps its remarks, but spoils a list with a repeated
     value, `2*0.01`: then the group is written anew."""

@@ -12,7 +12,10 @@ class Hands {
     canvas.addEventListener('pointerdown', event => this.press(event));
     canvas.addEventListener('pointermove', event => this.move(event));
     for (const kind of ['pointerup', 'pointercancel'])
-      canvas.addEventListener(kind, event => this.here.delete(event.pointerId));
+      canvas.addEventListener(kind, event => {
+        this.here.delete(event.pointerId);
+        if (stage.grab) stage.grab.release();
+      });
     canvas.addEventListener('pointerleave', () => { stage.pointed = null; stage.draw(); });
     canvas.addEventListener('wheel', event => {
       if (document.activeElement !== canvas) return;
@@ -27,6 +30,7 @@ class Hands {
     this.here.set(event.pointerId, [event.clientX, event.clientY]);
     stage.canvas.setPointerCapture(event.pointerId);
     if (!stage.flat || event.shiftKey || event.buttons & 2) return;
+    if (first && stage.grab && stage.grab.press(event.clientX, event.clientY)) return;
     stage.measured = first ? { from: stage.under(event.clientX, event.clientY) } : null;
     stage.draw();
   }
@@ -35,6 +39,7 @@ class Hands {
     const stage = this.stage, before = this.here.get(event.pointerId), now = [event.clientX, event.clientY];
     if (stage.flat) { stage.pointed = stage.under(...now); stage.draw(); }
     if (!before) return;
+    if (stage.grab && stage.grab.move(...now)) return;
     const d = now.map((v, i) => v - before[i]);
     const other = [...this.here].find(([id]) => id !== event.pointerId);
     this.here.set(event.pointerId, now);

@@ -8,6 +8,7 @@ from typing import Any
 
 # The page may load nothing at all; the browser itself refuses what this does not allow.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_ASKING = "; connect-src 'self'"
 _SCRIPTS = (
     "vectors",
     "water",
@@ -85,9 +86,16 @@ def data(name: str, content: Any) -> Markup:
     return Markup(f'<script type="application/json" id="{name}">{text}</script>')
 
 
-def document(title: str, *content: object, script: str = "", more: tuple[str, ...] = ()) -> str:
+def document(
+    title: str,
+    *content: object,
+    script: str = "",
+    more: tuple[str, ...] = (),
+    head: Markup | None = None,
+    wide: bool = False,
+) -> str:
     """The whole page with its style and scripts, `more` of them, `script` the one that starts
-    them."""
+    them. A page with a `head` of a server may ask that server, a `wide` one takes more room."""
     style = (files("micstools.pages") / "page.css").read_text()
     player = "".join(
         (files("micstools.pages") / f"{name}.js").read_text() for name in (*_SCRIPTS, *more)
@@ -95,12 +103,17 @@ def document(title: str, *content: object, script: str = "", more: tuple[str, ..
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag(
+            "meta",
+            http_equiv="Content-Security-Policy",
+            content=_POLICY + (_ASKING if head else ""),
+        ),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", name="color-scheme", content="light dark"),
         tag("title", title),
+        head,
         Markup(f"<style>\n{style}</style>"),
     )
     scripts = Markup(f"<script>\n{player}{script}\n</script>")
-    body = tag("body", tag("main", *content), scripts)
+    body = tag("body", tag("main", *content, class_="wide" if wide else None), scripts)
     return f'<!doctype html>\n<html lang="en">\n{head}\n{body}\n</html>\n'

@@ -19,6 +19,8 @@ POSES = 400_000  # places of blocks in a page: about 9 MB of it
 SURFACE_BYTES = 400_000  # of the water
 SPEED_BYTES = 400_000  # of its speed
 FINEST = 80  # columns of the water along the tank
+Columns = dict[float, Array]
+"""Height of the water in each column of cells (ny, nx) [m] by the time [s]."""
 WALL = 3.0  # lengths of the longest free block: a longer fixed body is a wall
 STEADY = 0.05  # [s] before and after a frame in which contacts count: they come and go
 FASTEST = 99.5  # per cent of the maps below the speed of the last colour: splashes are faster
@@ -40,6 +42,12 @@ def frames(run: Run) -> IntArray:
 def scene(run: Run, north: float | None = None) -> dict[str, Any]:
     """The fall of the blocks of a run, and the water; `north`: as of `tank`."""
     return tank(run, north) | blocks(run, frames(run)) | {"water": water(run)}
+
+
+def moving(run: Run, seen: Columns) -> dict[str, Any]:
+    """What has moved in a run that goes on, and the water without its speed; `seen`: of frames that
+    were read before."""
+    return blocks(run, frames(run)) | {"water": level(run, seen)}
 
 
 def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
@@ -175,17 +183,21 @@ def _surface_of(points: Array, triangles: IntArray, edges: IntArray) -> dict[str
 
 
 def water(run: Run) -> dict[str, Any] | None:
+    """The surface and, with fields, the speed of the water; none in a dry run, a full one, or
+    without a level."""
+    found = level(run, {})
+    if found is None or not run.field_times.size:
+        return found
+    return found | {"speed": speeds(run)}
+
+
+def level(run: Run, seen: Columns) -> dict[str, Any] | None:
     """The surface: its height over the plan at the written times, a byte each; without fields, or
-    where currents make it, a level; none in a dry run, a full one, or without a level. With fields
-    also its speed."""
+    where currents make it, a level. `seen`: of frames that were read before."""
     if pile.has_level(run):
-        found = _surface(run)
-    else:
-        level = pile.still_level(run)
-        if level is None:
-            return None
-        found = {"level": level}
-    return found | {"speed": speeds(run)} if run.field_times.size else found
+        return _surface(run, seen)
+    still = pile.still_level(run)
+    return None if still is None else {"level": still}
 
 
 def speeds(run: Run) -> dict[str, Any]:
@@ -231,7 +243,7 @@ def _speed_maps(run: Run, t: float, kept: tuple[slice, slice, slice]) -> dict[st
     }
 
 
-def _surface(run: Run) -> dict[str, Any]:
+def _surface(run: Run, seen: Columns) -> dict[str, Any]:
     """Mean height of the water in each column of cells, in fewer frames and columns where the
     whole would be too much."""
     grid = run.grid
@@ -240,7 +252,9 @@ def _surface(run: Run) -> dict[str, Any]:
     i, j = np.arange(0, nx, coarse), np.arange(0, ny, coarse)
     every = max(1, int(np.ceil(run.field_times.size * i.size * j.size / SURFACE_BYTES)))
     times = run.field_times[::every]
-    height = np.array([_columns(run, float(t))[np.ix_(j, i)] for t in times])
+    for t in set(times.tolist()) - set(seen):
+        seen[t] = _columns(run, t)
+    height = np.array([seen[t][np.ix_(j, i)] for t in times.tolist()])
     low, high = float(height.min()), float(height.max())
     span = high - low or 1.0
     x, y, _ = grid.centres

@@ -19,9 +19,10 @@ def north_note(north: float | None) -> Markup | None:
     return tag("p", NORTH_IS_Y, class_="note no-print") if north is None else None
 
 
-def player(name: str, label: str, plan: bool = False) -> Markup:
+def player(name: str, label: str, plan: bool = False, hint: str = "") -> Markup:
     """A stage and its buttons; `name` is that of the element. `plan`: of a set-up, in which nothing
-    has moved yet, but the cells are shown."""
+    has moved yet, but the cells are shown; `hint`: what the mouse does, where that is other than
+    usual."""
     moving = tag(
         "div",
         tag("button", "Play", class_="play", type="button"),
@@ -58,7 +59,7 @@ def player(name: str, label: str, plan: bool = False) -> Markup:
     )  # fmt: skip
     canvas = tag("canvas", class_="stage", tabindex=0, role="img", aria_label=label)
     picture = tag("div", canvas, tag("canvas", class_="over"), class_="picture")
-    legend, hint = tag("ul", class_="legend"), tag("p", _HINT, class_="hint")
+    legend, hint = tag("ul", class_="legend"), tag("p", hint or _HINT, class_="hint")
     sorry = tag("p", "This browser has no WebGL: the pictures below stand for it.", class_="sorry")
     parts = (picture, moving, settings, legend, hint, sorry)
     return tag("div", *parts, class_="player", id=name)

@@ -45,16 +45,19 @@ def page(found: SetUp, name: str, north: float | None = None) -> str:
 
 
 def content(found: SetUp, north: float | None = None) -> list[Markup | None]:
-    """The parts of the page: player, warnings, figures, blocks, plan."""
+    """The parts of the page, the player first."""
     label = "the set-up; arrow keys turn it, + and - zoom, space plays"
-    return [
-        player("player", label, plan=True),
-        north_note(north),
-        _warnings(found),
-        _facts(found),
-        _blocks(found),
-        _plan(found),
-    ]
+    return [player("player", label, plan=True), north_note(north), *parts(found).values()]
+
+
+def parts(found: SetUp) -> dict[str, Markup | None]:
+    """What is said of a set-up: warnings, figures, blocks, plan."""
+    return {
+        "warnings": _warnings(found),
+        "facts": _facts(found),
+        "blocks": _blocks(found),
+        "plan": _plan(found),
+    }
 
 
 def lead(found: SetUp) -> str:
@@ -155,8 +158,8 @@ def _groups(found: SetUp) -> Iterator[list[int]]:
 
 def _plan(found: SetUp) -> Markup:
     """The plan in the words of the program."""
-    parts = tag("div", *(_part(part) for part in found.plan), class_="parts")
-    return section("plan", "The plan", parts)
+    said = tag("div", *(_part(part) for part in found.plan), class_="parts")
+    return section("plan", "The plan", said)
 
 
 def _part(part: Part) -> Markup:

@@ -39,9 +39,11 @@ class Player {
     });
   }
 
-  load(scene) {
+  // `keep`: the view, the pace and who is followed stay.
+  load(scene, keep = false) {
+    const pace = this.pace.value, followed = this.follow.value;
     this.pause();
-    this.stage.load(scene);
+    this.stage.load(scene, keep);
     const times = this.stage.times;
     [this.slider.min, this.slider.max] = [times[0], times[times.length - 1]];
     this.slider.step = 'any';
@@ -53,7 +55,9 @@ class Player {
     this.wet.closest('label').hidden = !scene.water;
     this.wet.querySelector('[value=speed]').hidden = !(scene.water && scene.water.speed);
     if (this.stage.wet === 'speed' && !(scene.water && scene.water.speed)) this.wet.value = this.stage.wet = 'clear';
+    if (keep) this.follow.value = followed;
     this.offerPaces(times[times.length - 1] - times[0]);
+    if (keep && [...this.pace.options].some(option => option.value === pace)) this.pace.value = pace;
     this.explain();
     this.show(times[0]);
   }

@@ -192,10 +192,10 @@ def _blocks(run: Run, found: Found) -> Markup:
     note = "At rest: the time after which a block stays where it ends. Forces are means over a "
     note += "time step; the force of the water includes buoyancy."
     return section("blocks", "Fall and forces of each block", table(heads, rows),
-                   tag("p", note, class_="note"), *_curves(run, found.units))  # fmt: skip
+                   tag("p", note, class_="note"), *curves(run, found.units))  # fmt: skip
 
 
-def _curves(run: Run, shown: Units) -> list[Markup]:
+def curves(run: Run, shown: Units) -> list[Markup]:
     """Charts against time and their key, of the first blocks where there are many."""
     b, force = run.bodies, shown.force
     chosen = [int(k) for k in b.dropped if b.present(-1)[k]][:_MANY]

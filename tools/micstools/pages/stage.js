@@ -87,6 +87,7 @@ class Stage {
       ['camera', 'shift', 'turn', 'colour', 'picture', 'width']);
     this.colouring = 'block';
     this.wet = 'clear'; // or 'speed', 'none'
+    this.grab = null; // drags blocks in a flat view, where a page has that
     this.followed = null;
     this.water = new Water(this);
     this.overlay = new Overlay(this, over);
@@ -96,8 +97,8 @@ class Stage {
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
   }
 
-  // Takes a scene, frees the one before.
-  load(scene) {
+  // Takes a scene, frees the one before. `keep`: looks at it as at that.
+  load(scene, keep = false) {
     const gl = this.gl;
     for (const mesh of [...(this.meshes || []), this.bed, this.frame, this.floor]) this.free(mesh);
     this.scene = scene;
@@ -115,8 +116,10 @@ class Stage {
     this.water.load(scene);
     this.overlay.load(scene);
     this.layers.forEach(layer => layer.load(scene));
-    this.followed = null;
-    this.view('corner');
+    if (!keep) {
+      this.followed = null;
+      this.view('corner');
+    }
     this.set(this.times[0]);
   }
 

@@ -151,8 +151,8 @@ def open_ensemble(
     """Read every run that has an outcome; maps have squares of `step` [m], by default a 300th of
     the tank; `box` is that of the porosity, by default the one around each pile; blocks should lie
     in the `area`, by default that of the drops."""
-    about = _about(folder / "ensemble.json")
-    table = about["table"]
+    said = about(folder / "ensemble.json")
+    table = said["table"]
     done = [row for row in table if row["outcome"] in OUTCOMES]
     left = {int(row["run"]): str(row["outcome"]) for row in table if row not in done}
     if not done:
@@ -160,10 +160,10 @@ def open_ensemble(
     if step is None:
         step = pile_numbers.usual_step(Run(folder / str(done[0]["folder"]) / "result"))
     piles = [_pile(folder, row, step, box) for row in done]
-    return Ensemble(folder, about, piles, step, left, area or drop_area([p.run for p in piles]))
+    return Ensemble(folder, said, piles, step, left, area or drop_area([p.run for p in piles]))
 
 
-def _about(path: Path) -> dict[str, Any]:
+def about(path: Path) -> dict[str, Any]:
     """What an ensemble says of itself."""
     try:
         found: dict[str, Any] = json.loads(path.read_text())

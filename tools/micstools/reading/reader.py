@@ -163,9 +163,10 @@ class Fields:
 class Run:
     """The output folder of a run."""
 
-    def __init__(self, folder: str | Path) -> None:
-        """Point at a folder; nothing is read yet."""
-        self.folder = Path(folder)
+    def __init__(self, folder: str | Path, most: int | None = None) -> None:
+        """Point at a folder; nothing is read yet. `most`: rows of the bodies that are read, evenly,
+        and the last one."""
+        self.folder, self.most = Path(folder), most
         if not (self.folder / "run.h5").is_file():
             raise FileNotFoundError(f"{self.folder} holds no run.h5: is it the output of a run?")
 
@@ -190,9 +191,9 @@ class Run:
 
     def refresh(self) -> None:
         """Forget what was read, so that rows written since then are seen."""
-        folder = self.folder
+        kept = self.folder, self.most
         self.__dict__.clear()
-        self.folder = folder
+        self.folder, self.most = kept
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -262,7 +263,7 @@ class Run:
     def bodies(self) -> Bodies:
         """The bodies at every complete row."""
         placed = len(self.parameters.get("body", []))
-        return self._read("run.h5", lambda h5: _read_bodies(h5, placed))
+        return self._read("run.h5", lambda h5: _read_bodies(h5, placed, self.most))
 
     @cached_property
     def series(self) -> Series:
@@ -419,13 +420,15 @@ def _read_bed(h5: h5py.File) -> tuple[Array, IntArray]:
     return h5["bed/points"][:], h5["bed/triangles"][:].astype(int)
 
 
-def _read_bodies(h5: h5py.File, placed: int) -> Bodies:
-    """The bodies; the first `placed` of them are those of `&body`, the others drops."""
+def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
+    """The bodies at `most` of the rows; the first `placed` of them are those of `&body`, the others
+    drops."""
     group = h5["bodies"]
     per_body = ("shape", "name", "mass", "fixed", "release_time")
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
     complete = min(len(group[name]) for name in rows)
-    values = {name: group[name][:complete] for name in rows}
+    step = -(-complete // most) if most else 1
+    values = {name: _thinned(group[name], complete, step) for name in rows}
     return Bodies(
         shape=[_text(name) for name in group["shape"][:]],
         name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
@@ -434,6 +437,14 @@ def _read_bodies(h5: h5py.File, placed: int) -> Bodies:
         release_time=_true_release(group["release_time"][:], values, placed),
         **values,
     )
+
+
+def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
+    """Every `step`-th of the complete rows, and the last of them."""
+    found = rows[:complete:step]
+    if step > 1 and (complete - 1) % step:
+        found = np.concatenate([found, rows[complete - 1 : complete]])
+    return found
 
 
 def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:

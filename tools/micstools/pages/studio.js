@@ -1,0 +1,208 @@
+'use strict';
+// Edits a case: hands each change to the server, which has the text and asks the program, and shows
+// what that says beside the fields. In a flat view a block is dragged to its place.
+
+const TYPING = 350; // from the last letter to the change [ms]
+
+class Studio {
+  constructor(player) {
+    this.player = player;
+    this.form = document.getElementById('form');
+    this.text = document.getElementById('text');
+    this.number = 0;
+    this.form.addEventListener('input', event => this.later(event.target));
+    this.form.addEventListener('change', event => this.later(event.target, 0));
+    this.form.addEventListener('submit', event => event.preventDefault());
+    this.text.addEventListener('input', () => this.later(this.text));
+    document.addEventListener('click', event => this.click(event));
+    if (player) player.stage.grab = new Grab(player.stage, (body, by) => this.edit({ op: 'move', body, by }));
+    this.start();
+  }
+
+  async start() {
+    await this.rebuild();
+    this.take(await ask('draft'));
+    this.check();
+  }
+
+  // The form anew: groups came or went.
+  async rebuild() {
+    const open = new Map([...this.form.querySelectorAll('details')].map((d, k) => [k, d.open]));
+    this.form.innerHTML = (await ask('form')).form;
+    const all = [...this.form.querySelectorAll('details')];
+    if (open.size === all.length) all.forEach((d, k) => { d.open = open.get(k); });
+  }
+
+  later(field, wait = TYPING) {
+    clearTimeout(field.waiting);
+    field.waiting = setTimeout(() => this.send(field), wait);
+  }
+
+  send(field) {
+    if (field === this.text) return this.edit({ op: 'text', text: field.value });
+    const { group, n, variable } = field.dataset;
+    if (!variable || field.sent === field.value) return null;
+    field.sent = field.value;
+    return this.edit({ op: 'set', group, n: +n, variable, value: field.value });
+  }
+
+  // Changes are sent one after another.
+  edit(order) {
+    this.line = (this.line || Promise.resolve()).then(async () => {
+      try {
+        const state = await ask('edit', order), was = this.groups;
+        this.take(state);
+        if (order.op !== 'set' && order.op !== 'move' || was !== this.groups) await this.rebuild();
+        tell('');
+      } catch (problem) {
+        tell(problem.message);
+      }
+      this.check();
+    });
+    return this.line;
+  }
+
+  // The text and the values of the case; a field that one is in stays as it is.
+  take({ text, values, saved, undo }) {
+    const here = document.activeElement;
+    this.groups = values.map(({ group, n }) => `${group}.${n}`).join();
+    if (this.text !== here) this.text.value = text;
+    for (const { group, n, values: said } of values) for (const [name, value] of Object.entries(said || {})) {
+      const field = document.getElementById(`${group}-${n}-${name}`);
+      if (field && field !== here && field.value !== value) field.value = field.sent = value;
+    }
+    document.getElementById('undo').disabled = !undo;
+    document.getElementById('save').disabled = saved;
+  }
+
+  // What the program says; an answer that another change has overtaken is left out.
+  async check() {
+    const number = ++this.number, verdict = document.getElementById('verdict');
+    verdict.textContent = 'Checking …';
+    verdict.className = 'note';
+    let said;
+    try {
+      said = await ask('check');
+    } catch (problem) {
+      said = { problems: [{ text: problem.message }], warnings: [] };
+    }
+    if (number !== this.number) return;
+    const n = said.problems.length, w = said.warnings.length;
+    verdict.textContent = n ? `Refused: ${n === 1 ? 'one problem' : `${n} problems`}.`
+      : `Accepted${w ? `, with ${w === 1 ? 'one warning' : `${w} warnings`}` : ''}.`;
+    verdict.className = n ? 'look' : 'good';
+    document.getElementById('run').disabled = n > 0;
+    this.mark(said.problems);
+    if (n) return;
+    putParts(said.parts);
+    if (!this.player) return;
+    const time = this.player.stage.scene ? this.player.stage.time : 0;
+    this.player.load(said.scene, Boolean(this.player.stage.scene));
+    this.player.show(time);
+  }
+
+  // Each problem at its field, or at its group, and all in a list that leads there.
+  mark(problems) {
+    this.form.querySelectorAll('.wrong').forEach(place => { place.textContent = ''; });
+    this.form.querySelectorAll('[aria-invalid]').forEach(field => field.removeAttribute('aria-invalid'));
+    const list = problems.map(({ text, short, group, variable, n }) => {
+      const key = `${group}-${n}-${variable}`, field = document.getElementById(key);
+      const place = document.getElementById(`${key}-wrong`) || this.form.querySelector(`[data-of="${group}.${n}"]`);
+      if (place) place.textContent = [place.textContent, short].filter(Boolean).join('; ');
+      if (field) {
+        field.setAttribute('aria-invalid', 'true');
+        for (let box = field.closest('details'); box; box = box.parentElement.closest('details')) box.open = true;
+      }
+      const item = document.createElement('li'), button = document.createElement('button');
+      button.type = 'button';
+      button.textContent = '!';
+      button.setAttribute('aria-label', `go to: ${text}`);
+      button.addEventListener('click', () => (field || place || this.text).scrollIntoView({ block: 'center' }) || (field && field.focus()));
+      const words = document.createElement('span');
+      words.textContent = text;
+      item.append(button, words);
+      return item;
+    });
+    document.getElementById('problems').replaceChildren(...list);
+  }
+
+  async click(event) {
+    const button = event.target.closest('button');
+    if (!button) return;
+    const { add, copy, remove, n, show } = button.dataset;
+    if (copy || remove) event.preventDefault(); // stands in a summary, which would close
+    if (add) await this.edit({ op: 'add', group: add });
+    if (copy) await this.edit({ op: 'copy', group: copy, n: +n });
+    if (remove) await this.edit({ op: 'remove', group: remove, n: +n });
+    if (show) this.show(show);
+    if (button.id === 'undo') await this.edit({ op: 'undo' });
+    if (button.id === 'save' || button.id === 'run') await this.order(button.id);
+  }
+
+  show(name) {
+    this.form.hidden = name !== 'form';
+    this.text.hidden = name !== 'text';
+    document.querySelectorAll('[data-show]').forEach(b => b.setAttribute('aria-pressed', b.dataset.show === name));
+  }
+
+  // Saves or runs, once all changes have arrived.
+  async order(path) {
+    for (const field of [this.text, ...this.form.querySelectorAll('[data-variable]')]) clearTimeout(field.waiting);
+    const here = document.activeElement;
+    if (here === this.text || here.dataset.variable) this.send(here);
+    await this.line;
+    tell('…');
+    try {
+      const { told, open } = await ask(path, {});
+      tell(told);
+      if (open) location.assign(open);
+      else this.take(await ask('draft'));
+    } catch (problem) {
+      tell(problem.message);
+    }
+  }
+}
+
+// A block that is dragged in a flat view.
+class Grab {
+  constructor(stage, done) {
+    this.stage = stage;
+    this.done = done;
+    this.body = null;
+  }
+
+  // Takes the block under the mouse, the nearest of several; true if there is one.
+  press(clientX, clientY) {
+    const { stage } = this, p = stage.under(clientX, clientY), { right, up, away } = stage.axes;
+    let found = null, nearest = -Infinity;
+    stage.scene.bodies.forEach((body, k) => {
+      const { place } = stage.pose(k), d = place.map((v, i) => v - p[i]);
+      const far = Math.hypot(dot(d, right), dot(d, up)), near = dot(place, away);
+      if (far < 0.7 * stage.meshes[body.shape].radius && near > nearest) [found, nearest] = [k, near];
+    });
+    if (found === null) return false;
+    Object.assign(this, { body: found, from: p, by: [0, 0, 0], was: stage.place.slice() });
+    return true;
+  }
+
+  move(clientX, clientY) {
+    if (this.body === null) return false;
+    const { stage } = this, n = stage.scene.bodies.length;
+    this.by = stage.under(clientX, clientY).map((v, i) => v - this.from[i]);
+    for (let a = 0; a < stage.times.length; a++) for (let i = 0; i < 3; i++) {
+      const k = 3 * (a * n + this.body) + i;
+      stage.place[k] = this.was[k] + this.by[i];
+    }
+    stage.draw();
+    return true;
+  }
+
+  release() {
+    if (this.body === null) return;
+    const { body, by } = this;
+    this.body = null;
+    if (Math.hypot(...by) > 1e-9) this.done(body, by);
+  }
+}
+
+const startStudio = () => new Studio(startPlan(document.getElementById('player')));

@@ -1,0 +1,1 @@
+"""Pages served on this machine only: a run or an ensemble to watch, a case to edit."""

@@ -1,0 +1,269 @@
+"""A case that is being edited: its text, what was changed, and what the program says of it."""
+
+import json
+import math
+import re
+import subprocess
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from micstools.cases import case_copy, settings
+from micstools.pages import plan_page, set_up
+from micstools.pages.set_up import Refused, Remark
+from micstools.reading.reader import BadRun
+
+NEW = """! A first case: cubes dropped into a small tank.
+&run
+  title = 'New case'
+  t_end = 2.0
+  dt = 0.01
+  output = 'mics-out'
+/
+&grid
+  cells = 30, 10, 20
+  length = 0.3, 0.1, 0.2
+/
+&fluid
+  water_level = 0.12
+/
+&shape
+  name = 'cube'
+  kind = 'cube'
+  size = 0.03
+/
+&drop
+  shape = 'cube'
+  position = 0.1, 0.05, 0.16
+  count = 2
+  interval = 0.5
+  spread = 0.02, 0.0, 0.0
+/
+"""
+_FIRST = {"shape": {"kind": "cube", "size": 0.02}}
+"""Values to begin with that the schema does not ask for, since they depend on others."""
+_STEPS = 200  # that can be taken back
+_FINE = 3  # digits of the tank's length to which a block that is moved is placed
+_HEAD = re.compile(r"^&\w+ \w+ = .*?: ")
+Schema = dict[str, Any]
+
+
+def schema_of(program: Path) -> Schema:
+    """The schema of a case that the program prints."""
+    words = [str(program), "--help=json"]
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode:
+        raise BadRun(done.stderr.strip() or f"{program} --help=json ended with {done.returncode}")
+    found: Schema = json.loads(done.stdout)
+    return found
+
+
+class Draft:
+    """The text of a case beside its file. Changes are one at a time."""
+
+    def __init__(self, case: Path, program: Path) -> None:
+        """Of a case file that may not be there yet."""
+        self.case, self.program = case, program
+        self.schema = schema_of(program)
+        self.lock = threading.RLock()
+        self.saved = settings.read(case) if case.exists() else ""
+        self.text = self.saved or NEW
+        self.before: list[str] = []
+        self.bodies: list[tuple[str, int]] = []  # group and occurrence of each
+        self.step = 0.0  # places of blocks are multiples of this [m]
+        self.accepted = False
+
+    @property
+    def groups(self) -> dict[str, Schema]:
+        """Every group by its name, as the schema describes it."""
+        found: dict[str, Schema] = self.schema["$defs"]
+        return found
+
+    def repeats(self, group: str) -> bool:
+        """May there be several of it?"""
+        return "anyOf" in self.schema["properties"][group]
+
+    def variable(self, group: str, name: str) -> Schema:
+        """A variable as the schema describes it. Raises BadRun where there is none."""
+        try:
+            found: Schema = self.groups[group]["properties"][name]
+        except KeyError:
+            raise BadRun(f"&{group} {name}: no such variable") from None
+        return found
+
+    def values(self) -> list[tuple[str, int, dict[str, str] | None]]:
+        """The groups of the text in order: name, occurrence, and what is typed there; none where
+        it cannot be read."""
+        seen: dict[str, int] = {}
+        found = []
+        for name, start, end in settings.groups(self.text):
+            n = seen[name] = seen.get(name, -1) + 1
+            try:
+                group = settings.variables(self.text[start:end])
+                said = {str(k): words_of(v) for k, v in group.items()}
+            except BadRun:
+                said = None
+            found.append((name, n, said))
+        return found
+
+    def edit(self, order: dict[str, Any]) -> None:
+        """Change the text as ordered: `op` is set, add, copy, remove, move, text or undo."""
+        work = {"set": self._set, "add": self._add, "copy": self._copy, "remove": self._remove,
+                "move": self._move, "text": self._write, "undo": self._undo}  # fmt: skip
+        op = order.get("op")
+        if op not in work:
+            raise BadRun(f"no change '{op}'")
+        with self.lock:
+            before = self.text
+            work[op](order)
+            if op != "undo" and self.text != before:
+                self.before = [*self.before[-_STEPS:], before]
+
+    def _set(self, order: dict[str, Any]) -> None:
+        group, name, n = str(order["group"]), str(order["variable"]), int(order["n"])
+        about, words = self.variable(group, name), str(order["value"]).strip()
+        there = sum(g == group for g, _, _ in settings.groups(self.text))
+        if not words:
+            self.text = settings.unset(self.text, group, name, n) if n < there else self.text
+        else:
+            value = typed(about, words, f"{group}.{name}")
+            self.text = settings.set_group(self.text, group, {name: value}, n if there else None)
+
+    def _add(self, order: dict[str, Any]) -> None:
+        group = str(order["group"])
+        if group not in self.groups:
+            raise BadRun(f"&{group}: no such group")
+        needed = self.groups[group].get("required", [])
+        given = {name: self._example(group, name) for name in needed} | _FIRST.get(group, {})
+        self.text = self.text.rstrip("\n") + "\n\n" + settings.group_text(group, given)
+
+    def _example(self, group: str, name: str) -> Any:
+        """A value to begin with: of the first shape, in the middle of the tank."""
+        if name == "shape":
+            return settings.value(self.text, "shape", "name") or "cube"
+        if name == "position":
+            return self._middle(0.8 if group == "drop" else 0.5)
+        about = self.variable(group, name)
+        if group == "shape" and name == "name":
+            return f"shape{1 + sum(g == 'shape' for g, _, _ in settings.groups(self.text))}"
+        found = about.get("examples", [about.get("default", "")])
+        return found[0] if found else ""
+
+    def _middle(self, height: float) -> list[float]:
+        length = settings.value(self.text, "grid", "length") or [1.0, 1.0, 1.0]
+        origin = settings.value(self.text, "grid", "origin") or [0.0, 0.0, 0.0]
+        place = np.array(origin, float) + np.array([0.5, 0.5, height]) * np.array(length, float)
+        return [round(float(v), 9) for v in place]
+
+    def _place(self, order: dict[str, Any]) -> tuple[int, int]:
+        """Where the ordered group stands in the text."""
+        group, n = str(order["group"]), int(order["n"])
+        places = [(start, end) for g, start, end in settings.groups(self.text) if g == group]
+        if not 0 <= n < len(places):
+            raise BadRun(f"&{group} {n + 1}: no such group in the case")
+        return places[n]
+
+    def _copy(self, order: dict[str, Any]) -> None:
+        start, end = self._place(order)
+        self.text = self.text[:end] + "\n" + self.text[start:end] + self.text[end:]
+
+    def _remove(self, order: dict[str, Any]) -> None:
+        start, end = self._place(order)
+        self.text = self.text[:start] + self.text[end:].lstrip("\n")
+
+    def _move(self, order: dict[str, Any]) -> None:
+        body, by = int(order["body"]), [float(v) for v in order["by"]]
+        if not 0 <= body < len(self.bodies) or not all(math.isfinite(v) for v in by):
+            raise BadRun("no such block")
+        group, n = self.bodies[body]
+        place = settings.value(self.text, group, "position", n)
+        if place is None:
+            raise BadRun(f"&{group} {n + 1} has no position of its own: change its file")
+        new = [
+            round(round((float(p) + d) / self.step) * self.step, 12)
+            for p, d in zip(place, by, strict=True)
+        ]
+        self.text = settings.set_group(self.text, group, {"position": new}, n)
+
+    def _write(self, order: dict[str, Any]) -> None:
+        self.text = str(order["text"]).replace("\r\n", "\n")
+
+    def _undo(self, _: dict[str, Any]) -> None:
+        if self.before:
+            self.text = self.before.pop()
+
+    def look(self) -> dict[str, Any]:
+        """What the program says of the text: the plan with its scene, or what is wrong."""
+        with self.lock:
+            text = case_copy.from_here(self.text, self.case.parent)
+        try:
+            with set_up.read(self.program, text) as found:
+                self.accepted = True
+                self._keep_bodies(found)
+                said = [_remark(w) for w in found.warnings]
+                parts = {k: v or "" for k, v in plan_page.parts(found).items()}
+                return {"problems": [], "warnings": said, "parts": parts,
+                        "scene": plan_page.scene(found)}  # fmt: skip
+        except Refused as refused:
+            self.accepted = False
+            return {"problems": [_remark(r) for r in refused.remarks], "warnings": []}
+
+    def _keep_bodies(self, found: set_up.SetUp) -> None:
+        """Which group each body comes from."""
+        edges = found.run.grid.high - found.run.grid.low
+        self.step = 10.0 ** (math.floor(math.log10(float(edges.max()))) - _FINE)
+        seen: dict[str, int] = {}
+        self.bodies = [("", 0)] * found.run.bodies.n
+        for group, first, last in set_up.spans(found.text):
+            n = seen[group] = seen.get(group, -1) + 1
+            for k in np.flatnonzero((found.line >= first) & (found.line <= last)):
+                self.bodies[k] = (group, n)
+
+    def state(self) -> dict[str, Any]:
+        """The text and what is typed in each group."""
+        with self.lock:
+            values = [{"group": g, "n": n, "values": said} for g, n, said in self.values()]
+            return {"text": self.text, "values": values, "saved": self.text == self.saved,
+                    "undo": bool(self.before)}  # fmt: skip
+
+    def save(self) -> None:
+        """Write the case, unless somebody else has changed it since."""
+        with self.lock:
+            if self.case.exists() and settings.read(self.case) not in (self.saved, self.text):
+                raise BadRun(f"{self.case} was changed by another program: copy your text, "
+                             "then open it anew")  # fmt: skip
+            new = self.case.with_name(self.case.name + ".new")
+            new.write_text(self.text, encoding="utf-8")
+            new.replace(self.case)
+            self.saved = self.text
+
+
+def typed(about: Schema, words: str, name: str) -> Any:
+    """What was typed as a value of a variable; the program judges it."""
+    if _is_text(about):
+        return words.strip("'\"")
+    if about.get("type") == "array" and _is_text(about.get("items", {})):
+        found = [part.strip().strip("'\"") for part in words.split(",")]
+        return found if len(found) > 1 else found[0]
+    return settings.parse(f"{name}={words.rstrip(', ')}").value
+
+
+def _is_text(about: Schema) -> bool:
+    """Is its value a text, one of several perhaps?"""
+    return about.get("type") == "string" or "enum" in about
+
+
+def words_of(value: Any) -> str:
+    """A value of a namelist as one would type it, without quotes."""
+    if isinstance(value, bool):
+        return ".true." if value else ".false."
+    if isinstance(value, list):
+        return ", ".join(words_of(v) for v in value)
+    return "" if value is None else str(value)
+
+
+def _remark(remark: Remark) -> dict[str, Any]:
+    return {"text": remark.text, "short": _HEAD.sub("", remark.text), "group": remark.group,
+            "variable": remark.variable, "n": remark.occurrence}  # fmt: skip

@@ -1,0 +1,216 @@
+"""Watches a run or an ensemble: reads its files at each look, changes nothing but by a button."""
+
+import threading
+from pathlib import Path
+from typing import Any
+
+from aiohttp import web
+
+from micstools import command
+from micstools.ensembles import ensemble
+from micstools.ensembles.ensemble import Member
+from micstools.pages import ensemble_page, motion, run_page, run_words
+from micstools.piles import pile_ensemble
+from micstools.reading.reader import BadRun, Run
+from micstools.serve import living, watch_page
+from micstools.serve.server import Site, apart, json_answer, page_answer
+
+MOST = 600  # rows of blocks that are read of a run
+
+
+class Watched:
+    """A run that may still grow. Looks are one at a time: they share what was read."""
+
+    def __init__(self, folder: Path) -> None:
+        """Of a folder that may not be there yet."""
+        self.folder = folder
+        self.lock = threading.Lock()
+        self.run: Run | None = None
+        self.began: object = None
+        self.still: dict[str, Any] = {}  # of the scene
+        self.columns: motion.Columns = {}
+
+    def look(self) -> Run | None:
+        """The run as it is now; none before it has a row. A run that began anew is another one."""
+        try:
+            self.run = self.run or Run(self.folder, most=MOST)
+            self.run.refresh()
+            started = self.run.provenance.get("started")
+            if started != self.began:
+                self.began, self.still, self.columns = started, {}, {}
+            return self.run if self.run.series.time.size and self.run.bodies.time.size else None
+        except (FileNotFoundError, BadRun):
+            self.run = None
+            return None
+
+    def parts(self) -> dict[str, Any]:
+        """What the page shows now, and whether that may change."""
+        with self.lock:
+            run = self.look()
+            if run is None:
+                return {"parts": watch_page.waiting(self.folder), "running": False, "key": ""}
+            found = living.state(run)
+            key = f"{self.began} {run.series.time[-1]}"
+            return {
+                "parts": watch_page.run_parts(run, found),
+                "running": found.running,
+                "key": key,
+            }
+
+    def scene(self) -> dict[str, Any]:
+        """The motion so far."""
+        with self.lock:
+            run = self.look()
+            if run is None or not run.bodies.n:
+                return {}
+            self.still = self.still or motion.tank(run)
+            return self.still | motion.moving(run, self.columns)
+
+    def title(self) -> str:
+        """Of the case, else the folder."""
+        with self.lock:
+            run = self.look()
+            return run_words.title(run) if run else self.folder.name
+
+
+class Ensemble:
+    """The runs of an ensemble; what is done is read once."""
+
+    def __init__(self, folder: Path) -> None:
+        """Of its folder."""
+        self.folder = folder
+        self.lock = threading.Lock()
+        self.done: dict[int, ensemble.State] = {}
+        self.watched: dict[int, Watched] = {}
+
+    def members(self) -> list[Member]:
+        """As the table of the ensemble has them."""
+        about = pile_ensemble.about(self.folder / "ensemble.json")
+        found = []
+        for row in about["table"]:
+            folder = self.folder / str(row["folder"])
+            case = folder / "case.nml"
+            text = case.read_text() if case.is_file() else str(about["case"])
+            found.append(Member(int(row["run"]), int(row["seed"]), (), text, folder))
+        return found
+
+    def choices(self) -> dict[int, str]:
+        """What is varied in each run, in words."""
+        about = pile_ensemble.about(self.folder / "ensemble.json")
+        names = [name for choice in about["choices"] for name in choice]
+        said = ((int(row["run"]), [f"{k} = {row[k]}" for k in dict.fromkeys(names) if k in row])
+                for row in about["table"])  # fmt: skip
+        return {number: ", ".join(words) for number, words in said}
+
+    def states(self) -> tuple[dict[Member, ensemble.State], dict[int, living.State]]:
+        """How each run ended; of those that go on how far they are."""
+        found: dict[Member, ensemble.State] = {}
+        running: dict[int, living.State] = {}
+        for member in self.members():
+            end = self.done.get(member.number) or ensemble.state(member)
+            if end.counts:
+                self.done[member.number] = end
+            elif living.holder(member.result / "run.lock"):
+                run = self.of(member).look()
+                if run:
+                    running[member.number] = living.state(run)
+            found[member] = end
+        return found, running
+
+    def of(self, member: Member) -> Watched:
+        """The run of a member."""
+        return self.watched.setdefault(member.number, Watched(member.result))
+
+    def parts(self) -> dict[str, Any]:
+        """What the page shows now, and whether that may change."""
+        with self.lock:
+            states, running = self.states()
+            choices = self.choices()
+            parts = watch_page.ensemble_parts(states, running, lambda m: choices[m.number])
+            alive = bool(running) or living.holder(self.folder / "ensemble.lock") is not None
+            key = " ".join(f"{n}:{s.time}" for n, s in running.items()) + f" {len(self.done)}"
+            return {"parts": parts, "running": alive, "key": key}
+
+    def scene(self, number: int) -> dict[str, Any]:
+        """The motion of a run so far."""
+        with self.lock:
+            chosen = [m for m in self.members() if m.number == number]
+        return self.of(chosen[0]).scene() if chosen else {}
+
+    def stop(self) -> str:
+        """Let all runs end."""
+        with self.lock:
+            _, running = self.states()
+            results = [m.result for m in self.members() if m.number in running]
+        return living.stop_ensemble(self.folder, results)
+
+
+class Watch:
+    """The answers of a page of a run or an ensemble."""
+
+    def __init__(self, watched: Watched | Ensemble) -> None:
+        """Of what is watched."""
+        self.watched = watched
+
+    @property
+    def report(self) -> Path:
+        """The file of the report."""
+        return self.watched.folder / "report.html"
+
+    def add_to(self, site: Site) -> None:
+        """Answer for it on a site, below `/live`."""
+        site.get("/live", self._parts)
+        site.get("/scene", self._scene)
+        site.post("/stop", self._stop)
+        site.post("/report", self._make_report)
+        site.get("/report", self._report)
+
+    async def _parts(self, _: web.Request) -> web.Response:
+        return json_answer(await apart(self.watched.parts))
+
+    async def _scene(self, request: web.Request) -> web.Response:
+        if isinstance(self.watched, Ensemble):
+            number = int(request.query.get("run", "0") or 0)
+            return json_answer(await apart(self.watched.scene, number))
+        return json_answer(await apart(self.watched.scene))
+
+    async def _stop(self, request: web.Request) -> web.Response:
+        how = (await request.json()).get("how")
+        if how not in ("restart", "now"):
+            raise BadRun("a run is stopped 'restart' or 'now'")
+        if isinstance(self.watched, Ensemble):
+            return json_answer({"told": await apart(self.watched.stop)})
+        work = living.ask_to_stop if how == "restart" else living.stop_at_once
+        return json_answer({"told": work(self.watched.folder)})
+
+    async def _make_report(self, _: web.Request) -> web.Response:
+        await apart(self._write_report)
+        return json_answer({"told": f"{self.report}", "open": "/report"})
+
+    def _write_report(self) -> None:
+        folder = self.watched.folder
+        if isinstance(self.watched, Ensemble):
+            text = ensemble_page.page(pile_ensemble.open_ensemble(folder))
+        else:
+            text = run_page.page(command.open_run(folder))
+        self.report.write_text(text, encoding="utf-8")
+
+    async def _report(self, _: web.Request) -> web.Response:
+        if not self.report.is_file():
+            raise web.HTTPNotFound(reason="no report yet")
+        return page_answer(self.report.read_text(encoding="utf-8"))
+
+
+def site_of(folder: Path) -> Site:
+    """The site of a run or an ensemble."""
+    site = Site()
+    watched = Ensemble(folder) if pile_ensemble.is_ensemble(folder) else Watched(folder)
+    Watch(watched).add_to(site)
+
+    async def first(_: web.Request) -> web.Response:
+        if isinstance(watched, Ensemble):
+            return page_answer(watch_page.ensemble_frame(folder.resolve().name, site.head()))
+        return page_answer(watch_page.run_frame(await apart(watched.title), site.head()))
+
+    site.get("/", first)
+    return site

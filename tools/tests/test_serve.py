@@ -1,0 +1,452 @@
+"""Pages served on this machine: who is answered, a run and an ensemble watched and stopped, a case
+edited, checked, run and reported, all in a browser."""
+
+import asyncio
+import fcntl
+import json
+import os
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+pytest.importorskip("aiohttp", reason="no aiohttp here: tools/deps.sh serve")
+
+from aiohttp import web  # noqa: E402
+
+from browser import MISSING, Browser  # noqa: E402
+from micstools.cases import settings  # noqa: E402
+from micstools.reading.reader import BadRun, Run  # noqa: E402
+from micstools.serve import living, studio, watch  # noqa: E402
+from micstools.serve.draft import Draft, typed  # noqa: E402
+from micstools.serve.server import ADDRESS, TOKEN, Site  # noqa: E402
+from synthetic import Motion, write_run  # noqa: E402
+from test_pile_ensemble import write_ensemble  # noqa: E402
+from test_plan_page import drag  # noqa: E402
+
+ROOT = Path(__file__).parents[2]
+MICS = ROOT / "mics"
+in_browser = pytest.mark.skipif(bool(MISSING), reason=MISSING)
+needs_mics = pytest.mark.skipif(not os.access(MICS, os.X_OK), reason="./mics is not built")
+CASE = """! a remark that stays
+&run t_end = 50  dt = 0.002  physics = 'dry'  output = 'mics-here'  title = 'Two cubes' /
+&grid cells = 4, 2, 3  length = 0.4, 0.2, 0.3 /
+&shape name = 'cube'  kind = 'cube'  size = 0.05 /
+&body shape = 'cube'  position = 0.1, 0.1, 0.035 /
+&drop shape = 'cube'  position = 0.3, 0.1, 0.2  first_time = 0.5 /
+"""
+
+
+@contextmanager
+def serving(site: Site) -> Iterator[str]:
+    """The site in a thread; the address with its key."""
+    loop = asyncio.new_event_loop()
+    runner = web.AppRunner(site.app(), access_log=None)
+
+    async def begin() -> None:
+        await runner.setup()
+        await web.TCPSite(runner, ADDRESS, 0).start()
+        site.port = runner.addresses[0][1]
+
+    loop.run_until_complete(begin())
+    thread = threading.Thread(target=loop.run_forever, daemon=True)
+    thread.start()
+    try:
+        yield site.address
+    finally:
+        asyncio.run_coroutine_threadsafe(runner.cleanup(), loop).result(20)
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
+
+
+def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
+            known: bool = True, **headers: str) -> tuple[int, dict[str, str], str]:  # fmt: skip
+    """Status, headers and text of an answer; headers with `_` for `-`."""
+    import http.client
+
+    link = http.client.HTTPConnection(ADDRESS, site.port, timeout=20)
+    sent = {"Cookie": f"{site.cookie}={site.key}"} if known else {}
+    sent |= {name.replace("_", "-"): value for name, value in headers.items()}
+    link.request(method, path, json.dumps(body) if body is not None else None, sent)
+    answer = link.getresponse()
+    found = answer.status, dict(answer.getheaders()), answer.read().decode()
+    link.close()
+    return found
+
+
+def until(work: Callable[[], Any], patience: float = 30.0) -> Any:
+    """The first answer that is true."""
+    end = time.monotonic() + patience
+    while not (found := work()):
+        assert time.monotonic() < end, "it does not come"
+        time.sleep(0.05)
+    return found
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("browser")) as found:
+        yield found
+
+
+@pytest.fixture
+def run_site(tmp_path: Path) -> Iterator[Site]:
+    site = watch.site_of(write_run(tmp_path / "run", Motion(t_end=1.0)))
+    with serving(site):
+        yield site
+
+
+def test_nobody_else_is_answered(run_site: Site) -> None:
+    """No name but ours, no other page, no key, no token: no answer."""
+    site = run_site
+    here = f"{ADDRESS}:{site.port}"
+    assert request(site, "/live")[0] == 200
+    assert request(site, "/live", Host=f"localhost:{site.port}")[0] == 200
+    assert request(site, "/live", known=False)[0] == 403
+    assert request(site, "/?key=wrong", known=False)[0] == 403
+    for host in ("evil.example", f"evil.example:{site.port}", ADDRESS, f"{ADDRESS}:1"):
+        assert request(site, "/live", Host=host)[0] == 421, host
+    for origin in ("http://evil.example", "null", f"https://{here}"):
+        assert request(site, "/live", Origin=origin)[0] == 403, origin
+    assert request(site, "/live", Sec_Fetch_Site="cross-site")[0] == 403
+    stop = {"method": "POST", "body": {"how": "restart"}}
+    for headers in ({}, {TOKEN: "x"}, {TOKEN: site.key}):
+        assert request(site, "/stop", **stop, **headers)[0] == 403, headers
+    assert request(site, "/stop", **stop, **{TOKEN: site.token}, Host="evil.example")[0] == 421
+    assert request(site, "/stop", **stop, **{TOKEN: site.token})[0] == 422  # no run goes on
+    assert not (site_folder(site) / "stop").exists()
+    assert request(site, "/stop")[0] == 405
+
+
+def site_folder(site: Site) -> Path:
+    """The folder of results of a site that watches a run."""
+    handler = next(work for _, path, work in site.routes if path == "/live")
+    found: Path = handler.__self__.watched.folder  # type: ignore[attr-defined]
+    return found
+
+
+def test_answers_allow_nothing_from_outside(run_site: Site) -> None:
+    status, headers, _ = request(run_site, f"/?key={run_site.key}", known=False)
+    assert status == 303 and headers["Location"] == "/"
+    assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
+    for path, wanted in (("/", 200), ("/live", 200), ("/nowhere", 404)):
+        status, headers, text = request(run_site, path)
+        assert status == wanted
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert "connect-src 'self'" in headers["Content-Security-Policy"]
+        assert not [name for name in headers if name.startswith("Access-Control")]
+        assert headers["Cache-Control"] == "no-store"
+        assert "http://" not in text and "https://" not in text
+    assert request(run_site, "/live", known=False)[1]["X-Frame-Options"] == "DENY"
+
+
+def test_only_loopback_listens(run_site: Site) -> None:
+    """Another address of this machine has nobody at the port."""
+    import socket
+
+    with socket.socket() as link:
+        link.settimeout(2)
+        assert link.connect_ex(("127.0.0.2", run_site.port)) != 0
+
+
+def test_a_run_that_was_killed_does_not_run(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", Motion(t_end=1.0))
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        h5["provenance"].attrs["exit_status"] = -1
+    (folder / "run.lock").write_text(f"pid {os.getpid()} on {os.uname().nodename}")
+    found = living.state(Run(folder))
+    assert (found.words, found.running) == ("was killed", False)
+    with pytest.raises(BadRun, match="no run is going on"):
+        living.ask_to_stop(folder)
+    with (folder / "run.lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        found = living.state(Run(folder))
+        assert (found.words, found.running) == ("running", True)
+        assert living.ask_to_stop(folder) and (folder / "stop").exists()
+
+
+def test_the_time_left_is_that_of_the_last_rows() -> None:
+    time = np.concatenate([np.linspace(0, 1, 50), np.linspace(1.1, 3, 20)])
+    wall = np.concatenate([np.linspace(0, 1, 50), 10 + 20 * np.linspace(1.1, 3, 20)])
+    assert living._left(time, wall, 5.0) == pytest.approx(40.0)
+    assert living.clock(3725.4) == "1:02:05" and living.clock(float("nan")) == "–"
+
+
+def test_few_rows_are_read_of_a_long_run(tmp_path: Path) -> None:
+    """The last one among them."""
+    folder = write_run(tmp_path / "run", Motion(t_end=2.0))
+    whole, few = Run(folder).bodies, Run(folder, most=10).bodies
+    assert len(few.time) <= 11 and few.time[-1] == whole.time[-1] and few.time[0] == 0
+    assert few.position[-1].tolist() == whole.position[-1].tolist()
+    assert few.release_time.tolist() == whole.release_time.tolist()
+
+
+def begin(folder: Path, text: str = CASE) -> subprocess.Popen[bytes]:
+    """A run of the program that takes long, once its first rows are there."""
+    (folder / "case.nml").write_text(text)
+    process = subprocess.Popen(
+        [str(MICS), "--quiet", "--threads", "1", "case.nml"], cwd=folder, stderr=subprocess.DEVNULL
+    )
+    until(lambda: (folder / "mics-here" / "run.h5").is_file())
+    return process
+
+
+@needs_mics
+@in_browser
+def test_a_run_is_watched_and_stopped(tmp_path: Path, browser: Browser) -> None:
+    """The page follows it, and a button ends it with a restart file."""
+    process = begin(tmp_path)
+    folder = tmp_path / "mics-here"
+    try:
+        with serving(watch.site_of(folder)) as address:
+            browser.visit(address)
+            share = "+(document.querySelector('[data-live=bar] progress') || {}).value || 0"
+            first = until(lambda: browser.run(share))
+            assert until(lambda: browser.run(share) > first)
+            until(lambda: browser.run("live.player.stage.scene && live.player.stage.times.length"))
+            assert "Running at t" in browser.run("document.body.innerText")
+            assert "left at this pace" in browser.run("document.body.innerText")
+            browser.run("live.player.stage.yaw = 1.0")  # the view stays when more comes
+            end = browser.run("live.player.stage.time")
+            until(lambda: browser.run("live.player.stage.time") > end)
+            assert browser.run("live.player.stage.yaw") == 1.0
+            browser.run("document.querySelector('[data-stop=restart]').click()")
+            assert process.wait(30) == 143
+            assert (folder / "restart-a.h5").is_file() and not (folder / "stop").exists()
+            until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
+            assert browser.run("document.querySelectorAll('.chart .curve').length") > 3
+            assert browser.errors == []
+            assert outside(browser, address) == []
+    finally:
+        process.kill()
+
+
+@needs_mics
+@in_browser
+def test_a_run_is_stopped_at_once(tmp_path: Path, browser: Browser) -> None:
+    """After a question; what was written stays."""
+    process = begin(tmp_path)
+    try:
+        with serving(watch.site_of(tmp_path / "mics-here")) as address:
+            browser.visit(address)
+            browser.run("document.querySelector('[data-ask]').click()")
+            assert browser.run("document.getElementById('sure').open")
+            browser.run("document.querySelector('#sure .close').click()")
+            assert process.poll() is None
+            browser.run("document.querySelector('[data-ask]').click()")
+            browser.run("document.querySelector('[data-stop=now]').click()")
+            assert process.wait(30) == -9
+            until(lambda: "Was killed at t" in browser.run("document.body.innerText"))
+            assert Run(tmp_path / "mics-here").bodies.time.size
+    finally:
+        process.kill()
+
+
+@in_browser
+def test_an_ensemble_is_watched(tmp_path: Path, browser: Browser) -> None:
+    """Shares of the runs done, how far the others are, and the blocks of any of them."""
+    folder = write_ensemble(tmp_path / "piles")
+    about = json.loads((folder / "ensemble.json").read_text())
+    for row in about["table"]:
+        (folder / str(row["folder"])).mkdir(exist_ok=True)
+        (folder / str(row["folder"]) / "case.nml").write_text(about["case"])
+    result = folder / "0001" / "result"
+    with h5py.File(result / "run.h5", "r+") as h5:
+        h5["provenance"].attrs["exit_status"] = -1
+    (result / "run.lock").write_text(f"pid {os.getpid()} on {os.uname().nodename}")
+    site = watch.site_of(folder)
+    with (result / "run.lock").open() as lock, serving(site) as address:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        browser.visit(address)
+        text = "document.body.innerText"
+        until(lambda: "runs done" in browser.run(text))
+        said = " ".join(browser.run(text).split())
+        assert "5 of 7 runs done, one run goes on." in said
+        assert "5 (100 %," in said and "1 missing" in said
+        assert "running" in browser.run("document.querySelector('[data-live=runs]').innerText")
+        browser.run("document.querySelector('[data-run=\"2\"]').click()")
+        until(lambda: browser.run("live.player.stage.scene && true"))
+        assert browser.run("live.player.stage.scene.bodies.length") == 4
+        posted = request(
+            site, "/stop", method="POST", body={"how": "restart"}, **{TOKEN: site.token}
+        )
+        assert posted[0] == 200 and (result / "stop").exists()
+        assert not (folder / "0002" / "result" / "stop").exists()
+        assert browser.errors == [] and outside(browser, address) == []
+
+
+def outside(browser: Browser, address: str) -> list[str]:
+    """What the page asked of anybody but the server."""
+    ours = address.split("?")[0]
+    return [url for url in browser.requests if not url.startswith((ours, "data:"))]
+
+
+@in_browser
+@pytest.mark.parametrize(("width", "dark"), [(360, False), (1100, True)])
+def test_a_page_to_watch_fits(run_site: Site, browser: Browser, width: int, dark: bool) -> None:
+    browser.visit(run_site.address, width, 740, dark)
+    until(lambda: browser.run("live.player.stage.scene && true"))
+    assert browser.run("document.documentElement.scrollWidth") <= width
+    assert browser.errors == []
+
+
+@pytest.fixture
+def draft(tmp_path: Path) -> Draft:
+    (tmp_path / "case.nml").write_text(CASE)
+    return Draft(tmp_path / "case.nml", MICS)
+
+
+@needs_mics
+def test_a_change_keeps_the_rest(draft: Draft) -> None:
+    """Remarks stay; what was there before comes back, step by step."""
+    draft.edit({"op": "set", "group": "grid", "n": 0, "variable": "length", "value": "1, 2, 3"})
+    draft.edit({"op": "set", "group": "drop", "n": 0, "variable": "first_time", "value": ""})
+    draft.edit({"op": "copy", "group": "drop", "n": 0})
+    draft.edit({"op": "set", "group": "drop", "n": 1, "variable": "count", "value": "3"})
+    assert draft.text.startswith("! a remark that stays\n&run t_end = 50  dt = 0.002")
+    assert settings.value(draft.text, "grid", "length") == [1, 2, 3]
+    assert settings.value(draft.text, "drop", "first_time") is None
+    assert [settings.value(draft.text, "drop", "count", n) for n in (0, 1)] == [None, 3]
+    for _ in range(4):
+        draft.edit({"op": "undo"})
+    assert draft.text == CASE and draft.state()["saved"]
+    with pytest.raises(BadRun, match="no such variable"):
+        draft.edit({"op": "set", "group": "grid", "n": 0, "variable": "x) /", "value": "1"})
+    with pytest.raises(BadRun, match="no change 'burn'"):
+        draft.edit({"op": "burn"})
+
+
+@needs_mics
+def test_every_group_can_be_added(draft: Draft) -> None:
+    """What is added is a group that the program reads."""
+    for group in draft.groups:
+        if draft.repeats(group) or group not in draft.text:
+            draft.edit({"op": "add", "group": group})
+    assert [g for g, _, _ in draft.values() if g not in draft.groups] == []
+    problems = draft.look()["problems"]
+    assert [p["text"] for p in problems if p["group"] != "bed"] == []  # its file is to be named
+
+
+@needs_mics
+def test_the_program_judges_what_is_typed(draft: Draft) -> None:
+    draft.edit({"op": "set", "group": "shape", "n": 0, "variable": "size", "value": "big"})
+    (problem, *_) = draft.look()["problems"]
+    assert (problem["group"], problem["variable"], problem["n"]) == ("shape", "size", 0)
+    assert problem["short"] and not problem["short"].startswith("&")
+    draft.edit({"op": "undo"})
+    assert draft.look()["problems"] == []
+    assert draft.bodies == [("body", 0), ("drop", 0)]
+    draft.edit({"op": "move", "body": 1, "by": [0.0123456, 0, -0.05]})
+    assert settings.value(draft.text, "drop", "position") == [0.3123, 0.1, 0.15]
+
+
+@needs_mics
+def test_a_case_of_somebody_else_is_not_overwritten(draft: Draft) -> None:
+    draft.edit({"op": "set", "group": "run", "n": 0, "variable": "t_end", "value": "2"})
+    draft.case.write_text(CASE + "! from an editor\n")
+    with pytest.raises(BadRun, match="changed by another program"):
+        draft.save()
+    assert draft.case.read_text().endswith("! from an editor\n")
+    draft.case.write_text(CASE)
+    draft.save()
+    assert "t_end = 2" in draft.case.read_text() and draft.state()["saved"]
+
+
+def test_what_is_typed_has_the_type_of_its_variable() -> None:
+    text = {"type": "string"}
+    assert typed(text, "10", "run.title") == "10" and typed(text, "'a, b'", "run.title") == "a, b"
+    assert typed({"type": "number"}, "1d-3", "run.dt") == 1e-3
+    assert typed({"type": "array", "items": {"type": "number"}}, "1, 2,", "a.b") == [1, 2]
+    assert typed({"type": "array", "items": {"type": "string"}}, "'a', b", "a.b") == ["a", "b"]
+    assert typed({"type": "boolean"}, ".true.", "a.b") is True
+
+
+def field(name: str) -> str:
+    return f"document.getElementById('{name}')"
+
+
+def type_into(browser: Browser, name: str, words: str) -> None:
+    """Types into an empty field of the form, letter by letter."""
+    browser.run(f"{field(name)}.value = ''; {field(name)}.focus()")
+    for letter in words:
+        browser.key(letter)
+
+
+VERDICT = "document.getElementById('verdict').textContent"
+
+
+@needs_mics
+@in_browser
+def test_a_case_is_edited_run_stopped_and_reported(
+    tmp_path: Path, browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Typed, dragged, wrong told, saved, run, watched, stopped, reported."""
+    monkeypatch.chdir(tmp_path)
+    case = tmp_path / "case.nml"
+    case.write_text(CASE)
+    with serving(studio.site_of(case, MICS)) as address:
+        browser.visit(address, 1200, 900)
+        until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        type_into(browser, "shape-0-size", "big")
+        until(lambda: browser.run(VERDICT).startswith("Refused"))
+        assert "number" in browser.run(f"{field('shape-0-size-wrong')}.textContent")
+        assert browser.run(f"{field('shape-0-size')}.getAttribute('aria-invalid')") == "true"
+        assert browser.run(f"{field('run')}.disabled")
+        type_into(browser, "shape-0-size", "0.06")
+        until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        assert browser.run(f"{field('shape-0-size-wrong')}.textContent") == ""
+        assert "size = 0.06" in browser.run(f"{field('text')}.value")
+        assert case.read_text() == CASE  # nothing is written before it is asked for
+
+        browser.run("document.querySelector('[data-view=front]').click()")
+        browser.run("document.querySelector('.stage').scrollIntoView({ block: 'center' })")
+        browser.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        left, top = browser.run(
+            "(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())"
+        )
+        x, y = browser.run(
+            "(p => [p.x, p.y])(studio.player.stage.overlay.at(studio.player.stage.pose(1).place))"
+        )
+        drag(browser, (left + x, top + y), (left + x - 60, top + y))
+        value = f"+{field('drop-0-position')}.value.split(',')[0]"
+        until(lambda: browser.run(value) < 0.29)
+        until(lambda: browser.run(VERDICT).startswith("Accepted"))
+
+        browser.run("document.querySelector('[data-add=drop]').click()")
+        until(lambda: browser.run(f"{field('drop-1-count')} && true"))
+        browser.run("document.querySelector('[data-remove=drop][data-n=\"1\"]').click()")
+        until(lambda: browser.run(f"{field('drop-1-count')} === null"))
+        until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        browser.run(f"{field('run')}.click()")
+        until(lambda: browser.run("location.pathname") == "/watch")
+        until(lambda: "Running at t" in browser.run("document.body.innerText"))
+        assert "size = 0.06" in case.read_text() and case.read_text().startswith("! a remark")
+        browser.run("document.querySelector('[data-stop=restart]').click()")
+        until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
+        assert (tmp_path / "mics-here" / "restart-a.h5").is_file()
+        assert browser.errors == [] and outside(browser, address) == []
+        browser.run("document.getElementById('report').click()")
+        until(lambda: browser.run("location.pathname") == "/report")
+        until(lambda: browser.run("typeof runPlayer !== 'undefined' && true"))
+        assert browser.run("document.querySelector('h1').textContent") == "Two cubes"
+        assert (tmp_path / "mics-here" / "report.html").is_file()
+        assert browser.errors == [] and outside(browser, address) == []
+
+
+@needs_mics
+@in_browser
+def test_a_studio_fits_a_phone(tmp_path: Path, browser: Browser) -> None:
+    with serving(studio.site_of(tmp_path / "new.nml", MICS)) as address:
+        browser.visit(address, 360, 740, True)
+        until(lambda: browser.run(VERDICT).startswith("Accepted"))
+        assert browser.run("document.documentElement.scrollWidth") <= 360
+        assert browser.errors == []
+        assert not (tmp_path / "new.nml").exists()
