@@ -123,6 +123,21 @@ def test_a_list_with_a_repeated_value_is_set_right() -> None:
     assert settings.value(new, "drop", "c") == 1
 
 
+def test_a_variable_is_taken_out() -> None:
+    """The others stay as they were written, with their remarks."""
+    text = (
+        "&drop a = 1, 2,\n  3  ! of a\n  b = 'c = 4 / !', c = 5  ! kept\n  d = 6 /\n&drop c = 7 /\n"
+    )
+    assert settings.unset(text, "drop", "a") == text.replace("a = 1, 2,\n  3  ! of a\n  ", "")
+    assert settings.unset(text, "drop", "d") == text.replace("d = 6 ", "")
+    assert settings.unset(text, "drop", "c", 1) == text.replace("c = 7 ", "")
+    assert settings.unset(text, "drop", "e") == settings.unset(text, "drop", "a", 2) == text
+    assert settings.value(settings.unset(text, "drop", "c"), "drop", "c") is None
+    assert settings.value(settings.unset(text, "drop", "c"), "drop", "b") == "c = 4 / !"
+    with pytest.raises(BadRun, match="must be one group"):
+        settings.variables("&grid cells = 3\n&drop shape=cube &body /")
+
+
 def test_a_group_that_cannot_be_read_is_told() -> None:
     for work in (
         lambda text: settings.value(text, "drop", "a"),

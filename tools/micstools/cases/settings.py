@@ -187,8 +187,10 @@ def _read(group: str) -> f90nml.Namelist:
 
 def variables(group: str) -> dict[str, Any]:
     """What the text of one group gives."""
-    (found,) = _read(group).values()
-    return dict(found)
+    found = list(_read(group).values())
+    if len(found) != 1:
+        raise BadRun(f"{' '.join(group.split())[:60]}: must be one group")
+    return dict(found[0])
 
 
 def group_text(name: str, variables: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 // in their places, shows the motion so far, and hands on what the buttons ask for.
 
 const OFTEN = 1000, SELDOM = 4000; // between two looks, while it runs and else [ms]
-const PATIENCE = 10; // a look that takes long is not repeated before so many times that
+const PATIENCE = 4; // a look that takes long is not repeated before so many times that
 
 async function ask(path, body) {
   const token = document.querySelector('meta[name=mics-token]').content;
@@ -49,6 +49,7 @@ class Live {
       const { parts, running, key } = await ask('live');
       often = running;
       putParts(parts);
+      document.querySelectorAll('main > .row [data-stop], [data-ask]').forEach(b => { b.disabled = !running; });
       if (this.key !== `${this.chosen} ${key}`) await this.showScene(`${this.chosen} ${key}`);
       if (this.player && this.player.stage.scene) moveMarks(this.player.stage.time);
       if (this.lost) tell('');
@@ -65,7 +66,9 @@ class Live {
   async showScene(key) {
     const { player } = this, scene = player && await ask(this.chosen ? `scene?run=${this.chosen}` : 'scene');
     this.key = key;
-    if (!scene || !scene.bodies) return;
+    if (!scene) return;
+    player.root.hidden = !scene.bodies;
+    if (!scene.bodies) return;
     const stage = player.stage, same = stage.scene && this.loaded === this.chosen;
     const at = same ? stage.time : null, atEnd = !same || at >= stage.times[stage.times.length - 1];
     const playing = player.playing;

@@ -100,11 +100,13 @@ class Overlay {
     this.pen.font = FONT;
   }
 
-  // Moves a long label down until it stands on no other.
+  // Moves a long label down until it stands on no other; a line leads to a distant one.
   giveRoom(place) {
     const taken = () => this.labels.some(([, x, y]) =>
       Math.abs(x - place[0]) < LONG && Math.abs(y - place[1]) < HIGH);
+    const [x, y] = place;
     for (let tries = 0; tries < 12 && taken(); tries++) place[1] += HIGH;
+    if (place[1] > y + HIGH) this.line([[x, y], [x, place[1] - HIGH / 2]], this.ink, 0.7);
   }
 
   // The place at which a block is seen that is nearest to the middle of all of them.

@@ -22,8 +22,13 @@ class PlanLayer {
     const edges = box => [0, 1, 2].flatMap(c => [...Array(8).keys()].filter(k => !(k >> c & 1))
       .flatMap(k => [corner(k, box), corner(k | 1 << c, box)]));
     const strips = boxes => ({ lines: this.stage.strips(boxes.flatMap(edges)) });
+    const sides = box => [0, 1, 2].flatMap(c => [0, 7].flatMap(k => {
+      const [d, e] = [1 << (c + 1) % 3, 1 << (c + 2) % 3];
+      return [k, k ^ d, k ^ d ^ e, k, k ^ d ^ e, k ^ e].flatMap(n => [...corner(n, box), 0, 0, 1]);
+    }));
     this.reach = strips(plan.reach);
-    this.boxes = strips(plan.liquid);
+    const liquid = plan.liquid.flatMap(sides);
+    this.boxes = { ...strips(plan.liquid), faces: this.stage.buffer(liquid, liquid.length / 6) };
     // For each side of the tank the lines on it between two cells, and the way it faces.
     this.faces = [0, 1, 2].flatMap(d => [0, 1].map(end => {
       const at = [low, high][end][d], ends = [];
@@ -45,6 +50,7 @@ class PlanLayer {
     stage.put([0, 0, 0], [1, 0, 0, 0]);
     if (this.cells) for (const { lines, d, outward } of this.faces)
       if (outward * stage.axes.away[d] < -1e-6) stage.draft(lines, colour('--stage-line'), 0.22);
+    stage.fill(this.boxes.faces, LIQUID, 0.13);
     stage.draft(this.boxes.lines, LIQUID, 0.9);
     gl.enable(gl.CULL_FACE);
     scene.bodies.forEach((body, k) => { if (!stage.shown(k)) stage.paintBlock(k, GHOST); });

@@ -311,7 +311,8 @@ class Stage {
     const { place, turn } = this.pose(k);
     this.put(place, turn);
     this.fill(mesh.faces, colour, opacity, 1);
-    this.draft(mesh.lines, colour.map(c => 0.35 * c), opacity);
+    const seen = mesh.radius / (2 * this.half) * this.canvas.clientHeight; // where the focus is [pixels]
+    if (opacity === 1 || seen > SMALL) this.draft(mesh.lines, colour.map(c => 0.35 * c), opacity);
   }
 
   paintWalls(opacity) {

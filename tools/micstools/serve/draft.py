@@ -65,6 +65,8 @@ class Draft:
 
     def __init__(self, case: Path, program: Path) -> None:
         """Of a case file that may not be there yet."""
+        if case.is_dir() or not case.parent.is_dir():
+            raise BadRun(f"{case}: must be a file in a folder that is there")
         self.case, self.program = case, program
         self.schema = schema_of(program)
         self.lock = threading.RLock()

@@ -11,6 +11,7 @@ import hmac
 import json
 import secrets
 import sys
+import traceback
 import webbrowser
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -89,6 +90,9 @@ class Site:
             answer = web.Response(status=problem.status, text=problem.reason)
         except (BadRun, OSError) as problem:
             answer = json_answer({"error": str(problem)}, 422)
+        except Exception as fault:  # of ours: told, and the page goes on
+            traceback.print_exc()
+            answer = json_answer({"error": f"a fault of mics-tools: {fault!r}"}, 500)
         answer.headers.update(_SECURE)
         return answer
 

@@ -87,6 +87,7 @@ def run_content() -> list[Markup]:
         place("facts"),
         section("step", "The last rows", place("step")),
         section("history", "History", place("history")),
+        place("log"),
     ]
 
 
@@ -125,12 +126,20 @@ def run_parts(run: Run, found: State) -> Parts:
     if found.running:
         said += f", {clock(found.left)} left at this pace"
     parts = {
-        "state": markup(said + "."),
+        "state": markup(said + ".", _way_on(run, found)),
         "bar": bar(found.share, said),
         "facts": _facts(run, found),
         "step": _step(run),
     }
     return parts | {"history": markup(*_history(run))}
+
+
+def _way_on(run: Run, found: State) -> Markup | None:
+    """How a run that was stopped goes on."""
+    if found.running or found.code == 0 or not run.restart_files:
+        return None
+    words = f"mics-tools run CASE --restart {run.folder / run.restart_files[-1]}"
+    return markup(" It goes on with ", tag("code", words), ".")
 
 
 def _facts(run: Run, found: State) -> Markup:
