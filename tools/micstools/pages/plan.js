@@ -66,13 +66,16 @@ class PlanLayer {
   // Ways and marks over the picture.
   write(overlay) {
     const { stage, plan } = this, pen = overlay.pen;
-    for (const { way, name } of plan.ways) {
-      const seen = way.map(p => overlay.at(p)).filter(({ w }) => w > 0).map(({ x, y }) => [x, y]);
+    for (const { way, when, name } of plan.ways) { // faint as a whole, strong so far
+      const points = way.map((p, k) => ({ ...overlay.at(p), past: when[k] <= stage.time + 1e-9 })).filter(({ w }) => w > 0);
+      const seen = points.map(({ x, y }) => [x, y]), past = points.filter(p => p.past).map(({ x, y }) => [x, y]);
       if (seen.length < 2) continue;
-      overlay.line(seen, overlay.paper, 4);
-      pen.setLineDash([7, 4]);
-      overlay.line(seen, plan.colour, 2);
+      pen.globalAlpha = 0.8;
+      pen.setLineDash([5, 4]);
+      overlay.line(seen, plan.colour, way.length > 100 ? 0.8 : 1.8);
       pen.setLineDash([]);
+      pen.globalAlpha = 1;
+      overlay.line(past, plan.colour, 2.5);
       const [[x0, y0], [x1, y1]] = seen.slice(-2), long = Math.hypot(x1 - x0, y1 - y0);
       if (long > 1) {
         const [ux, uy] = [(x1 - x0) / long, (y1 - y0) / long];

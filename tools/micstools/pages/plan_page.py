@@ -183,7 +183,8 @@ def scene(found: SetUp, north: float | None = None) -> dict[str, Any]:
         still = motion.blocks(run, np.array([0, 0]))
         packed |= still | {"times": motion.packed([0.0, last], "f4")}
     for k in come if len(come) <= _TIMED else []:
-        packed["bodies"][k]["label"] = f"{k + 1}: {figure(float(b.release_time[k]))} s"
+        unit = found.name[k] or str(k + 1)
+        packed["bodies"][k]["label"] = f"{unit}: {figure(float(b.release_time[k]))} s"
     for k in come:
         if b.release_time[k] <= 0:  # it comes in at the start, and is a ghost before
             packed["bodies"][k]["release"] = 1e-6
@@ -259,13 +260,14 @@ def _ways(found: SetUp) -> list[dict[str, Any]]:
             tours.append(list(group))
     said = []
     for tour in tours:
-        way = found.place[sorted(tour, key=lambda k: float(due[k]))]
+        order = sorted(tour, key=lambda k: float(due[k]))
+        way, when = found.place[order].tolist(), due[order].tolist()
         if np.ptp(way, axis=0).any():
-            said.append({"way": way.tolist(), "name": f"drops {_span(sorted(tour))}"})
+            said.append({"way": way, "when": when, "name": f"drops {_span(sorted(tour))}"})
     for k in np.flatnonzero(b.fixed):
-        way = b.position[:, k]
+        way = b.position[:, k].tolist()
         if np.ptp(way, axis=0).any():
-            said.append({"way": way.tolist(), "name": f"body {k + 1}"})
+            said.append({"way": way, "when": b.time.tolist(), "name": f"body {k + 1}"})
     return said
 
 

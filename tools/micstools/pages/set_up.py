@@ -56,6 +56,7 @@ class SetUp:
     line: IntArray  # (N) of each body in the case
     place: Array  # (N, 3) before the random shift [m]
     spread: Array  # (N, 3) the random shift at most [m]
+    name: list[str]  # (N) of each unit in the plan, empty where it has none
 
     def entry(self, heading: str, name: str) -> str:
         """What the plan says under a name; empty where it says nothing."""
@@ -106,10 +107,13 @@ def _found(run: Run, text: str, said: str) -> SetUp:
     with h5py.File(run.folder / "run.h5") as h5:
         plan = {name: h5["plan"][name][:] for name in ("line", "place", "spread")}
         due = h5["bodies/release_time"][:]
+        known = "name" in h5["bodies"]
+        names = h5["bodies/name"].asstr()[:] if known else [""] * len(due)
     run.__dict__["bodies"] = replace(run.bodies, release_time=due)  # nothing waits for room yet
     warnings = [line for line in said.splitlines() if line.startswith(_WARNING)]
     remarks = [remark_of(line.removeprefix(_WARNING), text) for line in warnings]
-    return SetUp(run, text, parts_of(said), remarks, **plan)
+    units = [str(name).strip("\0 ") for name in names]
+    return SetUp(run, text, parts_of(said), remarks, **plan, name=units)
 
 
 def spans(text: str) -> list[tuple[str, int, int]]:
