@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -171,6 +172,22 @@ def test_a_run_that_was_killed_does_not_run(tmp_path: Path) -> None:
         found = living.state(Run(folder))
         assert (found.words, found.running) == ("running", True)
         assert living.ask_to_stop(folder) and (folder / "stop").exists()
+
+
+def test_an_ensemble_is_told_to_stop_by_its_process(tmp_path: Path) -> None:
+    words = (
+        "import fcntl, sys, time; f = open(sys.argv[1]); fcntl.flock(f, 2); print(1, flush=True);"
+    )
+    lock = tmp_path / "ensemble.lock"
+    lock.write_text("")
+    holder = subprocess.Popen(
+        [sys.executable, "-c", words + "time.sleep(60)", str(lock)], stdout=subprocess.PIPE
+    )
+    assert holder.stdout and holder.stdout.readline() == b"1\n"
+    lock.write_text(f"{holder.pid} on {os.uname().nodename}\n")
+    assert "same command goes on" in living.stop_ensemble(tmp_path, [])
+    assert holder.wait(20) == -15
+    assert living.stop_ensemble(tmp_path, []) == "0 runs asked to stop"
 
 
 def test_the_time_left_is_that_of_the_last_rows() -> None:
@@ -432,6 +449,12 @@ def test_a_case_is_edited_run_stopped_and_reported(
         browser.run("document.querySelector('[data-stop=restart]').click()")
         until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
         assert (tmp_path / "mics-here" / "restart-a.h5").is_file()
+        stopped = Run(tmp_path / "mics-here").series.time[-1]
+        browser.run("document.getElementById('go-on').click()")
+        until(lambda: Run(tmp_path / "mics-here").series.time[-1] > stopped)
+        until(lambda: "Running at t" in browser.run("document.body.innerText"))
+        browser.run("document.querySelector('[data-stop=restart]').click()")
+        until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
         assert browser.errors == [] and outside(browser, address) == []
         browser.run("document.getElementById('report').click()")
         until(lambda: browser.run("location.pathname") == "/report")

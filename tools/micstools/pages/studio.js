@@ -9,7 +9,7 @@ class Studio {
     this.player = player;
     this.form = document.getElementById('form');
     this.text = document.getElementById('text');
-    this.number = 0;
+    this.checking = this.again = false;
     this.form.addEventListener('input', event => this.later(event.target));
     this.form.addEventListener('change', event => this.later(event.target, 0));
     this.form.addEventListener('submit', event => event.preventDefault());
@@ -75,18 +75,24 @@ class Studio {
     document.getElementById('save').disabled = saved;
   }
 
-  // What the program says; an answer that another change has overtaken is left out.
+  // Asks the program, one question at a time: of changes that come meanwhile the last one counts.
   async check() {
-    const number = ++this.number, verdict = document.getElementById('verdict');
+    const verdict = document.getElementById('verdict');
     verdict.textContent = 'Checking …';
     verdict.className = 'note';
+    this.again = true;
+    if (this.checking) return;
+    this.checking = true;
     let said;
-    try {
-      said = await ask('check');
-    } catch (problem) {
-      said = { problems: [{ text: problem.message }], warnings: [] };
+    while (this.again) {
+      this.again = false;
+      said = await ask('check').catch(problem => ({ problems: [{ text: problem.message }], warnings: [] }));
     }
-    if (number !== this.number) return;
+    this.checking = false;
+    this.tellVerdict(said, verdict);
+  }
+
+  tellVerdict(said, verdict) {
     const n = said.problems.length, w = said.warnings.length;
     verdict.textContent = n ? `Refused: ${n === 1 ? 'one problem' : `${n} problems`}.`
       : `Accepted${w ? `, with ${w === 1 ? 'one warning' : `${w} warnings`}` : ''}.`;

@@ -26,13 +26,13 @@ _START = "const studio = startStudio();\n"
 class Started(Watched):
     """A run that was started here; what the program says goes to `log`."""
 
-    def __init__(self, draft: Draft) -> None:
-        """Start the program on the case as it is saved."""
-        text = draft.text
-        folder = str(settings.value(text, "run", "output") or OUTPUT).strip()
-        super().__init__(Path(folder))
+    def __init__(self, draft: Draft, folder: Path, restart: Path | None = None) -> None:
+        """Start the program on the case as it is saved; `restart`: the file from which it goes
+        on."""
+        super().__init__(folder)
         self.log = tempfile.TemporaryFile("w+")  # noqa: SIM115 - as long as the run
-        words = [str(draft.program), "--quiet", str(draft.case)]
+        more = ["--restart", str(restart)] if restart else []
+        words = [str(draft.program), "--quiet", *more, str(draft.case)]
         # In a session of its own: Ctrl-C ends the page, not the run.
         self.process = subprocess.Popen(
             words,
@@ -76,6 +76,7 @@ class Studio:
         self.site.post("/edit", self._edit)
         self.site.post("/save", self._save)
         self.site.post("/run", self._run)
+        self.site.post("/go-on", self._go_on)
 
     started: Started | None
 
@@ -104,25 +105,44 @@ class Studio:
         return json_answer({"told": f"{self.draft.case} is written"})
 
     async def _run(self, _: web.Request) -> web.Response:
-        if self.started and self.started.goes_on:
-            raise BadRun(f"a run goes on in {self.started.folder}: stop it first, or wait")
         await apart(self._begin)
         return json_answer({"told": "the run begins", "open": "/watch"})
 
+    async def _go_on(self, _: web.Request) -> web.Response:
+        await apart(self._continue)
+        return json_answer({"told": "the run goes on"})
+
     def _begin(self) -> None:
+        self._require_rest()
         self.draft.look()
         if not self.draft.accepted:
             raise BadRun("the program refuses this case: mend what is marked first")
         self.draft.save()
-        self.started = Started(self.draft)
-        self.watch.watched = self.started
+        folder = settings.value(self.draft.text, "run", "output") or OUTPUT
+        self._start(Started(self.draft, Path(str(folder).strip())))
+
+    def _continue(self) -> None:
+        """The run that was stopped, from its newest restart file."""
+        self._require_rest()
+        run = self.started.look() if self.started else None
+        if run is None or not run.restart_files:
+            raise BadRun("there is no restart file to go on from")
+        self._start(Started(self.draft, run.folder, run.folder / run.restart_files[-1]))
+
+    def _require_rest(self) -> None:
+        if self.started and self.started.goes_on:
+            raise BadRun(f"a run goes on in {self.started.folder}: stop it first, or wait")
+
+    def _start(self, started: Started) -> None:
+        self.started = self.watch.watched = started
 
     async def _watch(self, _: web.Request) -> web.Response:
         if not self.started:
             raise web.HTTPSeeOther("/")
         back = tag("p", tag("a", "← back to the case", href="/"), class_="note")
         title = await apart(self.started.title)
-        return page_answer(watch_page.run_frame(title, self.site.head(), back))
+        go_on = tag("button", "Go on", type="button", id="go-on")
+        return page_answer(watch_page.run_frame(title, self.site.head(), back, go_on))
 
 
 def frame(draft: Draft, head: Markup) -> str:

@@ -41,8 +41,8 @@ def place(name: str, element: str = "div", **more: object) -> Markup:
     return tag(element, data_live=name, **more)
 
 
-def buttons() -> Markup:
-    """Those that end a run. The second one asks first."""
+def buttons(more: Markup | None = None) -> Markup:
+    """Those that end a run, and `more`. The second one asks first."""
     sure = tag(
         "dialog",
         tag("h3", "Stop at once?"),
@@ -56,6 +56,7 @@ def buttons() -> Markup:
         "div",
         tag("button", "Stop with restart file", type="button", data_stop="restart"),
         tag("button", "Stop at once …", type="button", data_ask="sure", class_="single"),
+        more,
         tag("button", "Make the report", type="button", id="report"),
         tag("output", id="told", role="status"),
         sure,
@@ -63,26 +64,29 @@ def buttons() -> Markup:
     )
 
 
-def run_frame(title: str, head: Markup, above: Markup | None = None) -> str:
-    """The page of a run; its parts come later."""
+def run_frame(
+    title: str, head: Markup, above: Markup | None = None, more: Markup | None = None
+) -> str:
+    """The page of a run; its parts come later. `above` it and `more` buttons where it is part of
+    something."""
     return document(
         title,
         above,
         tag("h1", title),
-        *run_content(),
+        *run_content(more),
         script=_START,
         more=SCRIPTS,
         head=head,
     )
 
 
-def run_content() -> list[Markup]:
+def run_content(more: Markup | None) -> list[Markup]:
     """Places of the parts of a run."""
     label = "the blocks so far; arrow keys turn it, + and - zoom, space plays"
     return [
         place("state", class_="lead"),
         place("bar"),
-        buttons(),
+        buttons(more),
         player("player", label),
         place("facts"),
         section("step", "The last rows", place("step")),
