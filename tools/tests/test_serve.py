@@ -287,7 +287,7 @@ def test_an_ensemble_is_watched(tmp_path: Path, browser: Browser) -> None:
         until(lambda: "runs done" in browser.run(text))
         said = " ".join(browser.run(text).split())
         assert "5 of 7 runs done, one run goes on." in said
-        assert "5 (100 %," in said and "1 missing" in said
+        assert "5 (100 %," in said and "1 running, 1 missing" in said
         assert "running" in browser.run("document.querySelector('[data-live=runs]').innerText")
         browser.run("document.querySelector('[data-run=\"2\"]').click()")
         until(lambda: browser.run("live.player.stage.scene && true"))

@@ -7,6 +7,7 @@ from typing import Any
 from aiohttp import web
 
 from micstools import command
+from micstools.cases import settings
 from micstools.ensembles import ensemble
 from micstools.ensembles.ensemble import Member
 from micstools.pages import ensemble_page, motion, run_page, run_words
@@ -114,8 +115,15 @@ class Ensemble:
                 run = self.of(member).look()
                 if run:
                     running[member.number] = living.state(run)
+                    end = ensemble.State("running")
             found[member] = end
         return found, running
+
+    def title(self) -> str:
+        """Of the case, else the folder."""
+        case = str(pile_ensemble.about(self.folder / "ensemble.json")["case"])
+        said = str(settings.value(case, "run", "title") or "").strip()
+        return said or self.folder.resolve().name
 
     def of(self, member: Member) -> Watched:
         """The run of a member."""
@@ -209,7 +217,7 @@ def site_of(folder: Path) -> Site:
 
     async def first(_: web.Request) -> web.Response:
         if isinstance(watched, Ensemble):
-            return page_answer(watch_page.ensemble_frame(folder.resolve().name, site.head()))
+            return page_answer(watch_page.ensemble_frame(await apart(watched.title), site.head()))
         return page_answer(watch_page.run_frame(await apart(watched.title), site.head()))
 
     site.get("/", first)

@@ -1,6 +1,7 @@
 """The page of a run, or of an ensemble, while it goes on. The parts that change are made anew at
 each look, as markup, and put in their places by `live.js`."""
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -41,8 +42,9 @@ def place(name: str, element: str = "div", **more: object) -> Markup:
     return tag(element, data_live=name, **more)
 
 
-def buttons(more: Markup | None = None) -> Markup:
-    """Those that end a run, and `more`. The second one asks first."""
+def buttons(more: Markup | None = None, several: bool = False) -> Markup:
+    """Those that end a run, and `more`. The one that kills it asks first; it is not there for
+    `several` runs."""
     sure = tag(
         "dialog",
         tag("h3", "Stop at once?"),
@@ -54,12 +56,17 @@ def buttons(more: Markup | None = None) -> Markup:
     )  # fmt: skip
     return tag(
         "div",
-        tag("button", "Stop with restart file", type="button", data_stop="restart"),
-        tag("button", "Stop at once …", type="button", data_ask="sure", class_="single"),
+        tag(
+            "button",
+            f"Stop with restart file{'s' if several else ''}",
+            type="button",
+            data_stop="restart",
+        ),
+        None if several else tag("button", "Stop at once …", type="button", data_ask="sure"),
         more,
         tag("button", "Make the report", type="button", id="report"),
         tag("output", id="told", role="status"),
-        sure,
+        None if several else sure,
         class_="row bare",
     )
 
@@ -103,10 +110,15 @@ def ensemble_frame(title: str, head: Markup) -> str:
         tag("h1", title),
         place("state", class_="lead"),
         place("bar"),
-        buttons(),
+        buttons(several=True),
         section("shares", "Shares so far", place("shares")),
         section("runs", "Runs", place("runs")),
-        section("look", "A run", place("chosen"), player("player", label)),
+        section(
+            "look",
+            "A run",
+            tag("p", "The run that is chosen above.", class_="note"),
+            player("player", label),
+        ),
         script=_START,
         more=SCRIPTS,
         head=head,
@@ -216,7 +228,7 @@ def ensemble_parts(
         "bar": bar(done / total if total else 0.0, said),
         "shares": markup(
             table(["outcome", "share of the runs done (95 % interval)"], rows, numbers=False),
-            tag("p", ensemble_table.sentence(states), class_="note"),
+            tag("p", _others(states), class_="note"),
         ),
         "runs": table(
             ["run", "", "seed", "outcome", "t [s]", ""],
@@ -226,11 +238,17 @@ def ensemble_parts(
     }
 
 
+def _others(states: dict[Member, ensemble.State]) -> str:
+    """How many runs have no outcome, and why."""
+    counted = Counter(end.outcome for end in states.values() if not end.counts)
+    return ", ".join(f"{n} {outcome}" for outcome, n in counted.items())
+
+
 def _run_row(member: Member, end: ensemble.State, found: State | None, title: str) -> list[object]:
     look = tag("button", "look", type="button", data_run=member.number)
     if found:
         now = markup(bar(found.share, f"run {member.number}"), f" {clock(found.left)} left")
-        return [member.number, look, member.seed, "running", figure(found.time), now]
+        return [member.number, look, member.seed, end.outcome, figure(found.time), now]
     known = end.time == end.time
     return [member.number, look if known else "", member.seed, end.outcome,
             figure(end.time), end.reason or title]  # fmt: skip
