@@ -31,6 +31,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def findings(given: argparse.Namespace) -> int:
     """Print the findings."""
     run = command.open_run(given.run)
+    if run.note:
+        print(f"     {run.note}")
     print(pile.report(pile.findings(run, paper=given.paper or None)))
     return 0
 
@@ -97,6 +99,7 @@ def _of_run(given: argparse.Namespace) -> int:
     top = pile_numbers.top_of(run, step)
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
+    found["note"] = run.note
     found["units"] = pile_numbers.si_units(found)
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]
@@ -107,6 +110,8 @@ def _of_run(given: argparse.Namespace) -> int:
 def _of_ensemble(ensemble: Ensemble) -> int:
     """Print shares and spread of the numbers, for each choice; they go into `pile.json`, a row for
     each run into `pile.csv`, the maps into `pile_maps.h5`."""
+    if ensemble.example.run.note:
+        print(f"     {ensemble.example.run.note}")
     for part in ensemble.parts:
         _tell(part)
     with (ensemble.folder / "pile.csv").open("w", newline="") as file:

@@ -39,8 +39,9 @@ def with_fields(plan: Plan) -> list[Member]:
     for member in found:
         if settings.value(member.text, "run", "field_interval") == 0:
             raise BadRun(f"{OPTION}: the case writes none; add --set run.field_interval=0.1")
-        if str(settings.value(member.text, "run", "physics") or "").strip() == "dry":
-            raise BadRun(f"{OPTION}: the case is dry, it has none")
+        physics = str(settings.value(member.text, "run", "physics") or "").strip()
+        if physics in ("dry", "light"):
+            raise BadRun(f"{OPTION}: the case is {physics}, it has none")
     return found
 
 

@@ -148,7 +148,7 @@ def assumptions(ensemble: Ensemble) -> str:
     cells = " x ".join(str(len(f) - 1) for f in run.grid.faces)
     model = str(run.value("contact", "model", "surface")).strip()
     said.append(f"contact '{model}'")
-    if str(run.value("run", "physics", "coupled")).strip() == "coupled":
+    if run.physics == "coupled":
         coupling = str(run.value("numerics", "coupling", "monolithic")).strip()
         said[-1] += f", {cells} cells, coupling '{coupling}'"
     if varied:

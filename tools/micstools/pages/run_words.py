@@ -23,10 +23,18 @@ def count(n: int, thing: str, things: str | None = None) -> str:
     return f"{number} {thing if n == 1 else things or thing + 's'}"
 
 
+LIGHT = (
+    "No flow was computed: blocks fell in a given water with buoyancy, added mass and a drag "
+    "coefficient. Times and speeds of falls of compact blocks are within some 10 %; wakes, "
+    "tumbling and tilted plates are not in it, and piles are as good as without water, no better."
+)
+
+
 def title(run: Run, folder: Path | None = None) -> str:
-    """The title of the case, else the name of a folder, by default its own."""
+    """The title of the case, else the name of a folder, by default its own; and its note."""
     said = str(run.value("run", "title", "") or "").strip()
-    return said or (folder or run.folder).resolve().name
+    said = said or (folder or run.folder).resolve().name
+    return said + (f" ({run.note})" if run.note else "")
 
 
 def capital(text: str) -> str:
@@ -179,7 +187,7 @@ def tank(run: Run, units: Units) -> str:
     size, spacing = run.grid.high - run.grid.low, run.grid.spacing
     said = "The tank measures " + units.length.row(size, " x ", 4)
     level = run.value("fluid", "water_level", None)
-    if str(run.value("run", "physics", "coupled")).strip() == "dry":
+    if run.physics == "dry":
         said += " and is dry"
     elif bool(run.value("fluid", "single_phase", False)):
         said += " and is full of liquid"
@@ -187,7 +195,8 @@ def tank(run: Run, units: Units) -> str:
         depth = float(level) - float(run.grid.low[2])
         said += f", its water stands {units.length.text(depth, 4)} above its floor at first"
     said += "; it has " + " x ".join(str(len(f) - 1) for f in run.grid.faces) + " cells of "
-    return said + units.length.row(spacing, " x ") + "."
+    said += units.length.row(spacing, " x ") + "."
+    return f"{said} {LIGHT}" if run.physics == "light" else said
 
 
 def contact(run: Run) -> str:

@@ -86,7 +86,7 @@ def has_level(run: Run) -> bool:
 def level_follows(run: Run) -> bool:
     """Does the level follow from the blocks alone: still water, in a box, that cannot leave?"""
     ways_out = {"inflow", "outflow", "open"} & {k for s, k in run.sides.items() if s != "z_max"}
-    wet = str(run.value("run", "physics", "coupled")).strip() == "coupled"
+    wet = run.physics in ("coupled", "light")
     known = run.value("fluid", "water_level", None) is not None and not run.parameters.get("water")
     return bool(wet and known and not ways_out and not len(run.bed[1]))
 
@@ -250,7 +250,7 @@ def demanded_level(run: Run, row: int) -> float:
 def still_level(run: Run) -> float | None:
     """Level [m] of the water when it has come to rest around the blocks of the last row; that of
     the start where it does not follow from the blocks."""
-    wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
+    wet = run.physics != "dry"
     level = run.value("fluid", "water_level", None)
     if not wet or level is None or bool(run.value("fluid", "single_phase", False)):
         return None

@@ -142,7 +142,6 @@ def _has_level(run: Run) -> bool:
     """Are there blocks, a fluid with a level, and weight?"""
     if not run.bodies.n:
         return False
-    wet = str(run.value("run", "physics", "coupled")).strip() != "dry"
     level = run.value("fluid", "water_level", None) is not None
     single = bool(run.value("fluid", "single_phase", False))
-    return wet and level and not single and bool(run.gravity.any())
+    return run.physics == "coupled" and level and not single and bool(run.gravity.any())

@@ -27,6 +27,7 @@ from micstools.shapes.shape import Shape
 
 T = TypeVar("T")
 
+NOT_RESOLVED = "light: not resolved"
 _DEFAULT_SIDES = {"z_max": "open"}
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
@@ -181,7 +182,7 @@ class Run:
         frames = f"{times.size}, {times[0]:g} to {times[-1]:g} s" if times.size else "none"
         names = ", ".join(f.name for f in fields(Fields) if f.name != "time")
         lines = [
-            f"{self.folder}: {title or 'no title'}",
+            f"{self.folder}: {title or 'no title'}" + (f" ({self.note})" if self.note else ""),
             f"grid    {cells} cells, {size} m",
             f"blocks  {b.n}, fixed: {fixed}; shapes: {', '.join(self.shapes) or 'none'}",
             f"rows    {b.time.size}, {span}",
@@ -213,6 +214,16 @@ class Run:
         """A parameter of the case, or `default` where the case does not give it."""
         found = self.parameters.get(group, [{}])[0].get(name)
         return default if found is None else found
+
+    @property
+    def physics(self) -> str:
+        """What was computed: 'coupled', 'fluid', 'dry' or 'light'."""
+        return str(self.value("run", "physics", "coupled")).strip()
+
+    @property
+    def note(self) -> str:
+        """What must be said of every result of the run; mostly nothing."""
+        return NOT_RESOLVED if self.physics == "light" else ""
 
     @cached_property
     def gravity(self) -> Array:
