@@ -25,6 +25,7 @@ module simulation_m
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid, energy_of_level
   use energy_m, only: energy_parts_t, energy_init, begin_energy, energy_excess
   use coupling_m, only: coupling_t, copy_motion
+  use light_m, only: light_init, resume_light
   use monolithic_m, only: monolithic_t, monolithic_init
   use mass_average_m, only: mass_average_t, mass_average_init
   use flow_start_m, only: start_flow
@@ -46,7 +47,7 @@ module simulation_m
     type(walls_t) :: walls
     type(overlap_t) :: overlap
     type(deep_overlaps_t) :: deep
-    logical :: wet = .true.                !! there is a fluid
+    logical :: wet = .true.                !! there is a flow of water and air
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
     logical, allocatable :: felt(:)        !! blocks that have felt the fluid
     logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
@@ -66,7 +67,7 @@ contains
     sim%case = case
     select case (case%run%physics)
     case ('coupled', 'fluid'); sim%wet = .true.
-    case ('dry'); sim%wet = .false.
+    case ('dry', 'light'); sim%wet = .false.
     case default; error stop 'simulation_init: no such physics'
     end select
     sim%timer_blocks = timer('blocks')
@@ -83,6 +84,7 @@ contains
     call deep_overlaps_init(sim%blocks, sim%deep)
     allocate (sim%waiting(sim%blocks%n), sim%felt(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
+    if (case%run%physics == 'light') call light_init(case, bed, sim%blocks, sim%light)
     if (.not. sim%wet) return
     call energy_init(case, sim%grid, sim%blocks, sim%energy)
     call turn_with_fluid(case%fluid%liquid_density, sim%blocks)
@@ -139,8 +141,9 @@ contains
   subroutine resume(sim)
     type(simulation_t), intent(inout) :: sim
 
-    if (.not. sim%wet) return
     if (sim%clock%step > 0) sim%felt = sim%blocks%present
+    if (sim%light%on .and. sim%clock%step > 0) call resume_light(sim%blocks, sim%light)
+    if (.not. sim%wet) return
     call update_solid(sim%fraction, sim%grid, sim%blocks, sim%solid)
     call fill_velocity_halo(sim%grid, sim%flow%u)
     call fill_scalar_halo(sim%grid, sim%flow%p)

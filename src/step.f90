@@ -25,6 +25,7 @@
 !!     14 closing      motion of the blocks by the sum of the forces, u_f of the next step
 !!                                                                      [m dv/dt = sum of forces]
 !!
+!! With `physics = 'light'` only 1, 2 and 4 are done, in a water without flow (`light_m`).
 !! With `momentum = 'c_ismac'` momentum waits in 7 and is carried in 11, and 3 only notes the
 !! acceleration. With `coupling = 'mics'` an object of its own does 9 to 14 (`mass_average_m`).
 !! docs/architecture.md has the files of each stage.
@@ -48,6 +49,7 @@ module step_m
   use added_mass_m, only: update_added_mass
   use courant_m, only: courant_rate_t, courant_rate
   use simulation_m, only: simulation_t, energies
+  use light_m, only: step_in_water, enter_water, store_water_force
   use wave_step_m, only: gravity_step, capillary_step
   use timers_m, only: tic, toc
   implicit none
@@ -78,7 +80,9 @@ contains
       if (sim%wet) call begin(sim, dt_before, report%inertia_clips)
       ! 4 bodies
       call tic(sim%timer_blocks)
+      if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%felt, sim%light)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
+      if (sim%light%on) call store_water_force(case%fluid%gravity, dt, blocks, sim%light)
       call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap, sim%deep)
       associate (touching => sim%contacts%touching)
         if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
@@ -246,6 +250,8 @@ contains
 
     allowed = sim%case%run%dt
     if (sim%wet .and. sim%clock%step > 0) allowed = min(allowed, growth_max*sim%clock%dt)
+    if (sim%light%on) allowed = min(allowed, step_in_water(sim%case%fluid%gravity, sim%blocks, &
+      sim%light))
     if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)

@@ -105,7 +105,7 @@ contains
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
-        blocks%inverse_inertia(:, :, blocks%shape(b)))
+        blocks%inverse_inertia(:, :, b))
     end do
   end subroutine update_inertia
 

@@ -16,8 +16,8 @@ module rigid_body_m
   implicit none
   private
   public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share
-  public :: begin_step, drift, kick, hold_sleepers, set_velocity_after_fluid
-  public :: space_tensor, kinetic_energy, potential_energy, fastest_point
+  public :: begin_step, drift, turn_to_attitude, kick, hold_sleepers, set_velocity_after_fluid
+  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
 
   real(wp), parameter :: turning_share = 0.02_wp
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
@@ -32,9 +32,10 @@ module rigid_body_m
   type :: blocks_t
     integer :: n = 0
     type(shape_t), allocatable :: shapes(:)
-    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, shapes) body axes [1/(kg m2)]
     integer, allocatable :: shape(:)             !! (n) index into shapes
-    real(wp), allocatable :: mass(:)             !! (n) [kg]
+    !> Mass (n) [kg] and inverse inertia (3, 3, n), body axes [1/(kg m2)]; in 'light' with the water
+    !! that the body carries (`light_m`).
+    real(wp), allocatable :: mass(:), inverse_inertia(:, :, :)
     real(wp), allocatable :: added_mass(:)       !! (n) fluid that moves along in an impact [kg]
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
     logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
@@ -65,7 +66,7 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(blocks_t), intent(out) :: blocks
-    integer :: b, i, k, s
+    integer :: b, i, k
 
     blocks%n = size(case%body)
     do i = 1, size(case%drop)
@@ -73,9 +74,6 @@ contains
     end do
     blocks%shapes = shapes
     call allocate_state(blocks)
-    do s = 1, size(shapes)
-      blocks%inverse_inertia(:, :, s) = inverse3(shapes(s)%inertia)
-    end do
     do b = 1, size(case%body)
       blocks%shape(b) = shape_number(shapes, case%body(b)%shape)
       blocks%fixed(b) = case%body(b)%fixed
@@ -96,7 +94,10 @@ contains
       end do
     end do
     do b = 1, blocks%n
-      blocks%mass(b) = shapes(blocks%shape(b))%density*shapes(blocks%shape(b))%volume
+      associate (shape => shapes(blocks%shape(b)))
+        blocks%mass(b) = shape%density*shape%volume
+        blocks%inverse_inertia(:, :, b) = inverse3(shape%inertia)
+      end associate
       if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
     end do
     do b = 1, size(case%body)
@@ -116,9 +117,10 @@ contains
     do s = 1, size(blocks%shapes)
       more = max(1.0_wp, turning_share*density/blocks%shapes(s)%density)
       blocks%shapes(s)%inertia = more*blocks%shapes(s)%inertia
-      blocks%inverse_inertia(:, :, s) = blocks%inverse_inertia(:, :, s)/more
     end do
     do b = 1, blocks%n
+      more = max(1.0_wp, turning_share*density/blocks%shapes(blocks%shape(b))%density)
+      blocks%inverse_inertia(:, :, b) = blocks%inverse_inertia(:, :, b)/more
       if (blocks%present(b)) call release_body(blocks%release_time(b), b, blocks)
     end do
   end subroutine turn_with_fluid
@@ -129,7 +131,7 @@ contains
     integer :: n
 
     n = blocks%n
-    allocate (blocks%inverse_inertia(3, 3, size(blocks%shapes)), source=0.0_wp)
+    allocate (blocks%inverse_inertia(3, 3, n), source=0.0_wp)
     allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
     allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
       source=.false.)
@@ -201,7 +203,7 @@ contains
         call drift_prescribed(dt, b, blocks)
         cycle
       end if
-      associate (inverse => blocks%inverse_inertia(:, :, blocks%shape(b)), l => blocks%l(:, b), &
+      associate (inverse => blocks%inverse_inertia(:, :, b), l => blocks%l(:, b), &
         q => blocks%q(:, b))
         blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
         omega = angular_velocity(q, l, inverse)
@@ -225,6 +227,18 @@ contains
       blocks%q(:, b)))
     call set_momentum(b, blocks)
   end subroutine drift_prescribed
+
+  !> Angular velocity of the free present bodies at their attitudes, by their angular momentum.
+  pure subroutine turn_to_attitude(blocks)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      if (.not. blocks%present(b) .or. blocks%fixed(b) .or. blocks%asleep(b)) cycle
+      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
+        blocks%inverse_inertia(:, :, b))
+    end do
+  end subroutine turn_to_attitude
 
   !> Angular velocity of a body with angular momentum l, space frame [rad/s].
   pure function angular_velocity(q, l, inverse) result(omega)
@@ -260,7 +274,7 @@ contains
       blocks%v(:, b) = blocks%v(:, b) + dt*(gravity + force(:, b)/blocks%mass(b))
       blocks%l(:, b) = blocks%l(:, b) + dt*torque(:, b)
       blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
-        blocks%inverse_inertia(:, :, blocks%shape(b)))
+        blocks%inverse_inertia(:, :, b))
     end do
   end subroutine kick
 
@@ -305,6 +319,17 @@ contains
     end do
   end subroutine hold_sleepers
 
+  !> Mass of body b without water [kg].
+  pure function own_mass(blocks, b) result(mass)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b
+    real(wp) :: mass
+
+    associate (shape => blocks%shapes(blocks%shape(b)))
+      mass = shape%density*shape%volume
+    end associate
+  end function own_mass
+
   !> Kinetic energy of the free present bodies [J].
   pure function kinetic_energy(blocks) result(energy)
     type(blocks_t), intent(in) :: blocks
@@ -331,7 +356,7 @@ contains
     energy = 0.0_wp
     do b = 1, blocks%n
       if (blocks%fixed(b)) cycle
-      energy = energy - blocks%mass(b)*dot_product(gravity, blocks%x(:, b))
+      energy = energy - own_mass(blocks, b)*dot_product(gravity, blocks%x(:, b))
     end do
   end function potential_energy
 

@@ -145,6 +145,9 @@ contains
       not_negative('m', zero='0 means a tenth of the smallest edge'), &
       'distance of the contact spheres, for spheres = ''dense''', &
       example='spheres = ''dense''  sphere_spacing = 0.002')
+    call v%real('drag_coefficient', shape%drag_coefficient, not_negative('-'), &
+      'for physics = ''light'' only: C of the drag on each facet, C/3 of the whole surface for ' &
+      //'a compact block; `mics-tools calibrate` fits it to resolved falls', example='0.6')
   end subroutine visit_shape
 
   !> What the size of a kind of shape means [m].

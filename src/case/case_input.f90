@@ -6,7 +6,7 @@
 module case_input_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use case_types_m, only: case_t, is_given
+  use case_types_m, only: case_t, is_given, has_flow
   use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use description_m, only: group_description_t
@@ -227,6 +227,7 @@ contains
 
     call check_names(case, v%problems)
     call check_streams(list, case, v)
+    if (case%run%physics == 'light') call check_given_water(list, case, v)
     call find_idle(list, case, v)
     i = first_of(list, 'grid')
     if (i == 0 .or. case%grid%cells_faulty) return
@@ -262,7 +263,7 @@ contains
     integer :: d, s, i
 
     i = first_of(list, 'boundary')
-    if (i == 0 .or. case%run%physics == 'dry') return
+    if (i == 0 .or. .not. has_flow(case%run)) return
     call v%start_reading(list%group(i))
     way_out = any(gives_pressure(side_code(case%boundary%kind)) .or. case%boundary%faulty)
     associate (fluid => case%fluid)
@@ -281,6 +282,46 @@ contains
       end do
     end associate
   end subroutine check_streams
+
+  !> What a water without a flow has: a level between gravity and the sides, and a current along it.
+  subroutine check_given_water(list, case, v)
+    type(namelist_text_t), intent(in) :: list
+    type(case_t), intent(in) :: case
+    type(group_visitor_t), intent(inout) :: v
+    type(group_text_t) :: nothing
+    character(*), parameter :: light = 'physics = ''light'' '
+    integer :: i, d, s
+
+    allocate (nothing%assignment(0))
+    nothing%name = 'fluid'
+    i = first_of(list, 'fluid')
+    if (i > 0) nothing = list%group(i)
+    call v%start_reading(nothing)
+    associate (fluid => case%fluid)
+      call v%require('single_phase', .not. fluid%single_phase, light//'needs a level of the water')
+      if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
+          .and. v%good('water_level')) call v%note(': '//light//'needs water_level, the level of ' &
+        //'the water that is given [m]')
+      call v%require('gravity', .not. any(abs(fluid%gravity(1:2)) > 0.0_wp) &
+        .and. fluid%gravity(3) < 0.0_wp, light//'has a level, gravity must point straight down')
+      call v%require('velocity', .not. abs(fluid%velocity(3)) > 0.0_wp, &
+        light//'has a current along the level, its z component must be 0')
+    end associate
+    i = first_of(list, 'boundary')
+    if (i == 0) return
+    call v%start_reading(list%group(i))
+    do d = 1, 3
+      do s = 1, 2
+        if (case%boundary%faulty(s, d)) cycle
+        call v%require(side_name(s, d), all(case%boundary%kind(s, d) /= ['inflow ', 'outflow']), &
+          light//'has no stream through a side; the current is &fluid velocity')
+      end do
+    end do
+    call v%require('z_min', case%boundary%kind(1, 3) /= 'open', &
+      light//'keeps its water, the floor cannot be open')
+    call v%require('z_max', case%boundary%kind(2, 3) /= 'periodic', &
+      light//'has a level, z cannot be periodic')
+  end subroutine check_given_water
 
   !> Names of shapes are unique, capital or small letters apart.
   subroutine check_names(case, problems)

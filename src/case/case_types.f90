@@ -8,13 +8,14 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: absent, is_given, size_count, smallest_spacing
+  public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
+  character(*), parameter :: not_resolved = 'light: not resolved, no flow is computed'
 
   type :: run_t
     character(:), allocatable :: title, output
-    character(name_length) :: physics = 'coupled'   !! 'coupled', 'fluid' or 'dry'
+    character(name_length) :: physics = 'coupled'   !! 'coupled', 'fluid', 'dry', 'light'
     real(wp) :: t_end = absent                      !! required [s]
     real(wp) :: dt = 1.0e-2_wp                      !! largest fluid time step [s]
     real(wp) :: cfl_max = 0.5_wp                    !! 0: dt stays fixed
@@ -99,6 +100,7 @@ module case_types_m
     integer :: refinement = 2
     character(name_length) :: spheres = 'centroid'
     real(wp) :: sphere_spacing = 0.0_wp             !! [m]
+    real(wp) :: drag_coefficient = 0.55_wp          !! of the facets, in 'light' [-]
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! its form is not known
   end type shape_input_t
@@ -164,6 +166,14 @@ contains
 
     yes = x > absent
   end function is_given
+
+  !> Is the flow of water and air computed?
+  pure function has_flow(run) result(yes)
+    type(run_t), intent(in) :: run
+    logical :: yes
+
+    yes = run%physics == 'coupled' .or. run%physics == 'fluid'
+  end function has_flow
 
   !> How many lengths the size of a kind of shape has; 0 where it comes from a file.
   pure function size_count(kind) result(n)

@@ -42,7 +42,8 @@ contains
     call v%real('surface_tension', fluid%surface_tension, not_negative('N/m'), &
       'tension of the surface between liquid and gas', example='0.072')
     call v%real('velocity', fluid%velocity, any_number('m/s'), &
-      'velocity of the fluid at the start, everywhere the same', example='0.1, 0, 0')
+      'velocity of the fluid at the start, everywhere the same; with physics = ''light'' the ' &
+      //'current, for ever', example='0.1, 0, 0')
     call v%text('initial_state', fluid%initial_state, 'HDF5 file with the liquid shares and the ' &
       //'velocities of the cells at the start', example='''start.h5''')
   end subroutine visit_fluid

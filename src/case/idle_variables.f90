@@ -6,7 +6,7 @@
 !! case can be tried with other physics as it is.
 module idle_variables_m
   use errors_m, only: to_text
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, has_flow
   use namelist_text_m, only: namelist_text_t
   use description_m, only: next_word
   use group_visitor_m, only: group_visitor_t
@@ -26,6 +26,7 @@ contains
 
     select case (case%run%physics)
     case ('dry'); call pass_over_groups(list, 'water numerics', 'physics = ''dry''', v)
+    case ('light'); call pass_over_groups(list, 'water numerics', 'physics = ''light''', v)
     case ('fluid'); call pass_over_groups(list, 'contact shape body drop', 'physics = ''fluid''', v)
     case default   ! all groups count
     end select
@@ -33,11 +34,14 @@ contains
       call v%start_reading(list%group(i))
       select case (case%run%physics)
       case ('dry'); call pass_over_in_dry(list%group(i)%name, case, v)
+      case ('light'); call pass_over_in_light(list%group(i)%name, v)
       case ('fluid'); call pass_over_in_fluid(list%group(i)%name, case, v)
-      case default   ! all variables count
+      case default
+        if (list%group(i)%name == 'shape') call v%pass_over('drag_coefficient', &
+          'physics = '''//trim(case%run%physics)//'''')
       end select
       if (list%group(i)%name == 'water' .and. case%fluid%single_phase &
-          .and. case%run%physics /= 'dry') call v%note( &
+          .and. has_flow(case%run)) call v%note( &
         ': has no meaning with &fluid single_phase = .true.; the liquid fills the whole tank')
       list%group(i) = v%group
     end do
@@ -56,9 +60,25 @@ contains
     case ('fluid'); call v%pass_over('liquid_density liquid_viscosity gas_density gas_viscosity ' &
       //'water_level surface_tension single_phase velocity initial_state', chosen)
     case ('contact'); call v%pass_over('lubrication', chosen)
+    case ('shape'); call v%pass_over('drag_coefficient', chosen)
     case default   ! all of it counts, or nothing
     end select
   end subroutine pass_over_in_dry
+
+  !> A given water: its density, level and current count.
+  subroutine pass_over_in_light(group, v)
+    character(*), intent(in) :: group
+    type(group_visitor_t), intent(inout) :: v
+    character(*), parameter :: chosen = 'physics = ''light'''
+
+    select case (group)
+    case ('run'); call v%pass_over('cfl_max', chosen)
+    case ('fluid'); call v%pass_over('liquid_viscosity gas_density gas_viscosity ' &
+      //'surface_tension initial_state', chosen)
+    case ('contact'); call v%pass_over('lubrication', chosen)
+    case default   ! all of it counts, or nothing
+    end select
+  end subroutine pass_over_in_light
 
   !> No blocks: nothing settles, nothing rubs on a slippery wall, only a bed is solid.
   subroutine pass_over_in_fluid(group, case, v)

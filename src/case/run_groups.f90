@@ -29,13 +29,14 @@ contains
     call v%about('how long the run is, how fine in time, and where its results go')
     call v%text('title', run%title, 'a line about the case, for the plan and the results', &
       example='''Six blocks in a tank''')
-    call v%option('physics', run%physics, 'coupled fluid dry', &
-      'what is computed: water, air and blocks; without the blocks; or blocks alone, without ' &
-      //'water and air', example='''dry''')
+    call v%option('physics', run%physics, 'coupled fluid dry light', &
+      'what is computed: water, air and blocks; without the blocks; blocks alone, without ' &
+      //'water and air; or blocks in a given water whose flow is not resolved', &
+      example='''dry''')
     call v%real('t_end', run%t_end, positive('s'), 'the simulated time', example='10', &
       required=.true.)
     call v%real('dt', run%dt, positive('s'), 'largest time step of the fluid; in ''dry'' the ' &
-      //'step of the history', example='0.005')
+      //'step of the history, in ''light'' the longest step of the blocks', example='0.005')
     call v%real('cfl_max', run%cfl_max, not_negative('-', zero='0 keeps dt fixed'), &
       'the time step is made shorter to keep the Courant number of liquid and blocks below ' &
       //'this; gas up to eight times as fast moves in parts of the step', example='0.25')

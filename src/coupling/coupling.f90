@@ -278,9 +278,8 @@ contains
         bodies%volume(b) = shape%volume
         bodies%radius(b) = shape%radius
         bodies%inertia(:, :, b) = space_tensor(blocks%q(:, b), shape%inertia)
-        bodies%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
-                                                       blocks%inverse_inertia(:, :, &
-                                                           blocks%shape(b)))
+        bodies%inverse_inertia(:, :, b) = &
+          space_tensor(blocks%q(:, b), blocks%inverse_inertia(:, :, b))
       end associate
       call set_inertia(b, bodies)
     end do

@@ -53,7 +53,7 @@ contains
     integer :: b, d
     real(wp) :: g
 
-    self%known = case%run%physics /= 'dry' .and. case%fluid%surface_tension <= 0.0_wp &
+    self%known = case%fluid%surface_tension <= 0.0_wp &
                  .and. .not. any(abs(grid%side_velocity) > 0.0_wp) .and. only_top_is_open() &
                  .and. .not. any(grid%periodic .and. abs(case%fluid%gravity) > 0.0_wp)
     do b = 1, blocks%n

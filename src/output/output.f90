@@ -8,7 +8,7 @@ module output_m
   use parallel_m, only: broadcast, is_root
   use timers_m, only: timer, tic, toc, wall_clock
   use command_line_m, only: options_t
-  use case_types_m, only: case_t, fluid_t
+  use case_types_m, only: case_t, fluid_t, not_resolved
   use bed_m, only: bed_t
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
@@ -90,7 +90,7 @@ contains
       call close_files(output)
       call output%lock%release()
     end if
-    call progress_start(options%quiet, output%fluid, state%clock, output%progress)
+    call progress_start(options%quiet, output%fluid, state%light%on, state%clock, output%progress)
     call toc(output%phase)
   end subroutine open_output
 
@@ -130,6 +130,8 @@ contains
 
     call create_run_file(output%folder//run_name, output%text, output%parameters, state%grid, &
                          state%blocks, bed, output%run_file)
+    if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', 'note', &
+      not_resolved)
     if (output%fields) call create_field_file(output%folder//field_name, state%grid, &
                                               output%field_file)
     if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &

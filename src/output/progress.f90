@@ -7,6 +7,7 @@ module progress_m
   use parallel_m, only: is_root, spins_for_long
   use timers_m, only: wall_clock
   use rigid_body_m, only: blocks_t
+  use case_types_m, only: not_resolved
   use clock_m, only: clock_t
   use diagnostics_m, only: row_t
   implicit none
@@ -32,9 +33,10 @@ module progress_m
 contains
 
   !> Begin to count time.
-  subroutine progress_start(quiet, fluid, clock, self)
+  subroutine progress_start(quiet, fluid, light, clock, self)
     logical, intent(in) :: quiet
     logical, intent(in) :: fluid   !! there is one
+    logical, intent(in) :: light   !! there is a water without flow
     type(clock_t), intent(in) :: clock
     type(progress_t), intent(out) :: self
 
@@ -43,6 +45,7 @@ contains
     self%first_step = clock%step
     self%first_time = clock%t
     self%began = wall_clock()
+    if (light) call say(not_resolved, self)
     if (spins_for_long()) call say('threads spin while they wait: where other programs want the ' &
       //'cores, export GOMP_SPINCOUNT=1000 first, or take --threads 1', self)
   end subroutine progress_start

@@ -5,6 +5,7 @@ module run_state_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
   use contacts_m, only: contacts_t
+  use light_m, only: light_t
   use clock_m, only: clock_t
   use energy_m, only: energy_t
   implicit none
@@ -18,6 +19,7 @@ module run_state_m
     type(solid_geometry_t), allocatable :: solid   !! likewise
     type(blocks_t) :: blocks
     type(contacts_t) :: contacts
+    type(light_t) :: light
     type(energy_t) :: energy
   end type run_state_t
 

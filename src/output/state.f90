@@ -13,6 +13,7 @@ module state_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_body_m, only: blocks_t
   use contacts_m, only: contacts_t
+  use light_m, only: light_t
   use springs_m, only: springs_t, reserve_springs
   use clock_m, only: clock_t
   use run_state_m, only: run_state_t
@@ -22,7 +23,7 @@ module state_m
 
   !> Groups of the names below, in their order.
   character(*), parameter :: state_groups(*) = &
-    [character(9) :: '/clock', '/energy', '/flow', '/blocks', '/contacts']
+    [character(9) :: '/clock', '/energy', '/flow', '/blocks', '/light', '/contacts']
 
   integer, parameter :: max_springs = 100000000
 
@@ -88,6 +89,7 @@ contains
     end associate
     if (allocated(state%flow%u)) call visit_flow(visitor, state%grid, state%flow, state%solid)
     call visit_blocks(visitor, state%blocks)
+    if (state%light%on) call visit_light(visitor, state%light)
     call visit_contacts(visitor, state%contacts)
   end subroutine visit_state
 
@@ -166,6 +168,16 @@ contains
       call visitor%integers('/blocks/on_floor', [n], blocks%on_floor)
     end associate
   end subroutine visit_blocks
+
+  !> Level, and what the water does to each block, sleepers too.
+  subroutine visit_light(visitor, light)
+    class(state_visitor_t), intent(inout) :: visitor
+    type(light_t), intent(inout) :: light
+
+    call visitor%real_number('/light/level', 'm', light%level)
+    call visitor%reals('/light/wet', 'm3', [size(light%wet)], light%wet)
+    call visitor%reals('/light/force', 'N, N m', [6, size(light%wet)], light%force)
+  end subroutine visit_light
 
   !> What the contacts remember: tangential springs, at work and at rest, and how long blocks have
   !! been slow.

@@ -9,7 +9,7 @@ module write_run_m
   use build_info_m, only: version, git_revision, compiler, flags
   use grid_m, only: grid_t
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, own_mass
   use bed_m, only: bed_t
   use errors_m, only: exit_files
   use clock_m, only: clock_t
@@ -194,7 +194,7 @@ contains
     end do
     call file%group('/bodies')
     call file%store('/bodies/shape', '1', name)
-    call file%store('/bodies/mass', 'kg', blocks%mass)
+    call file%store('/bodies/mass', 'kg', [(own_mass(blocks, b), b=1, blocks%n)])
     call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
     call file%store('/bodies/release_time', 's', blocks%release_time)
   end subroutine write_bodies

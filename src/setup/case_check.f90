@@ -7,7 +7,7 @@ module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
   use vectors_m, only: norm
-  use case_types_m, only: case_t, drop_input_t, smallest_spacing
+  use case_types_m, only: case_t, drop_input_t, smallest_spacing, has_flow
   use boundary_kinds_m, only: side_code, side_periodic, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
@@ -21,6 +21,8 @@ module case_check_m
   use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, room_for
   use overlap_solid_m, only: expected_samples
+  use panels_m, only: surface_triangles
+  use panel_method_m, only: max_surface_panels
   implicit none
   private
   public :: make_shapes, check_case
@@ -63,6 +65,11 @@ contains
         if (samples > max_samples) message = given_size(case%shape(s))//': so slender a ' &
           //'block would need '//brief(samples)//' points on its surface, at most ' &
           //brief(max_samples)//', as of a box 400 times as long as it is thick'
+      end if
+      if (len(message) == 0 .and. case%run%physics == 'light') then
+        if (surface_triangles(shapes(s)) > max_surface_panels) message = given_size(case%shape(s)) &
+          //': a surface of '//to_text(surface_triangles(shapes(s)))//' triangles, physics = ' &
+          //'''light'' takes '//to_text(max_surface_panels)//' at most: simplify the drawing'
       end if
       if (len(message) == 0) cycle
       shapes(s) = empty
@@ -119,7 +126,7 @@ contains
     type(problems_t), intent(inout) :: problems
     real(wp) :: limit
 
-    if (case%run%physics == 'dry' .or. case%run%cfl_max > 0.0_wp) return
+    if (.not. has_flow(case%run) .or. case%run%cfl_max > 0.0_wp) return
     limit = capillary_step(case%fluid, smallest_spacing(case%grid))
     if (case%run%dt <= limit) return
     call problems%add('&run dt', case%run%dt, 'unstable with surface tension, must be at most ' &

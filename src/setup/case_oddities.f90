@@ -2,7 +2,8 @@
 module case_oddities_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing
+  use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing, &
+    has_flow
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
   use tet_mesh_m, only: shape_t
@@ -13,6 +14,8 @@ module case_oddities_m
   use contact_sphere_placement_m, only: height_errors
   use wave_step_m, only: gravity_step
   use rest_depth_m, only: look_at_rest
+  use panel_method_m, only: added_inertia_t
+  use light_m, only: added_inertia_of
   implicit none
   private
   public :: find_oddities
@@ -23,6 +26,8 @@ module case_oddities_m
   integer, parameter :: few_tets = 50                !! of a round shape
   integer, parameter :: many_tets = 250000           !! of one shape
   real(wp), parameter :: far_above = 0.5_wp          !! over the top of the tank, over its height
+  real(wp), parameter :: compact = 0.1_wp            !! spread of its added mass, in 'light'
+  real(wp), parameter :: shallow = 2.0_wp            !! water over the length of a block, in 'light'
   integer, parameter :: max_bodies = 5              !! warned of one by one
 
 contains
@@ -37,8 +42,8 @@ contains
 
     if (case%fluid%gravity(3) > 0.0_wp) call oddities%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
-    if (case%run%physics /= 'dry') then
-      call look_at_water(case, oddities)
+    if (case%run%physics /= 'dry') call look_at_water(case, oddities)
+    if (has_flow(case%run)) then
       call look_at_inflows(case, oddities)
       call look_at_open_sides(case, oddities)
     end if
@@ -61,6 +66,7 @@ contains
     logical :: below
 
     longest = gravity_step(case%fluid, smallest_spacing(case%grid))
+    if (.not. has_flow(case%run)) longest = huge(longest)
     if (case%run%dt > longest .and. case%run%cfl_max <= 0.0_wp) call oddities%add('&run dt', &
       case%run%dt, 'lets the shortest waves of the grid grow, should be at most ' &
       //brief(longest, 3)//' s; or cfl_max > 0 lets the step shrink', case%run%line)
@@ -268,6 +274,7 @@ contains
         //brief(cells, 3)//' cells long; below '//to_text(nint(min_cells)) &
         //' the water around it is coarse: more &grid cells', input%line)
     end if
+    if (case%run%physics == 'light') call look_at_light(case, input, shape, extent, oddities)
     if (case%contact%model == 'spheres') then
       call height_errors(shape, lowest, highest)
       if (max(-lowest, highest) > 0.0_wp) call oddities%add_message('&shape '//name//': its ' &
@@ -282,5 +289,23 @@ contains
       'cuts '//name//' into '//to_text(size(shape%tet, 2)) &
       //' tetrahedra, more of a prism than round; a larger value cuts it more finely', input%line)
   end subroutine look_at_shape
+
+  !> What a water without flow tells badly: slabs, and shallow water.
+  subroutine look_at_light(case, input, shape, extent, oddities)
+    type(case_t), intent(in) :: case
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: extent   !! of the shape [m]
+    type(problems_t), intent(inout) :: oddities
+    type(added_inertia_t) :: added
+
+    added = added_inertia_of(shape)
+    if (added%spread > compact) call oddities%add_message('&shape '//trim(input%name)//': its ' &
+      //'added mass differs by '//brief(100.0_wp*added%spread, 2)//' % between directions; ' &
+      //'''light'' takes the mean, and a tilted one glides as it should not', input%line)
+    if (case%fluid%water_level - case%grid%origin(3) < shallow*extent) call oddities%add_message( &
+      '&shape '//trim(input%name)//': the water is less than two blocks deep; entry, which ' &
+      //'''light'' tells roughly, is all there is', input%line)
+  end subroutine look_at_light
 
 end module case_oddities_m

@@ -2,7 +2,8 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing
+  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing, has_flow, &
+    not_resolved
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: told_file
   use contact_law_m, only: contact_law_t, load_t
@@ -18,6 +19,8 @@ module case_plan_m
   use bed_measure_m, only: bed_volume
   use fall_m, only: has_level
   use fall_plan_m, only: print_falls
+  use panel_method_m, only: added_inertia_t
+  use light_m, only: added_inertia_of
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t
   implicit none
@@ -41,14 +44,14 @@ contains
     integer :: touching(size(shapes))
     real(wp) :: d_s
 
-    wet = case%run%physics /= 'dry'
+    wet = has_flow(case%run)
     blocks = case%run%physics /= 'fluid'
     call find_touching(case, shapes, touching, d_s)
     call print_run(unit, case)
     call print_grid(unit, case, wet)
     if (bed%there) call print_bed(unit, case, bed)
-    if (wet) call print_liquid(unit, case, bed)
-    if (blocks) call print_shapes(unit, case, wet, shapes, touching)
+    if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
+    if (blocks) call print_shapes(unit, case, shapes, touching)
     if (blocks) call print_bodies(unit, case, shapes, bed)
     if (blocks) call print_falls(unit, case, shapes, bed)
     call print_steps(unit, case, shapes, d_s, wet, blocks)
@@ -65,6 +68,7 @@ contains
     select case (case%run%physics)
     case ('coupled'); call entry(unit, 'physics', 'coupled: water, air and blocks')
     case ('fluid'); call entry(unit, 'physics', 'fluid: water and air, no blocks')
+    case ('light'); call entry(unit, 'physics', not_resolved//'; blocks in a given water')
     case default; call entry(unit, 'physics', 'dry: blocks alone')
     end select
     call entry(unit, 'simulated time', brief(case%run%t_end)//' s')
@@ -118,6 +122,13 @@ contains
     real(wp) :: height, volume, high(3)
 
     call heading(unit, 'Fluid')
+    if (.not. has_flow(case%run)) then
+      call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3')
+      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; rises by what is ' &
+        //'displaced, if no side is open')
+      call entry(unit, 'current', triple(case%fluid%velocity, ', ')//' m/s')
+      return
+    end if
     call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3, ' &
                //brief(case%fluid%liquid_viscosity)//' Pa s')
     if (case%fluid%single_phase) then
@@ -156,10 +167,9 @@ contains
 
   !> A table with one line for each shape: its tetrahedra, what of it touches (points and the
   !! smallest edge of the form, or spheres and the smallest diameter), mass and weight.
-  subroutine print_shapes(unit, case, wet, shapes, touching)
+  subroutine print_shapes(unit, case, shapes, touching)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
-    logical, intent(in) :: wet
     type(shape_t), intent(in) :: shapes(:)
     integer, intent(in) :: touching(:)   !! points or spheres of each
     character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
@@ -180,7 +190,8 @@ contains
     do s = 1, size(shapes)
       mass = shapes(s)%density*shapes(s)%volume
       submerged = '-'
-      if (wet) submerged = brief((mass - case%fluid%liquid_density*shapes(s)%volume)*g)
+      if (case%run%physics /= 'dry') submerged = brief((mass - case%fluid%liquid_density &
+        *shapes(s)%volume)*g)
       smallest = 2*minval(shapes(s)%sphere_radius)
       if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
       write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
@@ -191,8 +202,22 @@ contains
     end do
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s), shapes(s))
+      if (case%run%physics == 'light') call print_added_mass(unit, case%shape(s), shapes(s))
     end do
   end subroutine print_shapes
+
+  !> What a block carries of a given water, and how much that brakes it.
+  subroutine print_added_mass(unit, input, shape)
+    integer, intent(in) :: unit
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(in) :: shape
+    type(added_inertia_t) :: added
+
+    added = added_inertia_of(shape)
+    call entry(unit, trim(shape%name)//' in water', 'added mass '//brief(added%mass, 3) &
+      //' and inertia '//brief(added%inertia, 2)//' of the displaced, drag coefficient ' &
+      //brief(input%drag_coefficient)//' on the facets')
+  end subroutine print_added_mass
 
   !> How long a block from a file is, so that a wrong unit shows.
   subroutine print_file_shape(unit, input, shape)

@@ -14,7 +14,7 @@
 module fall_m
   use kinds_m, only: wp, pi
   use vectors_m, only: rotation_matrix, cross
-  use case_types_m, only: case_t, drop_input_t, body_input_t, is_given
+  use case_types_m, only: case_t, drop_input_t, body_input_t, is_given, has_flow
   use boundary_kinds_m, only: side_code, is_wall
   use tet_mesh_m, only: shape_t
   use mass_properties_m, only: surface_area
@@ -55,7 +55,8 @@ contains
     type(case_t), intent(in) :: case
     logical :: yes
 
-    yes = case%run%physics /= 'dry' .and. len_trim(case%fluid%initial_state) == 0 &
+    yes = case%run%physics == 'light'
+    if (has_flow(case%run)) yes = len_trim(case%fluid%initial_state) == 0 &
       .and. (case%fluid%single_phase .or. is_given(case%fluid%water_level))
   end function has_level
 
@@ -100,18 +101,34 @@ contains
         speed = speed_after(speed, g, fall%bottom - fall%level)
         fall%at_surface = speed
       end if
-      fall%drag = drag_coefficient(shape)
+      call find_drag(case, shape, fall%drag, drag_area)
       if (shape%density <= case%fluid%liquid_density) return
-      drag_area = fall%drag*projected_area(shape)
       associate (s => shape%density/case%fluid%liquid_density)
         fall%terminal = terminal_speed(s, shape%volume, drag_area, g)
         if (fall%has_floor) fall%at_floor = fall_under_water(s, shape%volume, drag_area, g, &
           max(0.0_wp, speed), max(0.0_wp, min(fall%bottom, fall%level) - fall%floor))
       end associate
-    else if (fall%has_floor .and. (case%run%physics == 'dry' .or. has_level(case))) then
+    else if (fall%has_floor .and. (.not. has_flow(case%run) .or. has_level(case))) then
       fall%at_floor = speed_after(speed, g, max(0.0_wp, fall%bottom - fall%floor))
     end if
   end subroutine find_fall
+
+  !> Drag coefficient of a shape, and that times the area to which it belongs: its mean shadow, in
+  !! 'light' a third of its surface.
+  subroutine find_drag(case, shape, drag, drag_area)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(out) :: drag        !! [-]
+    real(wp), intent(out) :: drag_area   !! [m2]
+
+    if (case%run%physics == 'light') then
+      drag = sum(case%shape%drag_coefficient, case%shape%name == shape%name)
+      drag_area = drag*surface_area(shape%point, shape%triangle)/3.0_wp
+    else
+      drag = drag_coefficient(shape)
+      drag_area = drag*projected_area(shape)
+    end if
+  end subroutine find_drag
 
   !> Speed after a free fall [m/s].
   elemental function speed_after(speed, g, height) result(v)

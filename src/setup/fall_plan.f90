@@ -46,8 +46,13 @@ contains
     if (.not. under_water) return
     call entry(unit, 'in water, estimates', 'v_t^2 = 2 (s - 1) g V / (C A), ' &
       //'v^2 = v_t^2 + (v_0^2 - v_t^2) exp(-C A z / ((s + 0.5) V)),')
-    call entry(unit, '', 's = density over that of the liquid, A = mean projected area, ' &
-      //'C after Hoelzer and Sommerfeld (2008)')
+    if (case%run%physics == 'light') then
+      call entry(unit, '', 's = density over that of the liquid, A = a third of the surface, C = ' &
+        //'drag_coefficient')
+    else
+      call entry(unit, '', 's = density over that of the liquid, A = mean projected area, ' &
+        //'C after Hoelzer and Sommerfeld (2008)')
+    end if
   contains
     subroutine print_fall(group, drop)
       character(*), intent(in) :: group

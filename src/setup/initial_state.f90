@@ -13,7 +13,7 @@ module initial_state_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
   use errors_m, only: problems_t, fatal, to_text, exit_files
-  use case_types_m, only: case_t, fluid_t, is_given
+  use case_types_m, only: case_t, fluid_t, is_given, has_flow
   use named_files_m, only: found_file
   use grid_m, only: grid_t, unit_step
   use fields_m, only: flow_t
@@ -37,7 +37,7 @@ contains
     type(h5_file_t) :: file
     logical :: liquid, velocity
 
-    if (.not. is_named(case%fluid) .or. case%run%physics == 'dry') return
+    if (.not. (is_named(case%fluid) .and. has_flow(case%run))) return
     call file%open(found_file(case%fluid%folder, case%fluid%initial_state), .false., .false.)
     liquid = file%has(liquid_name)
     velocity = file%has(velocity_name)

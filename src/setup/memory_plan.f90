@@ -9,7 +9,7 @@ module memory_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, brief, to_text, exit_files
   use parallel_m, only: nproc, is_root, global_max
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, has_flow
   use tet_mesh_m, only: shape_t
   use machine_memory_m, only: available_memory, memory_limit
   implicit none
@@ -36,7 +36,7 @@ contains
 
     blocks = size(case%body) + sum(int(case%drop%count, i8))
     bytes = bytes_at_rest
-    if (case%run%physics /= 'dry') then
+    if (has_flow(case%run)) then
       each = bytes_per_cell
       if (case%numerics%momentum == 'c_ismac') each = each + bytes_of_c_ismac
       if (case%run%physics == 'coupled' .and. blocks > 0) each = each + bytes_of_landing

@@ -28,6 +28,7 @@ program test_case_input
   call test_bodies()
   call test_idle()
   call test_physics()
+  call test_given_water()
   call test_options()
   call test_all_at_once()
   call finish_checks()
@@ -288,14 +289,17 @@ contains
     call expect('&run t_end=1e20/'//grid, &
       '&run t_end = 1e20: must be at most 1e9 steps of dt = 0.01 s (line 1)')
     call expect('&run t_end=1 physics=''wet''/'//grid, &
-      '&run physics = ''wet'': unknown, must be one of ''coupled'', ''fluid'', ''dry'' (line 1)')
+      '&run physics = ''wet'': unknown, must be one of ''coupled'', ''fluid'', ''dry'', ' &
+      //'''light'' (line 1)')
     call expect('&run t_end=1 physics=''Dry''/'//grid, &
-      '&run physics = ''Dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'' (line 1)')
+      '&run physics = ''Dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'', ' &
+      //'''light'' (line 1)')
     call expect('&run t_end=1 physics=''''/'//grid, &
-      '&run physics = '''': unknown, must be one of ''coupled'', ''fluid'', ''dry'' (line 1)')
+      '&run physics = '''': unknown, must be one of ''coupled'', ''fluid'', ''dry'', ' &
+      //'''light'' (line 1)')
     call expect('&run t_end=1 physics=''fluid dry''/'//grid, &
-      '&run physics = ''fluid dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'' ' &
-      //'(line 1)')
+      '&run physics = ''fluid dry'': unknown, must be one of ''coupled'', ''fluid'', ''dry'', ' &
+      //'''light'' (line 1)')
     call expect('&run t_end=1 cfl_max=-.1/'//grid, &
       '&run cfl_max = -.1: must not be negative [-]; 0 keeps dt fixed (line 1)')
     call expect('&run t_end=1 output='' ''/'//grid, &
@@ -549,6 +553,7 @@ contains
       //'&body shape=''c'' position=3*0/ &drop shape=''c'' position=3*1/'//lf
     character(*), parameter :: dry = ' no meaning with physics = ''dry'', passed over (line '
     character(*), parameter :: fluid = ' no meaning with physics = ''fluid'', passed over (line '
+    character(*), parameter :: light = ' no meaning with physics = ''light'', passed over (line '
 
     call warn('physics=''dry'' cfl_max=1', '&fluid gravity=3*1 water_level=1 single_phase=F/'//lf &
       //'&numerics coupling=''mics''/ &contact friction=1 lubrication=F/'//lf &
@@ -571,7 +576,42 @@ contains
       //'&contact lubrication=T/'//lf//blocks, '')
     call warn('physics=''dry''', '&fluid single_phase=T/ &water min=3*0 max=3*1/', '&water: has' &
       //dry//'3)|&fluid single_phase: has'//dry//'3)')
+    call warn('physics=''dry''', '&shape name=''c'' kind=''cube'' size=1 drag_coefficient=1/', &
+      '&shape drag_coefficient: has'//dry//'3)')
+    call warn('physics=''coupled''', '&shape name=''c'' kind=''cube'' size=1 drag_coefficient=1/', &
+      '&shape drag_coefficient: has no meaning with physics = ''coupled'', passed over (line 3)')
+    call warn('physics=''light'' cfl_max=1', '&fluid water_level=1 velocity=1,0,0 ' &
+      //'gas_density=1/ &numerics coupling=''mics''/ &contact lubrication=T/'//lf &
+      //'&shape name=''c'' kind=''cube'' size=1 drag_coefficient=0/', '&numerics: has'//light &
+      //'3)|&run cfl_max: has'//light//'1)|&fluid gas_density: has'//light &
+      //'3)|&contact lubrication: has'//light//'3)')
   end subroutine test_physics
+
+  !> What a water without a flow must have and cannot have.
+  subroutine test_given_water()
+    character(*), parameter :: given = '&run t_end=1 physics=''light''/ '
+    character(*), parameter :: light = 'physics = ''light'' '
+    character(*), parameter :: stream = 'has no stream through a side; the current is &fluid ' &
+      //'velocity (line 2)'
+
+    call expect(given//'&fluid water_level=.1/ &boundary x_min=''open'' y_min=''periodic'' ' &
+      //'y_max=''periodic''/'//grid, '')
+    call expect(given//grid, '&fluid: '//light &
+      //'needs water_level, the level of the water that is given [m]')
+    call expect(given//'&fluid single_phase=T/'//grid, '&fluid single_phase = T: '//light &
+      //'needs a level of the water (line 1)')
+    call expect(given//'&fluid water_level=.1 gravity=1,0,-9 velocity=0,0,1/'//grid, &
+      '&fluid gravity = 1, 0, -9: '//light//'has a level, gravity must point straight down ' &
+      //'(line 1)|&fluid velocity = 0, 0, 1: '//light//'has a current along the level, its z ' &
+      //'component must be 0 (line 1)')
+    call expect(given//'&fluid water_level=.1 gravity=0,0,9/'//grid, &
+      '&fluid gravity = 0, 0, 9: '//light//'has a level, gravity must point straight down (line 1)')
+    call expect(given//'&fluid water_level=.1/'//lf//'&boundary x_min=''inflow'' ' &
+      //'x_min_velocity=1,0,0 x_max=''outflow'' z_min=''open''/'//grid, &
+      '&boundary x_min = ''inflow'': '//light//stream//'|&boundary x_max = ''outflow'': ' &
+      //light//stream//'|&boundary z_min = ''open'': '//light &
+      //'keeps its water, the floor cannot be open (line 2)')
+  end subroutine test_given_water
 
   !> Read a good case with these variables of &run and compare all warnings, '|' between them.
   subroutine warn(of_run, groups, messages)
