@@ -9,7 +9,7 @@ from verify import LEVELS
 
 pytestmark = pytest.mark.cost(10)
 
-COST = 20.0
+COST = 10.0
 """Longest run [s] that is part of `make test`."""
 
 
