@@ -10,7 +10,7 @@ module polyhedron_m
   private
   public :: polyhedron_t, max_corners
   public :: polyhedron_of_tet, polyhedron_of_box, cut_polyhedron, cut_polyhedron_by_box
-  public :: polyhedron_moments, polyhedron_moments_below
+  public :: polyhedron_moments, polyhedron_moments_below, polyhedron_faces
   public :: tet_volume, tet_moments_below, clip_tet_to_box, box_clip_moments_below
 
   integer, parameter :: max_corners = 64   !! a polyhedron of up to 30 faces can be cut safely
@@ -328,6 +328,38 @@ contains
     volume = volume/6.0_wp
     moment = moment/24.0_wp + volume*p%x(:, 1)
   end subroutine polyhedron_moments
+
+  !> Faces of a polyhedron: face f has the corners `corner(first(f):first(f + 1) - 1)` in order.
+  pure subroutine polyhedron_faces(p, n_faces, first, corner)
+    type(polyhedron_t), intent(in) :: p
+    integer, intent(out) :: n_faces, first(:)   !! a polyhedron of n corners has n/2 + 2 faces
+    integer, intent(out) :: corner(:)           !! (3*n)
+    logical :: done(3, max_corners)
+    integer :: v, slot, from, here, at, m
+
+    done = .false.
+    n_faces = 0
+    m = 0
+    do v = 1, p%n
+      do slot = 1, 3
+        if (done(slot, v)) cycle
+        n_faces = n_faces + 1
+        first(n_faces) = m + 1
+        from = v
+        at = slot
+        do
+          done(at, from) = .true.
+          m = m + 1
+          corner(m) = from
+          here = p%link(at, from)
+          at = before(slot_of(p%link(:, here), from))
+          from = here
+          if (from == v) exit
+        end do
+      end do
+    end do
+    first(n_faces + 1) = m + 1
+  end subroutine polyhedron_faces
 
   !> Volume and first moment of the part with `n.x <= d`; the polyhedron stays as it is.
   pure subroutine polyhedron_moments_below(p, n, d, volume, moment)

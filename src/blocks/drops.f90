@@ -7,12 +7,14 @@ module drops_m
   use case_types_m, only: drop_input_t
   use vectors_m, only: quaternion_from_axis, quaternion_product, normalised
   use random_counter_m, only: uniform, random_rotation
+  use tet_mesh_m, only: shape_t, is_called
   implicit none
   private
-  public :: draw_drop
+  public :: draw_drop, draw_shape
 
   integer, parameter :: k_shift = 101   !! k_shift .. k_shift+2: shift along x, y, z
   integer, parameter :: k_tilt = 111    !! angle; k_tilt+1, k_tilt+2: axis
+  integer, parameter :: k_member = 131  !! stone of a family
 
 contains
 
@@ -39,6 +41,25 @@ contains
     case default; error stop 'draw_drop: no such orientation'
     end select
   end subroutine draw_drop
+
+  !> Number of the shape of that name, or of a stone of that family drawn for block number `index`
+  !! of a drop; 0 if there is none.
+  pure function draw_shape(name, seed, index, shapes) result(s)
+    character(*), intent(in) :: name
+    integer, intent(in) :: seed, index
+    type(shape_t), intent(in) :: shapes(:)
+    integer :: s
+    integer :: n
+
+    n = count(is_called(shapes, name))
+    if (n > 1) n = 1 + int(n*uniform(seed, index, k_member))
+    do s = 1, size(shapes)
+      if (.not. is_called(shapes(s), name)) cycle
+      n = n - 1
+      if (n == 0) return
+    end do
+    s = 0
+  end function draw_shape
 
   !> A unit vector, uniform over the sphere: the height is uniform and so is the azimuth.
   pure function random_axis(seed, index) result(axis)

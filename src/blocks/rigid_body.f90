@@ -12,7 +12,7 @@ module rigid_body_m
   use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, &
     normalised
   use tet_mesh_m, only: shape_t
-  use drops_m, only: draw_drop
+  use drops_m, only: draw_drop, draw_shape
   implicit none
   private
   public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share
@@ -87,7 +87,7 @@ contains
     do i = 1, size(case%drop)
       do k = 1, case%drop(i)%count
         b = b + 1
-        blocks%shape(b) = shape_number(shapes, case%drop(i)%shape)
+        blocks%shape(b) = draw_shape(case%drop(i)%shape, case%drop(i)%seed, k, shapes)
         blocks%release_time(b) = case%drop(i)%first_time + real(k - 1, wp)*case%drop(i)%interval
         blocks%given%v(:, b) = case%drop(i)%velocity
         call draw_drop(case%drop(i), k, blocks%x(:, b), blocks%q(:, b))

@@ -3,13 +3,14 @@ module block_groups_m
   use kinds_m, only: wp, name_length, pi
   use vectors_m, only: quaternion_from_axis
   use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
-    bed_input_t, absent, size_count
+    bed_input_t, absent, size_count, max_variants
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
     between
   use group_visitor_m, only: group_visitor_t
   use run_groups_m, only: shortest
   use fluid_groups_m, only: lightest
   use value_text_m, only: nearest_name, quoted_text
+  use errors_m, only: to_text
   implicit none
   private
   public :: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
@@ -103,7 +104,7 @@ contains
     call v%name('name', shape%name, 'what &body and &drop call the shape', &
       example='''hexapod''', required=.true.)
     call v%option('kind', shape%kind, &
-      'hexapod cube box sphere cylinder tetrapod dolos reef_cube file', &
+      'hexapod cube box sphere cylinder tetrapod dolos reef_cube rock file', &
       'the form, such as ''hexapod''', example='size = 0.02  kind = ''hexapod''', &
       required=.true.)
     if (shape%kind /= '') then
@@ -111,6 +112,11 @@ contains
         'the file has the size and the tetrahedra')
       call v%without_meaning(shape%kind /= 'file', 'file scale', &
         'kind = '//quoted_text(trim(shape%kind)), 'only kind = ''file'' has it')
+      call v%without_meaning(shape%kind == 'rock', 'size', 'kind = ''rock''', &
+        'mass_50 and density give the size')
+      call v%without_meaning(shape%kind /= 'rock', 'seed variants mass_50 uniformity mass_min ' &
+        //'mass_max elongation blockiness', 'kind = '//quoted_text(trim(shape%kind)), &
+        'only kind = ''rock'' has it')
       call v%without_meaning(shape%kind == 'sphere', 'spheres sphere_spacing', &
         'kind = ''sphere''', 'a sphere touches as one')
     end if
@@ -120,9 +126,9 @@ contains
     most = merge(3, n, n == 0)
     lengths = between(shortest, 1.0_wp/shortest, 'm')
     lengths%fewest = max(n, 1)
-    call v%real('size', shape%size(:most), lengths, 'for every kind but ''file''. box: ' &
-      //size_meaning('box')//'; cylinder: '//size_meaning('cylinder')//'; hexapod: ' &
-      //size_meaning('hexapod')//'; cube: '//size_meaning('cube')//'; sphere: ' &
+    call v%real('size', shape%size(:most), lengths, 'for every kind but ''file'' and ' &
+      //'''rock''. box: '//size_meaning('box')//'; cylinder: '//size_meaning('cylinder') &
+      //'; hexapod: '//size_meaning('hexapod')//'; cube: '//size_meaning('cube')//'; sphere: ' &
       //size_meaning('sphere')//'; others: '//size_meaning('tetrapod'), &
       example='kind = ''box''  size = 0.02, 0.03, 0.04')
     call v%real('density', shape%density, between(lightest, 1.0_wp/lightest, 'kg/m3'), &
@@ -148,7 +154,43 @@ contains
     call v%real('drag_coefficient', shape%drag_coefficient, not_negative('-'), &
       'for physics = ''light'' only: C of the drag on each facet, C/3 of the whole surface for ' &
       //'a compact block; `mics-tools calibrate` fits it to resolved falls', example='0.6')
+    call visit_rock(v, shape)
   end subroutine visit_shape
+
+  !> The variables of `&shape` that a family of stones has.
+  subroutine visit_rock(v, shape)
+    type(group_visitor_t), intent(inout) :: v
+    type(shape_input_t), intent(inout) :: shape
+    character(*), parameter :: kind = 'kind = ''rock''  '
+
+    call v%integer('seed', shape%seed, any_whole(), 'for kind = ''rock'': the stones; another ' &
+      //'number draws others, the same number the same on every machine', example=kind//'seed = 7')
+    call v%integer('variants', shape%variants, between(1, max_variants), 'for kind = ''rock'': ' &
+      //'stones of the family, NAME-01 and so on; each drop draws one, each &body takes the next', &
+      example=kind//'variants = 50')
+    call v%real('mass_50', shape%mass_50, positive('kg'), 'for kind = ''rock'': half of the ' &
+      //'stones are lighter, before mass_min and mass_max cut the grade', &
+      example=kind//'mass_50 = 60')
+    call v%real('uniformity', shape%uniformity, between(0.1_wp, 100.0_wp, '-'), 'for kind = ' &
+      //'''rock'': n of Rosin and Rammler, mass = mass_50 (ln(1/(1 - y))/ln 2)^(1/n) with the ' &
+      //'share y of the stones lighter; larger is more uniform', example=kind//'uniformity = 5')
+    call v%real('mass_min', shape%mass_min, not_negative('kg', zero='0 means no bound'), &
+      'for kind = ''rock'': no stone is lighter', example=kind//'mass_min = 0.05')
+    call v%real('mass_max', shape%mass_max, not_negative('kg', zero='0 means no bound'), &
+      'for kind = ''rock'': no stone is heavier', example=kind//'mass_max = 0.2')
+    call v%real('elongation', shape%elongation, between(1.0_wp, 10.0_wp, '-'), &
+      'for kind = ''rock'': longest over shortest edge of the box around a stone', &
+      example=kind//'elongation = 2')
+    call v%real('blockiness', shape%blockiness, between(0.3_wp, 0.9_wp, '-'), &
+      'for kind = ''rock'': volume of a stone over that of the box around it', &
+      example=kind//'blockiness = 0.6')
+    if (shape%kind /= 'rock' .or. .not. v%reading) return
+    call v%require('name', len_trim(shape%name) <= name_length - 5, 'the name of a family has at ' &
+      //'most '//to_text(name_length - 5)//' letters, its stones are numbered')
+    if (shape%mass_max <= 0.0_wp .or. .not. v%good('mass_min mass_max mass_50 uniformity')) return
+    call v%require('mass_max', shape%mass_max > shape%mass_min, 'must be above mass_min = ' &
+      //to_text(shape%mass_min)//' kg, or 0 for no bound')
+  end subroutine visit_rock
 
   !> What the size of a kind of shape means [m].
   pure function size_meaning(kind) result(meaning)

@@ -6,7 +6,7 @@
 module case_input_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use case_types_m, only: case_t, is_given, has_flow
+  use case_types_m, only: case_t, shape_input_t, is_given, has_flow, member_name, max_variants
   use boundary_kinds_m, only: side_code, gives_pressure
   use namelist_text_m, only: namelist_text_t, group_text_t, cut_groups
   use description_m, only: group_description_t
@@ -15,7 +15,8 @@ module case_input_m
   use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics
   use idle_variables_m, only: find_idle
   use block_groups_m, only: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
-  use value_text_m, only: nearest_name, lower_case, printable, quoted_text
+  use value_text_m, only: nearest_name, lower_case, printable, quoted_text, &
+    parse_integer, value_ok
   implicit none
   private
   public :: read_case, parameters_text, describe_groups
@@ -53,10 +54,50 @@ contains
     end do
     call read_missing_groups(n, v, case)
     call check_together(list, case, v)
+    call name_members(case)
     problems = v%problems
     if (present(passed_over)) passed_over = v%passed_over
     if (case%run%physics == 'fluid') call leave_out_blocks(case)
   end subroutine read_case
+
+  !> A family of stones becomes one shape for each; each body that names the family takes the next.
+  subroutine name_members(case)
+    type(case_t), intent(inout) :: case
+    type(shape_input_t), allocatable :: all(:)
+    integer :: s, k, n, b
+
+    n = 0
+    do s = 1, size(case%shape)
+      n = n + max(1, members(case%shape(s)))
+    end do
+    allocate (all(n))
+    n = 0
+    do s = 1, size(case%shape)
+      associate (family => case%shape(s))
+        do k = min(1, members(family)), members(family)
+          n = n + 1
+          all(n) = family
+          all(n)%member = k
+        end do
+        if (members(family) == 0) cycle
+        k = 0
+        do b = 1, size(case%body)
+          if (case%body(b)%shape /= family%name) cycle
+          case%body(b)%shape = member_name(family, 1 + mod(k, family%variants))
+          k = k + 1
+        end do
+      end associate
+    end do
+    call move_alloc(all, case%shape)
+  end subroutine name_members
+
+  !> Stones of a family; 0 for any other shape.
+  pure function members(shape) result(n)
+    type(shape_input_t), intent(in) :: shape
+    integer :: n
+
+    n = merge(shape%variants, 0, shape%kind == 'rock')
+  end function members
 
   !> Fluid alone: the blocks that the case names and their shapes are not there.
   subroutine leave_out_blocks(case)
@@ -162,7 +203,8 @@ contains
     case ('water')
       input%water(n)%faulty = faulty('min max')
     case ('shape')
-      input%shape(n)%faulty = faulty('name kind size file scale refinement')
+      input%shape(n)%faulty = faulty('name kind size file scale refinement seed ' &
+        //'variants mass_50 uniformity mass_min mass_max elongation blockiness')
     case ('body')
       input%body(n)%faulty = faulty('shape position quaternion axis angle_deg')
       input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time')
@@ -200,23 +242,52 @@ contains
     end do
   end subroutine read_missing_groups
 
-  !> The names the shapes of the case were given, right or wrong.
+  !> The names the shapes of the case were given, right or wrong, and those of the stones of
+  !! families.
   pure function shape_names(list) result(names)
     type(namelist_text_t), intent(in) :: list
     character(name_length), allocatable :: names(:)
-    integer :: i, j, n
+    type(shape_input_t) :: family
+    integer :: i, k
 
-    allocate (names(count_groups(list, 'shape')))
-    names = ''
-    n = 0
+    allocate (names(0))
     do i = 1, list%n
       if (list%group(i)%name /= 'shape') cycle
-      n = n + 1
-      j = list%group(i)%find('name')
-      if (j == 0) cycle
-      if (list%group(i)%assignment(j)%n > 0) names(n) = list%group(i)%assignment(j)%value(1)%text
+      family = shape_input_t(name=first_value(list%group(i), 'name'), &
+        kind=first_value(list%group(i), 'kind'))
+      names = [character(name_length) :: names, family%name]
+      if (family%kind /= 'rock') cycle
+      family%variants = given_variants(list%group(i))
+      names = [character(name_length) :: names, &
+        [(member_name(family, k), k=1, family%variants)]]
     end do
   end function shape_names
+
+  !> The first value that a group gives a variable, as text; empty if it gives none.
+  pure function first_value(group, variable) result(text)
+    type(group_text_t), intent(in) :: group
+    character(*), intent(in) :: variable
+    character(name_length) :: text
+    integer :: j
+
+    text = ''
+    j = group%find(variable)
+    if (j == 0) return
+    if (group%assignment(j)%n > 0) text = group%assignment(j)%value(1)%text
+  end function first_value
+
+  !> How many stones a family has, as far as the group can be read.
+  pure function given_variants(group) result(n)
+    type(group_text_t), intent(in) :: group
+    integer :: n
+    type(shape_input_t) :: by_default
+    integer :: info
+
+    n = by_default%variants
+    if (first_value(group, 'variants') == '') return
+    call parse_integer(trim(first_value(group, 'variants')), n, info)
+    if (info /= value_ok .or. n < 1 .or. n > max_variants) n = by_default%variants
+  end function given_variants
 
   !> Checks across groups.
   subroutine check_together(list, case, v)
@@ -323,18 +394,21 @@ contains
       light//'has a level, z cannot be periodic')
   end subroutine check_given_water
 
-  !> Names of shapes are unique, capital or small letters apart.
+  !> Names of shapes are unique, capital or small letters apart, those of stones included.
   subroutine check_names(case, problems)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: problems
-    character(name_length) :: small(size(case%shape))
+    character(name_length) :: small
     integer :: i, j
 
     do i = 1, size(case%shape)
-      small(i) = lower_case(case%shape(i)%name)
-      if (small(i) == '') cycle
-      do j = 1, i - 1
-        if (small(i) /= small(j)) cycle
+      small = lower_case(case%shape(i)%name)
+      if (small == '') cycle
+      do j = 1, size(case%shape)
+        if (j == i) cycle
+        if (small /= lower_case(case%shape(j)%name) .or. j > i) then
+          if (.not. is_member(small, case%shape(j))) cycle
+        end if
         call problems%add_message('&shape name = '//quoted_text(trim(case%shape(i)%name)) &
           //': the &shape on line '//to_text(case%shape(j)%line)//' has this name already', &
           case%shape(i)%line)
@@ -342,6 +416,16 @@ contains
       end do
     end do
   end subroutine check_names
+
+  !> Does a stone of a family have this name, in small letters?
+  pure function is_member(name, family) result(yes)
+    character(name_length), intent(in) :: name
+    type(shape_input_t), intent(in) :: family
+    logical :: yes
+    integer :: k
+
+    yes = any([(lower_case(member_name(family, k)) == name, k=1, members(family))])
+  end function is_member
 
   !> Every parameter of a case after defaults, as the text of a case with the same meaning.
   function parameters_text(case) result(text)
@@ -355,6 +439,9 @@ contains
     copy = case
     do g = 1, size(groups)
       do i = 1, number_of(copy, groups(g))
+        if (groups(g) == 'shape') then
+          if (copy%shape(i)%member > 1) cycle   ! of a family already written
+        end if
         call v%start_writing(trim(groups(g)))
         call visit_group(v, copy, groups(g), i, no_names)
       end do

@@ -8,10 +8,13 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved
+  public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved, member_name
+  public :: max_variants
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
   character(*), parameter :: not_resolved = 'light: not resolved, no flow is computed'
+
+  integer, parameter :: max_variants = 5000   !! stones of a family
 
   type :: run_t
     character(:), allocatable :: title, output
@@ -101,6 +104,11 @@ module case_types_m
     character(name_length) :: spheres = 'centroid'
     real(wp) :: sphere_spacing = 0.0_wp             !! [m]
     real(wp) :: drag_coefficient = 0.55_wp          !! of the facets, in 'light' [-]
+    integer :: seed = 1, variants = 20              !! 'rock': the draw, stones of the family
+    real(wp) :: mass_50 = 0.1_wp, uniformity = 3.0_wp    !! M50 and n of Rosin and Rammler [kg, -]
+    real(wp) :: mass_min = 0.0_wp, mass_max = 0.0_wp     !! [kg], 0: no bound
+    real(wp) :: elongation = 1.5_wp, blockiness = 0.5_wp
+    integer :: member = 0                           !! this stone of the family; 0: all, or no rock
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! its form is not known
   end type shape_input_t
@@ -175,7 +183,7 @@ contains
     yes = run%physics == 'coupled' .or. run%physics == 'fluid'
   end function has_flow
 
-  !> How many lengths the size of a kind of shape has; 0 where it comes from a file.
+  !> How many lengths the size of a kind of shape has; 0 where it comes from a file or a mass.
   pure function size_count(kind) result(n)
     character(*), intent(in) :: kind
     integer :: n
@@ -183,10 +191,25 @@ contains
     select case (kind)
     case ('box'); n = 3
     case ('cylinder'); n = 2
-    case ('file'); n = 0
+    case ('file', 'rock'); n = 0
     case default; n = 1
     end select
   end function size_count
+
+  !> The name of a stone of a family, as in `rock-07`; of other shapes their own.
+  pure function member_name(shape, member) result(name)
+    type(shape_input_t), intent(in) :: shape
+    integer, intent(in) :: member   !! 1 .. variants; 0: the family
+    character(name_length) :: name
+    character(4) :: number
+
+    name = shape%name
+    if (member == 0) return
+    write (number, '(i4.4)') member
+    if (shape%variants < 1000) number = number(2:)
+    if (shape%variants < 100) number = number(2:)
+    name = trim(name)//'-'//number
+  end function member_name
 
   !> Shortest edge of a cell, of the directions that have more than one [m].
   pure function smallest_spacing(grid) result(h)

@@ -11,10 +11,10 @@ module case_check_m
   use boundary_kinds_m, only: side_code, side_periodic, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, is_called
   use shapes_builtin_m, only: make_shape, given_size
   use rigid_body_m, only: blocks_t, blocks_init
-  use drops_m, only: draw_drop
+  use drops_m, only: draw_drop, draw_shape
   use wave_step_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
@@ -54,8 +54,10 @@ contains
     type(shape_t) :: empty
     character(:), allocatable :: message
     real(wp) :: samples
-    integer :: s
+    logical :: told(size(case%shape))   ! of stones: that of the first of the family
+    integer :: s, first
 
+    told = .false.
     allocate (shapes(size(case%shape)))
     do s = 1, size(case%shape)
       if (case%shape(s)%faulty) cycle
@@ -73,7 +75,9 @@ contains
       end if
       if (len(message) == 0) cycle
       shapes(s) = empty
-      call problems%add_message('&shape '//message, case%shape(s)%line)
+      first = s - max(case%shape(s)%member - 1, 0)
+      if (.not. told(first)) call problems%add_message('&shape '//message, case%shape(s)%line)
+      told(first) = .true.
     end do
   end subroutine make_shapes
 
@@ -143,7 +147,7 @@ contains
 
     shortest = minval(case%grid%length, case%boundary%kind(1, :) == 'periodic')
     do s = 1, size(shapes)
-      if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s)%name)) cycle
+      if (shapes(s)%volume <= 0.0_wp .or. .not. in_use(case, shapes(s))) cycle
       if (2*shapes(s)%radius <= 0.5_wp*shortest) cycle   ! no need to look closer
       length = longest_line(shapes(s))
       do d = 1, 3
@@ -158,12 +162,12 @@ contains
   end subroutine check_lengths
 
   !> Does a body or a drop have this shape?
-  pure function in_use(case, name) result(yes)
+  pure function in_use(case, shape) result(yes)
     type(case_t), intent(in) :: case
-    character(*), intent(in) :: name
+    type(shape_t), intent(in) :: shape
     logical :: yes
 
-    yes = any(case%body%shape == name) .or. any(case%drop%shape == name)
+    yes = any(is_called(shape, case%body%shape)) .or. any(is_called(shape, case%drop%shape))
   end function in_use
 
   !> Largest distance between two points of a shape, which are corners of its facets [m].
@@ -434,11 +438,11 @@ contains
     integer :: b, k, n
 
     b = scene%n + 1
-    scene%blocks%shape(b) = findloc_name(scene%blocks%shapes, drop%shape)
-    if (scene%blocks%shape(b) == 0) return
     n = 0
     first = ''
     do k = 1, drop%count
+      scene%blocks%shape(b) = draw_shape(drop%shape, drop%seed, k, scene%blocks%shapes)
+      if (scene%blocks%shape(b) == 0) return
       call draw_drop(drop, k, scene%blocks%x(:, b), scene%blocks%q(:, b))
       scene%blocks%release_time(b) = drop%first_time + real(k - 1, wp)*drop%interval
       reason = hindrance(case, scene, b)
@@ -476,16 +480,5 @@ contains
       exit
     end do
   end function hindrance
-
-  !> Number of the shape of that name; 0 if there is none.
-  pure function findloc_name(shapes, name) result(s)
-    type(shape_t), intent(in) :: shapes(:)
-    character(*), intent(in) :: name
-    integer :: s
-
-    do s = size(shapes), 1, -1
-      if (shapes(s)%name == name) return
-    end do
-  end function findloc_name
 
 end module case_check_m

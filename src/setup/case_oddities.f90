@@ -6,7 +6,8 @@ module case_oddities_m
     has_flow
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, extreme_of_family
+  use drops_m, only: draw_shape
   use bed_m, only: bed_t
   use fall_m, only: fall_t, find_fall, as_drop
   use machine_memory_m, only: available_memory
@@ -54,7 +55,7 @@ contains
     call look_at_times(case, oddities)
     call look_at_heights(case, shapes, bed, oddities)
     do s = 1, size(shapes)
-      call look_at_shape(case, case%shape(s), shapes(s), oddities)
+      if (extreme_of_family(shapes, s)) call look_at_shape(case, case%shape(s), shapes(s), oddities)
     end do
   end subroutine find_oddities
 
@@ -133,6 +134,7 @@ contains
       case%contact%lubrication, 'has no effect: only blocks of kind ''sphere'' have such films')
     if (case%contact%model /= 'surface') return
     do s = 1, size(case%shape)
+      if (case%shape(s)%member > 1) cycle   ! one of a family is enough
       if (case%shape(s)%spheres /= 'centroid') call oddities%add('&shape spheres', &
         trim(case%shape(s)%spheres), 'of '//trim(case%shape(s)%name)//': no sphere touches with ' &
         //'&contact model = ''surface'', they only come into run.h5', case%shape(s)%line)
@@ -200,10 +202,8 @@ contains
 
       above = drop%position(3) - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return   ! no need to look closer
-      do s = 1, size(shapes)
-        if (shapes(s)%name == drop%shape) exit
-      end do
-      if (s > size(shapes)) return
+      s = draw_shape(drop%shape, drop%seed, 1, shapes)
+      if (s == 0) return
       call find_fall(case, drop, shapes(s), bed, fall)
       above = fall%bottom - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return
@@ -218,14 +218,18 @@ contains
   subroutine look_at_seeds(case, oddities)
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: oddities
+    logical :: random(size(case%drop))
     integer :: i
 
-    do i = 2, size(case%drop)
+    random = is_random(case%drop)
+    do i = 1, size(case%drop)
+      random(i) = random(i) .or. any(case%shape%member > 0 &
+        .and. case%shape%name == case%drop(i)%shape)
       associate (drop => case%drop(i))
-        if (.not. is_random(drop)) cycle
-        if (.not. any(case%drop(:i - 1)%seed == drop%seed .and. is_random(case%drop(:i - 1)))) cycle
+        if (.not. random(i)) cycle
+        if (.not. any(case%drop(:i - 1)%seed == drop%seed .and. random(:i - 1))) cycle
         call oddities%add('&drop seed', drop%seed, 'is that of another &drop too: their blocks ' &
-          //'have the same shifts and turns', drop%line)
+          //'have the same shifts, turns and stones', drop%line)
       end associate
     end do
   end subroutine look_at_seeds
@@ -249,7 +253,7 @@ contains
     real(wp) :: extent, cells, min_turning   ! [m], [cells], [kg/m3]
     real(wp) :: lowest, highest                ! contact spheres over the surface [m]
 
-    name = trim(input%name)
+    name = trim(shape%name)
     extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
     if (input%density < min_density) call oddities%add('&shape density', input%density, &
       'of '//name//' is in kg/m3; concrete has about 2300', input%line)

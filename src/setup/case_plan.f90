@@ -10,7 +10,8 @@ module case_plan_m
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, give_share
   use rest_depth_m, only: heaviest_mass
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, extreme_of_family
+  use drops_m, only: draw_shape
   use bed_m, only: bed_t
   use wave_step_m, only: gravity_step, capillary_step
   use machine_memory_m, only: available_memory
@@ -188,6 +189,7 @@ contains
     end if
     g = norm2(case%fluid%gravity)
     do s = 1, size(shapes)
+      if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
       submerged = '-'
       if (case%run%physics /= 'dry') submerged = brief((mass - case%fluid%liquid_density &
@@ -202,7 +204,11 @@ contains
     end do
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') call print_file_shape(unit, case%shape(s), shapes(s))
-      if (case%run%physics == 'light') call print_added_mass(unit, case%shape(s), shapes(s))
+      if (case%shape(s)%member == 1) call print_family(unit, pack(shapes, shapes%family &
+        == shapes(s)%family))
+      if (case%run%physics == 'light' .and. extreme_of_family(shapes, s)) then
+        call print_added_mass(unit, case%shape(s), shapes(s))
+      end if
     end do
   end subroutine print_shapes
 
@@ -218,6 +224,27 @@ contains
       //' and inertia '//brief(added%inertia, 2)//' of the displaced, drag coefficient ' &
       //brief(input%drag_coefficient)//' on the facets')
   end subroutine print_added_mass
+
+  !> The stones of a family; the table has its lightest and its heaviest.
+  subroutine print_family(unit, stones)
+    integer, intent(in) :: unit
+    type(shape_t), intent(in) :: stones(:)
+    real(wp) :: mass(size(stones))
+    logical :: heavier(size(stones))
+    real(wp) :: half(2)   ! half of the stones, half of the mass is lighter [kg]
+    integer :: s
+
+    mass = stones%density*stones%volume
+    half = maxval(mass)
+    do s = 1, size(mass)
+      heavier = mass > mass(s)
+      if (2*count(heavier) <= size(mass)) half(1) = min(half(1), mass(s))
+      if (2*sum(mass, heavier) <= sum(mass)) half(2) = min(half(2), mass(s))
+    end do
+    call entry(unit, trim(stones(1)%family), to_text(size(stones))//' stones of '//brief(sum(mass) &
+      /real(size(mass), wp))//' kg on average; half of the stones up to '//brief(half(1)) &
+      //' kg, half of the mass up to '//brief(half(2))//' kg')
+  end subroutine print_family
 
   !> How long a block from a file is, so that a wrong unit shows.
   subroutine print_file_shape(unit, input, shape)
@@ -273,11 +300,14 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     character(:), allocatable :: text
     real(wp) :: rise   ! [m]
-    integer :: i
+    integer :: i, k, s
 
     rise = 0.0_wp
     do i = 1, size(case%drop)
-      rise = rise + real(case%drop(i)%count, wp)*volume_of(shapes, case%drop(i)%shape)
+      do k = 1, case%drop(i)%count
+        s = draw_shape(case%drop(i)%shape, case%drop(i)%seed, k, shapes)
+        if (s > 0) rise = rise + shapes(s)%volume
+      end do
     end do
     do i = 1, size(case%body)
       if (case%body(i)%release_time > 0.0_wp) rise = rise + volume_of(shapes, case%body(i)%shape)
@@ -365,6 +395,7 @@ contains
     call choose_law(case%contact, law)
     heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
     do s = 1, size(shapes)
+      if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
       k = law%normal_constant(mass, heaviest, give_share*shapes(s)%smallest_edge)
       call entry(unit, 'stiffness on a wall', brief(k)//' N/m for '//trim(shapes(s)%name))

@@ -4,6 +4,7 @@ module fall_plan_m
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, drop_input_t
   use tet_mesh_m, only: shape_t
+  use drops_m, only: draw_shape
   use bed_m, only: bed_t
   use fall_m, only: fall_t, find_fall, as_drop, gravity_down
   use plan_text_m, only: heading, entry
@@ -61,10 +62,8 @@ contains
       character(:), allocatable :: label, start
       integer :: s
 
-      do s = 1, size(shapes)
-        if (shapes(s)%name == drop%shape) exit
-      end do
-      if (s > size(shapes)) return
+      s = draw_shape(drop%shape, drop%seed, 1, shapes)
+      if (s == 0) return
       call find_fall(case, drop, shapes(s), bed, fall)
       label = trim(drop%shape)
       if (drop%line > 0) label = group//' on line '//to_text(drop%line)

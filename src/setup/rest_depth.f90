@@ -3,7 +3,7 @@ module rest_depth_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, brief
   use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, is_called, extreme_of_family
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest, give_share
@@ -34,7 +34,7 @@ contains
     call choose_law(case%contact, law)
     heaviest = load_of(heaviest_mass(case, shapes), norm2(case%fluid%gravity))
     do s = 1, size(shapes)
-      if (n_free(case, shapes(s)) == 0) cycle
+      if (n_free(case, shapes(s)) == 0 .or. .not. extreme_of_family(shapes, s)) cycle
       depth = rest_depth(case, shapes(s), law, heaviest)
       give = give_share*shapes(s)%smallest_edge
       if (.not. depth > 1.000001_wp*give) cycle   ! the law itself may aim at it
@@ -100,7 +100,7 @@ contains
     integer :: n
 
     n = count(case%body%shape == shape%name .and. .not. case%body%fixed) &
-      + sum(case%drop%count, case%drop%shape == shape%name)
+      + sum(case%drop%count, is_called(shape, case%drop%shape))
   end function n_free
 
 end module rest_depth_m

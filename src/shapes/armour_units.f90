@@ -12,7 +12,7 @@ module armour_units_m
   use tet_mesh_m, only: shape_t
   implicit none
   private
-  public :: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
+  public :: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip, assemble, cuts
 
   real(wp), parameter :: same_point = 1.0e-9_wp   !! distance of points that are one [size]
 

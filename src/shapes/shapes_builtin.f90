@@ -5,12 +5,13 @@
 !! symmetry of the cube, with an odd one those of the regular tetrahedron.
 module shapes_builtin_m
   use kinds_m, only: wp, pi
-  use case_types_m, only: shape_input_t, size_count
+  use case_types_m, only: shape_input_t, size_count, member_name
   use named_files_m, only: found_file
   use tet_mesh_m, only: shape_t, surface_of_tets
   use vectors_m, only: cross
   use mass_properties_m, only: volume_and_centroid, inertia_about_origin, surface_area
   use armour_units_m, only: build_cylinder, build_tetrapod, build_dolos, tetrapod_tip, dolos_tip
+  use rock_m, only: build_rock, share_in_grade
   use contact_sphere_placement_m, only: place_at_centroids, place_inscribed, place_one_sphere
   use dense_spheres_m, only: place_densely
   use shape_file_m, only: read_shape_file
@@ -26,6 +27,7 @@ module shapes_builtin_m
   real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
   real(wp), parameter :: max_slender = 300.0_wp   !! height over diameter, refinement 1
   real(wp), parameter :: shortest = 1.0e-6_wp, longest = 1.0e6_wp   !! block from a file [m]
+  real(wp), parameter :: min_share = 1.0e-6_wp   !! stones of a grade between its bounds [-]
   real(wp), parameter :: max_spheres = 2.0e4_wp, dense_spacing = 0.1_wp   !! [-], [smallest edge]
   integer, parameter :: sphere_frequency = 2   !! parts of an icosahedron edge per refinement
 
@@ -58,11 +60,15 @@ contains
 
     message = problem_with(input)
     if (len(message) > 0) return
-    shape%name = input%name
+    shape%name = member_name(input, input%member)
+    if (input%member > 0) shape%family = input%name
     shape%kind = input%kind
     shape%density = input%density
     if (trim(input%kind) == 'file') then
       call build_from_file(input, shape, message)
+      if (len(message) > 0) return
+    else if (trim(input%kind) == 'rock') then
+      call build_stone(input, shape, message)
       if (len(message) > 0) return
     else
       call build_form(input, shape)
@@ -117,7 +123,7 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(inout) :: shape
     character(:), allocatable, intent(out) :: message
-    real(wp) :: volume, centroid(3), extent
+    real(wp) :: extent
     integer :: m
 
     call read_shape_file(found_file(input%folder, input%file), shape%point, shape%tet, message)
@@ -139,9 +145,45 @@ contains
     shape%facet = [(1 + 3*m, m=0, size(shape%triangle, 2))]
     shape%facet_point = reshape(shape%triangle, [size(shape%triangle)])
     call merge_flat_facets(shape%point, shape%facet, shape%facet_point)
+    call find_smallest_edge(shape)
+  end subroutine build_from_file
+
+  !> A stone of a family.
+  subroutine build_stone(input, shape, message)
+    type(shape_input_t), intent(in) :: input
+    type(shape_t), intent(inout) :: shape
+    character(:), allocatable, intent(out) :: message
+    logical :: found
+
+    if (.not. share_in_grade(input) >= min_share) then
+      message = 'mass_min = '//to_text(input%mass_min)//', mass_max = '//to_text(input%mass_max) &
+        //': leave '//to_text(max(share_in_grade(input), 0.0_wp))//' of the stones of mass_50 = ' &
+        //to_text(input%mass_50)//' and uniformity = '//to_text(input%uniformity) &
+        //', must leave at least '//to_text(min_share)
+      return
+    end if
+    call build_rock(input, shape, found)
+    if (.not. found) then
+      message = 'blockiness = '//to_text(input%blockiness)//': no stone '//trim(shape%name) &
+        //' of this blockiness was found; try another seed'
+      return
+    end if
+    call surface_of_tets(size(shape%point, 2), shape%tet, shape%triangle, shape%triangle_tet)
+    call find_smallest_edge(shape)
+    message = ''
+    if (shape%smallest_edge < shortest .or. shape%smallest_edge > longest) message = &
+      given_size(input)//': the stone '//trim(shape%name)//' is '//to_text(shape%smallest_edge) &
+      //' m thick, it must be between '//to_text(shortest)//' and '//to_text(longest)//' m'
+  end subroutine build_stone
+
+  !> Of a form that names none: the edge of the cube with the same volume over surface.
+  subroutine find_smallest_edge(shape)
+    type(shape_t), intent(inout) :: shape
+    real(wp) :: volume, centroid(3)
+
     call volume_and_centroid(shape%point, shape%tet, volume, centroid)
     shape%smallest_edge = 6.0_wp*volume/surface_area(shape%point, shape%triangle)
-  end subroutine build_from_file
+  end subroutine find_smallest_edge
 
   !> Points, tetrahedra, facets and smallest edge of a block.
   subroutine build_form(input, shape)
@@ -203,7 +245,8 @@ contains
 
     message = ''
     select case (trim(input%kind))
-    case ('hexapod', 'cube', 'sphere', 'tetrapod', 'dolos', 'reef_cube', 'box', 'cylinder', 'file')
+    case ('hexapod', 'cube', 'sphere', 'tetrapod', 'dolos', 'reef_cube', 'box', 'cylinder', &
+      'rock', 'file')
     case default
       message = 'kind = '''//trim(input%kind)//''' is unknown'
       return
@@ -249,6 +292,7 @@ contains
       return
     end if
     text = 'size = '//to_text(input%size(:size_count(input%kind)))
+    if (trim(input%kind) == 'rock') text = 'mass_50 = '//to_text(input%mass_50)
   end function given_size
 
   !> Occupied places of a hexapod in a block of 3 x 3 x 3 cubes.

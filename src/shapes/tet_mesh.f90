@@ -5,12 +5,14 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, surface_of_tets, chain_of, opposite, max_facet_corners
+  public :: shape_t, is_called, extreme_of_family, surface_of_tets, chain_of, opposite
+  public :: max_facet_corners
 
   integer, parameter :: max_facet_corners = 48   !! of one polygon of the surface
 
   type :: shape_t
     character(name_length) :: name = '', kind = ''
+    character(name_length) :: family = ''      !! of a stone: the name of its `&shape`
     real(wp) :: density = 0.0_wp               !! [kg/m3]
     real(wp) :: volume = 0.0_wp                !! [m3]
     real(wp) :: inertia(3, 3) = 0.0_wp         !! about the centroid, body axes [kg m2]
@@ -35,6 +37,27 @@ module tet_mesh_m
   integer, parameter :: opposite(3, 4) = reshape([2, 3, 4, 1, 4, 3, 1, 2, 4, 1, 3, 2], [3, 4])
 
 contains
+
+  !> Does a name of a case mean this shape, by itself or as one of a family?
+  elemental function is_called(shape, name) result(yes)
+    type(shape_t), intent(in) :: shape
+    character(*), intent(in) :: name
+    logical :: yes
+
+    yes = shape%name == name .or. (shape%family == name .and. name /= '')
+  end function is_called
+
+  !> Is shape s the least or the largest of its family, or of none? Messages name only these.
+  pure function extreme_of_family(shapes, s) result(yes)
+    type(shape_t), intent(in) :: shapes(:)
+    integer, intent(in) :: s
+    logical :: yes
+
+    yes = shapes(s)%family == ''
+    if (yes) return
+    yes = s == minloc(shapes%volume, 1, shapes%family == shapes(s)%family) &
+      .or. s == maxloc(shapes%volume, 1, shapes%family == shapes(s)%family)
+  end function extreme_of_family
 
   !> The faces that belong to one tetrahedron only, and that tetrahedron.
   pure subroutine surface_of_tets(n_point, tet, triangle, triangle_tet)

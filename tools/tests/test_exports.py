@@ -151,3 +151,11 @@ def test_wrong_wishes_are_one_line(loose_pile: Run, words: list[str], said: str,
     assert end.value.code == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
+
+
+def test_each_shape_has_its_file(loose_pile: Run, tmp_path: Path) -> None:
+    folder = exports.to_shapes(loose_pile, 0, tmp_path)
+    assert [path.stem for path in folder.iterdir()] == list(loose_pile.shapes)
+    mesh = trimesh.load(folder / "hexapod.stl", force="mesh")
+    mesh.merge_vertices()
+    assert mesh.is_watertight and mesh.volume == pytest.approx(56e-6, rel=1e-5)

@@ -25,6 +25,7 @@ program test_case_input
   call test_fluid_and_numerics()
   call test_contact()
   call test_shapes()
+  call test_rock()
   call test_bodies()
   call test_idle()
   call test_physics()
@@ -461,7 +462,7 @@ contains
       //'(line 3)')
     call expect(base//a//'''ball'' size=1/', '&shape kind = ''ball'': unknown, must be one of' &
       //' ''hexapod'', ''cube'', ''box'', ''sphere'', ''cylinder'', ''tetrapod'', ''dolos'', ' &
-      //'''reef_cube'', ''file'' (line 3)')
+      //'''reef_cube'', ''rock'', ''file'' (line 3)')
     call expect(base//a//'''file''/', &
       '&shape file: missing, required: a Gmsh .msh file or a mics-shape file (line 3)')
     call expect(base//a//'''cube'' size=1 file=''a.msh''/', &
@@ -500,6 +501,45 @@ contains
     call expect(cube//'&shape name=''C'' kind=''cube'' size=1/', &
       '&shape name = ''C'': the &shape on line 3 has this name already (line 4)')
   end subroutine test_shapes
+
+  !> A family of stones: its variables, its members, and who gets which.
+  subroutine test_rock()
+    character(*), parameter :: a = '&shape name=''a'' kind='
+    character(*), parameter :: rock = base//a//'''rock'' '
+    type(case_t) :: case
+    type(problems_t) :: problems
+
+    call expect(rock//'size=1/', '&shape size = 1: has no meaning with kind = ''rock''; mass_50 ' &
+      //'and density give the size (line 3)')
+    call expect(base//a//'''cube'' size=1 mass_50=2/', '&shape mass_50 = 2: has no meaning with ' &
+      //'kind = ''cube''; only kind = ''rock'' has it (line 3)')
+    call expect(rock//'variants=0 mass_50=0 uniformity=0 mass_min=-1 elongation=0.9 ' &
+      //'blockiness=1/', '&shape variants = 0: must lie between 1 and 5000 (line 3)|' &
+      //'&shape mass_50 = 0: must be positive [kg] (line 3)|' &
+      //'&shape uniformity = 0: must be positive [-] (line 3)|' &
+      //'&shape mass_min = -1: must not be negative [kg]; 0 means no bound (line 3)|' &
+      //'&shape elongation = 0.9: must lie between 1 and 10 (line 3)|' &
+      //'&shape blockiness = 1: must lie between 0.3 and 0.9 (line 3)')
+    call expect(rock//'mass_min=2 mass_max=1/', '&shape mass_max = 1: must be above mass_min = 2 ' &
+      //'kg, or 0 for no bound (line 3)')
+    call expect(rock//'/ &body shape=''a-21'' position=3*0/', '&body shape = ''a-21'': no &shape ' &
+      //'has this name, nearest known: ''a-01'' (line 3)')
+    call expect(rock//'/ &shape name=''A-07'' kind=''cube'' size=1/', '&shape name = ''A-07'': ' &
+      //'the &shape on line 3 has this name already (line 3)')
+    call read_case(rock//'variants=3/ &body shape=''a'' position=3*0/ &body shape=''a-03'' ' &
+      //'position=3*0/ &body shape=''a'' position=3*0/ &body shape=''a'' position=3*0/ ' &
+      //'&body shape=''a'' position=3*0/ &drop shape=''a'' position=3*0/', case, problems)
+    call check('a good family', problems%n, 0)
+    call check('a shape for each stone', size(case%shape), 3)
+    call check('members', all(case%shape%member == [1, 2, 3]))
+    call check('bodies take the next one', all(case%body%shape == [character(4) :: 'a-01', &
+      'a-03', 'a-02', 'a-03', 'a-01']))
+    call check('a drop draws', case%drop(1)%shape == 'a')
+    call check('one group is written', index(parameters_text(case), '&shape', back=.true.), &
+      index(parameters_text(case), '&shape'))
+    call read_case(rock//'variants=200/ &body shape=''a-007'' position=3*0/', case, problems)
+    call check('three digits', problems%n, 0)
+  end subroutine test_rock
 
   subroutine test_bodies()
     call expect(base//'&body shape=''x'' position=3*0/', &

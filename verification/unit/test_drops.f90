@@ -5,12 +5,14 @@ program test_drops
   use case_types_m, only: drop_input_t
   use vectors_m, only: quaternion_from_axis, quaternion_product
   use rotations_m, only: rotate
-  use drops_m, only: draw_drop
+  use drops_m, only: draw_drop, draw_shape
+  use tet_mesh_m, only: shape_t
   implicit none
 
   call check_shift()
   call check_tilt()
   call check_random()
+  call check_stones()
   call finish_checks()
 
 contains
@@ -48,6 +50,32 @@ contains
     call draw_drop(drop, 7, other, q)
     call check('another seed', norm2(other - again) > 1.0e-6_wp)
   end subroutine check_shift
+
+  !> Each stone of a family as often as another, a single one always; other shapes are passed over.
+  subroutine check_stones()
+    integer, parameter :: n = 20000
+    type(shape_t) :: shapes(5)
+    type(drop_input_t) :: drop
+    integer :: times(5), i, s
+
+    shapes%name = [character(4) :: 'a-01', 'cube', 'b-01', 'b-02', 'b-03']
+    shapes%family = [character(4) :: 'a', '', 'b', 'b', 'b']
+    drop%shape = 'b'
+    times = 0
+    do i = 1, n
+      s = draw_shape(drop%shape, drop%seed, i, shapes)
+      times(s) = times(s) + 1
+    end do
+    call check('only stones of the family', all(times(:2) == 0))
+    ! standard error 67, four of them
+    call check('as often', real(times(3:), wp), spread(real(n, wp)/3, 1, 3), 270.0_wp)
+    drop%shape = 'b-03'
+    call check('one stone', draw_shape(drop%shape, drop%seed, 1, shapes), 5)
+    drop%shape = 'cube'
+    call check('another shape', draw_shape(drop%shape, drop%seed, 1, shapes), 2)
+    drop%shape = 'c'
+    call check('none', draw_shape(drop%shape, drop%seed, 1, shapes), 0)
+  end subroutine check_stones
 
   !> Tilts of a given attitude: uniform angle up to the largest, axes in all directions.
   subroutine check_tilt()

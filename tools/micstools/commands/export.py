@@ -55,7 +55,8 @@ def _tell_left_out(run: Run) -> None:
 EXPORT = Command(
     "export",
     "Write a run for other programs, in m, a named object per block: the fall (glb), the pile of\n"
-    "one time (stl, obj), places and attitudes (csv), files for ParaView before 5.12 (pvd).",
+    "one time (stl, obj), each shape (shapes, an STL each), places and attitudes (csv), files for\n"
+    "ParaView before 5.12 (pvd).",
     (
         "export mics-coarse --to glb,csv",
         "export mics-coarse --to csv --final",

@@ -38,14 +38,16 @@ def to_stl(run: Run, row: int, folder: Path) -> Path:
     path = folder / "pile.stl"
     with path.open("w") as file:
         for k, body in present_bodies(run, row).items():
-            corners = body.triangles
-            normals = _normals(corners)
-            file.write(f"solid block-{k + 1}\n")
-            for normal, triangle in zip(normals, corners, strict=True):
-                file.write(f"facet normal {_words(normal)}\nouter loop\n")
-                file.writelines(f"vertex {_words(corner)}\n" for corner in triangle)
-                file.write("endloop\nendfacet\n")
-            file.write(f"endsolid block-{k + 1}\n")
+            file.write(_solid(f"block-{k + 1}", body.triangles))
+    return path
+
+
+def to_shapes(run: Run, _row: int, folder: Path) -> Path:
+    """Every shape, each stone of a family too, in its body axes: `shapes/NAME.stl`, as text."""
+    path = folder / "shapes"
+    path.mkdir(exist_ok=True)
+    for name, shape in run.shapes.items():
+        (path / f"{name}.stl").write_text(_solid(name, shape.points[shape.triangles]))
     return path
 
 
@@ -115,6 +117,16 @@ def _normals(corners: Array) -> Array:
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
+def _solid(name: str, corners: Array) -> str:
+    """Triangles (m, 3, 3) as a solid of an STL file."""
+    lines = [f"solid {name}\n"]
+    for normal, triangle in zip(_normals(corners), corners, strict=True):
+        lines.append(f"facet normal {_words(normal)}\nouter loop\n")
+        lines += [f"vertex {_words(corner)}\n" for corner in triangle]
+        lines.append("endloop\nendfacet\n")
+    return "".join(lines) + f"endsolid {name}\n"
+
+
 def _words(values: Array) -> str:
     return " ".join(f"{v:.9g}" for v in values)
 
@@ -122,6 +134,7 @@ def _words(values: Array) -> str:
 FORMATS: dict[str, Writer] = {
     "glb": to_glb,
     "stl": to_stl,
+    "shapes": to_shapes,
     "obj": to_obj,
     "csv": to_csv,
     "pvd": to_pvd,
