@@ -31,7 +31,7 @@ program mics
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
   use simulation_m, only: simulation_t, simulation_init, resume, measure
-  use step_m, only: take_step
+  use step_m, only: take_step, measure_overlap
   use faults_m, only: fault_t, store_places, find_fault, find_final_fault
   implicit none
   save   ! keeps the state off the stack
@@ -77,6 +77,7 @@ program mics
 
   code = fault%code
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
+  call measure_overlap(sim, report)   ! of the last row
   call close_output(code, sim%run_state_t, report, output)
   call stop_on_trouble()
   if (fault%code /= exit_ok) call fatal(code, fault%message)

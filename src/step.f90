@@ -41,7 +41,7 @@ module step_m
   use rigid_body_m, only: fastest_point
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: store_touches, warn_of_overlaps
+  use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, noted_share
   use release_m, only: release_due_blocks, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
@@ -54,9 +54,10 @@ module step_m
   use timers_m, only: tic, toc
   implicit none
   private
-  public :: take_step
+  public :: take_step, measure_overlap
 
   real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
+  real(wp), parameter :: worth_measuring = 0.5_wp   !! depth of a touch over that which is told [-]
 
 contains
 
@@ -83,10 +84,6 @@ contains
       if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%felt, sim%light)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       if (sim%light%on) call store_water_force(case%fluid%gravity, dt, blocks, sim%light)
-      call max_overlap(sim%walls, blocks, sim%overlap, report%max_overlap, sim%deep)
-      associate (touching => sim%contacts%touching)
-        if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
-      end associate
       call toc(sim%timer_blocks)
       if (sim%wet) then
         ! 5 voxelise
@@ -125,9 +122,29 @@ contains
       end if
     end associate
     call sim%clock%advance()
-    call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
     call describe(sim, contact, coupling_report, report)
+    report%overlap_known = .false.
+    if (sim%clock%row_due() .or. sim%clock%finished() .or. (sim%contacts%touching%exact &
+      .and. contact%deepest > worth_measuring*noted_share)) call measure_overlap(sim, report)
+    if (.not. report%overlap_known) call forget_overlaps(sim%deep)
+    associate (touching => sim%contacts%touching)
+      if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
+    end associate
+    call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
+
+  !> How deep the true shapes are in one another, unless it is known: for a row, or where touches are
+  !! deep.
+  subroutine measure_overlap(sim, report)
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+
+    if (report%overlap_known) return
+    call tic(sim%timer_blocks)
+    call max_overlap(sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
+    call toc(sim%timer_blocks)
+    report%overlap_known = .true.
+  end subroutine measure_overlap
 
   !> What the parts of the step found out, in one report.
   subroutine describe(sim, contact, stage, report)

@@ -8,15 +8,17 @@ module contact_forces_m
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_apart
+  use contact_load_m, only: give_share
   implicit none
   private
   public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
-    elastic_energy
+    elastic_energy, energy_in_memory
 
   !> Contact forces and torques on all partners: (3, partners).
   type :: loads_t
     real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
+    real(wp), allocatable :: film(:, :)          !! of films of liquid, with impulses [N]
   end type loads_t
 
   !> What happened in the substeps of one fluid step.
@@ -25,7 +27,8 @@ module contact_forces_m
     integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
     real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
-    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m],
+    real(wp) :: deepest = 0.0_wp        !! and over the smallest edge of the smaller block [-]
   end type contact_report_t
 
   !> What the touches of one group do along their normals.
@@ -168,6 +171,8 @@ contains
           call push_apart(touch, law%gamma_n, force_n, wrench)
           report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
           report%overlap_max = max(report%overlap_max, touch%depth)
+          report%deepest = max(report%deepest, give_share*touch%depth &
+            /min(touching%partners%give(touch%a), touching%partners%give(touch%b)))
         end associate
         push%force = push%force + force_n
         decay = max(decay, r%decay(t))
@@ -252,9 +257,19 @@ contains
     do g = 1, springs%n
       energy = energy + stored_energy(springs%k(g), touching%law%gamma_t, norm(springs%xi(:, g)))
     end do
-    do g = 1, rest%n
-      energy = energy + rest%energy(g)
-    end do
+    energy = energy + energy_in_memory(rest)
   end function elastic_energy
+
+  !> Energy of touches whose energy is remembered [J].
+  pure function energy_in_memory(springs) result(energy)
+    type(springs_t), intent(in) :: springs
+    real(wp) :: energy
+    integer :: g
+
+    energy = 0.0_wp
+    do g = 1, springs%n
+      energy = energy + springs%energy(g)
+    end do
+  end function energy_in_memory
 
 end module contact_forces_m

@@ -11,6 +11,7 @@ module contact_state_m
   use contact_forces_m, only: loads_t
   use substep_limits_m, only: limits_t, limits_init, longest_substep_of
   use partners_met_m, only: met_t
+  use impulse_rows_m, only: rows_t, rows_init
   implicit none
   private
   public :: contacts_t, contacts_init
@@ -33,6 +34,12 @@ module contact_state_m
     type(loads_t) :: loads
     type(start_t) :: start                       !! the place to go back to
     type(met_t) :: met                           !! pairs that touched in this step
+    logical :: by_impulses = .false.             !! solver = 'impulses', else springs
+    type(rows_t) :: rows                         !! its work
+    real(wp), allocatable :: gain(:)             !! (n) work: speed gained in free fall [m/s]
+    real(wp) :: contact_time = 0.0_wp            !! [s]
+    real(wp) :: restitution = 0.0_wp             !! [-]
+    real(wp) :: smallest_edge = 0.0_wp           !! of all blocks [m]
   end type contacts_t
 
 contains
@@ -42,7 +49,7 @@ contains
     type(contact_input_t), intent(in) :: input
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(out) :: contacts
-    integer :: n
+    integer :: n, b
 
     call touching_init(input, longest_substep_of(input), blocks, contacts%touching)
     call limits_init(input, contacts%touching, contacts%limits)
@@ -50,6 +57,7 @@ contains
     associate (loads => contacts%loads, start => contacts%start)
       allocate (loads%force(3, bed_partner:n), loads%torque(3, bed_partner:n), source=0.0_wp)
       allocate (loads%impulse(3, bed_partner:n), loads%twist(3, bed_partner:n), source=0.0_wp)
+      allocate (loads%film(3, bed_partner:n), source=0.0_wp)
       allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
     end associate
     allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
@@ -57,6 +65,20 @@ contains
     call reserve_springs(1, contacts%before)
     call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)
     allocate (contacts%woken(n), source=.false.)
+    select case (input%solver)
+    case ('springs'); return
+    case ('impulses'); contacts%by_impulses = .true.
+    case default; error stop 'contacts_init: no such solver'
+    end select
+    contacts%contact_time = input%contact_time
+    contacts%restitution = input%restitution
+    contacts%smallest_edge = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, n)])
+    call rows_init(n, contacts%rows)
+    allocate (contacts%gain(n), source=0.0_wp)
+    associate (search => contacts%touching%surface%search)
+      search%lasting = 2*input%contact_time   ! lists of fast bodies: two steps
+      search%lasting_gaps = 1.0_wp
+    end associate
   end subroutine contacts_init
 
 end module contact_state_m

@@ -26,7 +26,7 @@ module contact_surface_m
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
   private
-  public :: contact_surface_t, contact_surface_init, find_surface_touches
+  public :: contact_surface_t, contact_surface_init, find_surface_touches, cover_way, renew_pairs
 
   !> What may touch of a pair of bodies a > b, or of body a and the bed.
   type :: pair_t
@@ -42,6 +42,7 @@ module contact_surface_m
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
+    real(wp) :: listed_skin = 0.0_wp             !! of the present list [m]
     real(wp) :: clear = 0.0_wp                   !! way of pairs that are not in it to touch [m]
     type(pair_list_t) :: near                    !! pairs of bodies whose bounding spheres meet
     integer, allocatable :: slot(:)              !! (near%n) place of each in `pairs`
@@ -87,10 +88,18 @@ contains
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest
     self%search%lasting = real(lasting_substeps, wp)*longest_substep
-    self%search%ahead = courant_max*self%smallest
-    self%wide_skin = max(wide_share*maxval(self%reach), 2*self%search%ahead)
-    self%clear = 0.5_wp*self%wide_skin
+    self%search%min_ahead = courant_max*self%smallest
+    call cover_way(max(0.5_wp*wide_share*maxval(self%reach), self%search%min_ahead), self)
   end subroutine contact_surface_init
+
+  !> Let the list of pairs hold all that may meet before any two bodies have come nearer by a way.
+  pure subroutine cover_way(way, self)
+    real(wp), intent(in) :: way     !! [m]
+    type(contact_surface_t), intent(inout) :: self
+
+    self%clear = way
+    self%wide_skin = max(wide_share*maxval(self%reach), 2*way)
+  end subroutine cover_way
 
   !> All touches at the present poses, but for those between bodies that are still, and those
   !! (depth <= 0) that may come within a time `ahead`.
@@ -100,20 +109,23 @@ contains
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
     type(touches_t), intent(inout) :: touches
+    real(wp) :: speed, gap
     integer :: a, b, p, w
 
     do b = 1, blocks%n
       if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
-    if (pairs_may_be_missing(self, blocks)) call list_pairs(walls, blocks, self)
+    call renew_pairs(walls, blocks, self)
     touches%n = 0
     p = 1
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
-        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, ahead, self, touches)
+        speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
+        gap = ahead*speed + self%search%margin
+        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, speed, gap, self, touches)
         do w = 1, walls%n
-          call touch_wall(walls, blocks, a, w, ahead, self, touches)
+          call touch_wall(walls, blocks, a, w, gap, self, touches)
         end do
       end if
       do while (p <= self%near%n)
@@ -128,6 +140,15 @@ contains
     end do
   end subroutine find_surface_touches
 
+  !> Renew the list of pairs where it no longer holds.
+  subroutine renew_pairs(walls, blocks, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    type(contact_surface_t), intent(inout) :: self
+
+    if (pairs_may_be_missing(self, blocks)) call list_pairs(walls, blocks, self)
+  end subroutine renew_pairs
+
   !> Whether a pair may have come near that is not in the list.
   pure function pairs_may_be_missing(self, blocks) result(yes)
     type(contact_surface_t), intent(in) :: self
@@ -140,7 +161,7 @@ contains
     do b = 1, blocks%n
       if (blocks%present(b) .neqv. self%present(b)) return
       if (.not. blocks%present(b)) cycle
-      if (distance(blocks%x(:, b), self%x(:, b)) > 0.5_wp*(self%wide_skin - self%clear)) return
+      if (distance(blocks%x(:, b), self%x(:, b)) > 0.5_wp*(self%listed_skin - self%clear)) return
     end do
     yes = .false.
   end function pairs_may_be_missing
@@ -173,6 +194,7 @@ contains
       end associate
     end do
     self%listed = .true.
+    self%listed_skin = self%wide_skin
     self%present = blocks%present
     self%x = blocks%x
   end subroutine list_pairs
@@ -245,19 +267,17 @@ contains
   end subroutine ensure_pairs
 
   !> Touches of body a and wall w: its corners, or its lowest point where it is a sphere.
-  subroutine touch_wall(walls, blocks, a, w, ahead, self, touches)
+  subroutine touch_wall(walls, blocks, a, w, gap, self, touches)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, w
-    real(wp), intent(in) :: ahead   !! [s]
+    real(wp), intent(in) :: gap     !! still taken as a touch [m]
     type(contact_surface_t), intent(in) :: self
     type(touches_t), intent(inout) :: touches
-    real(wp) :: above, gap, n(3), depth, arm(3)
+    real(wp) :: above, n(3), depth, arm(3)
     integer :: i
 
     above = walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, a))
-    if (above > self%reach(a) + self%search%ahead) return
-    gap = ahead*(norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a))
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
       if (above > self%reach(a) + gap) return
       n = matmul(walls%normal(:, w), turn)
@@ -279,11 +299,12 @@ contains
 
   !> Touches of body a and the bed: corners of the bed, corners of the body, crossing edges. The
   !! points inside the faces of a body do not touch it: as on a wall, some corner always does.
-  subroutine touch_bed(bed, blocks, a, ahead, self, touches)
+  subroutine touch_bed(bed, blocks, a, speed, gap, self, touches)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
-    real(wp), intent(in) :: ahead   !! [s]
+    real(wp), intent(in) :: speed   !! of its points, at most [m/s]
+    real(wp), intent(in) :: gap     !! still taken as a touch [m]
     type(contact_surface_t), intent(inout) :: self
     type(touches_t), intent(inout) :: touches
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
@@ -295,8 +316,8 @@ contains
     now%turn_a = self%turn(:, :, a)
     now%turn_b = no_turn
     now%to_b = -now%poses%x_a
-    now%speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
-    now%gap = ahead*now%speed
+    now%speed = speed
+    now%gap = gap
     call touch_features(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
       self%with_bed(a), touches, bed)
   end subroutine touch_bed
@@ -319,7 +340,7 @@ contains
     now%to_b = now%poses%x_b + self%pairs(slot)%shift - now%poses%x_a
     now%speed = distance(blocks%v(:, a), blocks%v(:, b)) &
       + norm(blocks%omega(:, a))*self%reach(a) + norm(blocks%omega(:, b))*self%reach(b)
-    now%gap = ahead*now%speed
+    now%gap = ahead*now%speed + self%search%margin
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
@@ -340,6 +361,7 @@ contains
     type(pair_t), intent(inout) :: pair
     type(touches_t), intent(inout) :: touches
     type(bed_t), intent(in), optional :: bed  !! where it is b
+    real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
     real(wp) :: way
     logical :: holds
 
@@ -348,7 +370,8 @@ contains
     call update_views(now)
     if (.not. holds) then
       way = way_between(pair%near%when, now%poses, surface_a%reach, surface_b%reach)
-      if (way > pair%near%valid) then
+      if (way > pair%near%valid .or. now%gap > pair%near%ahead) then
+        search%ahead = max(search%min_ahead, wider*now%gap)
         if (present(bed)) then
           call list_bed(bed, now, surface_a, search, pair%near)
         else
@@ -356,7 +379,7 @@ contains
         end if
         way = 0.0_wp
       end if
-      call choose_features(now, way, search%skin, surface_a, surface_b, pair%near, pair%close)
+      call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
       if (n_chosen(pair%close) == 0) return
     end if
     call touch_probes(.false., now, surface_b, surface_a, pair, touches)
@@ -456,7 +479,7 @@ contains
       j = pair%close%item(m + 1)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      touch = touch_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, &
+      touch = touch_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, other=j, &
         length=min(surface_a%length, surface_b%length))
       call cross_edges(guest, surface_b%edge(j), -now%gap, touch%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle

@@ -12,7 +12,8 @@ module contacts_m
   use contact_partners_m, only: update_partners, update_motion
   use touching_m, only: find_touches
   use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
-    elastic_energy
+    elastic_energy, energy_in_memory
+  use impulse_step_m, only: move_by_impulses
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
   use partners_met_m, only: store_partners, count_partners
   use contact_state_m, only: contacts_t, contacts_init
@@ -46,12 +47,15 @@ contains
     contacts%met%n = 0
     call update_partners(walls, gravity, blocks, contacts%touching%partners)
     if (contacts%sleep%active) call update_stillness(blocks)
-    call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+    if (.not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
     left = dt
     if (all_still(blocks)) then
       contacts%loads%impulse(:, 1:) = dt*contacts%sleep%load
       contacts%loads%twist(:, 1:) = dt*contacts%sleep%load_torque
+      left = 0.0_wp
+    else if (contacts%by_impulses) then
+      call move_by_impulses(walls, gravity, dt, contacts, blocks, report)
       left = 0.0_wp
     end if
     do while (left > 0.0_wp)
@@ -70,8 +74,12 @@ contains
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
     call count_partners(contacts%met, blocks)
-    call find_touches(walls, blocks, 0.0_wp, contacts%touching)
-    report%energy = elastic_energy(contacts%touching, contacts%springs, contacts%sleep%rest)
+    if (contacts%by_impulses) then
+      report%energy = energy_in_memory(contacts%springs) + energy_in_memory(contacts%sleep%rest)
+    else
+      call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+      report%energy = elastic_energy(contacts%touching, contacts%springs, contacts%sleep%rest)
+    end if
   end subroutine move_blocks
 
   !> Begin a substep: drift for half of it and find what touches then.

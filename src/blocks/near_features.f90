@@ -28,6 +28,7 @@ module near_features_m
   type :: near_features_t
     type(poses_t) :: when                        !! poses at which they were made
     real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
+    real(wp) :: ahead = 0.0_wp                   !! largest gap for which they hold [m]
     type(probes_near_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
@@ -38,7 +39,10 @@ module near_features_m
   type :: search_t
     real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
     real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
-    real(wp) :: ahead = 0.0_wp                   !! longest way of a touch that comes soon [m]
+    real(wp) :: min_ahead = 0.0_wp               !! way of a touch that comes soon, at least [m],
+    real(wp) :: ahead = 0.0_wp                   !! and of the pair whose lists are made [m]
+    real(wp) :: margin = 0.0_wp                  !! added to all gaps [m]
+    real(wp) :: lasting_gaps = 10.0_wp           !! multiple of the gap for which short lists hold
     type(near_list_t) :: guests, hosts
     type(found_t) :: found
   end type search_t
@@ -55,7 +59,7 @@ contains
     type(near_features_t), intent(inout) :: near
     real(wp) :: apart, skin
 
-    call begin_lists(now%poses, near)
+    call begin_lists(now%poses, search%ahead, near)
     apart = norm(now%to_b) - a%reach - b%reach - search%ahead
     skin = skin_for(now%speed, search)
     near%valid = max(apart, skin)
@@ -75,7 +79,7 @@ contains
     real(wp) :: margin, place(3), distance, outward(3)
     integer :: i
 
-    call begin_lists(now%poses, near)
+    call begin_lists(now%poses, search%ahead, near)
     near%valid = skin_for(now%speed, search)
     margin = near%valid + search%ahead
     associate (x => now%poses%x_a, reach => surface%reach + margin)
@@ -99,11 +103,13 @@ contains
   end subroutine list_bed
 
   !> Empty lists for the present poses.
-  pure subroutine begin_lists(poses, near)
+  pure subroutine begin_lists(poses, ahead, near)
     type(poses_t), intent(in) :: poses
+    real(wp), intent(in) :: ahead                !! largest gap for which they hold [m]
     type(near_features_t), intent(inout) :: near
 
     near%when = poses
+    near%ahead = ahead
     near%of_a%n = 0
     near%of_b%n = 0
     near%n_crossings = 0

@@ -6,7 +6,7 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use springs_m, only: move_springs
-  use sleep_m, only: update_loads, is_tired, balanced, put_to_sleep, hold_or_wake, &
+  use sleep_m, only: update_loads, sum_memory, is_tired, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
   use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
@@ -47,12 +47,14 @@ contains
         contacts%sleep%tired(b) = is_tired(gravity, b, blocks, contacts%sleep)
       end do
       if (any(contacts%sleep%tired)) then
-        dt_b = equal_part(dt, substep_limit(walls, contacts%touching, blocks, dt, contacts%limits))
+        dt_b = dt
+        if (.not. contacts%by_impulses) dt_b = equal_part(dt, substep_limit(walls, &
+          contacts%touching, blocks, dt, contacts%limits))
         call let_sleep(gravity, dt_b, contacts, blocks, changed)
       end if
     end if
     contacts%woken = .false.
-    if (changed) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+    if (changed .and. .not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     associate (rest => contacts%sleep%rest)
       call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
@@ -70,9 +72,15 @@ contains
     type(contact_report_t) :: ignored
     integer :: b
 
-    call match_springs(contacts%touching, contacts%before, contacts%springs)
-    call foresee_motion(gravity, dt_b, blocks, contacts)
-    call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
+    if (contacts%by_impulses) then
+      contacts%loads%force = 0.0_wp
+      contacts%loads%torque = 0.0_wp
+      call sum_memory(contacts%springs, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:))
+    else
+      call match_springs(contacts%touching, contacts%before, contacts%springs)
+      call foresee_motion(gravity, dt_b, blocks, contacts)
+      call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
+    end if
     call update_supported(blocks, contacts)
     changed = .false.
     associate (sleep => contacts%sleep, loads => contacts%loads)
@@ -177,7 +185,7 @@ contains
         a = springs%a(g)
         b = springs%b(g)
         sleep%chosen(g) = at_rest(blocks, a, b)
-        if (.not. sleep%chosen(g)) cycle
+        if (contacts%by_impulses .or. .not. sleep%chosen(g)) cycle
         wrench = wrench_t()
         call push_group(g, dt_b, motion_between(contacts%touching%partners, a, b), &
           contacts%touching, springs, wrench, ignored)

@@ -16,7 +16,8 @@ module rigid_body_m
   implicit none
   private
   public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share
-  public :: begin_step, drift, turn_to_attitude, kick, hold_sleepers, set_velocity_after_fluid
+  public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
+  public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
 
   real(wp), parameter :: turning_share = 0.02_wp
@@ -188,32 +189,55 @@ contains
   end subroutine begin_step
 
   !> Move the bodies for a time dt with their present v and l; fixed bodies at their given rates.
-  !!
-  !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the
-  !! whole step. `omega` belongs to the new attitude afterwards.
   pure subroutine drift(dt, blocks)
     real(wp), intent(in) :: dt   !! [s]
     type(blocks_t), intent(inout) :: blocks
-    real(wp) :: omega(3), half_way(4)
     integer :: b
 
     do b = 1, blocks%n
-      if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
-      if (blocks%fixed(b)) then
-        call drift_prescribed(dt, b, blocks)
-        cycle
-      end if
-      associate (inverse => blocks%inverse_inertia(:, :, b), l => blocks%l(:, b), &
-        q => blocks%q(:, b))
-        blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
-        omega = angular_velocity(q, l, inverse)
-        half_way = quaternion_product(quaternion_exp(0.5_wp*dt*omega), q)
-        omega = angular_velocity(half_way, l, inverse)
-        q = normalised(quaternion_product(quaternion_exp(dt*omega), q))
-        blocks%omega(:, b) = angular_velocity(q, l, inverse)
-      end associate
+      if (blocks%present(b) .and. .not. blocks%asleep(b)) call drift_body(dt, b, blocks)
     end do
   end subroutine drift
+
+  !> Move one body that is awake.
+  !!
+  !! Rotation by the midpoint rule: the angular velocity half a step ahead turns the body for the
+  !! whole step. `omega` belongs to the new attitude afterwards.
+  pure subroutine drift_body(dt, b, blocks)
+    real(wp), intent(in) :: dt   !! [s]
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: omega(3), half_way(4)
+
+    if (blocks%fixed(b)) then
+      call drift_prescribed(dt, b, blocks)
+      return
+    end if
+    associate (inverse => blocks%inverse_inertia(:, :, b), l => blocks%l(:, b), &
+      q => blocks%q(:, b))
+      blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
+      omega = angular_velocity(q, l, inverse)
+      half_way = quaternion_product(quaternion_exp(0.5_wp*dt*omega), q)
+      omega = angular_velocity(half_way, l, inverse)
+      q = normalised(quaternion_product(quaternion_exp(dt*omega), q))
+      blocks%omega(:, b) = angular_velocity(q, l, inverse)
+    end associate
+  end subroutine drift_body
+
+  !> Move a free body by a way and a turn, and give it a velocity and more angular momentum.
+  pure subroutine place_body(b, way, v, twist, blocks)
+    integer, intent(in) :: b
+    real(wp), intent(in) :: way(6)             !! of the centre, and rotation vector [m], [rad]
+    real(wp), intent(in) :: v(3), twist(3)     !! space frame [m/s], [N m s]
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%x(:, b) = blocks%x(:, b) + way(1:3)
+    blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(way(4:6)), blocks%q(:, b)))
+    blocks%v(:, b) = v
+    blocks%l(:, b) = blocks%l(:, b) + twist
+    blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
+      blocks%inverse_inertia(:, :, b))
+  end subroutine place_body
 
   !> Move a fixed body for a time dt at its constant given rate.
   pure subroutine drift_prescribed(dt, b, blocks)
@@ -270,13 +294,24 @@ contains
     integer :: b
 
     do b = 1, blocks%n
-      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      blocks%v(:, b) = blocks%v(:, b) + dt*(gravity + force(:, b)/blocks%mass(b))
-      blocks%l(:, b) = blocks%l(:, b) + dt*torque(:, b)
-      blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
-        blocks%inverse_inertia(:, :, b))
+      if (blocks%present(b)) call kick_body(gravity, dt, force(:, b), torque(:, b), b, blocks)
     end do
   end subroutine kick
+
+  !> Let them act on one body, unless it is fixed.
+  pure subroutine kick_body(gravity, dt, force, torque, b, blocks)
+    real(wp), intent(in) :: gravity(3)           !! [m/s2]
+    real(wp), intent(in) :: dt                   !! [s]
+    real(wp), intent(in) :: force(3), torque(3)  !! [N], [N m]
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+
+    if (blocks%fixed(b)) return
+    blocks%v(:, b) = blocks%v(:, b) + dt*(gravity + force/blocks%mass(b))
+    blocks%l(:, b) = blocks%l(:, b) + dt*torque
+    blocks%omega(:, b) = angular_velocity(blocks%q(:, b), blocks%l(:, b), &
+      blocks%inverse_inertia(:, :, b))
+  end subroutine kick_body
 
   !> Velocities at the end of a fluid step from those at its start, the mean contact forces of the
   !! substeps and the fluid forces of this step, which are stored.

@@ -6,7 +6,7 @@ module short_list_m
   use surface_search_m, only: surface_t, nearest_on_surface, nowhere
   use edge_crossing_m, only: edge_t
   use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
-  use near_features_m, only: near_features_t, probes_near_t, append_facets, append_edges, &
+  use near_features_m, only: near_features_t, probes_near_t, search_t, append_facets, append_edges, &
     edge_in_view, way_to_crossing
   implicit none
   private
@@ -18,6 +18,7 @@ module short_list_m
     type(poses_t) :: when                  !! poses at which it was made
     real(wp) :: until = -1.0_wp            !! way and gap since then for which it holds [m]
     real(wp) :: left = -1.0_wp             !! way since then for which the lists near it hold [m]
+    real(wp) :: ahead = 0.0_wp             !! largest gap for which they do [m]
     integer :: n_of_b = 0, n_of_a = 0, n_edges = 0   !! probes of each, crossings
     integer :: of_a = 1, edges = 1         !! where the parts of a and of the edges begin
     integer :: n = 0                       !! length
@@ -43,24 +44,24 @@ contains
     real(wp) :: way
 
     way = way_between(short%when, now%poses, reach_a, reach_b)
-    yes = way <= short%left .and. way + now%gap <= short%until
+    yes = way <= short%left .and. way + now%gap <= short%until .and. now%gap <= short%ahead
   end function short_list_holds
 
   !> Choose from the lists of a pair what may touch before the bodies have moved a little.
-  subroutine choose_features(now, way, skin, surface_a, surface_b, near, short)
+  subroutine choose_features(now, way, search, surface_a, surface_b, near, short)
     type(meeting_t), intent(in) :: now
     real(wp), intent(in) :: way               !! of the bodies since the lists were made [m]
-    real(wp), intent(in) :: skin              !! least way before lists are renewed [m]
+    type(search_t), intent(in) :: search
     type(surface_t), intent(in) :: surface_a, surface_b
     type(near_features_t), intent(in) :: near
     type(short_list_t), intent(inout) :: short
-    real(wp), parameter :: share = 0.02_wp    !! of a skin: way for which the short list holds,
-    real(wp), parameter :: lasting = 10.0_wp  !! or such a multiple of the gap
+    real(wp), parameter :: share = 0.02_wp    !! of a skin: least way for which the short list holds
     integer :: n
 
     short%when = now%poses
     short%left = near%valid - way
-    short%until = now%gap + max(share*skin, lasting*now%gap)
+    short%ahead = near%ahead
+    short%until = now%gap + max(share*search%skin, search%lasting_gaps*now%gap)
     short%n = 0
     call choose_probes(now%b_in_a, way, surface_b, surface_a, near%of_b, short, n)
     short%n_of_b = n

@@ -15,7 +15,7 @@ module sleep_m
   use springs_m, only: springs_t, reserve_springs
   implicit none
   private
-  public :: sleep_t, sleep_init, update_stillness, update_loads, store_poses, store_quiet, is_tired
+  public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses, store_quiet, is_tired
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
@@ -71,20 +71,28 @@ contains
   !> Force and torque on each body of the touches at rest.
   pure subroutine update_loads(sleep)
     type(sleep_t), intent(inout) :: sleep
-    integer :: i, a, b
 
     sleep%load = 0.0_wp
     sleep%load_torque = 0.0_wp
-    do i = 1, sleep%rest%n
-      a = sleep%rest%a(i)
-      b = sleep%rest%b(i)
-      sleep%load(:, a) = sleep%load(:, a) + sleep%rest%force(:, i)
-      sleep%load_torque(:, a) = sleep%load_torque(:, a) + sleep%rest%torque_a(:, i)
-      if (b < 1) cycle
-      sleep%load(:, b) = sleep%load(:, b) - sleep%rest%force(:, i)
-      sleep%load_torque(:, b) = sleep%load_torque(:, b) + sleep%rest%torque_b(:, i)
-    end do
+    call sum_memory(sleep%rest, sleep%load, sleep%load_torque)
   end subroutine update_loads
+
+  !> Add the forces and torques on bodies of touches that remember them.
+  pure subroutine sum_memory(springs, force, torque)
+    type(springs_t), intent(in) :: springs
+    real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) [N], [N m]
+    integer :: i, a, b
+
+    do i = 1, springs%n
+      a = springs%a(i)
+      b = springs%b(i)
+      force(:, a) = force(:, a) + springs%force(:, i)
+      torque(:, a) = torque(:, a) + springs%torque_a(:, i)
+      if (b < 1) cycle
+      force(:, b) = force(:, b) - springs%force(:, i)
+      torque(:, b) = torque(:, b) + springs%torque_b(:, i)
+    end do
+  end subroutine sum_memory
 
   !> Note where the blocks are when a fluid step begins.
   pure subroutine store_poses(blocks, sleep)

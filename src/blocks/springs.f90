@@ -14,16 +14,18 @@ module springs_m
   type :: springs_t
     integer :: n = 0
     integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `touch_t`
+    integer, allocatable :: other(:)             !! (n) edge of b, of touches solved for impulses
     real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
     real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
-    !> Of touches at rest (`sleep_m`) only: force on a, torques on a and b, energy of the touch.
+    !> Of touches at rest (`sleep_m`) and of those solved for impulses: force on a, torques on a and
+    !! b, energy of the touch.
     real(wp), allocatable :: force(:, :), torque_a(:, :), torque_b(:, :)   !! (3, n) [N], [N m]
     real(wp), allocatable :: energy(:)           !! (n) [J]
   end type springs_t
 
   !> One of them, to move it.
   type :: spring_t
-    integer :: a = 0, b = 0, key = 0
+    integer :: a = 0, b = 0, key = 0, other = 0
     real(wp) :: xi(3) = 0.0_wp, k = 0.0_wp
     real(wp) :: force(3) = 0.0_wp, torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp
     real(wp) :: energy = 0.0_wp
@@ -39,6 +41,7 @@ contains
     call ensure_room(n, springs%a)
     call ensure_room(n, springs%b)
     call ensure_room(n, springs%key)
+    call ensure_room(n, springs%other)
     call ensure_room(n, springs%k)
     call ensure_room(n, springs%xi)
     call ensure_room(n, springs%force)
@@ -119,6 +122,7 @@ contains
     spring%a = springs%a(i)
     spring%b = springs%b(i)
     spring%key = springs%key(i)
+    spring%other = springs%other(i)
     spring%xi = springs%xi(:, i)
     spring%k = springs%k(i)
     spring%force = springs%force(:, i)
@@ -136,6 +140,7 @@ contains
     springs%a(i) = spring%a
     springs%b(i) = spring%b
     springs%key(i) = spring%key
+    springs%other(i) = spring%other
     springs%xi(:, i) = spring%xi
     springs%k(i) = spring%k
     springs%force(:, i) = spring%force

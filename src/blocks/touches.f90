@@ -18,6 +18,7 @@ module touches_m
     real(wp) :: length = 0.0_wp              !! d_s of the contact Courant number, eq. (6) [m]
     !> Relative change of the weight with a shift of a, and with a turn about the contact.
     real(wp) :: weight_shift(3) = 0.0_wp, weight_turn(3) = 0.0_wp   !! [1/m], [1/rad]
+    integer :: other = 0                     !! edge of b that crosses that of the key
   end type touch_t
 
   !> Touches of one moment, sorted by a, then b, then key.

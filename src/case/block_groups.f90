@@ -37,6 +37,15 @@ contains
       call v%without_meaning(contact%law == 'constants', 'restitution', 'law = ''constants''', &
         'only law = ''restitution'' has it')
     end if
+    call v%option('solver', contact%solver, 'springs impulses', 'how the forces are found: ' &
+      //'springs in short steps, or impulses of all touches together in long ones', &
+      example='''impulses''')
+    if (v%good('solver')) then
+      call v%require('solver', contact%solver == 'springs' .or. (contact%model == 'surface' &
+        .and. contact%law == 'restitution'), 'needs model = ''surface'' and law = ''restitution''')
+      call v%without_meaning(contact%solver == 'impulses', 'substep_ratio courant_max', &
+        'solver = ''impulses''', 'its steps follow contact_time')
+    end if
     call v%real('restitution', contact%restitution, between(0.0_wp, 1.0_wp, '-'), &
       'speed after over speed before a central impact without friction; below 0.01 as 0.01', &
       example='0.5')

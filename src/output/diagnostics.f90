@@ -32,7 +32,8 @@ module diagnostics_m
     integer :: pressure_passes = 0
     integer :: solver_iterations = 0          !! of all passes together
     real(wp) :: contact_energy = 0.0_wp       !! elastic, at the end of the step [J]
-    real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m]
+    real(wp) :: max_overlap = 0.0_wp          !! of the true shapes with one another or a wall [m],
+    logical :: overlap_known = .false.        !! measured for rows only
     real(wp) :: contact_courant_max = 0.0_wp  !! C_s of eq. (6) [-]
     integer :: substeps = 0
     integer :: sealed_cells = 0               !! cells without any open face that held fluid

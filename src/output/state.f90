@@ -185,21 +185,20 @@ contains
     class(state_visitor_t), intent(inout) :: visitor
     type(contacts_t), intent(inout) :: contacts
 
-    call visit_springs(visitor, '/contacts/', contacts%springs)
+    call visit_springs(visitor, '/contacts/', contacts%by_impulses, contacts%by_impulses, &
+                       contacts%springs)
     associate (quiet => contacts%sleep%quiet, rest => contacts%sleep%rest)
       call visitor%reals('/contacts/quiet', 's', [size(quiet)], quiet)
-      call visit_springs(visitor, '/contacts/rest_', rest)
-      call visitor%reals('/contacts/rest_force', 'N', [3, rest%n], rest%force)
-      call visitor%reals('/contacts/rest_torque_a', 'N m', [3, rest%n], rest%torque_a)
-      call visitor%reals('/contacts/rest_torque_b', 'N m', [3, rest%n], rest%torque_b)
-      call visitor%reals('/contacts/rest_energy', 'J', [rest%n], rest%energy)
+      call visit_springs(visitor, '/contacts/rest_', .true., contacts%by_impulses, rest)
     end associate
   end subroutine visit_contacts
 
   !> A list of tangential springs.
-  subroutine visit_springs(visitor, name, s)
+  subroutine visit_springs(visitor, name, with_force, with_edge, s)
     class(state_visitor_t), intent(inout) :: visitor
     character(*), intent(in) :: name
+    logical, intent(in) :: with_force   !! it remembers forces, torques and energies
+    logical, intent(in) :: with_edge    !! and the edge of the partner
     type(springs_t), intent(inout) :: s
 
     call visitor%whole_number(name//'n', s%n)
@@ -210,6 +209,12 @@ contains
     call visitor%integers(name//'key', [s%n], s%key)
     call visitor%reals(name//'stretch', 'm', [3, s%n], s%xi)
     call visitor%reals(name//'stiffness', 'N/m^gamma', [s%n], s%k)
+    if (with_edge) call visitor%integers(name//'edge', [s%n], s%other)
+    if (.not. with_force) return
+    call visitor%reals(name//'force', 'N', [3, s%n], s%force)
+    call visitor%reals(name//'torque_a', 'N m', [3, s%n], s%torque_a)
+    call visitor%reals(name//'torque_b', 'N m', [3, s%n], s%torque_b)
+    call visitor%reals(name//'energy', 'J', [s%n], s%energy)
   end subroutine visit_springs
 
   subroutine real_number(self, name, units, x)

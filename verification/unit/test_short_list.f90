@@ -37,7 +37,7 @@ contains
     call check('none yet', .not. short_list_holds(now, cube%reach, cube%reach, short))
     now%gap = gap
     call list_features(now, cube, cube, search, near)
-    call choose_features(now, 0.0_wp, skin, cube, cube, near, short)
+    call choose_features(now, 0.0_wp, search, cube, cube, near, short)
     call check('corners and inner points of both faces', all([short%n_of_a, short%n_of_b] == 8))
     call check('features', n_chosen(short), 16 + short%n_edges)
     left = short%until - gap
@@ -48,7 +48,7 @@ contains
     now%gap = 0.9_wp*gap
     call check('less counts as a touch', short_list_holds(now, cube%reach, cube%reach, short))
     now%poses = short%when
-    call choose_features(now, near%valid - 0.5_wp*gap, skin, cube, cube, near, short)
+    call choose_features(now, near%valid - 0.5_wp*gap, search, cube, cube, near, short)
     now%poses%x_b(1) = 0.49_wp*gap
     call check('the lists hold', short_list_holds(now, cube%reach, cube%reach, short))
     now%poses%x_b(1) = 0.51_wp*gap
@@ -56,7 +56,7 @@ contains
       .not. short_list_holds(now, cube%reach, cube%reach, short))
     now = meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 3.0_wp], none, none))
     call list_features(now, cube, cube, search, near)
-    call choose_features(now, 0.0_wp, skin, cube, cube, near, short)
+    call choose_features(now, 0.0_wp, search, cube, cube, near, short)
     now%poses%x_b(3) = 3.0_wp - 0.999_wp*near%valid
     call check('as long as empty lists', short_list_holds(now, cube%reach, cube%reach, short))
   end subroutine check_how_long
@@ -77,7 +77,7 @@ contains
       now = meeting_at(moved(i, 0.5_wp*near%valid, now%poses))
       now%gap = gap
       way = way_between(near%when, now%poses, cube%reach, cube%reach)
-      call choose_features(now, way, skin, cube, cube, near, short)
+      call choose_features(now, way, search, cube, cube, near, short)
       now = meeting_at(moved(i, min(short%until - gap, short%left), now%poses))
       now%gap = gap
       call check('holds still', short_list_holds(now, cube%reach, cube%reach, short))

@@ -1,0 +1,411 @@
+!> The touches of one contact step as constraints: what is solved for the impulses, and what is
+!! remembered of them.
+!!
+!! A row is a touch that is there or may come in the step. Rows of one pair of partners stand
+!! together. Pairs have colours: those of one colour share no body that moves, so that the order of
+!! their solution does not matter, nor the number of threads.
+module impulse_rows_m
+  use kinds_m, only: wp, i8, pi
+  use growing_m, only: ensure_room
+  use vectors_m, only: cross, norm
+  use rigid_body_m, only: blocks_t
+  use bed_m, only: bed_partner
+  use touches_m, only: touch_t, touches_t
+  use springs_m, only: springs_t, reserve_springs, comes_before
+  use contact_partners_m, only: partners_t
+  use contact_law_m, only: contact_law_t
+  implicit none
+  private
+  public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads
+
+  !> One touch: its frame, the masses it works on, and its impulse, on partner b.
+  type :: row_t
+    real(wp) :: n(3) = 0.0_wp, e1(3) = 0.0_wp, e2(3) = 0.0_wp  !! normal from a to b, tangents [-]
+    real(wp) :: arm_a(3) = 0.0_wp, arm_b(3) = 0.0_wp  !! from the centres to the contact [m]
+    real(wp) :: response(3) = 0.0_wp                  !! K n: velocity by a unit push [1/kg]
+    real(wp) :: mass = 0.0_wp                         !! 1/(n.K n) [kg]
+    real(wp) :: mass_11 = 0.0_wp, mass_12 = 0.0_wp, mass_22 = 0.0_wp  !! of the tangents [kg]
+    real(wp) :: mass_slip = 0.0_wp                    !! one over the largest K along the tangents
+    real(wp) :: gap = 0.0_wp                          !! at the start of the step [m]
+    real(wp) :: friction = 0.0_wp                     !! [-]
+    real(wp) :: rate = 0.0_wp                         !! at which an overlap is taken back [1/s]
+    real(wp) :: soft = 1.0_wp, keep = 0.0_wp          !! share of the mass, of the impulse [-]
+    real(wp) :: stretch(2) = 0.0_wp                   !! tangential way remembered [m]
+    real(wp) :: impulse(3) = 0.0_wp                   !! of a sub-sweep along n, e1, e2 [N s]
+  end type row_t
+
+  type :: rows_t
+    integer :: n = 0
+    type(row_t), allocatable :: row(:)
+    integer, allocatable :: touch(:)              !! (n) number in the list of touches
+    real(wp), allocatable :: closing(:)           !! (n) normal velocity at the start [m/s]
+    real(wp), allocatable :: largest(:)           !! (n) largest normal impulse of the step [N s]
+    real(wp), allocatable :: total(:, :)          !! (3, n) impulse of the whole step [N s]
+    integer, allocatable :: hit(:)                !! rows of impacts
+    real(wp), allocatable :: returned(:, :)       !! (3, hits) their impulses [N s]
+    integer :: n_pairs = 0
+    integer, allocatable :: a(:), b(:), first(:)  !! (n_pairs), (n_pairs + 1) rows of each
+    integer, allocatable :: colour(:)             !! (n_pairs)
+    real(wp), allocatable :: push(:, :)           !! (3, n_pairs) on b, of a sub-sweep [N s]
+    real(wp), allocatable :: turn(:, :)           !! (3, n_pairs) twist of both by their way [N m s]
+    integer :: n_colours = 0
+    integer, allocatable :: order(:)              !! (n_pairs) pairs, colour by colour
+    integer, allocatable :: begin(:)              !! (n_colours + 1) in `order`
+    integer(i8), allocatable :: used(:)           !! (n) work: colours of each body
+    integer :: n_active = 0
+    integer, allocatable :: active(:)             !! bodies that move and have rows
+    logical, allocatable :: busy(:), struck(:)    !! (partners) has rows; was hit
+    real(wp), allocatable :: v(:, :)              !! (6, partners) velocity and spin [m/s], [rad/s]
+    real(wp), allocatable :: v_start(:, :)        !! (6, partners) at the start of the step
+    real(wp), allocatable :: way(:, :)            !! (6, partners) since the step began [m], [rad]
+    real(wp), allocatable :: a_free(:, :)         !! (6, partners) without contact [m/s2], [rad/s2]
+    real(wp), allocatable :: by_contact(:, :)     !! (6, partners) change of v in a sub-sweep
+    real(wp), allocatable :: inverse_mass(:)      !! (partners) 0: does not yield [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, partners) [1/(kg m2)]
+  end type rows_t
+
+  real(wp), parameter :: damping_ratio = 5.0_wp   !! of the soft touches: they do not swing [-]
+  real(wp), parameter :: min_weight = 0.02_wp     !! of a touch that counts [-]
+  integer, parameter :: max_colours = 64          !! pairs of the last one are solved one by one
+
+contains
+
+  !> Room for the partners of a case.
+  subroutine rows_init(n, rows)
+    integer, intent(in) :: n                      !! bodies
+    type(rows_t), intent(out) :: rows
+
+    allocate (rows%v(6, bed_partner:n), rows%v_start(6, bed_partner:n), source=0.0_wp)
+    allocate (rows%way(6, bed_partner:n), rows%a_free(6, bed_partner:n), &
+      rows%by_contact(6, bed_partner:n), rows%inverse_mass(bed_partner:n), &
+      rows%inverse_inertia(3, 3, bed_partner:n), source=0.0_wp)
+    allocate (rows%used(n), source=0_i8)
+    allocate (rows%active(n + 1 - bed_partner), source=0)
+    allocate (rows%busy(bed_partner:n), rows%struck(bed_partner:n), source=.false.)
+    allocate (rows%begin(max_colours + 1), source=1)
+  end subroutine rows_init
+
+  !> Rows of all touches of a contact step, with the impulses and stretches remembered.
+  !!
+  !! The soft touch is a spring of the frequency 1/contact_time of what it pushes, damped so much
+  !! that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D (2024).
+  subroutine make_rows(h, contact_time, touches, law, partners, blocks, memory, rows)
+    real(wp), intent(in) :: h                     !! sub-sweep [s]
+    real(wp), intent(in) :: contact_time          !! [s]
+    type(touches_t), intent(in) :: touches
+    class(contact_law_t), intent(in) :: law
+    type(partners_t), intent(in) :: partners
+    type(blocks_t), intent(in) :: blocks
+    type(springs_t), intent(in) :: memory
+    type(rows_t), intent(inout) :: rows
+    real(wp) :: w, a1, a2
+    integer :: t, m, r
+
+    call copy_partners(partners, blocks, rows)
+    call reserve_rows(touches%n, rows)
+    rows%n = 0
+    rows%n_pairs = 0
+    m = 1
+    do t = 1, touches%n
+      associate (touch => touches%item(t))
+        if (touch%weight < min_weight) cycle
+        r = rows%n + 1
+        rows%n = r
+        rows%touch(r) = t
+        call begin_pair(touch%a, touch%b, rows)
+        w = 2*pi*sqrt(touch%weight)/contact_time
+        a1 = 2*damping_ratio + h*w
+        a2 = h*w*a1
+        rows%row(r) = row_t(n=touch%normal, arm_a=touch%arm_a, arm_b=touch%arm_b, &
+          gap=-touch%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
+          friction=merge(law%wall_friction, law%friction, touch%b < 0))
+        call weigh(touch%a, touch%b, rows, rows%row(r))
+        rows%closing(r) = dot_product(point_velocity(rows%v, touch%a, touch%b, rows%row(r)), &
+                                      touch%normal)
+        rows%largest(r) = 0.0_wp
+        rows%total(:, r) = 0.0_wp
+        call recall(touch, h, memory, m, rows%row(r))
+      end associate
+    end do
+    rows%first(rows%n_pairs + 1) = rows%n + 1
+    call list_active(blocks%n, rows)
+    call colour_pairs(rows)
+  end subroutine make_rows
+
+  !> Velocities and inverse inertia of the partners; what is held, sleeps or is moved at a given
+  !! rate does not yield.
+  pure subroutine copy_partners(partners, blocks, rows)
+    type(partners_t), intent(in) :: partners
+    type(blocks_t), intent(in) :: blocks
+    type(rows_t), intent(inout) :: rows
+    integer :: b
+
+    do b = bed_partner, blocks%n
+      rows%v(1:3, b) = partners%v(:, b)
+      rows%v(4:6, b) = partners%omega(:, b)
+      rows%v_start(:, b) = rows%v(:, b)
+      rows%way(:, b) = 0.0_wp
+      rows%by_contact(:, b) = 0.0_wp
+      rows%busy(b) = .false.
+      rows%inverse_mass(b) = partners%inverse_mass(b)
+      rows%inverse_inertia(:, :, b) = partners%inverse_inertia(:, :, b)
+      if (b < 1) cycle
+      if (.not. blocks%fixed(b) .and. .not. blocks%asleep(b)) cycle
+      rows%inverse_mass(b) = 0.0_wp
+      rows%inverse_inertia(:, :, b) = 0.0_wp
+    end do
+  end subroutine copy_partners
+
+  !> Make room for n rows and pairs.
+  subroutine reserve_rows(n, rows)
+    integer, intent(in) :: n
+    type(rows_t), intent(inout) :: rows
+
+    if (allocated(rows%row)) then
+      if (n > size(rows%row)) deallocate (rows%row)
+    end if
+    if (.not. allocated(rows%row)) allocate (rows%row(2*n + 16))
+    call ensure_room(n, rows%touch)
+    call ensure_room(n, rows%closing)
+    call ensure_room(n, rows%largest)
+    call ensure_room(n, rows%total)
+    call ensure_room(n, rows%hit)
+    call ensure_room(n, rows%returned)
+    call ensure_room(n, rows%a)
+    call ensure_room(n, rows%b)
+    call ensure_room(n + 1, rows%first)
+    call ensure_room(n, rows%colour)
+    call ensure_room(n, rows%order)
+    call ensure_room(n, rows%push)
+    call ensure_room(n, rows%turn)
+  end subroutine reserve_rows
+
+  !> Begin a new pair with row `rows%n`, unless it goes on with the last one.
+  pure subroutine begin_pair(a, b, rows)
+    integer, intent(in) :: a, b
+    type(rows_t), intent(inout) :: rows
+
+    if (rows%n_pairs > 0) then
+      if (rows%a(rows%n_pairs) == a .and. rows%b(rows%n_pairs) == b) return
+    end if
+    rows%n_pairs = rows%n_pairs + 1
+    rows%a(rows%n_pairs) = a
+    rows%b(rows%n_pairs) = b
+    rows%first(rows%n_pairs) = rows%n
+    rows%push(:, rows%n_pairs) = 0.0_wp
+    rows%turn(:, rows%n_pairs) = 0.0_wp
+    rows%busy([a, b]) = .true.
+  end subroutine begin_pair
+
+  !> Tangents of a row and the masses that two partners set against an impulse at it,
+  !! K = J M^-1 J^T.
+  pure subroutine weigh(a, b, rows, row)
+    integer, intent(in) :: a, b
+    type(rows_t), intent(in) :: rows
+    type(row_t), intent(inout) :: row
+    real(wp), parameter :: far_from_x = 0.6_wp   !! the normal is, below this cosine
+    real(wp) :: k(3, 3), along_1(3), along_2(3), k_11, k_12, k_22, determinant
+
+    if (abs(row%n(1)) < far_from_x) then
+      row%e1 = [0.0_wp, row%n(3), -row%n(2)]
+    else
+      row%e1 = [-row%n(3), 0.0_wp, row%n(1)]
+    end if
+    row%e1 = row%e1/norm(row%e1)
+    row%e2 = cross(row%n, row%e1)
+    k = 0.0_wp
+    call add_response(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, k)
+    call add_response(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, k)
+    row%response = matmul(k, row%n)
+    row%mass = 1.0_wp/dot_product(row%n, row%response)
+    along_1 = matmul(k, row%e1)
+    along_2 = matmul(k, row%e2)
+    k_11 = dot_product(row%e1, along_1)
+    k_12 = dot_product(row%e2, along_1)
+    k_22 = dot_product(row%e2, along_2)
+    determinant = k_11*k_22 - k_12**2
+    row%mass_11 = k_22/determinant
+    row%mass_12 = -k_12/determinant
+    row%mass_22 = k_11/determinant
+    row%mass_slip = 1.0_wp/(0.5_wp*(k_11 + k_22) + sqrt(0.25_wp*(k_11 - k_22)**2 + k_12**2))
+  end subroutine weigh
+
+  !> Add what a partner yields at its arm to a unit impulse: 1/m - [r] I^-1 [r].
+  pure subroutine add_response(inverse_mass, inverse_inertia, arm, k)
+    real(wp), intent(in) :: inverse_mass, inverse_inertia(3, 3), arm(3)   !! [1/kg], [1/(kg m2)]
+    real(wp), intent(inout) :: k(3, 3)           !! [1/kg]
+    real(wp) :: lever(3, 3)
+    integer :: i
+
+    if (inverse_mass <= 0.0_wp) return
+    lever(:, 1) = [0.0_wp, arm(3), -arm(2)]
+    lever(:, 2) = [-arm(3), 0.0_wp, arm(1)]
+    lever(:, 3) = [arm(2), -arm(1), 0.0_wp]
+    k = k + matmul(transpose(lever), matmul(inverse_inertia, lever))
+    do i = 1, 3
+      k(i, i) = k(i, i) + inverse_mass
+    end do
+  end subroutine add_response
+
+  !> Velocity (or way) of partner b past body a at a row: v_b + w_b x r_b - v_a - w_a x r_a.
+  pure function point_velocity(v, a, b, row) result(past)
+    real(wp), intent(in) :: v(:, bed_partner:)   !! (6, partners)
+    integer, intent(in) :: a, b
+    type(row_t), intent(in) :: row
+    real(wp) :: past(3)
+
+    past = v(1:3, b) - v(1:3, a) + (cross(v(4:6, b), row%arm_b) - cross(v(4:6, a), row%arm_a))
+  end function point_velocity
+
+  !> What is remembered of a touch: the force that it bore, and its tangential way. Both lists are
+  !! sorted; m is the place in the memory.
+  pure subroutine recall(touch, h, memory, m, row)
+    type(touch_t), intent(in) :: touch
+    real(wp), intent(in) :: h                    !! sub-sweep [s]
+    type(springs_t), intent(in) :: memory
+    integer, intent(inout) :: m
+    type(row_t), intent(inout) :: row
+
+    do while (m <= memory%n)
+      if (.not. comes_before(memory%a(m), memory%b(m), memory%key(m), &
+                             touch%a, touch%b, touch%key)) then
+        if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
+            .or. memory%other(m) >= touch%other) exit
+      end if
+      m = m + 1
+    end do
+    if (m > memory%n) return
+    if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
+        .or. memory%other(m) /= touch%other) return
+    row%impulse(1) = max(0.0_wp, -h*dot_product(memory%force(:, m), row%n))
+    row%impulse(2) = -h*dot_product(memory%force(:, m), row%e1)
+    row%impulse(3) = -h*dot_product(memory%force(:, m), row%e2)
+    row%stretch(1) = dot_product(memory%xi(:, m), row%e1)
+    row%stretch(2) = dot_product(memory%xi(:, m), row%e2)
+  end subroutine recall
+
+  !> List the partners that have rows and move.
+  pure subroutine list_active(n, rows)
+    integer, intent(in) :: n                     !! bodies
+    type(rows_t), intent(inout) :: rows
+    integer :: b
+
+    rows%n_active = 0
+    do b = bed_partner, n
+      if (.not. rows%busy(b)) cycle
+      if (rows%inverse_mass(b) <= 0.0_wp .and. all(abs(rows%v(:, b)) <= 0.0_wp)) cycle
+      rows%n_active = rows%n_active + 1
+      rows%active(rows%n_active) = b
+    end do
+  end subroutine list_active
+
+  !> Give each pair the first colour that none of its bodies has yet, and sort the pairs by colour.
+  pure subroutine colour_pairs(rows)
+    type(rows_t), intent(inout) :: rows
+    integer :: k, c, place(max_colours)
+    integer(i8) :: taken
+
+    rows%used = 0_i8
+    place = 0
+    do k = 1, rows%n_pairs
+      taken = 0_i8
+      if (yields(rows, rows%a(k))) taken = rows%used(rows%a(k))
+      if (yields(rows, rows%b(k))) taken = ior(taken, rows%used(rows%b(k)))
+      c = min(trailz(not(taken)) + 1, max_colours)
+      if (yields(rows, rows%a(k))) rows%used(rows%a(k)) = ibset(rows%used(rows%a(k)), c - 1)
+      if (yields(rows, rows%b(k))) rows%used(rows%b(k)) = ibset(rows%used(rows%b(k)), c - 1)
+      rows%colour(k) = c
+      place(c) = place(c) + 1
+    end do
+    rows%n_colours = 0
+    rows%begin(1) = 1
+    do c = 1, max_colours
+      rows%begin(c + 1) = rows%begin(c) + place(c)
+      if (place(c) > 0) rows%n_colours = c
+      place(c) = rows%begin(c)
+    end do
+    do k = 1, rows%n_pairs
+      c = rows%colour(k)
+      rows%order(place(c)) = k
+      place(c) = place(c) + 1
+    end do
+  end subroutine colour_pairs
+
+  !> Whether a partner is a body that yields to impulses.
+  pure function yields(rows, b) result(yes)
+    type(rows_t), intent(in) :: rows
+    integer, intent(in) :: b
+    logical :: yes
+
+    yes = b > 0
+    if (yes) yes = rows%inverse_mass(b) > 0.0_wp
+  end function yields
+
+  !> Mean forces and torques of the step on all partners.
+  pure subroutine sum_loads(step, rows, force, torque)
+    real(wp), intent(in) :: step                                   !! [s]
+    type(rows_t), intent(in) :: rows
+    real(wp), intent(inout) :: force(:, bed_partner:), torque(:, bed_partner:)
+      !! (3, partners) [N], [N m]
+    real(wp) :: p(3)
+    integer :: k, r
+
+    force = 0.0_wp
+    torque = 0.0_wp
+    do k = 1, rows%n_pairs
+      associate (a => rows%a(k), b => rows%b(k))
+        do r = rows%first(k), rows%first(k + 1) - 1
+          associate (row => rows%row(r))
+            p = (rows%total(1, r)*row%n + rows%total(2, r)*row%e1 + rows%total(3, r)*row%e2)/step
+            force(:, a) = force(:, a) - p
+            force(:, b) = force(:, b) + p
+            torque(:, a) = torque(:, a) - cross(row%arm_a, p)
+            torque(:, b) = torque(:, b) + cross(row%arm_b, p)
+          end associate
+        end do
+        torque(:, a) = torque(:, a) + rows%turn(:, k)/step
+        torque(:, b) = torque(:, b) + rows%turn(:, k)/step
+      end associate
+    end do
+  end subroutine sum_loads
+
+  !> Remember the rows that bear something: force and torques of the last sub-sweep, and the
+  !! tangential way where friction holds. They store no energy: overlaps open without speed.
+  subroutine store_memory(h, touches, rows, memory)
+    real(wp), intent(in) :: h                    !! sub-sweep [s]
+    type(touches_t), intent(in) :: touches
+    type(rows_t), intent(in) :: rows
+    type(springs_t), intent(inout) :: memory
+    real(wp), parameter :: sticking = 0.999_wp   !! of the bound of friction: below it nothing slips
+    real(wp) :: way(3), p(3)
+    integer :: k, r, m
+
+    call reserve_springs(rows%n, memory)
+    m = 0
+    do k = 1, rows%n_pairs
+      do r = rows%first(k), rows%first(k + 1) - 1
+        associate (row => rows%row(r), touch => touches%item(rows%touch(r)))
+          if (.not. row%impulse(1) > 0.0_wp) cycle
+          m = m + 1
+          memory%a(m) = touch%a
+          memory%b(m) = touch%b
+          memory%key(m) = touch%key
+          memory%other(m) = touch%other
+          memory%k(m) = 0.0_wp
+          way = point_velocity(rows%way, touch%a, touch%b, row)
+          memory%xi(:, m) = 0.0_wp
+          if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) &
+            memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &
+              + way - dot_product(way, row%n)*row%n
+          p = (row%impulse(1)*row%n + row%impulse(2)*row%e1 + row%impulse(3)*row%e2)/h
+          memory%force(:, m) = -p
+          memory%torque_a(:, m) = -cross(row%arm_a, p)
+          memory%torque_b(:, m) = cross(row%arm_b, p)
+          memory%energy(m) = 0.0_wp
+        end associate
+      end do
+    end do
+    memory%n = m
+  end subroutine store_memory
+
+end module impulse_rows_m

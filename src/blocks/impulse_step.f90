@@ -1,0 +1,256 @@
+!> Contact by impulses: few long steps within a fluid step, each of which finds what touches or may
+!! come to touch once, and solves for the impulses of all touches together.
+!!
+!! A step is as long as the fastest motion of what can meet in it allows; what is far from all
+!! others falls in one step.
+module impulse_step_m
+  use kinds_m, only: wp
+  use vectors_m, only: cross, distance, norm
+  use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body
+  use walls_m, only: walls_t
+  use bed_m, only: bed_is_near, bed_place
+  use contact_surface_m, only: contact_surface_t, find_surface_touches, cover_way, renew_pairs
+  use contact_partners_m, only: update_motion, update_inertia
+  use contact_forces_m, only: contact_report_t
+  use contact_load_m, only: give_share
+  use contact_state_m, only: contacts_t
+  use substep_limits_m, only: equal_part
+  use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
+  use impulse_sweeps_m, only: solve_rows, restore
+  use lubrication_m, only: lubricate
+  use sleep_m, only: hold_or_wake
+  use resting_m, only: rouse
+  use partners_met_m, only: store_partners
+  implicit none
+  private
+  public :: move_by_impulses
+
+  integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
+  integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
+  real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
+  real(wp), parameter :: margin = 5.0e-3_wp       !! of a touch to come, over that edge [-]
+  real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
+  real(wp), parameter :: free_way = 0.5_wp        !! covered by the list of pairs, over a reach [-]
+  real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
+
+contains
+
+  !> Move the blocks through a fluid step; impulses of contact are added to the loads of the step.
+  subroutine move_by_impulses(walls, gravity, dt, contacts, blocks, report)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(inout) :: report
+    real(wp) :: left, longest, step, h
+    integer :: n
+
+    left = dt
+    do while (left > 0.0_wp)
+      call longest_step(walls, gravity, left, contacts, blocks, longest)
+      if (.not. left < longest*real(max_steps, wp)) then
+        report%info = 1
+        return
+      end if
+      step = equal_part(left, longest)
+      n = ceiling(step*real(n_sub_sweeps, wp)/contacts%contact_time*(1.0_wp - 1.0e-9_wp))
+      h = step/real(n, wp)
+      do
+        call solve_step(walls, gravity, step, h, n, contacts, blocks)
+        if (.not. contacts%sleep%active) exit
+        call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
+          contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
+        if (.not. any(contacts%woken)) exit
+        call rouse(blocks, contacts)   ! what wakes takes part: once more
+      end do
+      call finish_step(gravity, step, h, contacts, blocks, report)
+      left = merge(left - step, 0.0_wp, step < left)
+      report%substeps = report%substeps + 1
+    end do
+  end subroutine move_by_impulses
+
+  !> Longest contact step now [s].
+  !!
+  !! Bodies that can meet, or touch, move by a share of the smallest edge at most, and for a contact
+  !! time; others may move until they can.
+  subroutine longest_step(walls, gravity, left, contacts, blocks, longest)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: left         !! of the fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(out) :: longest
+    real(wp) :: speed, most, two(2), edge
+    integer :: p, b, w
+
+    two = 0.0_wp
+    do b = 1, blocks%n
+      if (.not. blocks%present(b) .or. blocks%still(b)) then
+        contacts%gain(b) = 0.0_wp
+        cycle
+      end if
+      contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
+                               blocks%fixed(b))*left
+      speed = fastest(b)
+      if (.not. speed <= two(2)) two(2) = speed
+      if (.not. two(2) <= two(1)) two = two([2, 1])
+    end do
+    most = sum(two)
+    longest = 0.0_wp
+    if (.not. most <= huge(most)) return   ! not a number
+    associate (s => contacts%touching%surface)
+      edge = contacts%smallest_edge
+      longest = left
+      if (most*left > free_way*maxval(s%reach)) longest = min(left, &
+        max(contacts%contact_time, free_way*maxval(s%reach)/most))
+      call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
+      call renew_pairs(walls, blocks, s)
+      do b = 1, blocks%n
+        if (.not. blocks%present(b) .or. blocks%still(b) .or. blocks%fixed(b)) cycle
+        speed = fastest(b)
+        do w = 1, walls%n
+          call limit_by(walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, b)) &
+                        - s%reach(b), speed)
+        end do
+        if (walls%bed%there) then
+          associate (place => bed_place(walls%bed, blocks%x(:, b)), far => s%reach(b) + left*speed)
+            if (bed_is_near(walls%bed, place - far, place + far)) call limit_by(0.0_wp, speed)
+          end associate
+        end if
+      end do
+      do p = 1, s%near%n
+        associate (a => s%near%a(p), c => s%near%b(p))
+          if (blocks%still(a) .and. blocks%still(c)) cycle
+          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, a))*s%reach(a) &
+            + norm(blocks%omega(:, c))*s%reach(c) + contacts%gain(a) + contacts%gain(c)
+          call limit_by(distance(blocks%x(:, a), blocks%x(:, c) + s%near%shift(:, p)) &
+                        - s%reach(a) - s%reach(c), speed)
+        end associate
+      end do
+    end associate
+  contains
+    !> Speed of any point of a body until the fluid step ends, at most [m/s].
+    pure real(wp) function fastest(b)
+      integer, intent(in) :: b
+
+      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%touching%surface%reach(b) &
+        + contacts%gain(b)
+    end function fastest
+
+    !> What a gap allows that closes at a speed.
+    subroutine limit_by(gap, closing)
+      real(wp), intent(in) :: gap, closing   !! [m], [m/s]
+
+      if (gap > closing*longest) return
+      longest = min(longest, max(gap/closing, &
+        min(contacts%contact_time, max_way*edge/max(closing, tiny(closing)))))
+    end subroutine limit_by
+  end subroutine longest_step
+
+  !> Find the touches of a contact step and their impulses; the bodies stay where they are.
+  subroutine solve_step(walls, gravity, step, h, n, contacts, blocks)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: step, h      !! of n sub-sweeps [s]
+    integer, intent(in) :: n
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+
+    associate (touching => contacts%touching, rows => contacts%rows, loads => contacts%loads)
+      touching%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
+      call find_surface_touches(walls, blocks, step, touching%surface, touching%touches)
+      call update_motion(blocks, touching%partners)
+      call update_inertia(blocks, touching%partners)
+      loads%film = 0.0_wp
+      if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
+        loads%film)
+      call make_rows(h, contacts%contact_time, touching%touches, touching%law, touching%partners, &
+                     blocks, contacts%springs, rows)
+      if (rows%n > 0) then
+        call fall_freely(gravity, contacts, blocks, rows)
+        call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
+        call restore(contacts%restitution, slow_hit*norm(gravity)*step, rows)
+      end if
+      call sum_loads(step, rows, loads%force, loads%torque)
+      loads%force = loads%force + loads%film
+    end associate
+  end subroutine solve_step
+
+  !> Accelerations of all bodies with rows but for contact, at the start of the step.
+  pure subroutine fall_freely(gravity, contacts, blocks, rows)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    type(contacts_t), intent(in) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    type(rows_t), intent(inout) :: rows
+    integer :: k
+
+    do k = 1, rows%n_active
+      associate (b => rows%active(k))
+        rows%a_free(:, b) = 0.0_wp
+        if (rows%inverse_mass(b) <= 0.0_wp) cycle
+        rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) &
+          + rows%inverse_mass(b)*contacts%loads%film(:, b)
+        rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), blocks%fluid_torque(:, b) &
+          - cross(blocks%omega(:, b), blocks%l(:, b)))
+      end associate
+    end do
+  end subroutine fall_freely
+
+  !> Move the bodies by what was found, book the impulses, remember the touches.
+  subroutine finish_step(gravity, step, h, contacts, blocks, report)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: step, h      !! [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(inout) :: blocks
+    type(contact_report_t), intent(inout) :: report
+    real(wp) :: force(3)
+    integer :: b
+
+    associate (rows => contacts%rows, loads => contacts%loads)
+      do b = 1, blocks%n
+        if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle
+        if (rows%busy(b) .and. .not. blocks%fixed(b)) then
+          call place_body(b, rows%way(:, b), rows%v(1:3, b), &
+            step*(blocks%fluid_torque(:, b) + loads%torque(:, b)), blocks)
+        else
+          force = contacts%steady(:, b) + contacts%share(b)*loads%film(:, b)
+          call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)
+          call drift_body(step, b, blocks)
+          call kick_body(gravity, 0.5_wp*step, force, blocks%fluid_torque(:, b), b, blocks)
+        end if
+      end do
+      loads%impulse = loads%impulse + step*loads%force
+      loads%twist = loads%twist + step*loads%torque
+      call report_rows(step, contacts, report)
+      call store_memory(h, contacts%touching%touches, rows, contacts%springs)
+    end associate
+  end subroutine finish_step
+
+  !> Partners that touched, how deep at the start of the step, and how far they came in it.
+  subroutine report_rows(step, contacts, report)
+    real(wp), intent(in) :: step   !! [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(contact_report_t), intent(inout) :: report
+    logical :: touched(contacts%rows%n_pairs)
+    integer :: k, r
+
+    associate (rows => contacts%rows, give => contacts%touching%partners%give)
+      do k = 1, rows%n_pairs
+        associate (first => rows%first(k), last => rows%first(k + 1) - 1)
+          touched(k) = any(rows%largest(first:last) > 0.0_wp)
+          do r = first, last
+            report%overlap_max = max(report%overlap_max, -rows%row(r)%gap)
+            report%deepest = max(report%deepest, -give_share*rows%row(r)%gap &
+              /min(give(rows%a(k)), give(rows%b(k))))
+            if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
+              abs(rows%closing(r))*step/contacts%touching%touches%item(rows%touch(r))%length)
+          end do
+        end associate
+      end do
+      call store_partners(pack(rows%a(:rows%n_pairs), touched), &
+                          pack(rows%b(:rows%n_pairs), touched), contacts%met)
+    end associate
+  end subroutine report_rows
+
+end module impulse_step_m
