@@ -133,8 +133,8 @@ contains
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
 
-  !> How deep the true shapes are in one another, unless it is known: for a row, or where touches are
-  !! deep.
+  !> How deep the true shapes are in one another, unless it is known: for rows, or where touches
+  !! are deep.
   subroutine measure_overlap(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report

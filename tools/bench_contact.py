@@ -1,7 +1,8 @@
 """Time the dry pile of hexapods and measure it.
 
 usage: python tools/bench_contact.py [--n 64] [--time 2] [--box 0.3] [--seed 1] [--threads 1]
-                                     [--dt 0.1] [--contact-time 0.008] [--solver springs] [--program ./mics]
+                                     [--dt 0.1] [--contact-time 0.008] [--solver springs]
+                                     [--program ./mics]
 
 N hexapods (edge of a cube 20 mm, 2300 kg/m3) start on a loose grid with random attitudes above
 the floor of a square tank, fall and pile up; friction 0.5, restitution 0.3, exact surfaces. `--dt`

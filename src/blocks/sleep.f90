@@ -15,7 +15,8 @@ module sleep_m
   use springs_m, only: springs_t, reserve_springs
   implicit none
   private
-  public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses, store_quiet, is_tired
+  public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
+  public :: store_quiet, is_tired
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
