@@ -394,9 +394,10 @@ contains
           memory%k(m) = 0.0_wp
           way = point_velocity(rows%way, touch%a, touch%b, row)
           memory%xi(:, m) = 0.0_wp
-          if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) &
+          if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &
               + way - dot_product(way, row%n)*row%n
+          end if
           p = (row%impulse(1)*row%n + row%impulse(2)*row%e1 + row%impulse(3)*row%e2)/h
           memory%force(:, m) = -p
           memory%torque_a(:, m) = -cross(row%arm_a, p)

@@ -6,7 +6,7 @@
 !! away the velocity with which overlaps opened:
 !!
 !! $$ \Delta\gamma_n = -m_n (v_n + s/h) \;\text{ for gaps } s > 0, \qquad
-!!    \Delta\gamma_n = -a_2 a_3 m_n (v_n + \max(r s, -v_p)) - a_3 \gamma_n \;\text{ for overlaps}, $$
+!!    \Delta\gamma_n = -a_2 a_3 m_n (v_n + \max(r s, -v_p)) - a_3 \gamma_n \;\text{ else}, $$
 !!
 !! gamma_n >= 0, and friction within mu gamma_n after it, with the tangential way as its memory.
 !! Source: Macklin et al. (2019), Small steps in physics simulation; Catto (2024), Solver2D.
@@ -126,8 +126,8 @@ contains
     end do
   end subroutine begin_sweep
 
-  !> Half of the way of a past b: the contact stays between them, and the arm of b is longer, that of
-  !! a shorter by this. Zero where one does not yield [m].
+  !> Half of the way of a past b: the contact stays between them, and the arm of b is longer, that
+  !! of a shorter by this. Zero where one does not yield [m].
   pure function half_way_past(k, rows) result(way)
     integer, intent(in) :: k    !! pair
     type(rows_t), intent(in) :: rows
@@ -329,8 +329,8 @@ contains
     end do
   end subroutine go_on
 
-  !> Restitution after Newton: where a body was hit faster than `slowest`, all its touches leave with
-  !! e times the speed at which they came, v_n = -e v_n(start), unless their impulse of the whole
+  !> Restitution after Newton: where a body was hit faster than `slowest`, all its touches leave
+  !! with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of the whole
   !! step would pull. So no energy is made: that of impulses P is the sum of P (v_n + v_n(start))/2.
   !! The arms are those of where the bodies are now.
   pure subroutine restore(e, slowest, rows)
@@ -377,8 +377,9 @@ contains
     rows%struck = .false.
     do k = 1, rows%n_pairs
       do r = rows%first(k), rows%first(k + 1) - 1
-        if (rows%largest(r) > 0.0_wp .and. rows%closing(r) < -slowest) &
+        if (rows%largest(r) > 0.0_wp .and. rows%closing(r) < -slowest) then
           rows%struck([rows%a(k), rows%b(k)]) = .true.
+        end if
       end do
     end do
     hits = 0

@@ -54,7 +54,8 @@ contains
       end if
     end if
     contacts%woken = .false.
-    if (changed .and. .not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+    if (changed .and. .not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, &
+      contacts%touching)
     associate (rest => contacts%sleep%rest)
       call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
