@@ -33,7 +33,7 @@ def test_state_is_taken(tmp_path: Path) -> None:
     done = mics(["--output", "out"], tmp_path, CASE + "gravity = 0, 0, 0 /")
     assert done.returncode == 0, done.stderr
     run = Run(tmp_path / "out")
-    first = run.fields(0.0)
+    first = run.fields_at(0.0)
     assert np.abs(first.liquid - liquid).max() < 1e-6  # fields are stored in single precision
     assert np.abs(first.velocity - wave()).max() < 1e-6
     assert run.series.liquid_volume[0] == pytest.approx(1e-3 * liquid.sum(), rel=1e-12)

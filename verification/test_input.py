@@ -190,7 +190,7 @@ def test_files_are_looked_for_beside_the_case_first(tmp_path: Path) -> None:
     for words, text, share in (["sub/case.nml"], "", 1.0), ([], FILES, 0.0):
         done = mics([*words, "--quiet", "--output", f"out{share}"], tmp_path, text)
         assert (done.returncode, done.stderr) == (0, "")
-        assert Run(tmp_path / f"out{share}").fields(0.0).liquid.max() == pytest.approx(share)
+        assert Run(tmp_path / f"out{share}").fields_at(0.0).liquid.max() == pytest.approx(share)
     for name in ("flat.txt", "block.txt", "state.h5"):
         (tmp_path / "sub" / name).unlink()
     done = mics(["--check", "sub/case.nml"], tmp_path)

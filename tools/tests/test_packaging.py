@@ -97,7 +97,7 @@ def test_pip_installs_what_the_tools_import(metadata: Message) -> None:
     ]
     needed = metadata.get_all("Requires-Dist", [])
     always = set().union(*(imports(path, inside=False) for path in files))
-    always_needed = always - {"aiohttp", "dask", "distributed", "dask-jobqueue"}
+    always_needed = always - {"aiohttp", "distributed", "dask-jobqueue"}
     assert names_of(needed) == always_needed
     offered = set().union(*(names_of(needed, extra) for extra in extras.PACKAGES))
     assert offered | always >= set().union(*(imports(path, inside=True) for path in files))

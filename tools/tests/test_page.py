@@ -17,7 +17,7 @@ from browser import MISSING, Browser
 from micstools import cli
 from micstools.pages import charts, html, motion, run_page, run_words, views
 from micstools.pages.charts import Curve
-from micstools.piles import pile_numbers
+from micstools.piles import maps, pile_numbers
 from micstools.reading import block_numbers
 from micstools.reading.overlap import Placed
 from micstools.reading.reader import Run
@@ -139,7 +139,7 @@ def test_units_go_with_the_blocks(make_run) -> None:
 
 def test_plan_is_covered_within_the_footprint(make_run) -> None:
     run = make_run(Motion(t_end=2.0, field_step=2.0, cells=(12, 4, 8), places=[(CLEAR, UPRIGHT)]))
-    n = pile_numbers.numbers(run, pile_numbers.usual_step(run))
+    n = pile_numbers.numbers(run, maps.usual_step(run))
     tile = run_page.page(run).split("plan covered")[1].split("</div>")[0].replace("\u00a0", " ")
     share = f"{100 * n.plan_area / n.footprint:.0f} % of a footprint of"
     assert share in tile and f"{1e4 * n.footprint:.3g} cm²" in tile

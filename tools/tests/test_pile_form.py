@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from micstools.piles import pile_form
-from micstools.piles.pile_numbers import height_map
+from micstools.piles.maps import height_map
 from micstools.reading.overlap import Placed
 from micstools.shapes import shape as shapes
 from micstools.shapes.geometry import quaternion_from_axis

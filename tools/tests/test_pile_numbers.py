@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from micstools import cli
-from micstools.piles import pile_numbers
+from micstools.piles import maps, pile_numbers
 from micstools.reading.overlap import Placed, present_bodies, sphere_gap, touches
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
@@ -67,7 +67,7 @@ def test_layer_and_porosity_on_a_slope(make_run) -> None:
     lowest = run.points(0, -1)[:, 2].max() - 0.2 * 0.14
     assert found.height == pytest.approx(lowest, abs=0.005)
     assert 0 < found.porosity < 1
-    volume = pile_numbers.bed_volume(run, np.zeros(3), np.array([0.3, 0.1, 0.2]), 0.001)
+    volume = maps.bed_volume(run, np.zeros(3), np.array([0.3, 0.1, 0.2]), 0.001)
     assert volume == pytest.approx(0.5 * 0.3 * 0.06 * 0.1, rel=1e-3)
     box = (np.array([0.24, 0.02, 0.0]), np.array([0.26, 0.04, 0.1]))
     inside = pile_numbers.numbers(run, step=0.001, box=box).porosity
@@ -81,12 +81,12 @@ def test_layer_and_porosity_on_a_slope(make_run) -> None:
 def test_height_map_of_a_cube_and_a_tilted_one() -> None:
     cube = shapes.cube(EDGE)
     low, high = np.zeros(3), np.array([0.1, 0.1, 0.1])
-    upright = pile_numbers.Placed(cube, np.array([0.03, 0.05, 0.01]), UPRIGHT)
+    upright = Placed(cube, np.array([0.03, 0.05, 0.01]), UPRIGHT)
     turned = np.array([np.cos(np.pi / 8), 0.0, np.sin(np.pi / 8), 0.0])  # 45 degrees about y
-    edge_up = pile_numbers.Placed(cube, np.array([0.07, 0.05, 0.03]), turned)
-    one = pile_numbers.height_map([upright], low, high, 0.001)
+    edge_up = Placed(cube, np.array([0.07, 0.05, 0.03]), turned)
+    one = maps.height_map([upright], low, high, 0.001)
     assert np.isfinite(one).sum() == 400 and np.nanmax(one) == np.nanmin(one) == EDGE
-    both = pile_numbers.height_map([upright, edge_up], low, high, 0.001)
+    both = maps.height_map([upright, edge_up], low, high, 0.001)
     x = (np.arange(100) + 0.5) * 0.001
     roof = 0.03 + EDGE / np.sqrt(2) - np.abs(x - 0.07)
     seen = np.isfinite(both[50]) & (x > 0.05)
@@ -104,7 +104,8 @@ def test_the_command_writes_outline_and_height_map(make_run, capsys) -> None:
     content = json.loads((run.folder / "pile.json").read_text())
     assert content["units"] == {"plan_area": "m2", "top": "m", "centre": "m", "spread": "m",
         "time_to_rest": "s", "impact_speed": "m/s", "contact_force": "N", "slopes": "deg",
-        "box": "m", "height": "m", "layer_thickness": "m", "footprint": "m2"}  # fmt: skip
+        "box": "m", "height": "m", "layer_thickness": "m", "thickness_ball": "m",
+        "footprint": "m2"}  # fmt: skip
     corners = np.concatenate(content["outline"])
     assert len(content["outline"]) == 4
     assert corners[:, 0].min() == pytest.approx(0.02, abs=1e-9)

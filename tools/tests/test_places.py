@@ -178,7 +178,7 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
         cli.main(words)
     assert end.value.code == 0
     said = capsys.readouterr().out
-    assert "4 free units, 4 of them at rest" in said and "per 100 m2" in said
+    assert "4 free units, 4 of them at rest" in said and "per 100 cm2" in said
     table = pandas.read_csv(tmp_path / "places.csv")
     contract = ["unit", "name", "x", "y", "z", "heading_deg", "tilt_deg", "deviation", "at_rest",
                 "neighbours", "contacts"]  # fmt: skip

@@ -70,7 +70,7 @@ def test_a_bed_has_sides_down_to_the_floor(tmp_path: Path) -> None:
 def test_the_speed_of_the_water_is_that_of_the_fields(loose_pile: Run) -> None:
     water = motion.water(loose_pile)
     assert water is not None
-    found, fields = water["speed"], loose_pile.fields(2.0)
+    found, fields = water["speed"], loose_pile.fields_at(2.0)
     frame = list(unpacked(found["times"], "<f4")).index(2.0)
     speed = np.linalg.norm(fields.velocity, axis=3)
     speed[(fields.liquid <= 0.5) | (fields.solid >= 0.5)] = 0.0

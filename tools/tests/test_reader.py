@@ -34,7 +34,7 @@ def test_shapes_grid_and_parameters(loose_pile: Run) -> None:
 
 
 def test_fields_are_those_of_the_nearest_frame(loose_pile: Run) -> None:
-    fields = loose_pile.fields(2.2)
+    fields = loose_pile.fields_at(2.2)
     assert fields.time == 2.0
     assert fields.liquid.shape == (40, 20, 60)
     assert fields.velocity.shape == (40, 20, 60, 3)
@@ -95,7 +95,7 @@ def test_a_run_without_fluid_has_no_fields(tmp_path: Path, loose_pile: Run) -> N
     run = Run(folder)
     assert run.field_times.size == 0
     with pytest.raises(ValueError, match="no fields"):
-        run.fields(0.0)
+        run.fields_at(0.0)
 
 
 def test_print_tells_what_is_there(loose_pile: Run) -> None:

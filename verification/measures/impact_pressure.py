@@ -48,7 +48,7 @@ class Experiment:
         column, scale = self.column(run.grid), self.density * self.gravity * self.height
         found: dict[str, list[float]] = {name: [] for name in self.sensors}
         for t in run.field_times:
-            pressure = run.fields(t).pressure[:, 0, column].astype(float) / scale
+            pressure = run.fields_at(t).pressure[:, 0, column].astype(float) / scale
             heights = (np.arange(len(pressure)) + 0.5) * run.grid.spacing[2]
             for name, height in self.sensors.items():
                 found[name].append(float(np.interp(height, heights, pressure)))

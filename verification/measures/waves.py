@@ -15,7 +15,7 @@ def standing_amplitude(run: Run, mode: int = 1) -> tuple[Array, Array]:
     shape = np.cos(mode * np.pi * x)
     found = []
     for t in run.field_times:
-        heights = run.fields(t).liquid[:, 0, :].astype(float).sum(axis=0) * run.grid.spacing[2]
+        heights = run.fields_at(t).liquid[:, 0, :].astype(float).sum(axis=0) * run.grid.spacing[2]
         found.append(2.0 * float(np.mean(heights * shape)))
     # A mean over cells of a cosine that is itself a mean over cells.
     phase = 0.5 * mode * np.pi / n

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from micstools import command
 from micstools.commands.base import Command
-from micstools.piles import pile_ensemble, pile_numbers
+from micstools.piles import maps, pile_ensemble, pile_numbers
 from micstools.reading import comparison, units
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Units, figure
@@ -17,7 +17,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _numbers(run: Run) -> dict[str, float | str]:
-    return pile_ensemble.flat(pile_numbers.numbers(run, pile_numbers.usual_step(run)))
+    return pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run)))
 
 
 def _compare(given: argparse.Namespace) -> int:

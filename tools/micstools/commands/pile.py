@@ -12,7 +12,7 @@ import numpy as np
 
 from micstools import command
 from micstools.commands.base import Command
-from micstools.piles import pile, pile_ensemble, pile_form, pile_numbers, placing
+from micstools.piles import layer, maps, pile, pile_ensemble, pile_form, pile_numbers, placing
 from micstools.piles.pile_ensemble import Ensemble
 from micstools.piles.placing import Area
 from micstools.piles.shares import in_words
@@ -90,16 +90,19 @@ def _of_run(given: argparse.Namespace) -> int:
     box = _box(given.box)
     findings(given)
     run = command.open_run(given.run)
-    step = given.step or pile_numbers.usual_step(run)
+    step = given.step or maps.usual_step(run)
     numbers, chosen = pile_numbers.numbers(run, step, box=box), units.of_run(run)
     found = asdict(numbers)
     for name, value in found.items():
         values = value if isinstance(value, tuple) else (value,)
         print(f"     {name:20}{pile_numbers.words(chosen, name, values)}")
-    top = pile_numbers.top_of(run, step)
+    top = maps.top_of(run, step)
     x, y = (run.grid.low[d] + (np.arange(top.shape[1 - d]) + 0.5) * step for d in (0, 1))
     _write_h5(run.folder / "pile_maps.h5", {"x": x, "y": y, "top": top})
     found["note"] = run.note
+    if measured := layer.of_run(run):
+        print(ascii_of("\n".join(f"     {line}" for line in layer.words(measured[1], chosen))))
+        found["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
     found["units"] = pile_numbers.si_units(found)
     found["outline"] = [line.tolist() for line in pile_form.outline(top, run.grid.low, step)]
     found["of_blocks"] = [asdict(k) for k in block_numbers.of_blocks(run)]

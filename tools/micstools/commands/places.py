@@ -15,11 +15,10 @@ from micstools.piles import handover, layer, pile_ensemble, places
 from micstools.piles.handover import Handover
 from micstools.piles.layer import Corners
 from micstools.piles.pile_ensemble import Ensemble
-from micstools.piles.places import Place, Survey, Within
-from micstools.piles.shares import in_words
+from micstools.piles.places import Place, Survey
 from micstools.reading import units
 from micstools.reading.reader import BadRun, Run
-from micstools.reading.units import Units, ascii_of
+from micstools.reading.units import ascii_of
 
 FORMATS = (*handover.WRITERS, "asc")
 CONTOURS = (0.1, 0.5, 0.9)
@@ -104,9 +103,11 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
     tell_rest(found)
     if measured:
         about["layer"] = asdict(measured[1]) | {"definitions": layer.DEFINITIONS}
-        within = places.within(found, _tolerance(given, measured[1].nominal_diameter))
+        within = places.within(
+            found, given.tolerance or places.TOLERANCE * measured[1].nominal_diameter
+        )
         about["within"] = asdict(within) | {"share": within.share}
-        print(ascii_of(share_words(within, shown)))
+        print(ascii_of(places.share_words(within, shown.length)))
         print(ascii_of("\n".join(layer.words(measured[1], shown))))
     for name in formats:
         path = folder / f"places.{name}"
@@ -133,16 +134,6 @@ def tell_rest(found: list[Place]) -> None:
           + (f"; not released: {', '.join(out)}" if out else ""))  # fmt: skip
 
 
-def share_words(found: Within, shown: Units) -> str:
-    """The share within a tolerance, in words."""
-    return (f"{in_words(found.count, found.units)} of the free units lie within "
-            f"{shown.length.text(found.tolerance)} of their place in the plan")  # fmt: skip
-
-
-def _tolerance(given: argparse.Namespace, diameter: float) -> float:
-    return float(given.tolerance or places.TOLERANCE * diameter)
-
-
 def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:
     """A table of all places, one of the landings of each unit; the other files for each choice."""
     whole = pile_ensemble.open_ensemble(given.run)
@@ -151,12 +142,13 @@ def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) 
     all_places, all_landings, about = [], [], []
     for number, part in enumerate(whole.parts, start=1):
         stem = "places" if len(whole.parts) == 1 else f"places-{number}"
-        each = [places.places(p.run, survey) for p in part.piles]
-        bodies, _ = layer.parted(part.example.run)
-        tolerance = _tolerance(given, layer.nominal_diameter(bodies.values()))
+        each, tolerance = pile_ensemble.places_of(part, survey, given.tolerance)
         found = places.landings(each, tolerance)
         within = places.within([p for one in each for p in one], tolerance)
-        print((f"{part.name}: " if part.name else "") + ascii_of(share_words(within, part.units)))
+        print(
+            (f"{part.name}: " if part.name else "")
+            + ascii_of(places.share_words(within, part.units.length))
+        )
         choice = part.choices[0]
         all_places += [{"run": p.number} | choice | places.row_of(row)
                        for p, one in zip(part.piles, each, strict=True) for row in one]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from micstools.cases import case_copy, program, settings
 from micstools.cases.convergence import Convergence, converge
 from micstools.commands.base import Command
-from micstools.piles import pile_ensemble, pile_numbers
+from micstools.piles import maps, pile_ensemble, pile_numbers
 from micstools.reading import units
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Unit, Units, ascii_of
@@ -84,7 +84,7 @@ def _study(given: argparse.Namespace) -> int:
                   "blocks without room: left out", file=sys.stderr)  # fmt: skip
             continue
         whole.append(factor)
-        found.append(pile_ensemble.flat(pile_numbers.numbers(run, pile_numbers.usual_step(run))))
+        found.append(pile_ensemble.flat(pile_numbers.numbers(run, maps.usual_step(run))))
     if found:
         _tell(folder, whole, found, units.of_run(run))
     return 0 if len(whole) == len(factors) else 3

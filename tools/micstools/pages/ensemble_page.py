@@ -24,7 +24,7 @@ from micstools.pages.html import (
 )
 from micstools.pages.parts import north_note, number, player
 from micstools.pages.run_words import count
-from micstools.piles import pile, pile_ensemble, placing
+from micstools.piles import pile, pile_ensemble, places, placing
 from micstools.piles.pile_ensemble import MEANING, PATTERNS, Ensemble, Maps, Pile
 from micstools.piles.shares import in_words
 from micstools.reading import health
@@ -76,6 +76,8 @@ _QUANTITIES = (
     Quantity("footprint", "area", lambda p: p.numbers.footprint),
     Quantity("contacts per block", "number", lambda p: p.numbers.coordination),
     Quantity("void share of the layer", "number", lambda p: p.numbers.layer_porosity),
+    Quantity("layer thickness by a ball of D_n/2", "length", lambda p: p.numbers.thickness_ball),
+    Quantity("layer coefficient by that ball", "number", lambda p: p.numbers.coefficient_ball),
     Quantity("time to rest", "time", lambda p: p.numbers.time_to_rest),
     Quantity("hardest contact", "force", lambda p: p.numbers.contact_force),
 )
@@ -92,6 +94,7 @@ def page(ensemble: Ensemble, north: float | None = None) -> str:
         *(tag("p", sentence(part), class_="lead") for part in ensemble.parts),
         tag("p", assumptions(ensemble)),
         *([_plan(ensemble)] if ensemble.whole else []),
+        _landings(ensemble),
         *([_patterns(ensemble)] if ensemble.has_patterns else []),
         *([_histograms(ensemble)] if ensemble.whole else []),
         _wall(ensemble),
@@ -227,6 +230,36 @@ def _plan(ensemble: Ensemble) -> Markup:
             parts.append(tag("h3", f"{part.name}: {count(len(part.whole), 'pile')}"))
         parts.append(tag("div", *_maps(maps, top, length), class_="maps"))
     return section("plan", "Where blocks will lie", *parts, tag("p", note, class_="note"))
+
+
+def _landings(ensemble: Ensemble) -> Markup:
+    """Where each unit lands, for each choice of the varied variables."""
+    length, parts = ensemble.units.length, []
+    heads: list[object] = ["unit", "landings", f"mean x, y [{length.name}]",
+                           f"half axes of the ellipse [{length.name}]", "long one heads [°]",
+                           "within the tolerance"]  # fmt: skip
+    for part in ensemble.parts:
+        each, tolerance = pile_ensemble.places_of(part)
+        if not (found := places.landings(each, tolerance)):
+            continue
+        within = places.within([p for one in each for p in one], tolerance)
+        rows: list[list[object]] = [
+            [
+                f"{k.unit} {k.name}".strip(),
+                k.landings,
+                f"{length.figure(k.x, 4)}, {length.figure(k.y, 4)}",
+                f"{length.figure(k.long)}, {length.figure(k.short)}",
+                number(k.heading_deg, ".0f"),
+                in_words(k.within.count, k.within.units),
+            ]
+            for k in found
+        ]
+        head = f"{part.name}: " if part.name else ""
+        parts += [tag("p", head + places.share_words(within, length)), table(heads, rows)]
+    note = f"The ellipse holds {100 * places.ELLIPSE:.0f} % of normally distributed landings with "
+    note += "the same mean and covariance; headings go from +y towards +x. In brackets: share and "
+    note += "its 95 % interval. mics-tools places writes it in coordinates of a survey."
+    return section("landings", "Where each unit lands", *parts, tag("p", note, class_="note"))
 
 
 def _maps(found: Maps, top: float, length: Unit) -> list[Markup]:

@@ -230,7 +230,7 @@ def speeds(run: Run) -> dict[str, Any]:
 def _speed_maps(run: Run, t: float, kept: tuple[slice, slice, slice]) -> dict[str, Array]:
     """Speeds [m/s]: plan (ny, nx), front (nz, nx), side (nz, ny), of the cells that are kept; 0
     where there is no water."""
-    fields = run.fields(t)
+    fields = run.fields_at(t)
     wet = (fields.liquid > 0.5) & (fields.solid < 0.5)
     speed = np.where(wet, np.linalg.norm(fields.velocity, axis=3), 0.0)
     top = len(wet) - 1 - np.argmax(wet[::-1], axis=0)
@@ -280,4 +280,4 @@ def _columns(run: Run, t: float) -> Array:
     """Height (ny, nx) [m] at which the water of each column would stand; a block counts as the
     water around it."""
     height = np.diff(run.grid.z)[:, None, None]
-    return np.asarray(run.grid.z[0] + (run.fields(t).liquid * height).sum(axis=0))
+    return np.asarray(run.grid.z[0] + (run.fields_at(t).liquid * height).sum(axis=0))

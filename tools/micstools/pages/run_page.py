@@ -22,7 +22,7 @@ from micstools.pages.html import (
 from micstools.pages.parts import north_note, number, player, swatch
 from micstools.pages.run_words import count
 from micstools.pages.views import Sheet, bed_of, block_colours
-from micstools.piles import pile, pile_numbers
+from micstools.piles import layer, maps, pile, pile_numbers, places
 from micstools.piles.pile_numbers import PileNumbers
 from micstools.reading import block_numbers, health, scales, units
 from micstools.reading.block_numbers import BlockNumbers
@@ -61,7 +61,7 @@ def page(run: Run, north: float | None = None) -> str:
         )
         return document(title, tag("h1", title), tag("p", lead, class_="lead"), case,
                         _health(run, chosen), *last, script="")  # fmt: skip
-    numbers = pile_numbers.numbers(run, pile_numbers.usual_step(run))
+    numbers = pile_numbers.numbers(run, maps.usual_step(run))
     found = Found(numbers, block_numbers.of_blocks(run), chosen)
     return document(
         title,
@@ -72,6 +72,7 @@ def page(run: Run, north: float | None = None) -> str:
         _facts(run, found),
         case,
         _pile(run, chosen),
+        _places(run, chosen),
         _blocks(run, found),
         _health(run, chosen),
         *last,
@@ -152,6 +153,45 @@ def _pile(run: Run, shown: Units) -> Markup:
     words += " The dashed line is the water level." if level is not None else ""
     return section("pile", "The pile at the end", tag("div", *drawn, class_="views"),
                    tag("p", words, class_="note"))  # fmt: skip
+
+
+def _places(run: Run, shown: Units) -> Markup:
+    """Where units lie, and the layer that they form."""
+    found, length = places.places(run), shown.length
+    measured = layer.of_run(run)
+    said = layer.words(measured[1], shown) if measured else []
+    if measured:
+        diameter = measured[1].nominal_diameter
+        within = places.within(found, places.TOLERANCE * diameter)
+        said.insert(0, places.share_words(within, length))
+    heads: list[object] = ["unit", *(["name"] if any(p.name for p in found) else []),
+                           f"x, y, z [{length.name}]", "heading [°]", "tilt [°]",
+                           f"deviation [{length.name}]", "at rest", "touches"]  # fmt: skip
+    rows: list[list[object]] = [
+        [
+            p.unit,
+            *([p.name] if "name" in heads else []),
+            ", ".join(length.figure(v, 4) for v in (p.x, p.y, p.z)),
+            number(p.heading_deg, ".0f"),
+            number(p.tilt_deg, ".0f"),
+            "fixed" if p.fixed else length.figure(p.deviation),
+            "yes" if p.at_rest else "no",
+            p.touching or "–",
+        ]
+        for p in found
+    ]
+    take = tag("p", "To take along: ", download("places.csv", "text/csv", places.csv_text(found),
+               "all places as CSV"), "; mics-tools places writes GeoJSON and DXF, in coordinates "
+               "of a survey.", class_="no-print")  # fmt: skip
+    meaning = [tag("li", f"{name}: {words.removesuffix(' [m]')}") for name, words in
+               (*places.MEANING.items(), *layer.DEFINITIONS.items())]  # fmt: skip
+    defined = tag(
+        "details",
+        tag("summary", "What these numbers mean; in files in SI units"),
+        tag("ul", *meaning),
+    )
+    return section("places", "Where units lie", *(tag("p", words) for words in said),
+                   table(heads, rows), take, defined)  # fmt: skip
 
 
 def _upper_corner(run: Run, bodies: dict[int, Placed], level: float | None) -> Array:

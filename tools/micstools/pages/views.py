@@ -12,7 +12,7 @@ from PIL import Image
 from micstools.pages.charts import colour
 from micstools.pages.html import Markup, tag
 from micstools.pictures.labels import round_below
-from micstools.piles.pile_numbers import under
+from micstools.piles.maps import under
 from micstools.reading.overlap import Placed
 from micstools.reading.reader import Run
 from micstools.reading.units import Unit

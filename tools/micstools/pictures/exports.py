@@ -84,7 +84,7 @@ def to_pvd(run: Run, _row: int, folder: Path) -> Path:
             parts.setdefault("blocks", []).append((float(time), name))
         if run.field_times.size:
             name = f"fields-{frame:05d}.vti"
-            vtk_data.cells(run, run.fields(time)).save(folder / name)
+            vtk_data.cells(run, run.fields_at(time)).save(folder / name)
             parts.setdefault("fields", []).append((float(time), name))
     for what, files in parts.items():
         (folder / f"{what}.pvd").write_text(_collection(files))

@@ -52,7 +52,7 @@ class Reel:
                 actor.visibility = bool(present[k])
                 actor.user_matrix = pose
         if self._wet:
-            fields = self.run.fields(t)
+            fields = self.run.fields_at(t)
             if fields.time != self._field_time:
                 scene.add_water(self._plotter, self.run, fields)
                 self._field_time = fields.time

@@ -103,7 +103,7 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     With fluid the picture is that of the written field nearest to `t`.
     """
     style = style or Style()
-    fields = run.fields(t) if run.field_times.size else None
+    fields = run.fields_at(t) if run.field_times.size else None
     row = run.bodies.row(t if fields is None else fields.time)
     if view == "top":
         fields = None
@@ -144,7 +144,7 @@ def arrow_speed(run: Run, times: list[float], views: list[str]) -> float:
     if not run.field_times.size:
         return 0.0
     sides = [view for view in views if view != "top"]
-    found = [arrows_of(run, run.fields(t), view).velocity for t in times for view in sides]
+    found = [arrows_of(run, run.fields_at(t), view).velocity for t in times for view in sides]
     return usual_speed(np.concatenate(found)) if found else 0.0
 
 

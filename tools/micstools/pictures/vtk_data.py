@@ -89,7 +89,7 @@ def at(run: Run, t: float) -> MultiBlock:
         raise ValueError(f"{run.folder} holds no rows yet")
     if not span[0] <= t <= span[-1]:
         raise ValueError(f"t = {t:g} s: the run goes from {span[0]:g} to {span[-1]:g} s")
-    fields = run.fields(t) if run.field_times.size else None
+    fields = run.fields_at(t) if run.field_times.size else None
     row = run.bodies.row(t if fields is None else fields.time)
     found = pv.MultiBlock()
     for k, block in blocks(run, row).items():

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from micstools.piles import pile_form
-from micstools.piles.pile_numbers import ground_map, height_map
+from micstools.piles.maps import ground_map, height_map
 from micstools.reading.overlap import Placed, images, present_bodies
 from micstools.reading.reader import Run
 from micstools.reading.units import Units, figure
@@ -201,7 +201,8 @@ def words(found: Layer, units: Units) -> list[str]:
     count = "1 layer" if found.layers == 1 else f"{found.layers} layers"
     return [
         f"{figure(found.units)} units of D_n = {length.text(found.nominal_diameter)} over "
-        f"{units.area.text(found.area)}: {figure(found.packing)} per 100\u00a0m², packing density "
+        f"{units.area.text(found.area)}: {figure(found.packing * units.area.size)} per "
+        f"100\u00a0{units.area.name}, packing density "
         f"{found.packing_density:.3g}.",
         f"Thickness {thick}; layer coefficient of {count} {coefficient}; porosity {void}.",
     ]

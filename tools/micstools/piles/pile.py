@@ -266,7 +266,7 @@ def measured_level(run: Run, t: float, guess: float) -> float:
     so waves of any length cancel. Only cells within five cells of `guess` [m] are summed: bubbles
     under blocks and drops on the walls do not count.
     """
-    fields, grid = run.fields(t), run.grid
+    fields, grid = run.fields_at(t), run.grid
     step = float(grid.spacing[2])
     middle = int((guess - grid.low[2]) / step)
     low, high = max(0, middle - 5), min(len(grid.z) - 1, middle + 6)

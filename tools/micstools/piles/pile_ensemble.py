@@ -11,8 +11,11 @@ import numpy as np
 
 from micstools.ensembles.ensemble import OUTCOMES
 from micstools.piles import pile_numbers
+from micstools.piles.layer import nominal_diameter, parted
+from micstools.piles.maps import ground_map, top_of, usual_step
 from micstools.piles.pile import has_papers_blocks, still_level
 from micstools.piles.pile_numbers import PileNumbers
+from micstools.piles.places import TOLERANCE, Place, Survey, places
 from micstools.piles.placing import Area, Placing, drop_area, placing
 from micstools.piles.shares import wilson
 from micstools.reading import block_numbers, units
@@ -158,7 +161,7 @@ def open_ensemble(
     if not done:
         raise BadRun(f"{folder} holds no run that came to its end")
     if step is None:
-        step = pile_numbers.usual_step(Run(folder / str(done[0]["folder"]) / "result"))
+        step = usual_step(Run(folder / str(done[0]["folder"]) / "result"))
     piles = [_pile(folder, row, step, box) for row in done]
     return Ensemble(folder, said, piles, step, left, area or drop_area([p.run for p in piles]))
 
@@ -179,8 +182,8 @@ def about(path: Path) -> dict[str, Any]:
 def _pile(folder: Path, row: dict[str, Any], step: float, box: tuple[Array, Array] | None) -> Pile:
     run = Run(folder / str(row["folder"]) / "result")
     found = pile_numbers.numbers(run, step, box=box)
-    top = pile_numbers.top_of(run, step)
-    ground = pile_numbers.ground_map(run, run.grid.low, run.grid.high, step)
+    top = top_of(run, step)
+    ground = ground_map(run, run.grid.low, run.grid.high, step)
     return Pile(row, run, pattern(run, found), found, block_numbers.of_blocks(run), top, ground)
 
 
@@ -214,6 +217,14 @@ def running(piles: Sequence[Pile], name: str) -> Iterator[tuple[int, float, floa
     for total, p in enumerate(piles, start=1):
         count += p.pattern == name
         yield total, count / total, *wilson(count, total)
+
+
+def places_of(part: Ensemble, survey: Survey = Survey(),  # noqa: B008 (it is frozen)
+              tolerance: float | None = None) -> tuple[list[list[Place]], float]:  # fmt: skip
+    """The places of each run of a choice, and the tolerance [m], by default that of `places`."""
+    bodies, _ = parted(part.example.run)
+    wanted = tolerance or TOLERANCE * nominal_diameter(bodies.values())
+    return [places(p.run, survey) for p in part.piles], wanted
 
 
 def maps(ensemble: Ensemble) -> Maps:

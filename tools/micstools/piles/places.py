@@ -1,16 +1,20 @@
 """Where units lie: place, attitude, deviation from the plan, rest and contacts of each; over the
 runs of an ensemble the ellipse in which a unit lands, and the share within a tolerance."""
 
+import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
+import pandas as pd
 
-from micstools.piles.shares import wilson
+from micstools.piles.shares import in_words, wilson
 from micstools.reading import rest
 from micstools.reading.overlap import touches
 from micstools.reading.reader import Run
+from micstools.reading.units import Unit
 from micstools.shapes.geometry import Array
 
 TOLERANCE = 0.5
@@ -163,9 +167,25 @@ def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (i
     return found
 
 
+def csv_text(found: Sequence[Place]) -> str:
+    """The places as a table, a row each; what is not known is empty."""
+    file = io.StringIO()
+    writer = csv.DictWriter(file, list(MEANING), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(row_of(p) for p in found)
+    return file.getvalue()
+
+
 def row_of(place: Place) -> dict[str, object]:
     """A row of a table; empty where something is not known."""
     return {name: "" if value != value else value for name, value in asdict(place).items()}
+
+
+def frame(run: Run) -> pd.DataFrame:
+    """The places as a table; `attrs["meaning"]` explains the columns."""
+    table = pd.DataFrame([asdict(p) for p in places(run)], columns=list(MEANING))
+    table.attrs["meaning"] = MEANING
+    return table
 
 
 @dataclass(frozen=True)
@@ -188,6 +208,14 @@ def within(found: Sequence[Place], tolerance: float) -> Within:
     away = [p.deviation for p in found if not p.fixed and p.deviation == p.deviation]
     count = sum(d <= tolerance for d in away)
     return Within(tolerance, len(away), count, wilson(count, len(away)))
+
+
+def share_words(found: Within, length: Unit) -> str:
+    """The share within a tolerance, in words."""
+    return (
+        f"{in_words(found.count, found.units)} of the free units lie within "
+        f"{length.text(found.tolerance)} of their place in the plan."
+    )
 
 
 @dataclass(frozen=True)

@@ -2,19 +2,23 @@
 
     run = Run("mics-out")
     run.bodies.position      # (T, N, 3) [m]
-    run.fields(2.0).liquid   # (nz, ny, nx)
+    run.fields_at(2.0).liquid  # (nz, ny, nx)
+    run.blocks               # pandas: a row for each block at each time
+    run.fields               # xarray: the water over time, z, y, x, read when asked for
+    run.places               # pandas: where each block lies at the end
 
 Everything is read when it is first asked for. The files may still be growing: rows that are not
 complete yet are left out, and `refresh` forgets what was read.
 """
 
 import csv
+import html
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import f90nml
 import h5py
@@ -24,6 +28,10 @@ from numpy.typing import NDArray
 from micstools.reading.profiles import along_line
 from micstools.shapes.geometry import Array, IntArray, place
 from micstools.shapes.shape import Shape
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 T = TypeVar("T")
 
@@ -69,15 +77,6 @@ class Grid:
     def high(self) -> Array:
         """Upper corner of the tank (3) [m]."""
         return np.array([f[-1] for f in self.faces])
-
-
-_LOADS = {
-    "fluid_f": "fluid_force",
-    "fluid_t": "fluid_torque",
-    "contact_f": "contact_force",
-    "contact_t": "contact_torque",
-}
-"""Columns of a table, and what they hold."""
 
 
 @dataclass(frozen=True)
@@ -190,6 +189,17 @@ class Run:
         ]
         return "\n".join(lines)
 
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        """The summary, and the places at the end, for a notebook."""
+        said = f"<pre>{html.escape(str(self))}</pre>"
+        if not (self.bodies.n and self.bodies.time.size):
+            return said
+        shown = self.places.drop(columns=["plan_x", "plan_y", "plan_z", "touching"])
+        return said + str(shown.to_html(index=False, max_rows=12, na_rep="", border=0))
+
     def refresh(self) -> None:
         """Forget what was read, so that rows written since then are seen."""
         kept = self.folder, self.most
@@ -293,12 +303,16 @@ class Run:
             return np.empty(0)
         return self._read("fields.vtkhdf", _frame_times)
 
-    def fields(self, t: float) -> Fields:
+    def fields_at(self, t: float) -> Fields:
         """The fluid at the written time nearest to `t` [s]."""
         if self.field_times.size == 0:
             raise ValueError(f"{self.folder} holds no fields of the fluid")
         frame = int(np.abs(self.field_times - t).argmin())
         return self._read("fields.vtkhdf", lambda h5: _read_fields(h5, frame))
+
+    def frame(self, name: str, frame: int) -> Array:
+        """A field at one of the written times, by their number from 0."""
+        return self._read("fields.vtkhdf", lambda h5: _at_frame(h5, name, frame))
 
     def profile(
         self, p: Sequence[float], q: Sequence[float], name: str, t: float, n: int = 101
@@ -314,7 +328,7 @@ class Run:
             raise ValueError(f"the line leaves the tank, which reaches from {low} to {high} m")
         share = np.linspace(0.0, 1.0, n)
         points = ends[0] + share[:, None] * (ends[1] - ends[0])
-        values = along_line(self.grid.faces, getattr(self.fields(t), name), points)
+        values = along_line(self.grid.faces, getattr(self.fields_at(t), name), points)
         return share * float(np.linalg.norm(ends[1] - ends[0])), values
 
     def vtk(self, t: float) -> Any:
@@ -326,22 +340,32 @@ class Run:
 
         return vtk_data.at(self, t)
 
+    @property
+    def blocks(self) -> "pd.DataFrame":
+        """A row for each block (from 1) at each time: place, attitude, velocities, forces [N] and
+        torques [N m], contacts; units in `attrs["units"]`."""
+        from micstools.reading import tables
+
+        return tables.blocks(self)
+
+    @property
+    def fields(self) -> "xr.Dataset":
+        """The water with named axes time, z, y, x and units; a time is read when asked for."""
+        from micstools.reading import tables
+
+        return tables.fields(self)
+
+    @property
+    def places(self) -> "pd.DataFrame":
+        """Where each block lies at the end, a row each; the columns are explained in
+        `attrs["meaning"]`."""
+        from micstools.piles import places
+
+        return places.frame(self)
+
     def to_csv(self, path: str | Path) -> Path:
-        """Write time, number, place, attitude, velocities, forces [N] and torques [N m] of every
-        block at every row as a table; blocks count from 1."""
-        b = self.bodies
-        heads = ["time", "block", "shape", "released", "x", "y", "z", "qw", "qx", "qy", "qz"]
-        heads += [f"{name}{axis}" for name in ("v", "w", *_LOADS) for axis in "xyz"]
-        with Path(path).open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(heads)
-            for row, time in enumerate(b.time.tolist()):
-                parts = [b.position, b.quaternion, b.velocity, b.angular_velocity]
-                parts += [getattr(b, name) for name in _LOADS.values()]
-                values = np.concatenate([part[row] for part in parts], axis=1).tolist()
-                present = b.present(row)
-                for k in range(b.n):
-                    writer.writerow([time, k + 1, b.shape[k], int(present[k]), *values[k]])
+        """Write `blocks` as a table."""
+        self.blocks.to_csv(path, index=False, lineterminator="\n")
         return Path(path)
 
     def series_to_csv(self, path: str | Path) -> Path:
@@ -490,16 +514,19 @@ def _frame_times(h5: h5py.File) -> Array:
     return np.asarray(steps["Values"][: int(_plain(steps.attrs["NSteps"]))])
 
 
+def _at_frame(h5: h5py.File, name: str, frame: int) -> Array:
+    offsets = h5["VTKHDF/Steps"].get(f"CellDataOffsets/{name}")
+    return np.asarray(
+        h5["VTKHDF/CellData"][name][frame if offsets is None else int(offsets[frame])]
+    )
+
+
 def _read_fields(h5: h5py.File, frame: int) -> Fields:
-    data, steps = h5["VTKHDF/CellData"], h5["VTKHDF/Steps"]
-
-    def at_frame(name: str) -> Array:
-        offsets = steps.get(f"CellDataOffsets/{name}")
-        return np.asarray(data[name][frame if offsets is None else int(offsets[frame])])
-
     return Fields(
-        time=float(steps["Values"][frame]),
-        **{name: at_frame(name) for name in ("liquid", "solid", "pressure", "velocity")},
+        time=float(h5["VTKHDF/Steps/Values"][frame]),
+        **{
+            name: _at_frame(h5, name, frame) for name in ("liquid", "solid", "pressure", "velocity")
+        },
     )
 
 

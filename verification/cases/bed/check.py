@@ -78,7 +78,7 @@ def same(bed: Run, other: Run, checks: Checks) -> None:
         checks.below(f"{name}: places [m]", places, SAME)
         return
     t = bed.field_times[-1]
-    ours, theirs = bed.fields(t), other.fields(other.field_times[-1])
+    ours, theirs = bed.fields_at(t), other.fields_at(other.field_times[-1])
     checks.below(f"{name}: velocity [m/s]", largest(ours.velocity, theirs.velocity), SAME)
     checks.below(f"{name}: liquid", largest(ours.liquid, theirs.liquid), SAME)
     moves = float(np.abs(ours.velocity).max())
@@ -88,7 +88,7 @@ def same(bed: Run, other: Run, checks: Checks) -> None:
 def still(run: Run, checks: Checks) -> None:
     """Water at rest over a bed stays at rest; its volume is that above the bed."""
     name = run.folder.name
-    written = max(float(np.abs(run.fields(t).velocity).max()) for t in run.field_times)
+    written = max(float(np.abs(run.fields_at(t).velocity).max()) for t in run.field_times)
     checks.below(f"{name}: largest speed at any time [m/s]", written, SPEED)
     final = float(np.abs(run.restart()["flow/u"]).max())
     checks.below(f"{name}: largest speed at the end [m/s]", final, SPEED)

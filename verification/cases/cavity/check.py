@@ -25,7 +25,7 @@ def reference(reynolds: int) -> dict[str, Array]:
 
 def middle_lines(run: Run) -> dict[str, tuple[Array, Array]]:
     """u over height on x = 0.5 and w over x on z = 0.5 at the end, walls included."""
-    fields = run.fields(run.field_times[-1])
+    fields = run.fields_at(run.field_times[-1])
     x, _, z = run.grid.centres
     u, w = fields.velocity[:, 0, :, 0], fields.velocity[:, 0, :, 2]
     return {

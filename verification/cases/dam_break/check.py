@@ -46,7 +46,7 @@ def history(run: Run) -> tuple[Values, Values, Values]:
     dx, dz = run.grid.spacing[0], run.grid.spacing[2]
     front, height = [], []
     for t in run.field_times:
-        depth = run.fields(t).liquid[:, 0, :].astype(float).sum(axis=0) * dz
+        depth = run.fields_at(t).liquid[:, 0, :].astype(float).sum(axis=0) * dz
         wet = np.flatnonzero(depth >= 0.5 * dz)
         last = int(wet[-1])
         beyond = depth[last + 1] if last + 1 < len(depth) else 0.0
@@ -72,7 +72,7 @@ def impulse_over_force(run: Run, base: float, height: float) -> float:
     """Momentum of the water along x at the first row of fields, over exact force and time."""
     dx, dz = run.grid.spacing[0], run.grid.spacing[2]
     time = run.field_times[1]
-    fields = run.fields(time)
+    fields = run.fields_at(time)
     momentum = fields.liquid[:, 0, :].astype(float) * fields.velocity[:, 0, :, 0].astype(float)
     return float(momentum.sum() * dx * dz / (starting_force(base, height) * time))
 
@@ -81,7 +81,7 @@ def energy(run: Run) -> tuple[Values, Values]:
     """Times [s], and kinetic and potential energy over that of the start."""
     h, potential, kinetic = run.grid.spacing, [], []
     for t in run.field_times:
-        share = run.fields(t).liquid[:, 0, :].astype(float)
+        share = run.fields_at(t).liquid[:, 0, :].astype(float)
         rows, columns = share.shape
         below = np.vstack([np.ones((1, columns)), share[:-1]])
         above = np.vstack([share[1:], np.zeros((1, columns))])

@@ -29,7 +29,7 @@ BOX = Experiment(
 def passes(run: Run, x: float, level: float) -> float:
     """First time at which the water at a gauge is higher than a level [s]."""
     column = int(x / run.grid.spacing[0])
-    heights = np.array([run.fields(t).liquid[:, 0, column].sum() for t in run.field_times])
+    heights = np.array([run.fields_at(t).liquid[:, 0, column].sum() for t in run.field_times])
     heights *= run.grid.spacing[2]
     i = int(np.flatnonzero(heights > level)[0])
     return float(np.interp(level, heights[i - 1 : i + 1], run.field_times[i - 1 : i + 1]))

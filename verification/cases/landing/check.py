@@ -31,7 +31,7 @@ def excess_of(run: Run, name: str, checks: Checks) -> None:
     """At all rows, with a lid at the rows of the frames, and in all cells of the restart file."""
     series = run.series
     times = run.field_times[1:]  # at 0 no drop is there
-    frames = [run.fields(t) for t in times]
+    frames = [run.fields_at(t) for t in times]
     share = np.array([squeezed(run, frame) for frame in frames])
     if run.sides["z_max"] == "open":
         checks.below(f"{name}: largest excess [V]", series.volume_excess_max.max(), EXCESS_LIMIT)
@@ -53,7 +53,7 @@ def excess_of(run: Run, name: str, checks: Checks) -> None:
 def rise_of(run: Run, name: str, checks: Checks) -> None:
     """Height of the water with the blocks under it at the end, over that of the start."""
     length = run.grid.high - run.grid.low
-    frame, area = run.fields(run.field_times[-1]), float(length[0] * length[1])
+    frame, area = run.fields_at(run.field_times[-1]), float(length[0] * length[1])
     solid = frame.solid.astype(float)
     height = float((solid + (1.0 - solid) * frame.liquid).mean() * length[2])
     wanted = sum(run.shapes[shape].volume for shape in run.bodies.shape) / area

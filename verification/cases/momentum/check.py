@@ -21,7 +21,7 @@ class Budget:
         gas = float(run.value("fluid", "gas_density", 1.204))
         fluid, walls, weight, height = [], [], [], []
         for t in self.time:
-            field = run.fields(t)
+            field = run.fields_at(t)
             density = gas + (liquid - gas) * field.liquid.astype(float)
             mass = density * h.prod() * (1 - field.solid.astype(float))
             fluid.append((mass[..., None] * field.velocity.astype(float)).sum(axis=(0, 1, 2)))

@@ -15,7 +15,7 @@ LEVEL, SPEED = 0.1213, 0.2
 
 def depths(run: Run, t: float) -> Array:
     """Depth of the water over x [m]."""
-    column: Array = run.grid.spacing[2] * run.fields(t).liquid.sum(axis=0)[0]
+    column: Array = run.grid.spacing[2] * run.fields_at(t).liquid.sum(axis=0)[0]
     return column
 
 
@@ -44,7 +44,7 @@ def waves(run: Run, reference: Run, checks: Checks) -> None:
 
 def current(run: Run, checks: Checks) -> None:
     """Level and discharge at the end."""
-    fields = run.fields(run.field_times[-1])
+    fields = run.fields_at(run.field_times[-1])
     depth = depths(run, float(run.field_times[-1]))
     flow = run.grid.spacing[2] * (fields.velocity[..., 0] * fields.liquid).sum(axis=0)[0]
     checks.close("current from rest: depth at the outflow [m]", float(depth[-1]), LEVEL, 0.005)
@@ -58,7 +58,7 @@ def uniform(run: Run, checks: Checks) -> None:
     """Nothing changes."""
     worst = 0.0
     for t in run.field_times:
-        fields = run.fields(t)
+        fields = run.fields_at(t)
         worst = max(worst, float(np.abs(fields.velocity - [SPEED, 0.0, 0.0]).max()))
         change = float(np.abs(depths(run, t) - LEVEL).max())
         checks.below(f"uniform current: change of depth at {t:.1f} s [m]", change, 1e-8)

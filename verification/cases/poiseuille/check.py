@@ -44,7 +44,7 @@ def plane(run: Run, checks: Checks) -> float:
     true: dict[str, tuple[Array, Array]] = {}
     worst = 0.0
     for t in TIMES.values():
-        fields = run.fields(t)
+        fields = run.fields_at(t)
         wanted, found = exact(z, fields.time), fields.velocity[:, 0, 0, 0]
         worst = float(np.abs(found - wanted).max() / wanted.max())
         ours[f"t = {t:g}"], true[f"exact, t = {t:g}"] = (z, found), (z, wanted)
@@ -59,7 +59,7 @@ def plane(run: Run, checks: Checks) -> float:
 
 def duct(run: Run, checks: Checks) -> None:
     """Centre and mean velocity of the steady flow."""
-    u = run.fields(run.field_times[-1]).velocity[:, :, 0, 0]
+    u = run.fields_at(run.field_times[-1]).velocity[:, :, 0, 0]
     y, z = run.grid.centres[1:]
     width = float(run.grid.y[-1])
     across = with_ends(0.0, cubic(np.array([0.5]), z, u.T)[:, 0], 0.0)

@@ -15,9 +15,9 @@ def empty(run: Run, checks: Checks) -> None:
     """Depth everywhere and at all times, and the discharge at the end."""
     level, dz = float(run.value("fluid", "water_level", 0.0)), float(run.grid.spacing[2])
     times = run.field_times
-    far = [float(np.abs(dz * run.fields(t).liquid.sum(axis=0) - level).max()) for t in times]
+    far = [float(np.abs(dz * run.fields_at(t).liquid.sum(axis=0) - level).max()) for t in times]
     checks.below("without blocks: largest change of depth / depth", max(far) / level, LEVEL_BAND)
-    fields = run.fields(times[-1])
+    fields = run.fields_at(times[-1])
     flow = dz * (fields.velocity[..., 0] * fields.liquid).sum(axis=0).mean(axis=0)
     speed = run.value("boundary", "x_min_velocity", [0.0])[0]
     checks.close(

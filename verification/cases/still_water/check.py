@@ -27,7 +27,9 @@ def counted_rows(run: Run, checks: Checks) -> None:
     x = run.bodies.position[-1, :, 0]
     centre = (run.grid.x[1:] + run.grid.x[:-1]) / 2
     cell = np.diff(run.grid.x)[0] * np.diff(run.grid.y)[0] * np.diff(run.grid.z)[0]
-    solid = np.asarray(run.fields(run.field_times[-1]).solid, dtype=float).sum(axis=(0, 1)) * cell
+    solid = (
+        np.asarray(run.fields_at(run.field_times[-1]).solid, dtype=float).sum(axis=(0, 1)) * cell
+    )
     weight = float(run.value("fluid", "liquid_density", 998.2)) * 9.81
     for body in (0, 1):
         mine = np.abs(centre[:, None] - x).argmin(axis=1) == body
@@ -41,7 +43,7 @@ def check(runs: list[Run]) -> Checks:
     checks = Checks("still water")
     for run in runs:
         tolerance = float(run.value("numerics", "divergence_tolerance", 1e-6))
-        written = max(float(np.abs(run.fields(t).velocity).max()) for t in run.field_times)
+        written = max(float(np.abs(run.fields_at(t).velocity).max()) for t in run.field_times)
         final = float(np.abs(run.restart()["flow/u"]).max())
         name = run.folder.name
         checks.below(f"{name}: largest speed at any time [m/s]", written, SPEED_BAND[tolerance])

@@ -33,7 +33,7 @@ def reference(t: float) -> tuple[float, float]:
 
 def compare(run: Run) -> tuple[float, float, float]:
     """Error in the root mean square, amplitude, and mean kinetic energy at the end."""
-    fields = run.fields(run.field_times[-1])
+    fields = run.fields_at(run.field_times[-1])
     x, z = run.grid.centres[0][None, :], run.grid.centres[2][:, None]
     u, w = fields.velocity[:, 0, :, 0], fields.velocity[:, 0, :, 2]
     shape_u, shape_w = np.cos(x) * np.sin(z), -np.sin(x) * np.cos(z)

@@ -23,7 +23,7 @@ def check(runs: list[Run]) -> Checks:
             found = np.asarray(state[name])[:, :nz, :ny, :nx]
             worst = float(np.abs(found - stream[:, None, None, None]).max()) / speed
             checks.below(f"change of {name} / speed", worst, BAND)
-        liquid = run.fields(run.field_times[-1]).liquid
+        liquid = run.fields_at(run.field_times[-1]).liquid
         checks.true(
             "water and air are still there", bool(liquid.max() > 0.99 and liquid.min() < 0.01)
         )
