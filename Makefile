@@ -49,7 +49,7 @@ vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
 .PHONY: all units everything deps run test verify mutate soak bench bench-contact paper-ensemble \
-  docs reference lint clean help FORCE
+  docs reference lint clean help install install-tools FORCE
 
 all: $(binary)
 
@@ -59,6 +59,8 @@ help:
 	@echo 'make          build ./mics          make MPI=1    build ./mics_mpi'
 	@echo 'make DEBUG=1  build ./mics_debug, with every run-time check'
 	@echo 'make SAN=1    ./mics_san, under the address and undefined behaviour sanitizers'
+	@echo 'make install  copy the program and the cases of input to PREFIX=/usr/local (DESTDIR=, MPI=1)'
+	@echo 'make install-tools  the Python tools there, in an environment of their own, and mics-tools'
 	@echo 'make run      deps, build, run $(CASE), draw the pictures, make the page'
 	@echo 'make test     deps, all builds, every quick test'
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
@@ -135,7 +137,7 @@ $(B)/sources: FORCE
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
 	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@
 
-no_build := deps lint clean help run test verify mutate soak bench bench-contact paper-ensemble \
+no_build := deps lint clean help install install-tools run test verify mutate soak bench bench-contact paper-ensemble \
   docs reference everything $(variants)
 ifneq ($(filter-out $(no_build),$(or $(MAKECMDGOALS),all)),)
 include $(B)/depend.mk
@@ -211,6 +213,22 @@ docs:
 lint:
 	@$(deps) lint
 	@tools/lint.sh
+
+# For other processors than this one: make OPT='-O3 -march=x86-64-v3'.
+PREFIX := /usr/local
+install:
+	@test -x $(binary) || { echo 'install: there is no ./$(binary) yet; run make' >&2; exit 1; }
+	install -d '$(DESTDIR)$(PREFIX)/bin' '$(DESTDIR)$(PREFIX)/share/mics/input'
+	install -m 755 $(binary) '$(DESTDIR)$(PREFIX)/bin'
+	install -m 644 LICENSE CHANGELOG.md '$(DESTDIR)$(PREFIX)/share/mics'
+	install -m 644 input/* '$(DESTDIR)$(PREFIX)/share/mics/input'
+
+# An environment knows where it is, so there is no DESTDIR here.
+install-tools:
+	python3 -m venv '$(PREFIX)/lib/mics'
+	'$(PREFIX)/lib/mics/bin/python' -m pip install --quiet --prefer-binary '.[pictures]'
+	install -d '$(PREFIX)/bin'
+	ln -sf ../lib/mics/bin/mics-tools '$(PREFIX)/bin/mics-tools'
 
 clean:
 	rm -rf build mics mics_mpi mics_debug mics_mpi_debug mics_san

@@ -130,6 +130,20 @@ def test_an_installed_tool_makes_the_page(installed: Path, loose_pile: Run, tmp_
     assert "What differs from the defaults" in path.read_text()
 
 
+def test_an_installed_package_reads_cases_and_runs(installed: Path, loose_pile: Run) -> None:
+    """Into pandas and xarray, in any folder."""
+    program = (
+        "import sys; from micstools import Case, Run\n"
+        "case, run = Case.read(sys.argv[1]), Run(sys.argv[2])\n"
+        "print(case.run.about('dt'), len(case.body), len(run.blocks), dict(run.fields.sizes))"
+    )
+    words = [sys.executable, "-c", program, ROOT / "input" / "blocks_coarse.nml", loose_pile.folder]
+    done = subprocess.run(words, cwd=installed, capture_output=True, text=True, timeout=120,
+                          env={**os.environ, "PYTHONPATH": str(installed)})  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "[s]" in done.stdout and f" 3 {401 * 9} " in done.stdout and "'time': 17" in done.stdout
+
+
 def test_defaults_are_those_of_the_schema(wheel: Path) -> None:
     """Of which there is one: the package carries the file that `make reference` writes."""
     with zipfile.ZipFile(wheel) as file:

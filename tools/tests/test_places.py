@@ -134,6 +134,27 @@ def test_a_track_is_the_plan_of_its_drops(tmp_path: Path) -> None:
     assert plan[:, :2] == pytest.approx(np.array([(0.1 * k, 0.01 * k) for k in range(4)]))
 
 
+def test_a_table_beside_a_track(tmp_path: Path) -> None:
+    """Of the four, two are rows of a table."""
+    run = write(tmp_path / "run")
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        head = str(h5["provenance"].attrs["parameters"]).split("&drop")[0]
+        drops = "&drop file = 'plan.csv' / &drop position = 0.1,0.02,0.1 spread = 1,1,0 count = 2 /"
+        h5["provenance"].attrs["parameters"] = head + drops
+    plan = places.planned(Run(run.folder))[3:]
+    assert plan[:, :2] == pytest.approx(np.array([START[:2]] * 2 + [(0.1, 0.02)] * 2))
+
+
+def test_the_status_says_what_is_there(tmp_path: Path) -> None:
+    """A fixed block that nobody touched is there, one that was left out is not, wherever it is."""
+    run = write(tmp_path / "run")
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/status"] = np.array([2.0, 2, 2, 2, 2, 3, 1])
+    found = places.places(Run(run.folder))
+    assert [p.x == p.x for p in found] == [True] * 5 + [False] * 2
+    assert [p.at_rest for p in found] == [1] * 5 + [0] * 2
+
+
 def test_share_within_a_tolerance(run: Run) -> None:
     found = places.places(run)
     assert places.within(found, 0.11).count == 2 and places.within(found, 0.11).units == 4

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 NOT_RESOLVED = "light: not resolved"
+_RELEASED = 2
+"""Status of a block that is let go: docs of `/bodies/status` in run.h5."""
 _DEFAULT_SIDES = {"z_max": "open"}
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
@@ -469,7 +471,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
         name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
-        release_time=_true_release(group["release_time"][:], values, placed),
+        release_time=_true_release(group, values, placed),
         **values,
     )
 
@@ -482,9 +484,13 @@ def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
     return found
 
 
-def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:
-    """Release times (N) [s]; infinite for a block that is due but not let go yet, which shows in
-    that it has neither moved nor felt a force since. Those `placed` at the start do not wait."""
+def _true_release(group: h5py.Group, rows: dict[str, Array], placed: int) -> Array:
+    """Release times (N) [s]; infinite for a block that is not let go yet, or left out, by its
+    status. Where an older program wrote none, one that is due waits if it has neither moved nor
+    felt a force since; those `placed` at the start do not wait."""
+    due: Array = group["release_time"][:]
+    if "status" in group:
+        return np.where(group["status"][:] == _RELEASED, due, np.inf)
     if not len(rows["time"]):
         return due
     signs = [rows[name] for name in ("velocity", "fluid_force", "contact_force")]
