@@ -19,6 +19,7 @@ module faults_m
     character(:), allocatable :: message
     real(wp), allocatable, private :: place(:, :)   !! (3, n) of the blocks before the step [m]
     real(wp), allocatable, private :: speed(:)      !! (n) of theirs [m/s]
+    logical, allocatable, private :: there(:)       !! (n) were they in the tank?
   end type fault_t
 
   !> A step that carries fluid through so many cells does not follow it: the water of a dam break
@@ -36,6 +37,7 @@ contains
 
     fault%place = sim%blocks%x(:, :sim%blocks%n)
     fault%speed = norm2(sim%blocks%v(:, :sim%blocks%n), 1)
+    fault%there = sim%blocks%present
   end subroutine store_places
 
   !> The first fault of the step that just ended, if there is one. All processes call.
@@ -77,7 +79,7 @@ contains
     integer :: b
 
     do b = 1, sim%blocks%n
-      if (.not. sim%blocks%present(b)) cycle
+      if (.not. fault%there(b)) cycle
       associate (dt => sim%clock%dt, v => norm2(sim%blocks%v(:, b)))
         moved = norm2(sim%blocks%x(:, b) - fault%place(:, b))
         explained = dt*(fault%speed(b) + v + dt*norm2(sim%case%fluid%gravity)) &

@@ -6,7 +6,7 @@ program mics
   use, intrinsic :: iso_fortran_env, only: output_unit, error_unit
   use kinds_m, only: wp
   use build_info_m, only: version, git_revision
-  use errors_m, only: problems_t, fatal, exit_ok, exit_input, exit_files
+  use errors_m, only: problems_t, fatal, to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, set_threads, broadcast
   use stack_limit_m, only: check_stack
   use signals_m, only: catch_signals
@@ -15,9 +15,10 @@ program mics
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use checksum_m, only: checksum_t
   use case_file_m, only: read_text
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, place_t
   use case_input_m, only: read_case, parameters_text
   use named_files_m, only: look_beside
+  use placing_table_m, only: read_places
   use reference_m, only: reference_text
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
@@ -90,12 +91,16 @@ contains
   !> All values of the case as text, and what the files of shapes and the bed held.
   function parameters() result(text)
     character(:), allocatable :: text
-    integer :: s
+    integer :: s, i
 
     text = parameters_text(case)
     do s = 1, size(shapes)
       if (shapes(s)%kind == 'file') text = text//'! checksum of the shape ' &
         //trim(shapes(s)%name)//' '//checksum_of(shapes(s))//new_line('a')
+    end do
+    do i = 1, size(case%drop)
+      if (allocated(case%drop(i)%row)) text = text//'! checksum of the places of &drop ' &
+        //to_text(i)//' '//checksum_of_places(case%drop(i)%row)//new_line('a')
     end do
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
   end function parameters
@@ -110,6 +115,21 @@ contains
     call checksum%add_integers(size(shape%tet), shape%tet)
     text = checksum%text()
   end function checksum_of
+
+  !> A checksum of the rows of a table of places.
+  function checksum_of_places(row) result(text)
+    type(place_t), intent(in) :: row(:)
+    character(:), allocatable :: text
+    type(checksum_t) :: checksum
+    integer :: r
+
+    do r = 1, size(row)
+      call checksum%add_text(row(r)%shape//row(r)%name)
+      call checksum%add_reals(11, [row(r)%x, row(r)%q, row(r)%v, row(r)%time])
+      call checksum%add_integers(1, [merge(1, 0, row(r)%fixed)])
+    end do
+    text = checksum%text()
+  end function checksum_of_places
 
   !> The program as it was called.
   function program_name() result(name)
@@ -156,6 +176,7 @@ contains
     call broadcast(text)
     call read_case(text, case, problems, warnings)
     call look_beside(options%case_file, case)
+    call read_places(case, problems)
     call make_shapes(case, shapes, problems)
     call make_bed(case, bed, problems)
     call check_case(case, shapes, bed, problems)

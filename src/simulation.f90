@@ -15,7 +15,7 @@ module simulation_m
   use outflow_m, only: outflow_init, start_outflow, update_outflow, resume_outflow
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo, set_side_velocity
   use tet_mesh_m, only: shape_t
-  use rigid_body_m, only: blocks_init, turn_with_fluid, kinetic_energy, potential_energy
+  use rigid_body_m, only: lowering, blocks_init, turn_with_fluid, kinetic_energy, potential_energy
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use contacts_m, only: contacts_init
@@ -49,6 +49,7 @@ module simulation_m
     type(deep_overlaps_t) :: deep
     logical :: wet = .true.                !! there is a flow of water and air
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
+    real(wp) :: next_let_go = huge(1.0_wp)   !! when a lowered block will be let go [s]
     logical, allocatable :: felt(:)        !! blocks that have felt the fluid
     logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
@@ -141,6 +142,8 @@ contains
   subroutine resume(sim)
     type(simulation_t), intent(inout) :: sim
 
+    where (sim%blocks%handling%lowering_speed > 0.0_wp) sim%blocks%fixed = &
+      sim%blocks%status == lowering
     if (sim%clock%step > 0) sim%felt = sim%blocks%present
     if (sim%light%on .and. sim%clock%step > 0) call resume_light(sim%blocks, sim%light)
     if (.not. sim%wet) return

@@ -42,7 +42,7 @@ module step_m
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, noted_share
-  use release_m, only: release_due_blocks, next_release, none_to_come
+  use release_m, only: release_due_blocks, let_go_lowered, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
   use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
@@ -192,6 +192,8 @@ contains
 
     call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
                             report%warnings, released)
+    call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
+                        sim%next_let_go, report%warnings)
     if (.not. sim%wet) return
     if (released) call make_room(sim)
     call first_force(sim)
@@ -277,7 +279,8 @@ contains
         allowed = min(allowed, gravity_step(sim%case%fluid, h), capillary_step(sim%case%fluid, h))
       end if
     end if
-    call sim%clock%choose_step(allowed, next_release(sim%clock%t, sim%blocks))
+    call sim%clock%choose_step(allowed, min(sim%next_let_go, &
+                                            next_release(sim%clock%t, sim%blocks)))
     report%cfl = sim%clock%dt*rate%followed
     report%cfl_carried = sim%clock%dt*rate%carried
   end subroutine choose_step

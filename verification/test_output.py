@@ -139,7 +139,10 @@ def test_names_units_and_shapes(wet: Path) -> None:
             assert h5[f"bodies/{name}"].attrs["units"] == units, name
         assert {n: d.attrs["units"] for n, d in h5["series"].items()} == SERIES
         assert all(d.shape == (rows,) for d in h5["series"].values())
-        assert set(h5["bodies"]) == {*BODY_ROWS, "shape", "mass", "fixed", "release_time"}
+        assert set(h5["bodies"]) == {
+            *BODY_ROWS, "shape", "name", "mass", "fixed",
+            "release_time", "entry_time", "raised", "status",
+        }  # fmt: skip
         for axis, cells in zip("xyz", (24, 16, 32), strict=True):
             assert h5[f"grid/{axis}"].shape == (cells + 1,)
         assert h5["grid/z"][-1] == pytest.approx(0.2, abs=1e-15)

@@ -1,46 +1,118 @@
-!> The random part of a drop: where and how each of its blocks starts.
+!> Where, when and how each block of a drop starts: from its group or table, and by chance.
 !!
-!! Every number depends on (seed, index of the block within its drop, k) alone, so it is the same on
-!! every machine, in any order, and whether or not other drops exist.
+!! Every random number depends on (seed, index of the block within its drop, k) alone, so it is the
+!! same on every machine, in any order, and whether or not other drops exist.
 module drops_m
   use kinds_m, only: wp, pi
-  use case_types_m, only: drop_input_t
+  use case_types_m, only: drop_input_t, body_input_t, place_t, is_given
   use vectors_m, only: quaternion_from_axis, quaternion_product, normalised
   use random_counter_m, only: uniform, random_rotation
   use tet_mesh_m, only: shape_t, is_called
   implicit none
   private
-  public :: draw_drop, draw_shape
+  public :: place_of_block, place_of_body, shape_of_place, count_of_shape, draw_shape
 
   integer, parameter :: k_shift = 101   !! k_shift .. k_shift+2: shift along x, y, z
   integer, parameter :: k_tilt = 111    !! angle; k_tilt+1, k_tilt+2: axis
+  integer, parameter :: k_shape = 121   !! which of several shapes
   integer, parameter :: k_member = 131  !! stone of a family
 
 contains
 
-  !> Starting pose of block number `index` of a drop.
-  subroutine draw_drop(drop, index, x, q)
+  !> Block number `index` of a drop as it is placed.
+  function place_of_block(drop, index) result(place)
     type(drop_input_t), intent(in) :: drop
     integer, intent(in) :: index       !! 1 .. drop%count
-    real(wp), intent(out) :: x(3)      !! centre of mass [m]
-    real(wp), intent(out) :: q(4)      !! attitude
+    type(place_t) :: place
     real(wp) :: angle
     integer :: d
 
+    if (allocated(drop%row)) then
+      place = drop%row(index)
+    else
+      place%shape = shape_drawn(drop, index)
+      place%x = drop%position
+      if (is_given(drop%to(1)) .and. drop%count > 1) place%x = drop%position &
+        + (drop%to - drop%position)*(real(index - 1, wp)/real(drop%count - 1, wp))
+      place%q = normalised(drop%quaternion)
+      place%v = drop%velocity
+      place%time = drop%first_time + real(index - 1, wp)*drop%interval
+    end if
+    place%seed = drop%seed
+    place%index = index
     do d = 1, 3
-      x(d) = drop%position(d) + drop%spread(d)*(2*uniform(drop%seed, index, k_shift + d - 1) &
-        - 1.0_wp)
+      if (is_given(place%x(d))) place%x(d) = place%x(d) + drop%spread(d) &
+        *(2*uniform(drop%seed, index, k_shift + d - 1) - 1.0_wp)
     end do
     select case (drop%orientation)
     case ('random')
-      q = random_rotation(drop%seed, index)
+      place%q = random_rotation(drop%seed, index)
     case ('given')
       angle = uniform(drop%seed, index, k_tilt)*drop%tilt_deg*pi/180.0_wp
-      q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), &
-        normalised(drop%quaternion))
-    case default; error stop 'draw_drop: no such orientation'
+      place%q = quaternion_product(quaternion_from_axis(random_axis(drop%seed, index), angle), &
+        place%q)
+    case default; error stop 'place_of_block: no such orientation'
     end select
-  end subroutine draw_drop
+  end function place_of_block
+
+  !> The shape of a drop, or the one of several that is drawn for a block.
+  pure function shape_drawn(drop, index) result(shape)
+    type(drop_input_t), intent(in) :: drop
+    integer, intent(in) :: index
+    character(len(drop%shape)) :: shape
+    real(wp) :: left
+    integer :: i
+
+    shape = drop%shape
+    if (drop%shapes(1) == '') return
+    left = uniform(drop%seed, index, k_shape)*sum(drop%weights, is_given(drop%weights))
+    do i = 1, count(drop%shapes /= '')
+      if (drop%weights(i) <= 0.0_wp) cycle
+      shape = drop%shapes(i)
+      left = left - drop%weights(i)
+      if (left < 0.0_wp) return
+    end do
+  end function shape_drawn
+
+  !> A body as it is placed.
+  pure function place_of_body(body) result(place)
+    type(body_input_t), intent(in) :: body
+    type(place_t) :: place
+
+    place%shape = body%shape
+    place%x = body%position
+    place%q = normalised(body%quaternion)
+    place%v = body%velocity
+    place%time = body%release_time
+    place%fixed = body%fixed
+  end function place_of_body
+
+  !> Number of the shape of a block; 0 if there is none of its name.
+  pure function shape_of_place(place, shapes) result(s)
+    type(place_t), intent(in) :: place
+    type(shape_t), intent(in) :: shapes(:)
+    integer :: s
+
+    s = draw_shape(trim(place%shape), place%seed, place%index, shapes)
+  end function shape_of_place
+
+  !> How many blocks of a drop have a shape or may draw it; those that are fixed only if asked for.
+  pure function count_of_shape(drop, shape, with_fixed) result(n)
+    type(drop_input_t), intent(in) :: drop
+    type(shape_t), intent(in) :: shape
+    logical, intent(in) :: with_fixed
+    integer :: n
+    integer :: k
+
+    n = 0
+    if (allocated(drop%row)) then
+      n = count(is_called(shape, drop%row%shape) .and. (with_fixed .or. .not. drop%row%fixed))
+    else if (drop%shapes(1) == '') then
+      if (is_called(shape, drop%shape)) n = drop%count
+    else
+      n = count([(is_called(shape, shape_drawn(drop, k)), k=1, drop%count)])
+    end if
+  end function count_of_shape
 
   !> Number of the shape of that name, or of a stone of that family drawn for block number `index`
   !! of a drop; 0 if there is none.

@@ -7,15 +7,17 @@
 !! exactly and no gyroscopic term appears. A substep drifts for half its time, kicks, and drifts
 !! again.
 module rigid_body_m
-  use kinds_m, only: wp
-  use case_types_m, only: case_t
+  use kinds_m, only: wp, name_length
+  use case_types_m, only: case_t, place_t, handling_t, is_given
+  use boundary_kinds_m, only: side_code, is_wall
   use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, &
     normalised
-  use tet_mesh_m, only: shape_t
-  use drops_m, only: draw_drop, draw_shape
+  use tet_mesh_m, only: shape_t, reach_along
+  use drops_m, only: place_of_block, place_of_body, shape_of_place
   implicit none
   private
-  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share
+  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share, told_body
+  public :: to_come, lowering, let_go, left_out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
@@ -23,6 +25,10 @@ module rigid_body_m
   real(wp), parameter :: turning_share = 0.02_wp
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
     !! its radius
+
+  !> Status of a block: not there yet (its time may have come), held and lowered, released, or left
+  !! out for good because its place was taken.
+  integer, parameter :: to_come = 0, lowering = 1, let_go = 2, left_out = 3
 
   !> Given rates: (3, n) velocity [m/s], and spin, space frame [rad/s].
   type :: given_t
@@ -39,10 +45,18 @@ module rigid_body_m
     real(wp), allocatable :: mass(:), inverse_inertia(:, :, :)
     real(wp), allocatable :: added_mass(:)       !! (n) fluid that moves along in an impact [kg]
     logical, allocatable :: fixed(:)             !! (n) held, or moved at its constant given rate
-    logical, allocatable :: present(:)           !! (n) released: displaces fluid, touches, moves
+    logical, allocatable :: present(:)
+      !! (n) released or being lowered: displaces fluid, touches, moves
+    integer, allocatable :: status(:)            !! (n) see `to_come`
     logical, allocatable :: asleep(:)            !! (n) at rest until woken (`sleep_m`)
     logical, allocatable :: still(:)             !! (n) asleep, or held at rest for ever
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
+    real(wp), allocatable :: entry_time(:)       !! (n) likewise of coming into the tank [s]
+    real(wp), allocatable :: raised(:)           !! (n) above its place when that was taken [m]
+    character(name_length), allocatable :: name(:)   !! (n) of the unit in a plan; '': none
+    type(handling_t), allocatable :: handling(:)     !! (n) by the crane
+    logical, allocatable :: on_ground(:)         !! (n) its height is found at the release
+    real(wp), allocatable :: goal(:)             !! (n) height to which it is lowered at most [m]
     type(given_t) :: given                       !! at release; of fixed bodies for ever
     real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass, never wrapped [m]
     real(wp), allocatable :: q(:, :)             !! (4, n) attitude w, x, y, z [-]
@@ -76,35 +90,69 @@ contains
     blocks%shapes = shapes
     call allocate_state(blocks)
     do b = 1, size(case%body)
-      blocks%shape(b) = shape_number(shapes, case%body(b)%shape)
-      blocks%fixed(b) = case%body(b)%fixed
-      blocks%release_time(b) = case%body(b)%release_time
-      blocks%given%v(:, b) = case%body(b)%velocity
+      call put_block(case, place_of_body(case%body(b)), b, blocks)
       blocks%given%omega(:, b) = case%body(b)%angular_velocity
-      blocks%x(:, b) = case%body(b)%position
-      blocks%q(:, b) = normalised(case%body(b)%quaternion)
+      if (blocks%release_time(b) <= 0.0_wp) call release_body(0.0_wp, b, blocks)
     end do
     b = size(case%body)
     do i = 1, size(case%drop)
       do k = 1, case%drop(i)%count
         b = b + 1
-        blocks%shape(b) = draw_shape(case%drop(i)%shape, case%drop(i)%seed, k, shapes)
-        blocks%release_time(b) = case%drop(i)%first_time + real(k - 1, wp)*case%drop(i)%interval
-        blocks%given%v(:, b) = case%drop(i)%velocity
-        call draw_drop(case%drop(i), k, blocks%x(:, b), blocks%q(:, b))
+        blocks%handling(b) = case%drop(i)%handling
+        call put_block(case, place_of_block(case%drop(i), k), b, blocks)
       end do
     end do
-    do b = 1, blocks%n
-      associate (shape => shapes(blocks%shape(b)))
-        blocks%mass(b) = shape%density*shape%volume
-        blocks%inverse_inertia(:, :, b) = inverse3(shape%inertia)
-      end associate
-      if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
-    end do
-    do b = 1, size(case%body)
-      if (blocks%release_time(b) <= 0.0_wp) call release_body(0.0_wp, b, blocks)
-    end do
   end subroutine blocks_init
+
+  !> Block b where it is placed, before its release. One that is lowered to its place, or whose
+  !! height what lies there gives, begins with its lowest point at the level of the water.
+  subroutine put_block(case, place, b, blocks)
+    type(case_t), intent(in) :: case
+    type(place_t), intent(in) :: place
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+
+    blocks%shape(b) = shape_of_place(place, blocks%shapes)
+    blocks%name(b) = place%name
+    blocks%fixed(b) = place%fixed
+    blocks%release_time(b) = place%time
+    blocks%entry_time(b) = place%time
+    blocks%given%v(:, b) = place%v
+    blocks%x(:, b) = place%x
+    blocks%q(:, b) = normalised(place%q)
+    if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
+    associate (shape => blocks%shapes(blocks%shape(b)), handling => blocks%handling(b))
+      blocks%mass(b) = shape%density*shape%volume
+      blocks%inverse_inertia(:, :, b) = inverse3(shape%inertia)
+      blocks%on_ground(b) = .not. is_given(place%x(3))
+      blocks%goal(b) = -huge(1.0_wp)
+      if (is_given(place%x(3)) .and. handling%release == 'place') blocks%goal(b) = place%x(3)
+      if (handling%lowering_speed > 0.0_wp) blocks%given%v(:, b) = [0.0_wp, 0.0_wp, &
+                                                                    -handling%lowering_speed]
+      if (blocks%on_ground(b) .or. (handling%lowering_speed > 0.0_wp .and. &
+        handling%release == 'place')) blocks%x(3, b) = max(blocks%goal(b), &
+        height_at_level(case, shape, blocks%q(:, b)))
+    end associate
+  end subroutine put_block
+
+  !> Height of the centre of a shape whose lowest point is at the level of the water, or at the top
+  !! of the tank where there is none; below a lid it touches that at most [m].
+  pure function height_at_level(case, shape, q) result(height)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: q(4)
+    real(wp) :: height
+    real(wp) :: turn(3, 3), top
+
+    turn = rotation_matrix(q)
+    top = case%grid%origin(3) + case%grid%length(3)
+    height = top
+    if (case%run%physics /= 'dry' .and. .not. case%fluid%single_phase &
+        .and. is_given(case%fluid%water_level)) height = min(top, case%fluid%water_level)
+    height = height + reach_along(shape, -turn(3, :))
+    if (is_wall(side_code(case%boundary%kind(2, 3)))) height = min(height, &
+      top - reach_along(shape, turn(3, :)))
+  end function height_at_level
 
   !> Blocks lighter than a fiftieth of the liquid turn with the inertia of such a block, before the
   !! first step: what has less than the boundary layer that it drags along would spin up and down
@@ -136,7 +184,11 @@ contains
     allocate (blocks%shape(n), blocks%contacts(n), blocks%on_floor(n), source=0)
     allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
       source=.false.)
-    allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), source=0.0_wp)
+    allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
+      blocks%raised(n), blocks%goal(n), source=0.0_wp)
+    allocate (blocks%name(n), blocks%handling(n))
+    allocate (blocks%on_ground(n), source=.false.)
+    allocate (blocks%status(n), source=to_come)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
       source=0.0_wp)
     allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
@@ -146,29 +198,35 @@ contains
     allocate (blocks%contact_force(3, n), blocks%contact_torque(3, n), source=0.0_wp)
   end subroutine allocate_state
 
-  !> Number of the shape of that name; zero if there is none.
-  pure function shape_number(shapes, name) result(s)
-    type(shape_t), intent(in) :: shapes(:)
-    character(*), intent(in) :: name
-    integer :: s
-
-    do s = size(shapes), 1, -1
-      if (shapes(s)%name == name) return
-    end do
-  end function shape_number
-
-  !> Release body b with its given velocity.
+  !> Release body b with its given velocity. One that a crane lowers is held first: it comes in, and
+  !! is let go by a second call.
   pure subroutine release_body(time, b, blocks)
     real(wp), intent(in) :: time   !! [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
 
+    if (.not. blocks%present(b)) blocks%entry_time(b) = time
+    if (blocks%handling(b)%lowering_speed > 0.0_wp) blocks%fixed(b) = .not. blocks%present(b)
+    blocks%status(b) = merge(lowering, let_go, blocks%handling(b)%lowering_speed > 0.0_wp &
+                             .and. blocks%fixed(b))
     blocks%present(b) = .true.
-    blocks%release_time(b) = time
+    if (blocks%status(b) == let_go) blocks%release_time(b) = time
     blocks%v(:, b) = blocks%given%v(:, b)
     blocks%omega(:, b) = blocks%given%omega(:, b)
     call set_momentum(b, blocks)
   end subroutine release_body
+
+  !> A body for people: its number, and its name in the plan.
+  pure function told_body(b, blocks) result(text)
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+    character(:), allocatable :: text
+    character(12) :: number
+
+    write (number, '(i0)') b
+    text = 'body '//trim(number)
+    if (blocks%name(b) /= '') text = text//' ('//trim(blocks%name(b))//')'
+  end function told_body
 
   !> Angular momentum of body b from its angular velocity.
   pure subroutine set_momentum(b, blocks)

@@ -2,8 +2,9 @@
 module block_groups_m
   use kinds_m, only: wp, name_length, pi
   use vectors_m, only: quaternion_from_axis
+  use errors_m, only: to_text
   use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
-    bed_input_t, absent, size_count, max_variants
+    bed_input_t, handling_t, absent, is_given, size_count, max_variants
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
     between
   use group_visitor_m, only: group_visitor_t
@@ -224,7 +225,7 @@ contains
 
     body%line = v%group%line
     call v%about('one block, there from the start or released later')
-    call visit_shape_name(v, body%shape, shapes)
+    call visit_shape_name(v, body%shape, shapes, required=.true.)
     call v%real('position', body%position, any_number('m'), 'the centre of mass', &
       example='0.15, 0.05, 0.1', required=.true.)
     call visit_attitude(v, body%quaternion)
@@ -243,15 +244,29 @@ contains
     type(group_visitor_t), intent(inout) :: v
     type(drop_input_t), intent(inout) :: drop
     character(name_length), intent(in) :: shapes(:)
+    logical :: table   ! names a file
 
     drop%line = v%group%line
-    call v%about('blocks dropped one after another from one place')
-    call visit_shape_name(v, drop%shape, shapes)
+    if (.not. allocated(drop%file)) drop%file = ''
+    call v%about('blocks dropped one after another: at one place, along a line, or as a table says')
+    call v%text('file', drop%file, 'a table of places in CSV, in place of shape to interval and ' &
+      //'orientation to velocity: columns shape, x, y, z (empty: on what lies there), time; if ' &
+      //'wanted qw, qx, qy, qz or yaw_deg, pitch_deg, roll_deg; vx, vy, vz; fixed; name', &
+      example='''plan.csv''')
+    table = len_trim(drop%file) > 0
+    if (.not. v%good('file')) table = v%given('file')
+    call v%without_meaning(table, 'shape shapes weights position to count first_time interval ' &
+      //'orientation quaternion axis angle_deg velocity', 'a file of places', 'the file has it')
+    call visit_drop_shapes(v, drop, shapes, table)
     call v%real('position', drop%position, any_number('m'), 'the centre of mass', &
-      example='0.15, 0.05, 0.16', required=.true.)
+      example='0.15, 0.05, 0.16', required=.not. (v%reading .and. table))
     call v%integer('count', drop%count, between(1, max_drops), 'how many blocks', example='6')
-    call v%real('first_time', drop%first_time, not_negative('s'), 'when the first is let go', &
-      example='0.5')
+    call v%without_meaning(drop%count == 1 .and. v%good('count') .and. .not. table, 'to', &
+      'count = 1', 'a line needs more blocks')
+    call v%real('to', drop%to, any_number('m'), 'the last block is here, the others evenly ' &
+      //'between position and here', example='count = 6  to = 0.2, 0.05, 0.16')
+    call v%real('first_time', drop%first_time, not_negative('s'), 'when the first is let go, or ' &
+      //'begins to be lowered', example='0.5')
     call v%real('interval', drop%interval, not_negative('s'), 'time from one to the next', &
       example='2')
     call v%real('spread', drop%spread, not_negative('m'), &
@@ -265,27 +280,102 @@ contains
     call visit_attitude(v, drop%quaternion)
     call v%real('tilt_deg', drop%tilt_deg, between(0.0_wp, 180.0_wp, 'degrees'), &
       'each block is tilted at random by up to this about an axis at random', example='10')
-    call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
-      example='0, 0, -0.1')
     call v%integer('seed', drop%seed, any_whole(), 'the random places and attitudes: ' &
       //'another number draws others, the same number the same on every machine', example='7')
+    call visit_handling(v, drop%handling)
+    call v%without_meaning(drop%handling%lowering_speed > 0.0_wp, 'velocity', &
+      'lowering_speed > 0', 'a block is let go with the speed of lowering')
+    call v%real('velocity', drop%velocity, any_number('m/s'), 'velocity at the release', &
+      example='0, 0, -0.1')
   end subroutine visit_drop
 
+  !> What a drop drops: blocks of one shape, or of several drawn by weight.
+  subroutine visit_drop_shapes(v, drop, shapes, table)
+    type(group_visitor_t), intent(inout) :: v
+    type(drop_input_t), intent(inout) :: drop
+    character(name_length), intent(in) :: shapes(:)
+    logical, intent(in) :: table   !! the shapes come from a file
+    type(allowed_t) :: weights
+    logical :: several
+    integer :: i, n
+
+    several = v%given('shapes') .or. (v%writing .and. drop%shapes(1) /= '')
+    call v%without_meaning(several, 'shape', 'shapes', 'give one of the two')
+    call visit_shape_name(v, drop%shape, shapes, &
+      required=.not. (v%reading .and. (table .or. several)))
+    call v%names('shapes', drop%shapes, 'several shapes, of which the seed draws one for each ' &
+      //'block, in place of shape', example='''hexapod'', ''hexapod''')
+    n = count(drop%shapes /= '')
+    do i = 1, n
+      call require_shape(v, 'shapes', drop%shapes(i), shapes)
+    end do
+    call v%without_meaning(.not. (several .or. table), 'weights', 'one shape', &
+      'shapes draws from several')
+    weights = not_negative('-')
+    weights%fewest = 1
+    if (v%describing) drop%weights(1) = 1.0_wp
+    call v%real('weights', drop%weights, weights, 'how likely each of shapes is beside others', &
+      example='shapes = ''hexapod'', ''hexapod''  weights = 3, 1')
+    if (.not. (v%reading .and. several .and. v%good('shapes weights'))) return
+    if (.not. v%given('weights')) drop%weights(:n) = 1.0_wp
+    call v%require('weights', count(is_given(drop%weights)) == n, &
+      'must be '//to_text(n)//', one for each of shapes')
+    call v%require('weights', any(drop%weights > 0.0_wp), 'one of them must be above 0')
+  end subroutine visit_drop_shapes
+
+  !> How a crane handles the blocks of a drop.
+  subroutine visit_handling(v, handling)
+    type(group_visitor_t), intent(inout) :: v
+    type(handling_t), intent(inout) :: handling
+    logical :: lowered
+
+    call v%option('if_blocked', handling%if_blocked, 'wait raise skip', 'what happens to a block ' &
+      //'whose place is taken: it waits for room, is raised above what lies there, or left out', &
+      example='''raise''')
+    call v%real('lowering_speed', handling%lowering_speed, &
+      not_negative('m/s', zero='0 means let go at once'), &
+      'the block is held and lowered at this speed until its release', example='0.1')
+    lowered = handling%lowering_speed > 0.0_wp .or. .not. v%good('lowering_speed')
+    call v%option('release', handling%release, 'place height touch', 'where a lowered block is ' &
+      //'let go: at its place, to which it comes from the water level (without one the top of ' &
+      //'the tank); or, lowered from its place, at release_height over what lies below, or where ' &
+      //'it touches that', example='lowering_speed = 0.1  release = ''touch''')
+    call v%require('release', lowered .or. handling%release == 'place', &
+      'needs lowering_speed above 0')
+    call v%without_meaning(handling%release /= 'height' .and. v%good('release'), &
+      'release_height', 'release = '//quoted_text(trim(handling%release)), &
+      'only ''height'' has it')
+    if (handling%release == 'height') call v%needed('release_height', &
+      'height over what lies below [m]')
+    call v%real('release_height', handling%release_height, not_negative('m'), &
+      'how far above what lies below a lowered block is let go', &
+      example='lowering_speed = 0.1  release = ''height''  release_height = 0.02')
+  end subroutine visit_handling
+
   !> The shape of a body or drop: one that exists.
-  subroutine visit_shape_name(v, shape, shapes)
+  subroutine visit_shape_name(v, shape, shapes, required)
     type(group_visitor_t), intent(inout) :: v
     character(name_length), intent(inout) :: shape
     character(name_length), intent(in) :: shapes(:)
+    logical, intent(in) :: required
 
-    call v%name('shape', shape, 'the name of a &shape', example='''hexapod''', required=.true.)
-    if (shape == '') return
+    call v%name('shape', shape, 'the name of a &shape', example='''hexapod''', required=required)
+    if (shape /= '') call require_shape(v, 'shape', shape, shapes)
+  end subroutine visit_shape_name
+
+  !> A name must be that of a `&shape`.
+  subroutine require_shape(v, variable, shape, shapes)
+    type(group_visitor_t), intent(inout) :: v
+    character(*), intent(in) :: variable
+    character(name_length), intent(in) :: shape, shapes(:)
+
     if (size(shapes) == 0) then
-      call v%require('shape', .false., 'the case has no &shape group')
+      call v%require(variable, .false., 'the case has no &shape group')
     else
-      call v%require('shape', any(shapes == shape), 'no &shape has this name, nearest known: ' &
+      call v%require(variable, any(shapes == shape), 'no &shape has this name, nearest known: ' &
                      //quoted_text(nearest_name(trim(shape), shapes)))
     end if
-  end subroutine visit_shape_name
+  end subroutine require_shape
 
   !> Attitude as a unit quaternion, read from `quaternion` or from `axis` with `angle_deg`.
   subroutine visit_attitude(v, q)

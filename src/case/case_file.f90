@@ -9,7 +9,7 @@ module case_file_m
   use plain_file_m, only: is_pipe
   implicit none
   private
-  public :: read_text
+  public :: read_text, is_utf8, utf8_of_latin1
 
   integer, parameter :: longest_text = 2**24   !! bytes of a case file
 

@@ -209,8 +209,8 @@ contains
       input%body(n)%faulty = faulty('shape position quaternion axis angle_deg')
       input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time')
     case ('drop')
-      input%drop(n)%faulty = faulty('shape position count first_time interval spread ' &
-        //'orientation quaternion axis angle_deg tilt_deg seed')
+      input%drop(n)%faulty = faulty('file shape shapes weights position count to ' &
+        //'first_time interval spread orientation quaternion axis angle_deg tilt_deg seed')
     case ('bed')
       input%bed%faulty = faulty('file kind')
     case default   ! nobody asks about the others

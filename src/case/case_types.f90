@@ -8,11 +8,12 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
+  public :: place_t, handling_t, most_shapes, max_variants
   public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved, member_name
-  public :: max_variants
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
   character(*), parameter :: not_resolved = 'light: not resolved, no flow is computed'
+  integer, parameter :: most_shapes = 20          !! that a drop draws from
 
   integer, parameter :: max_variants = 5000   !! stones of a family
 
@@ -128,9 +129,37 @@ module case_types_m
     logical :: time_faulty = .false.                !! when it is there, or whether it moves
   end type body_input_t
 
+  !> One block as it is placed: a row of a table, or drawn for a drop.
+  type :: place_t
+    character(name_length) :: shape = ''
+    character(name_length) :: name = ''             !! of the unit in a plan; '': none
+    real(wp) :: x(3) = absent                       !! z absent: on what lies there [m]
+    real(wp) :: q(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    real(wp) :: v(3) = 0.0_wp                       !! [m/s]
+    real(wp) :: time = 0.0_wp                       !! [s]
+    logical :: fixed = .false.
+    integer :: line = 0                             !! of the table; 0: none
+    integer :: seed = 1, index = 1                  !! by which it draws a stone of a family
+  end type place_t
+
+  !> How a crane handles a block.
+  type :: handling_t
+    character(name_length) :: if_blocked = 'wait'   !! 'wait', 'raise' or 'skip'
+    real(wp) :: lowering_speed = 0.0_wp             !! [m/s]
+    character(name_length) :: release = 'place'     !! 'place', 'height' or 'touch'
+    real(wp) :: release_height = 0.0_wp             !! [m]
+  end type handling_t
+
   type :: drop_input_t
-    character(name_length) :: shape = ''            !! required
+    character(name_length) :: shape = ''            !! required, or one of the next two
+    character(name_length) :: shapes(most_shapes) = ''   !! drawn by weight
+    character(:), allocatable :: file               !! with a table of places
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
+    character(:), allocatable :: checksum           !! of the table
+    type(place_t), allocatable :: row(:)            !! of the table
+    real(wp) :: weights(most_shapes) = absent
     real(wp) :: position(3) = absent                !! required [m]
+    real(wp) :: to(3) = absent                      !! of the last block [m]
     integer :: count = 1
     real(wp) :: first_time = 0.0_wp, interval = 1.0_wp   !! [s]
     real(wp) :: spread(3) = 0.0_wp                  !! [m]
@@ -139,6 +168,7 @@ module case_types_m
     real(wp) :: tilt_deg = 0.0_wp
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     integer :: seed = 1
+    type(handling_t) :: handling
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! its places or times are not known
   end type drop_input_t

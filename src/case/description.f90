@@ -5,7 +5,8 @@ module description_m
   use value_text_m, only: quoted_text
   implicit none
   private
-  public :: variable_t, group_description_t, described, choices, word_text, next_word
+  public :: variable_t, group_description_t, described, choices, word_text, &
+    words_text, next_word
 
   !> One variable of a group.
   type :: variable_t
@@ -81,5 +82,19 @@ contains
     text = ''
     if (word /= '') text = quoted_text(trim(word))
   end function word_text
+
+  !> Words between quotes, commas between several; empty for none.
+  pure function words_text(words) result(text)
+    character(*), intent(in) :: words(:)
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(words)
+      if (words(i) == '') cycle
+      if (len(text) > 0) text = text//', '
+      text = text//word_text(words(i))
+    end do
+  end function words_text
 
 end module description_m

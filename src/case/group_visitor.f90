@@ -15,7 +15,7 @@ module group_visitor_m
   use long_text_m, only: long_text_t
   use allowed_values_m, only: allowed_t
   use description_m, only: variable_t, group_description_t, described, choices, &
-    word_text, next_word
+    word_text, words_text, next_word
   use case_types_m, only: is_given
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
@@ -42,7 +42,7 @@ module group_visitor_m
   contains
     procedure :: start_reading, start_writing, start_describing, about, finish
     procedure :: given, good, needed, require, without_meaning, note, pass_over
-    procedure :: name, option, text => text_value, logical => logical_value
+    procedure :: name, names, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
     procedure, private :: real_value, real_values, integer_value, integer_values
@@ -373,7 +373,8 @@ contains
     end if
     i = self%lookup(variable, meaning)
     if (i == 0) return
-    call self%read_text(i, ok)
+    if (.not. self%count_is(i, 1, 1)) return
+    call self%read_text(i, 1, ok)
     if (.not. ok) return
     text = self%group%assignment(i)%value(1)%text
     if (sanitise(text) /= text) call self%fault(i, 'must hold no control characters')
@@ -386,29 +387,49 @@ contains
     character(name_length), intent(inout) :: word
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
+    character(name_length) :: words(1)
+
+    words = word
+    call self%names(variable, words, meaning, example, required)
+    word = words(1)
+  end subroutine name
+
+  !> One to as many names as `words` has elements; those not given stay.
+  subroutine names(self, variable, words, meaning, example, required)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable
+    character(name_length), intent(inout) :: words(:)
+    character(*), intent(in) :: meaning, example
+    logical, intent(in), optional :: required
     character(*), parameter :: allowed = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
-    integer :: i
+    type(variable_t) :: told
+    integer :: i, j
     logical :: ok
 
     if (.not. self%reading) then
-      call self%tell(described(variable, 'name', word_text(word), meaning, example, required))
+      told = described(variable, 'name', words_text(words), meaning, example, required)
+      told%most = size(words)
+      call self%tell(told)
       return
     end if
     i = self%lookup(variable, meaning, required)
     if (i == 0) return
-    call self%read_text(i, ok)
-    if (.not. ok) return
-    associate (text => self%group%assignment(i)%value(1)%text)
-      if (len(text) == 0 .or. len(text) > name_length .or. verify(text, allowed) > 0 &
-          .or. scan(text//'.', '.') == 1) then
-        call self%fault(i, 'a name has 1 to '//to_text(name_length) &
-                        //' letters, digits or _ - . and does not begin with a point')
-      else
-        word = text
-      end if
-    end associate
-  end subroutine name
+    if (.not. self%count_is(i, 1, size(words))) return
+    do j = 1, self%group%assignment(i)%n
+      call self%read_text(i, j, ok)
+      if (.not. ok) return
+      associate (text => self%group%assignment(i)%value(j)%text)
+        if (len(text) == 0 .or. len(text) > name_length .or. verify(text, allowed) > 0 &
+            .or. scan(text//'.', '.') == 1) then
+          call self%fault(i, 'a name has 1 to '//to_text(name_length) &
+                          //' letters, digits or _ - . and does not begin with a point')
+          return
+        end if
+        words(j) = text
+      end associate
+    end do
+  end subroutine names
 
   !> One of the words in `allowed`; those this version cannot do are refused as such.
   subroutine option(self, variable, word, allowed, meaning, example, required)
@@ -430,7 +451,8 @@ contains
     end if
     i = self%lookup(variable, meaning, required)
     if (i == 0) return
-    call self%read_text(i, ok)
+    if (.not. self%count_is(i, 1, 1)) return
+    call self%read_text(i, 1, ok)
     if (.not. ok) return
     associate (text => self%group%assignment(i)%value(1)%text)
       if (index(' '//allowed//' ', ' '//text//' ') == 0 .or. scan(text//' ', ' ') <= len(text) &
@@ -561,18 +583,16 @@ contains
     end if
   end subroutine read_integer
 
-  !> Is assignment i one quoted text?
-  subroutine read_text(self, i, ok)
+  !> Is value j of assignment i a quoted text?
+  subroutine read_text(self, i, j, ok)
     class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i
+    integer, intent(in) :: i, j
     logical, intent(out) :: ok
 
-    ok = self%count_is(i, 1, 1)
-    if (.not. ok) return
     associate (a => self%group%assignment(i))
-      ok = a%value(1)%quoted
+      ok = a%value(j)%quoted
       if (.not. ok) then
-        call self%fault(i, 'text needs quotes, '//quoted_text(printable(a%value(1)%text)))
+        call self%fault(i, 'text needs quotes, '//quoted_text(printable(a%value(j)%text)))
       end if
     end associate
   end subroutine read_text

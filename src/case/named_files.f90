@@ -22,6 +22,9 @@ contains
     do s = 1, size(case%shape)
       case%shape(s)%folder = folder
     end do
+    do s = 1, size(case%drop)
+      case%drop(s)%folder = folder
+    end do
   end subroutine look_beside
 
   !> The path of a file with this name in a case that stands in `folder`.

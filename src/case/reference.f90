@@ -199,7 +199,9 @@ contains
         if (with_unit .and. len(allowed%unit) > 0) words = words//' ['//allowed%unit//']'
         if (allowed%bounded_below()) words = words//', '//allowed%words()
       end associate
-    case default; words = variable%kind
+    case default
+      words = variable%kind
+      if (variable%most > 1) words = '1 to '//to_text(variable%most)//' '//words//'s'
     end select
   end function values
 

@@ -107,7 +107,10 @@ contains
 
     select case (variable%kind)
     case ('logical'); text = '"type": "boolean"'
-    case ('name'); text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
+    case ('name')
+      text = '"type": "string", "minLength": 1, "maxLength": '//to_text(name_length)
+      if (variable%most > 1) text = '"anyOf": [{'//text//'}, {"type": "array", "items": {'//text &
+        //'}, "minItems": 1, "maxItems": '//to_text(variable%most)//'}]'
     case ('choice'); text = '"enum": ['//words_json(variable%choices)//']'
     case ('number')
       text = number(variable)
@@ -160,10 +163,16 @@ contains
     character(*), intent(in) :: value
     logical, intent(in) :: list
     character(:), allocatable :: text
+    integer :: part
 
     select case (value(1:1))
     case ('''')
-      text = quoted(value(2:len(value) - 1))
+      part = index(value, ''', ''')
+      if (list .and. part > 0) then   ! two words
+        text = '['//quoted(value(2:part - 1))//', '//quoted(value(part + 4:len(value) - 1))//']'
+      else
+        text = quoted(value(2:len(value) - 1))
+      end if
     case ('.')
       text = value(2:len(value) - 1)
     case default

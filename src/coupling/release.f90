@@ -2,20 +2,28 @@
 !!
 !! A block whose time has come appears at rest or with its given velocity if its place is free; the
 !! liquid in its place comes back as an equal rise of the free surface in the same step. A block
-!! whose place is taken waits and is tried at every step.
+!! whose place is taken waits and is tried at every step, or is raised above what lies there, or is
+!! left out. A block whose height is not given is set on what lies there.
+!!
+!! A block that is lowered comes in the same way, but is held: it moves down at a constant speed
+!! until it is let go at its place, at a height over what lies below, or where it touches that.
+!! Where it touches something earlier, or its sling goes slack, it is let go too.
 module release_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp
-  use errors_m, only: to_text
+  use errors_m, only: to_text, brief
   use parallel_m, only: is_root
-  use rigid_body_m, only: blocks_t, release_body
+  use rigid_body_m, only: blocks_t, release_body, told_body, own_mass, to_come, lowering, left_out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, room_for, exclude
+  use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
-  public :: release_due_blocks, next_release, n_waiting, none_to_come
+  public :: release_due_blocks, let_go_lowered, next_release, n_waiting, none_to_come
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
+  real(wp), parameter :: slack_share = 0.05_wp
+    !! of the weight of a block: a sling that carries less is slack
 
 contains
 
@@ -39,31 +47,136 @@ contains
     if (blocks%n == 0) return
     if (.not. any(is_due(time, blocks))) return
     due = pack([(b, b=1, blocks%n)], is_due(time, blocks))
-    free = [(room_for(walls, blocks, due(i), overlap), i=1, size(due))]
+    allocate (free(size(due)))
+    do i = 1, size(due)
+      call look_for_room(walls, overlap, due(i), blocks, free(i))
+    end do
     call order_due(walls, overlap, blocks, due, free)
     do i = 1, size(due)
       b = due(i)
-      if (free(i) .and. released) free(i) = room_for(walls, blocks, b, overlap)
+      if (free(i) .and. released) call look_for_room(walls, overlap, b, blocks, free(i))
+      if (.not. free(i) .and. blocks%handling(b)%if_blocked == 'raise') then
+        call raise_block(walls, overlap, b, blocks, free(i))
+        if (free(i)) call warn(time, b, 'was raised by '//brief(blocks%raised(b), 3) &
+          //' m, its place is taken', blocks, warnings)
+      end if
       if (free(i)) then
-        if (waiting(b)) call warn(b, ' found room and was released at t = ')
+        if (waiting(b)) call warn(time, b, 'found room and was released', blocks, warnings)
         call release_body(time, b, blocks)
         released = .true.
+      else if (blocks%handling(b)%if_blocked == 'skip') then
+        call warn(time, b, 'is left out, its place is taken', blocks, warnings)
+        blocks%status(b) = left_out
       else if (.not. waiting(b)) then
-        call warn(b, ' is due but its place is taken; it waits, t = ')
+        call warn(time, b, 'is due but its place is taken; it waits', blocks, warnings)
         waiting(b) = .true.
       end if
     end do
-  contains
-    subroutine warn(b, what)
-      integer, intent(in) :: b
-      character(*), intent(in) :: what
-
-      warnings = warnings + 1
-      if (.not. is_root()) return
-      write (error_unit, '(5a)') 'mics: warning: body ', to_text(b), what, to_text(time), ' s'
-      flush (error_unit)
-    end subroutine warn
   end subroutine release_due_blocks
+
+  !> Tell what became of a block.
+  subroutine warn(time, b, what, blocks, warnings)
+    real(wp), intent(in) :: time   !! [s]
+    integer, intent(in) :: b
+    character(*), intent(in) :: what
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(inout) :: warnings
+
+    warnings = warnings + 1
+    if (.not. is_root()) return
+    write (error_unit, '(7a)') 'mics: warning: ', told_body(b, blocks), ' ', what, ', t = ', &
+      to_text(time), ' s'
+    flush (error_unit)
+  end subroutine warn
+
+  !> Has a block room at its place? One without a given height is set on what lies there first.
+  subroutine look_for_room(walls, overlap, b, blocks, free)
+    type(walls_t), intent(in) :: walls
+    type(overlap_t), intent(in) :: overlap
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    logical, intent(out) :: free
+    real(wp) :: height
+
+    if (blocks%on_ground(b) .and. blocks%handling(b)%lowering_speed <= 0.0_wp) then
+      height = height_on_top(walls, blocks, b, overlap)
+      free = height > -nothing_below
+      if (.not. free) return
+      blocks%x(3, b) = height
+    end if
+    free = room_for(walls, blocks, b, overlap)
+  end subroutine look_for_room
+
+  !> Raise a block above all that lies at its place, if it has room there.
+  subroutine raise_block(walls, overlap, b, blocks, free)
+    type(walls_t), intent(in) :: walls
+    type(overlap_t), intent(in) :: overlap
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    logical, intent(out) :: free
+    real(wp) :: place, height
+
+    place = blocks%x(3, b)
+    height = height_on_top(walls, blocks, b, overlap)
+    free = height > place
+    if (.not. free) return
+    blocks%x(3, b) = height
+    free = room_for(walls, blocks, b, overlap)
+    if (free) then
+      blocks%raised(b) = height - place
+    else
+      blocks%x(3, b) = place
+    end if
+  end subroutine raise_block
+
+  !> Let go the lowered blocks that are where they should be, and find when the next of them will be
+  !! if nothing changes.
+  subroutine let_go_lowered(walls, gravity, time, overlap, blocks, next, warnings)
+    type(walls_t), intent(in) :: walls
+    real(wp), intent(in) :: gravity(3)        !! [m/s2]
+    real(wp), intent(in) :: time              !! [s]
+    type(overlap_t), intent(in) :: overlap
+    type(blocks_t), intent(inout) :: blocks
+    real(wp), intent(out) :: next             !! huge if there is none [s]
+    integer, intent(inout) :: warnings        !! counted up
+    real(wp) :: left, way, gap
+    integer :: b
+
+    next = huge(next)
+    do b = 1, blocks%n
+      if (blocks%status(b) /= lowering) cycle
+      associate (handling => blocks%handling(b))
+        gap = ground_gap*blocks%shapes(blocks%shape(b))%smallest_edge
+        way = way_down(walls, blocks, b, overlap)
+        left = way
+        if (handling%release == 'height') left = max(0.0_wp, way - handling%release_height)
+        left = min(left, blocks%x(3, b) - blocks%goal(b))
+        if (time > blocks%entry_time(b) .and. is_slack(gravity, b, blocks)) left = 0.0_wp
+        if (left > gap) then
+          if (left < nothing_below) next = min(next, time + left/handling%lowering_speed)
+          cycle
+        end if
+        if (handling%release == 'place' .and. blocks%x(3, b) - blocks%goal(b) > gap &
+            .and. .not. blocks%on_ground(b)) call warn(time, b, 'touches what lies below and was ' &
+          //'let go '//brief(blocks%x(3, b) - blocks%goal(b), 3)//' m above its place', blocks, &
+          warnings)
+        call release_body(time, b, blocks)
+      end associate
+    end do
+  end subroutine let_go_lowered
+
+  !> Does what a held block lies on carry it, all but a small share of its weight?
+  pure function is_slack(gravity, b, blocks) result(yes)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    integer, intent(in) :: b
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+    real(wp) :: weight, carried
+
+    weight = -own_mass(blocks, b)*gravity(3)
+    carried = weight - blocks%fluid_force(3, b) - blocks%contact_force(3, b)
+    yes = blocks%contact_force(3, b) > 0.0_wp .and. carried < slack_share*weight
+  end function is_slack
 
   !> Which blocks are due and not there yet.
   pure function is_due(time, blocks) result(due)
@@ -71,7 +184,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     logical :: due(blocks%n)
 
-    due = .not. (blocks%present .or. blocks%release_time > time + same_time)
+    due = .not. blocks%present .and. blocks%status == to_come &
+          .and. .not. blocks%release_time > time + same_time
   end function is_due
 
   !> Put due blocks into the order in which they are tried: as they are numbered, but of those that
@@ -123,7 +237,7 @@ contains
 
     next = huge(next)
     if (blocks%n == 0) return
-    next = minval(blocks%release_time, mask=.not. blocks%present &
+    next = minval(blocks%release_time, mask=blocks%status == to_come .and. .not. blocks%present &
                   .and. blocks%release_time > time + same_time)
   end function next_release
 
@@ -135,17 +249,19 @@ contains
     integer :: n
 
     n = 0
-    if (blocks%n > 0) n = count(.not. blocks%present .and. blocks%release_time < time - same_time)
+    if (blocks%n > 0) n = count(blocks%status == to_come .and. .not. blocks%present &
+                                .and. blocks%release_time < time - same_time)
   end function n_waiting
 
-  !> Is every block in the tank, or tried before this moment and without room? Once all blocks rest
-  !! nobody makes room any more.
+  !> Is every block let go, left out, or tried before this moment and without room? Once all blocks
+  !! rest nobody makes room any more.
   pure function none_to_come(time, blocks) result(yes)
     real(wp), intent(in) :: time   !! [s]
     type(blocks_t), intent(in) :: blocks
     logical :: yes
 
-    yes = count(.not. blocks%present) == n_waiting(time, blocks)
+    yes = count(blocks%status == to_come .and. .not. blocks%present) == n_waiting(time, blocks) &
+      .and. .not. any(blocks%status == lowering)
   end function none_to_come
 
 end module release_m

@@ -57,7 +57,7 @@ contains
                  .and. .not. any(abs(grid%side_velocity) > 0.0_wp) .and. only_top_is_open() &
                  .and. .not. any(grid%periodic .and. abs(case%fluid%gravity) > 0.0_wp)
     do b = 1, blocks%n
-      if (.not. blocks%fixed(b)) cycle
+      if (.not. (blocks%fixed(b) .or. blocks%handling(b)%lowering_speed > 0.0_wp)) cycle
       self%known = self%known .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
                    .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp)
     end do

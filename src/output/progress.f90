@@ -6,7 +6,7 @@ module progress_m
   use value_text_m, only: fixed_text
   use parallel_m, only: is_root, spins_for_long
   use timers_m, only: wall_clock
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, let_go
   use case_types_m, only: not_resolved
   use clock_m, only: clock_t
   use diagnostics_m, only: row_t
@@ -91,7 +91,7 @@ contains
     if (modulo(self%lines, lines_per_header) == 0) call say(header(self%fluid), self)
     self%lines = self%lines + 1
     self%last_line = wall_clock()
-    released = count(blocks%present)
+    released = count(blocks%status == let_go)
     moving = count_moving(clock%run%rest_speed, blocks)
     if (self%fluid) then
       write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, row%dt, &

@@ -153,7 +153,10 @@ contains
       if (n == 0) return
       call visitor%logicals('/blocks/present', n, blocks%present)
       call visitor%logicals('/blocks/asleep', n, blocks%asleep)
+      call visitor%integers('/blocks/status', [n], blocks%status)
       call visitor%reals('/blocks/release_time', 's', [n], blocks%release_time)
+      call visitor%reals('/blocks/entry_time', 's', [n], blocks%entry_time)
+      call visitor%reals('/blocks/raised', 'm', [n], blocks%raised)
       call visitor%reals('/blocks/position', 'm', [3, n], blocks%x)
       call visitor%reals('/blocks/quaternion', '1', [4, n], blocks%q)
       call visitor%reals('/blocks/velocity', 'm/s', [3, n], blocks%v)

@@ -26,6 +26,9 @@ module write_run_m
     'angular_velocity', 'fluid_force', 'fluid_torque', 'contact_force', 'contact_torque']
   character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', &
     'N m', 'N', 'N m']
+  character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
+    'raised', 'status']                      !! datasets with a number per block
+  character(*), parameter :: once_units(*) = ['s', 's', 'm', '1']
   integer, parameter :: chunk_bytes = 16384  !! room that a column takes at a time
   integer, parameter :: running = &
     -1         !! exit status while the run goes on, or if it was killed
@@ -38,7 +41,7 @@ module write_run_m
     type(h5_column_t), private :: series(n_columns)
     type(h5_column_t), private :: time, vector(n_vectors), quaternion, contacts, on_floor
     real(wp), allocatable, private :: q(:, :)          !! as in the last row
-    real(wp), allocatable, private :: release_time(:)  !! as in the file
+    real(wp), allocatable, private :: once(:, :)       !! (blocks, `once_name`) as in the file
   end type run_file_t
 
 contains
@@ -83,7 +86,8 @@ contains
       end do
       call file%flush()
     end associate
-    self%release_time = blocks%release_time
+    self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
+                        [blocks%n, size(once_name)])
     self%q = first_sign(blocks%q)
   end subroutine create_run_file
 
@@ -187,7 +191,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(h5_file_t), intent(inout) :: file
     character(name_length) :: name(blocks%n)
-    integer :: b
+    integer :: b, c
 
     do b = 1, blocks%n
       name(b) = blocks%shapes(blocks%shape(b))%name
@@ -196,8 +200,42 @@ contains
     call file%store('/bodies/shape', '1', name)
     call file%store('/bodies/mass', 'kg', [(own_mass(blocks, b), b=1, blocks%n)])
     call file%store('/bodies/fixed', '1', merge(1, 0, blocks%fixed))
-    call file%store('/bodies/release_time', 's', blocks%release_time)
+    call file%store('/bodies/name', '1', blocks%name)
+    do c = 1, size(once_name)
+      call file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), once_values(blocks, c))
+    end do
+    call file%attribute('/bodies/status', 'meaning', '0 not there yet, 1 being lowered, ' &
+      //'2 released, 3 left out')
   end subroutine write_bodies
+
+  !> What may change once or twice in a run, of all blocks.
+  pure function once_values(blocks, c) result(values)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: c   !! number of its name
+    real(wp) :: values(blocks%n)
+
+    select case (c)
+    case (1); values = blocks%release_time
+    case (2); values = blocks%entry_time
+    case (3); values = blocks%raised
+    case default; values = real(blocks%status, wp)
+    end select
+  end function once_values
+
+  !> Overwrite those that differ from what is in the file.
+  subroutine rewrite_once(blocks, self)
+    type(blocks_t), intent(in) :: blocks
+    type(run_file_t), intent(inout) :: self
+    real(wp) :: values(blocks%n)
+    integer :: c
+
+    do c = 1, size(once_name)
+      values = once_values(blocks, c)
+      if (.not. any(abs(values - self%once(:, c)) > 0.0_wp)) cycle
+      self%once(:, c) = values
+      call self%file%rewrite('/bodies/'//trim(once_name(c)), values)
+    end do
+  end subroutine rewrite_once
 
   !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
   subroutine reopen_run_file(path, clock, blocks, self)
@@ -228,7 +266,8 @@ contains
       call file%read_row(self%series(n_columns), self%rows, wall_time)
       self%q = reshape(q, [4, blocks%n])
       self%wall_time = wall_time(1)
-      self%release_time = blocks%release_time
+      self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
+                          [blocks%n, size(once_name)])
     end associate
   end subroutine reopen_run_file
 
@@ -236,12 +275,15 @@ contains
   subroutine continue_run_file(text, parameters, self)
     character(*), intent(in) :: text, parameters   !! the case as it is now
     type(run_file_t), intent(inout) :: self
+    integer :: c
 
     if (.not. is_root()) return
     associate (file => self%file)
       call file%make_room(room_for_change + 2*(len(text) + len(parameters)))
       call resize_all(self)
-      call file%rewrite('/bodies/release_time', self%release_time)
+      do c = 1, size(once_name)
+        call file%rewrite('/bodies/'//trim(once_name(c)), self%once(:, c))
+      end do
       call file%attribute('/provenance', 'namelist', text)
       call file%attribute('/provenance', 'parameters', parameters)
       call file%attribute('/provenance', 'finished', '')
@@ -302,10 +344,7 @@ contains
       do c = 1, n_columns
         call file%append(self%series(c), values(c:c))
       end do
-      if (any(abs(blocks%release_time - self%release_time) > 0.0_wp)) then
-        self%release_time = blocks%release_time
-        call file%rewrite('/bodies/release_time', self%release_time)
-      end if
+      call rewrite_once(blocks, self)
       call file%flush()
     end associate
     self%rows = self%rows + 1

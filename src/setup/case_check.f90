@@ -6,15 +6,16 @@
 module case_check_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, to_text, brief
-  use vectors_m, only: norm
-  use case_types_m, only: case_t, drop_input_t, smallest_spacing, has_flow
+  use vectors_m, only: norm, rotation_matrix
+  use case_types_m, only: case_t, drop_input_t, body_input_t, place_t, is_given, &
+    smallest_spacing, has_flow
   use boundary_kinds_m, only: side_code, side_periodic, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
-  use tet_mesh_m, only: shape_t, is_called
+  use tet_mesh_m, only: shape_t, is_called, reach_along
   use shapes_builtin_m, only: make_shape, given_size
   use rigid_body_m, only: blocks_t, blocks_init
-  use drops_m, only: draw_drop, draw_shape
+  use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
@@ -38,7 +39,9 @@ module case_check_m
     type(walls_t) :: walls, no_walls    !! the latter with the periods only, no bed either
     type(overlap_t) :: overlap
     integer :: n = 0
+    integer :: n_bodies = 0             !! those of `&body`, the others are fixed blocks of tables
     integer, allocatable :: line(:)     !! (n) lines of the bodies in the case file
+    integer, allocatable :: origin(:, :)   !! (2, n + 1) drop and block of it, 0 for `&body`
     logical, allocatable :: held(:)     !! (n) fixed and never moved
     logical, allocatable :: outside(:)  !! (n) reported as outside the tank
     logical, allocatable :: dated(:)    !! (n) it is known when they are there
@@ -101,10 +104,10 @@ contains
     call set_scene(known, shapes, bed, scene)
     if (.not. allocated(scene%line)) return
     if (.not. case%grid%extent_faulty) call check_places(known, scene, problems)
-    call check_pairs(scene, problems)
+    call check_pairs(known, scene, problems)
     if (case%grid%extent_faulty) return
     do i = 1, size(case%drop)
-      if (.not. case%drop(i)%faulty) call check_drop(known, case%drop(i), scene, problems)
+      if (.not. case%drop(i)%faulty) call check_drop(known, i, scene, problems)
     end do
   end subroutine check_case
 
@@ -166,8 +169,10 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
     logical :: yes
+    integer :: i
 
-    yes = any(is_called(shape, case%body%shape)) .or. any(is_called(shape, case%drop%shape))
+    yes = any(is_called(shape, case%body%shape)) .or. any([(count_of_shape(case%drop(i), shape, &
+      with_fixed=.true.), i=1, size(case%drop))] > 0)
   end function in_use
 
   !> Largest distance between two points of a shape, which are corners of its facets [m].
@@ -217,9 +222,14 @@ contains
     do n = 1, size(case%body)
       use_it(n) = .not. case%body(n)%faulty .and. any(made%name == case%body(n)%shape)
     end do
-    scene%n = count(use_it)
-    allocate (good%body(scene%n + 1), good%drop(0))
-    good%body(:scene%n) = pack(case%body, use_it)
+    good%body = pack(case%body, use_it)
+    scene%n_bodies = size(good%body)
+    call add_fixed_rows(case, made, good%body, scene)
+    scene%n = size(good%body)
+    scene%line = good%body%line
+    scene%dated = .not. good%body%time_faulty
+    good%body = [good%body, body_input_t()]
+    allocate (good%drop(0))
     good%body(scene%n + 1)%shape = made(1)%name
     good%body(scene%n + 1)%position = 0.0_wp
     call blocks_init(good, made, scene%blocks)
@@ -230,8 +240,6 @@ contains
     scene%walls%bed = bed
     scene%no_walls%period = scene%walls%period
     allocate (scene%held(scene%n), scene%outside(scene%n))
-    scene%line = pack(case%body%line, use_it)
-    scene%dated = pack(.not. case%body%time_faulty, use_it)
     scene%outside = .false.
     associate (blocks => scene%blocks)
       do n = 1, scene%n
@@ -242,6 +250,76 @@ contains
     end associate
   end subroutine set_scene
 
+  !> The fixed blocks of tables, whose height is known, stand there like bodies of the case.
+  subroutine add_fixed_rows(case, shapes, body, scene)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(body_input_t), allocatable, intent(inout) :: body(:)
+    type(scene_t), intent(inout) :: scene
+    type(body_input_t), allocatable :: all_bodies(:)
+    type(place_t) :: place
+    integer :: i, k, n, s
+
+    n = size(body)
+    do i = 1, size(case%drop)
+      if (allocated(case%drop(i)%row)) n = n + count(case%drop(i)%row%fixed)
+    end do
+    allocate (all_bodies(n), scene%origin(2, n + 1))
+    scene%origin = 0
+    n = size(body)
+    all_bodies(:n) = body
+    do i = 1, size(case%drop)
+      if (case%drop(i)%faulty .or. .not. allocated(case%drop(i)%row)) cycle
+      if (case%drop(i)%handling%if_blocked == 'raise') cycle   ! it may stand higher
+      do k = 1, case%drop(i)%count
+        if (.not. case%drop(i)%row(k)%fixed) cycle
+        place = place_of_block(case%drop(i), k)
+        s = shape_of_place(place, shapes)
+        if (s == 0 .or. .not. is_given(place%x(3))) cycle
+        n = n + 1
+        all_bodies(n)%shape = shapes(s)%name
+        all_bodies(n)%position = place%x
+        all_bodies(n)%quaternion = place%q
+        all_bodies(n)%velocity = place%v
+        all_bodies(n)%fixed = .true.
+        all_bodies(n)%release_time = place%time
+        all_bodies(n)%line = case%drop(i)%line
+        scene%origin(:, n) = [i, k]
+      end do
+    end do
+    body = all_bodies(:n)
+    scene%origin = scene%origin(:, :n + 1)
+  end subroutine add_fixed_rows
+
+  !> How a message about body b of the scene begins.
+  function subject(case, scene, b) result(text)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: b
+    character(:), allocatable :: text
+
+    text = '&body position = '//to_text(scene%blocks%x(:, b))
+    if (scene%origin(1, b) == 0) return
+    associate (drop => case%drop(scene%origin(1, b)))
+      text = '&drop file = '//quoted_text(drop%file)//': line ' &
+        //to_text(drop%row(scene%origin(2, b))%line)
+    end associate
+  end function subject
+
+  !> Where body b of the scene stands in the case.
+  function told_held(case, scene, b) result(text)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: b
+    character(:), allocatable :: text
+
+    text = '&body on line '//to_text(scene%line(b))
+    if (scene%origin(1, b) == 0) return
+    associate (drop => case%drop(scene%origin(1, b)))
+      text = 'block on line '//to_text(drop%row(scene%origin(2, b))%line)//' of '//drop%file
+    end associate
+  end function told_held
+
   !> Every body lies inside the tank; through an open top it may stick out.
   subroutine check_places(case, scene, problems)
     type(case_t), intent(in) :: case
@@ -250,7 +328,7 @@ contains
     character(:), allocatable :: where_to
     integer :: b
 
-    do b = 1, scene%n
+    do b = 1, scene%n_bodies
       where_to = way_out(case, scene, b)
       scene%outside(b) = len(where_to) > 0
       if (scene%outside(b)) then
@@ -308,7 +386,8 @@ contains
   end function way_out
 
   !> Bodies do not overlap at the start; one that is released later finds no held body in its place.
-  subroutine check_pairs(scene, problems)
+  subroutine check_pairs(case, scene, problems)
+    type(case_t), intent(in) :: case
     type(scene_t), intent(inout) :: scene
     type(problems_t), intent(inout) :: problems
     type(pair_list_t) :: pairs
@@ -340,9 +419,9 @@ contains
         if (depth <= 0.0_wp) cycle
         n = n + 1
         if (n > max_reported) cycle
-        call problems%add_message('&body position = '//to_text(scene%blocks%x(:, b)) &
-          //': overlaps the &body on line '//to_text(scene%line(a))//' by '//brief(depth, 3) &
-          //' m; bodies must lie apart at the start', scene%line(b))
+        call problems%add_message(subject(case, scene, b)//': overlaps the ' &
+          //told_held(case, scene, a)//' by ' &
+          //brief(depth, 3)//' m; bodies must lie apart at the start', scene%line(b))
       end do
       if (n == max_counted) exit
     end do
@@ -428,38 +507,76 @@ contains
   end subroutine place
 
   !> Every block of a drop has one place, drawn from its seed, spread and tilt included. One whose
-  !! place lies in a wall or a held body could wait for ever, so it is a problem now.
-  subroutine check_drop(case, drop, scene, problems)
+  !! place lies in a wall or a held body could wait for ever, so it is a problem now. One that is
+  !! set on what lies there, or raised above it, only needs room at the highest place.
+  subroutine check_drop(case, i, scene, problems)
     type(case_t), intent(in) :: case
-    type(drop_input_t), intent(in) :: drop
+    integer, intent(in) :: i   !! number of the drop
     type(scene_t), intent(inout) :: scene
     type(problems_t), intent(inout) :: problems
+    type(place_t) :: place
     character(:), allocatable :: reason, first
     integer :: b, k, n
+    logical :: hangs   ! there is nothing to be set on
 
     b = scene%n + 1
     n = 0
     first = ''
-    do k = 1, drop%count
-      scene%blocks%shape(b) = draw_shape(drop%shape, drop%seed, k, scene%blocks%shapes)
-      if (scene%blocks%shape(b) == 0) return
-      call draw_drop(drop, k, scene%blocks%x(:, b), scene%blocks%q(:, b))
-      scene%blocks%release_time(b) = drop%first_time + real(k - 1, wp)*drop%interval
-      reason = hindrance(case, scene, b)
-      if (len(reason) == 0) cycle
-      n = n + 1
-      if (n > 1) cycle
-      first = reason
-      if (drop%count > 1) first = 'block '//to_text(k)//' at '//to_text(scene%blocks%x(:, b)) &
-        //' '//reason
-    end do
-    if (n == 0) return
-    first = first//'; it could never be released'
-    if (n > 1) first = first//'; '//to_text(n)//' of '//to_text(drop%count) &
-      //' blocks have such places'
-    call problems%add_message('&drop position = '//to_text(drop%position)//': '//first, &
-      drop%line)
+    associate (drop => case%drop(i))
+      do k = 1, drop%count
+        place = place_of_block(drop, k)
+        scene%blocks%shape(b) = shape_of_place(place, scene%blocks%shapes)
+        if (scene%blocks%shape(b) == 0) cycle
+        scene%blocks%q(:, b) = place%q
+        scene%blocks%release_time(b) = place%time
+        scene%origin(:, b) = [i, k]
+        hangs = .not. (is_given(place%x(3)) .or. scene%walls%bed%there &
+                       .or. is_wall(side_code(case%boundary%kind(1, 3))))
+        if (.not. is_given(place%x(3)) .or. drop%handling%if_blocked == 'raise') then
+          place%x(3) = highest_place(case, scene, b)
+        end if
+        scene%blocks%x(:, b) = place%x
+        reason = hindrance(case, scene, b)
+        if (hangs) reason = 'has neither floor nor bed to lie on'
+        if (len(reason) == 0) cycle
+        n = n + 1
+        if (place%line > 0 .and. n <= max_reported) call problems%add_message('&drop file = ' &
+          //quoted_text(drop%file)//': line '//to_text(place%line)//': '//reason &
+          //'; it could never be released', drop%line)
+        if (n > 1) cycle
+        first = reason
+        if (drop%count > 1) first = 'block '//to_text(k)//' at '//to_text(place%x)//' '//reason
+      end do
+      if (n > max_reported .and. allocated(drop%row)) call problems%add_message('&drop file = ' &
+        //quoted_text(drop%file)//': '//to_text(n - max_reported)//' more such places', drop%line)
+      if (n == 0 .or. allocated(drop%row)) return
+      first = first//'; it could never be released'
+      if (n > 1) first = first//'; '//to_text(n)//' of '//to_text(drop%count) &
+        //' blocks have such places'
+      call problems%add_message('&drop position = '//to_text(drop%position)//': '//first, &
+        drop%line)
+    end associate
   end subroutine check_drop
+
+  !> Height of the centre of body b with its lowest point at the top of the tank, or its highest one
+  !! where there is a lid [m].
+  pure function highest_place(case, scene, b) result(height)
+    type(case_t), intent(in) :: case
+    type(scene_t), intent(in) :: scene
+    integer, intent(in) :: b
+    real(wp) :: height
+    real(wp) :: turn(3, 3)
+
+    turn = rotation_matrix(scene%blocks%q(:, b))
+    height = case%grid%origin(3) + case%grid%length(3)
+    associate (shape => scene%blocks%shapes(scene%blocks%shape(b)))
+      if (is_wall(side_code(case%boundary%kind(2, 3)))) then
+        height = height - reach_along(shape, turn(3, :))
+      else
+        height = height + reach_along(shape, -turn(3, :))
+      end if
+    end associate
+  end function highest_place
 
   !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
   function hindrance(case, scene, b) result(text)
@@ -471,12 +588,14 @@ contains
 
     text = way_out(case, scene, b)
     if (len(text) > 0) return
+    if (any(scene%origin(1, :scene%n) == scene%origin(1, b) .and. &
+            scene%origin(2, :scene%n) == scene%origin(2, b))) return   ! `check_pairs` has looked
     do a = 1, scene%n
       if (.not. scene%held(a) .or. scene%outside(a)) cycle
       if (scene%blocks%release_time(a) > scene%blocks%release_time(b)) cycle
       if (.not. near(scene, a, b)) cycle
       if (room_beside(scene, a, b)) cycle
-      text = 'lies inside the fixed &body on line '//to_text(scene%line(a))
+      text = 'lies inside the fixed '//told_held(case, scene, a)
       exit
     end do
   end function hindrance

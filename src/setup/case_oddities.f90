@@ -2,14 +2,14 @@
 module case_oddities_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
-  use case_types_m, only: case_t, shape_input_t, drop_input_t, is_given, smallest_spacing, &
-    has_flow
+  use case_types_m, only: case_t, shape_input_t, drop_input_t, place_t, is_given, &
+    smallest_spacing, has_flow
   use run_groups_m, only: side_name
   use rigid_body_m, only: turning_share
   use tet_mesh_m, only: shape_t, extreme_of_family
-  use drops_m, only: draw_shape
   use bed_m, only: bed_t
-  use fall_m, only: fall_t, find_fall, as_drop
+  use fall_m, only: fall_t, find_fall
+  use drops_m, only: place_of_block, place_of_body, shape_of_place
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
   use contact_sphere_placement_m, only: height_errors
@@ -160,13 +160,17 @@ contains
     type(case_t), intent(in) :: case
     type(problems_t), intent(inout) :: oddities
     character(:), allocatable :: late
+    type(place_t) :: place
     integer :: i, k, n
 
     late = ' due only after the end of the run, t_end = '//to_text(case%run%t_end)//' s'
     do i = 1, size(case%drop)
       associate (drop => case%drop(i))
-        n = count([(drop%first_time + real(k, wp)*drop%interval, k=0, drop%count - 1)] &
-                  > case%run%t_end)
+        n = 0
+        do k = 1, drop%count
+          place = place_of_block(drop, k)
+          if (place%time > case%run%t_end) n = n + 1
+        end do
         if (n > 0) call oddities%add('&drop count', drop%count, to_text(n)//trim(merge(' is ', &
           ' are', n == 1))//late, drop%line)
       end associate
@@ -186,31 +190,34 @@ contains
     integer :: i, n
 
     do i = 1, size(case%drop)
-      call look_at(case%drop(i), '&drop')
+      if (case%drop(i)%count > 0) call look_at(place_of_block(case%drop(i), 1), '&drop', &
+                                               case%drop(i)%line)
     end do
     n = 0
     do i = 1, size(case%body)
-      if (n < max_bodies) call look_at(as_drop(case%body(i)), '&body')
+      if (n < max_bodies) call look_at(place_of_body(case%body(i)), '&body', &
+                                             case%body(i)%line)
     end do
   contains
-    subroutine look_at(drop, group)
-      type(drop_input_t), intent(in) :: drop
+    subroutine look_at(place, group, line)
+      type(place_t), intent(in) :: place
       character(*), intent(in) :: group
+      integer, intent(in) :: line
       type(fall_t) :: fall
       real(wp) :: above
       integer :: s
 
-      above = drop%position(3) - case%grid%origin(3) - case%grid%length(3)
+      above = place%x(3) - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return   ! no need to look closer
-      s = draw_shape(drop%shape, drop%seed, 1, shapes)
+      s = shape_of_place(place, shapes)
       if (s == 0) return
-      call find_fall(case, drop, shapes(s), bed, fall)
+      call find_fall(case, place, shapes(s), bed, fall)
       above = fall%bottom - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return
       n = n + 1
-      call oddities%add_message(group//' position = '//to_text(drop%position)//': begins ' &
+      call oddities%add_message(group//' position = '//to_text(place%x)//': begins ' &
         //brief(above, 3)//' m above the tank, which is '//brief(case%grid%length(3), 3) &
-        //' m high; is that meant?', drop%line)
+        //' m high; is that meant?', line)
     end subroutine look_at
   end subroutine look_at_heights
 
@@ -240,7 +247,7 @@ contains
     logical :: yes
 
     yes = any(abs(drop%spread) > 0.0_wp) .or. drop%orientation == 'random' &
-          .or. drop%tilt_deg > 0.0_wp
+          .or. drop%tilt_deg > 0.0_wp .or. drop%shapes(1) /= ''
   end function is_random
 
   !> A block too light, too large, too coarse in the grid or in its own tetrahedra.

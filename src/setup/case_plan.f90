@@ -2,8 +2,9 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, shape_input_t, is_given, smallest_spacing, has_flow, &
+  use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow, &
     not_resolved
+  use drops_m, only: place_of_block, shape_of_place
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: told_file
   use contact_law_m, only: contact_law_t, load_t
@@ -11,7 +12,6 @@ module case_plan_m
   use contact_load_m, only: load_of, give_share
   use rest_depth_m, only: heaviest_mass
   use tet_mesh_m, only: shape_t, extreme_of_family
-  use drops_m, only: draw_shape
   use bed_m, only: bed_t
   use wave_step_m, only: gravity_step, capillary_step
   use machine_memory_m, only: available_memory
@@ -262,8 +262,9 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
+    type(place_t) :: place
     real(wp) :: last   ! release [s]
-    integer :: n_fixed
+    integer :: n_fixed, i, k
 
     n_fixed = count(case%body%fixed)
     call heading(unit, 'Bodies')
@@ -272,7 +273,13 @@ contains
     if (sum(case%drop%count) == 0) then
       call entry(unit, 'dropped', '0')
     else
-      last = maxval(case%drop%first_time + real(case%drop%count - 1, wp)*case%drop%interval)
+      last = 0.0_wp
+      do i = 1, size(case%drop)
+        do k = 1, case%drop(i)%count
+          place = place_of_block(case%drop(i), k)
+          last = max(last, place%time)
+        end do
+      end do
       call entry(unit, 'dropped', to_text(sum(case%drop%count))//', the last one at ' &
                  //brief(last)//' s')
     end if
@@ -305,7 +312,7 @@ contains
     rise = 0.0_wp
     do i = 1, size(case%drop)
       do k = 1, case%drop(i)%count
-        s = draw_shape(case%drop(i)%shape, case%drop(i)%seed, k, shapes)
+        s = shape_of_place(place_of_block(case%drop(i), k), shapes)
         if (s > 0) rise = rise + shapes(s)%volume
       end do
     end do

@@ -14,19 +14,18 @@
 module fall_m
   use kinds_m, only: wp, pi
   use vectors_m, only: rotation_matrix, cross
-  use case_types_m, only: case_t, drop_input_t, body_input_t, is_given, has_flow
+  use case_types_m, only: case_t, place_t, is_given, has_flow
   use boundary_kinds_m, only: side_code, is_wall
-  use tet_mesh_m, only: shape_t
+  use tet_mesh_m, only: shape_t, reach_along
   use mass_properties_m, only: surface_area
   use bed_m, only: bed_t
   use bed_measure_m, only: bed_height
-  use drops_m, only: draw_drop
   implicit none
   private
-  public :: fall_t, find_fall, gravity_down, has_level, as_drop
+  public :: fall_t, find_fall, gravity_down, has_level
   public :: projected_area, drag_coefficient, terminal_speed, fall_under_water
 
-  !> The fall of the first block of a drop.
+  !> The fall of a block.
   type :: fall_t
     real(wp) :: bottom = 0.0_wp           !! height of its lowest point at the start [m]
     logical :: has_floor = .false.
@@ -60,32 +59,19 @@ contains
       .and. (case%fluid%single_phase .or. is_given(case%fluid%water_level))
   end function has_level
 
-  !> A body as a drop of one block.
-  pure function as_drop(body) result(drop)
-    type(body_input_t), intent(in) :: body
-    type(drop_input_t) :: drop
-
-    drop%shape = body%shape
-    drop%position = body%position
-    drop%quaternion = body%quaternion
-    drop%velocity = body%velocity
-    drop%first_time = body%release_time
-    drop%line = body%line
-  end function as_drop
-
-  !> What to expect of the first block of a drop.
-  subroutine find_fall(case, drop, shape, bed, fall)
+  !> What to expect of a block that is let go.
+  subroutine find_fall(case, place, shape, bed, fall)
     type(case_t), intent(in) :: case
-    type(drop_input_t), intent(in) :: drop
+    type(place_t), intent(in) :: place
     type(shape_t), intent(in) :: shape
     type(bed_t), intent(in) :: bed
     type(fall_t), intent(out) :: fall
-    real(wp) :: x(3), q(4), g, speed, ground, top, drag_area
+    real(wp) :: turn(3, 3), g, speed, ground, top, drag_area
 
-    call draw_drop(drop, 1, x, q)
-    fall%bottom = x(3) - depth_below_centre(shape, q)
+    turn = rotation_matrix(place%q)
+    fall%bottom = place%x(3) - reach_along(shape, -turn(3, :))
     fall%has_floor = bed%there .or. is_wall(side_code(case%boundary%kind(1, 3)))
-    fall%floor = bed_height(bed, x, case%grid%origin(3))
+    fall%floor = bed_height(bed, place%x, case%grid%origin(3))
     ground = merge(fall%floor, -huge(ground), fall%has_floor)
     top = case%grid%origin(3) + case%grid%length(3)
     if (has_level(case)) then
@@ -95,7 +81,7 @@ contains
     end if
     g = gravity_down(case%fluid%gravity)
     if (g <= 0.0_wp) return
-    speed = -drop%velocity(3)
+    speed = -place%v(3)
     if (fall%has_water) then
       if (fall%bottom > fall%level) then
         speed = speed_after(speed, g, fall%bottom - fall%level)
@@ -139,26 +125,6 @@ contains
 
     v = sqrt(speed**2 + 2*g*height)
   end function speed_after
-
-  !> From the centre of mass of a turned shape down to its lowest point [m].
-  pure function depth_below_centre(shape, q) result(depth)
-    type(shape_t), intent(in) :: shape
-    real(wp), intent(in) :: q(4)   !! attitude
-    real(wp) :: depth
-    real(wp) :: turn(3, 3), p(3)
-    integer :: i
-
-    if (shape%kind == 'sphere') then
-      depth = shape%sphere_radius(1)
-      return
-    end if
-    depth = 0.0_wp
-    turn = rotation_matrix(q)
-    do i = 1, size(shape%point, 2)
-      p = matmul(turn, shape%point(:, i))
-      depth = max(depth, -p(3))
-    end do
-  end function depth_below_centre
 
   !> Area of the shadow of a shape, the mean over thirteen directions [m2].
   function projected_area(shape) result(area)

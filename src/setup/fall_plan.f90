@@ -2,11 +2,11 @@
 module fall_plan_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, drop_input_t
+  use case_types_m, only: case_t, place_t, is_given
+  use drops_m, only: place_of_block, place_of_body, shape_of_place
   use tet_mesh_m, only: shape_t
-  use drops_m, only: draw_shape
   use bed_m, only: bed_t
-  use fall_m, only: fall_t, find_fall, as_drop, gravity_down
+  use fall_m, only: fall_t, find_fall, gravity_down
   use plan_text_m, only: heading, entry
   implicit none
   private
@@ -36,9 +36,10 @@ contains
     if (size(case%drop) == 0 .and. b == 0) return
     call heading(unit, 'Falls')
     under_water = .false.
-    if (b > 0) call print_fall('&body', as_drop(case%body(b)))
+    if (b > 0) call print_fall('&body', place_of_body(case%body(b)), case%body(b)%line, 1)
     do i = 1, min(size(case%drop), max_told)
-      call print_fall('&drop', case%drop(i))
+      call print_fall('&drop', place_of_block(case%drop(i), 1), case%drop(i)%line, &
+                      case%drop(i)%count)
     end do
     if (size(case%drop) > max_told) call entry(unit, '', 'and of ' &
       //to_text(size(case%drop) - max_told)//' more groups &drop')
@@ -55,20 +56,25 @@ contains
         //'C after Hoelzer and Sommerfeld (2008)')
     end if
   contains
-    subroutine print_fall(group, drop)
+    subroutine print_fall(group, place, line, count)
       character(*), intent(in) :: group
-      type(drop_input_t), intent(in) :: drop
+      type(place_t), intent(in) :: place
+      integer, intent(in) :: line, count   !! of the group, blocks of it
       type(fall_t) :: fall
       character(:), allocatable :: label, start
       integer :: s
 
-      s = draw_shape(drop%shape, drop%seed, 1, shapes)
+      s = shape_of_place(place, shapes)
       if (s == 0) return
-      call find_fall(case, drop, shapes(s), bed, fall)
-      label = trim(drop%shape)
-      if (drop%line > 0) label = group//' on line '//to_text(drop%line)
+      label = trim(place%shape)
+      if (line > 0) label = group//' on line '//to_text(line)
       start = ''
-      if (drop%count > 1) start = 'the first of '//to_text(drop%count)//': '
+      if (count > 1) start = 'the first of '//to_text(count)//': '
+      if (.not. is_given(place%x(3))) then
+        call entry(unit, label, start//'is set on what lies there')
+        return
+      end if
+      call find_fall(case, place, shapes(s), bed, fall)
       call entry(unit, label, start//start_text(case, bed, fall))
       if (fall%at_surface >= 0.0_wp) call entry(unit, '', 'meets the water at ' &
         //brief(fall%at_surface, 3)//' m/s')

@@ -3,7 +3,8 @@ module rest_depth_m
   use kinds_m, only: wp
   use errors_m, only: problems_t, brief
   use case_types_m, only: case_t
-  use tet_mesh_m, only: shape_t, is_called, extreme_of_family
+  use drops_m, only: count_of_shape
+  use tet_mesh_m, only: shape_t, extreme_of_family
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest, give_share
@@ -98,9 +99,10 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
     integer :: n
+    integer :: i
 
     n = count(case%body%shape == shape%name .and. .not. case%body%fixed) &
-      + sum(case%drop%count, is_called(shape, case%drop%shape))
+      + sum([(count_of_shape(case%drop(i), shape, with_fixed=.false.), i=1, size(case%drop))])
   end function n_free
 
 end module rest_depth_m

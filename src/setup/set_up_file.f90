@@ -6,11 +6,11 @@
 module set_up_file_m
   use kinds_m, only: wp
   use errors_m, only: exit_ok
-  use case_types_m, only: case_t, drop_input_t
+  use case_types_m, only: case_t, drop_input_t, place_t, is_given
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
   use grid_m, only: grid_init
-  use drops_m, only: draw_drop
+  use drops_m, only: place_of_block
   use rigid_body_m, only: blocks_t, blocks_init, drift
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
@@ -72,7 +72,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(run_file_t), intent(inout) :: run
     type(drop_input_t) :: unshifted
-    real(wp) :: place(3, blocks%n), spread(3, blocks%n), q(4)
+    type(place_t) :: one
+    real(wp) :: place(3, blocks%n), spread(3, blocks%n)
     integer :: line(blocks%n), b, i, k
 
     place = blocks%x
@@ -86,7 +87,8 @@ contains
         spread(:, b) = case%drop(i)%spread
         unshifted = case%drop(i)
         unshifted%spread = 0.0_wp
-        call draw_drop(unshifted, k, place(:, b), q)
+        one = place_of_block(unshifted, k)
+        where (is_given(one%x)) place(:, b) = one%x
       end do
     end do
     associate (file => run%file)

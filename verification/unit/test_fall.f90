@@ -8,6 +8,7 @@ program test_fall
   use case_check_m, only: make_shapes
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
+  use drops_m, only: place_of_block
   use fall_m, only: fall_t, find_fall, gravity_down, drag_coefficient, projected_area, &
     terminal_speed, fall_under_water
   implicit none
@@ -117,29 +118,29 @@ contains
     call make('&fluid water_level=3 liquid_density=1000/ &drop shape=''c'' position=5,5,5.5 ' &
       //'velocity=1,0,-2/ &drop shape=''s'' position=5,5,5/ &drop shape=''c'' position=5,5,2/ ' &
       //'&drop shape=''c'' position=5,5,5.5 axis=1,0,0 angle_deg=45/', case, shapes)
-    call find_fall(case, case%drop(1), shapes(1), bed, fall)
+    call find_fall(case, place_of_block(case%drop(1), 1), shapes(1), bed, fall)
     call check('lowest point', fall%bottom, 5.0_wp, 1.0e-14_wp)
     call check('floor', fall%floor, -2.0_wp, 0.0_wp)
     call check('level', fall%level, 3.0_wp, 0.0_wp)
     call check('at the surface', fall%at_surface, sqrt(4 + 4*g), 1.0e-14_wp)
     call check('at the floor', fall%at_floor, under_water(shapes(1), &
       fall%at_surface, 5.0_wp), 1.0e-14_wp)
-    call find_fall(case, case%drop(2), shapes(2), bed, fall)
+    call find_fall(case, place_of_block(case%drop(2), 1), shapes(2), bed, fall)
     call check('a light one floats', fall%at_surface > 0.0_wp .and. fall%terminal < 0.0_wp &
       .and. fall%at_floor < 0.0_wp)
-    call find_fall(case, case%drop(3), shapes(1), bed, fall)
+    call find_fall(case, place_of_block(case%drop(3), 1), shapes(1), bed, fall)
     call check('in the water at once', fall%at_surface, -1.0_wp, 0.0_wp)
     call check('from there to the floor', fall%at_floor, under_water(shapes(1), &
       0.0_wp, 3.5_wp), 1.0e-14_wp)
-    call find_fall(case, case%drop(4), shapes(1), bed, fall)
+    call find_fall(case, place_of_block(case%drop(4), 1), shapes(1), bed, fall)
     call check('lowest edge', fall%bottom, 5.5_wp - sqrt(0.5_wp), 1.0e-14_wp)
     call make('&fluid water_level=3/ &boundary z_min=''open''/ &drop shape=''c'' ' &
       //'position=5,5,2/', case, shapes)
-    call find_fall(case, case%drop(1), shapes(1), bed, fall)
+    call find_fall(case, place_of_block(case%drop(1), 1), shapes(1), bed, fall)
     call check('no floor', .not. fall%has_floor .and. fall%at_floor < 0.0_wp &
       .and. fall%terminal > 0.0_wp)
     call make('&fluid water_level=-5/ &drop shape=''c'' position=5,5,2/', case, shapes)
-    call find_fall(case, case%drop(1), shapes(1), bed, fall)
+    call find_fall(case, place_of_block(case%drop(1), 1), shapes(1), bed, fall)
     call check('no water there', .not. fall%has_water)
     call check('free fall to the floor', fall%at_floor, sqrt(2*g*3.5_wp), 1.0e-14_wp)
   end subroutine falls

@@ -5,10 +5,10 @@
 program test_unknown_names
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
-  use case_types_m, only: case_t
+  use case_types_m, only: case_t, place_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use drops_m, only: draw_drop
+  use drops_m, only: place_of_block
   use rigid_body_m, only: blocks_t, blocks_init
   use touching_m, only: touching_t, touching_init
   use grid_m, only: grid_t, grid_init
@@ -59,7 +59,7 @@ contains
     type(pressure_system_t) :: system
     type(monolithic_t) :: coupling
     character(:), allocatable :: message
-    real(wp) :: x(3), q(4)
+    type(place_t) :: place
     integer :: subcells
 
     allocate (case%shape(1), case%body(1), case%drop(1))
@@ -87,7 +87,7 @@ contains
       end select
       call make_shape(shape, shapes(1), message)
       if (len(message) > 0) error stop 'test_unknown_names: a shape that the program refuses'
-      call draw_drop(drop, 1, x, q)
+      place = place_of_block(drop, 1)
       call blocks_init(case, shapes, blocks)
       call touching_init(contact, 1.0e-4_wp, blocks, touching)
       call grid_init(case%grid, case%boundary, grid)

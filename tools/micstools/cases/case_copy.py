@@ -10,7 +10,7 @@ from pathlib import Path
 from micstools.cases import settings
 from micstools.reading.reader import BadRun
 
-_FILES = (("shape", "file"), ("bed", "file"), ("fluid", "initial_state"))
+_FILES = (("shape", "file"), ("drop", "file"), ("bed", "file"), ("fluid", "initial_state"))
 
 
 def from_here(text: str, folder: Path) -> str:

@@ -66,7 +66,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
                 "fixed": bool(b.fixed[k]),
                 "wall": k in walls,
                 "colour": colours[k + 1],
-                "release": _known(b.release_time[k]),
+                "release": _known(b.entry_time[k]),
             }
             for k in range(b.n)
         ],

@@ -67,10 +67,9 @@ class SetUp:
         """Numbers, from 0, of the bodies that a remark concerns."""
         if remark.group == "shape":
             name = settings.value(self.text, "shape", "name", remark.occurrence)
-            wanted = re.escape(str(name or "").strip())
-            stones = re.compile(rf"{wanted}(-\d+)?")  # of a family of rock, too
+            wanted = str(name or "").strip()
             names = self.run.bodies.shape
-            return [k for k, shape in enumerate(names) if stones.fullmatch(shape)][:1]  # for all
+            return [names.index(wanted)] if wanted in names else []  # one stands for all
         if remark.group not in ("body", "drop"):
             return []
         found = [g for g in spans(self.text) if g[0] == remark.group]
@@ -110,7 +109,8 @@ def _found(run: Run, text: str, said: str) -> SetUp:
         due = h5["bodies/release_time"][:]
         known = "name" in h5["bodies"]
         names = h5["bodies/name"].asstr()[:] if known else [""] * len(due)
-    run.__dict__["bodies"] = replace(run.bodies, release_time=due)  # nothing waits for room yet
+    # nothing waits for room yet
+    run.__dict__["bodies"] = replace(run.bodies, release_time=due, entry_time=due)
     warnings = [line for line in said.splitlines() if line.startswith(_WARNING)]
     remarks = [remark_of(line.removeprefix(_WARNING), text) for line in warnings]
     units = [str(name).strip("\0 ") for name in names]

@@ -27,7 +27,7 @@ def to_final_csv(run: Run, row: int, folder: Path) -> Path:
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["block", "shape", "fixed", "x", "y", "z", "qw", "qx", "qy", "qz"])
-        for k in np.flatnonzero(b.present(row)):
+        for k in np.flatnonzero(b.there(row)):
             pose = [*b.position[row, k].tolist(), *b.quaternion[row, k].tolist()]
             writer.writerow([int(k) + 1, b.shape[k], int(b.fixed[k]), *pose])
     return path

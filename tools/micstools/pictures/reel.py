@@ -44,7 +44,7 @@ class Reel:
         """The picture of the row nearest to `t` [s]; the water is that of the nearest written
         field."""
         b, row = self.run.bodies, self.run.bodies.row(t)
-        present, place = b.present(row), self.run.into_tank(b.position[row])
+        present, place = b.there(row), self.run.into_tank(b.position[row])
         for k, actors in enumerate(self._blocks):
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = rotation_matrix(b.quaternion[row, k]), place[k]

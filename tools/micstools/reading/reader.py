@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 NOT_RESOLVED = "light: not resolved"
-_RELEASED = 2
-"""Status of a block that is let go: docs of `/bodies/status` in run.h5."""
 _DEFAULT_SIDES = {"z_max": "open"}
 _SIDES = ("x_min", "x_max", "y_min", "y_max", "z_min", "z_max")
 
@@ -90,6 +88,9 @@ class Bodies:
     mass: Array  # (N) [kg]
     fixed: NDArray[np.bool_]  # (N)
     release_time: Array  # (N) true time of release, infinite for blocks not released yet [s]
+    entry_time: Array  # (N) likewise of coming into the tank, earlier if a crane lowers it [s]
+    raised: Array  # (N) height above the place, where that was taken [m]
+    status: IntArray  # (N) 0 not there yet, 1 being lowered, 2 released, 3 left out
     time: Array  # (T) [s]
     position: Array  # (T, N, 3) [m]
     quaternion: Array  # (T, N, 4) w, x, y, z
@@ -120,6 +121,10 @@ class Bodies:
     def present(self, row: int) -> NDArray[np.bool_]:
         """Which bodies are released at a row (N)."""
         return np.asarray(self.release_time <= self.time[row] + 1e-12)
+
+    def there(self, row: int) -> NDArray[np.bool_]:
+        """Which bodies are in the tank at a row, released or held by a crane (N)."""
+        return np.asarray(self.entry_time <= self.time[row] + 1e-12)
 
 
 @dataclass(frozen=True)
@@ -461,7 +466,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     """The bodies at `most` of the rows; the first `placed` of them are those of `&body`, the others
     drops."""
     group = h5["bodies"]
-    per_body = ("shape", "name", "mass", "fixed", "release_time")
+    per_body = ("shape", "name", "mass", "fixed", *_HANDLED)
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
     complete = min(len(group[name]) for name in rows)
     step = -(-complete // most) if most else 1
@@ -471,9 +476,27 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
         name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
-        release_time=_true_release(group, values, placed),
+        **_handled(group, values, placed),
         **values,
     )
+
+
+_HANDLED = ("release_time", "entry_time", "raised", "status")
+"""What became of each body."""
+
+
+def _handled(group: h5py.Group, rows: dict[str, Array], placed: int) -> dict[str, Any]:
+    """The values of `_HANDLED`; results of older programs have no more than release times."""
+    due = group["release_time"][:]
+    if "status" not in group:
+        release = _true_release(due, rows, placed)
+        status = np.where(np.isfinite(release), 2, 0)
+        return dict(zip(_HANDLED, (release, release, 0 * due, status), strict=True))
+    status = group["status"][:].astype(int)
+    to_come = (status == 0) & (due > rows["time"][-1] if len(rows["time"]) else True)
+    release = np.where((status == 2) | to_come, due, np.inf)
+    entry = np.where((status == 1) | (status == 2), group["entry_time"][:], release)
+    return dict(zip(_HANDLED, (release, entry, group["raised"][:], status), strict=True))
 
 
 def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
@@ -484,13 +507,9 @@ def _thinned(rows: h5py.Dataset, complete: int, step: int) -> Any:
     return found
 
 
-def _true_release(group: h5py.Group, rows: dict[str, Array], placed: int) -> Array:
-    """Release times (N) [s]; infinite for a block that is not let go yet, or left out, by its
-    status. Where an older program wrote none, one that is due waits if it has neither moved nor
-    felt a force since; those `placed` at the start do not wait."""
-    due: Array = group["release_time"][:]
-    if "status" in group:
-        return np.where(group["status"][:] == _RELEASED, due, np.inf)
+def _true_release(due: Array, rows: dict[str, Array], placed: int) -> Array:
+    """Release times (N) [s]; infinite for a block that is due but not let go yet, which shows in
+    that it has neither moved nor felt a force since. Those `placed` at the start do not wait."""
     if not len(rows["time"]):
         return due
     signs = [rows[name] for name in ("velocity", "fluid_force", "contact_force")]

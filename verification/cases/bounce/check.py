@@ -21,6 +21,7 @@ OBLIQUE = ("edge on face with ends on its border", "edge along edge", "corner on
 """These touch along several oblique normals; the last pair slips off sideways and turns."""
 LENGTH, TIME = 1e-4, 1e-2  # units of the tables D3 [m], [s]
 VARIES = (
+    "contact solver",
     "contact restitution",
     "contact contact_time",
     "contact friction",

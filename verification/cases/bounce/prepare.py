@@ -49,17 +49,19 @@ def body(shape: str, place: tuple[float, ...], speed: float, attitude: str = "")
     return f"&body shape = '{shape}'  position = {where}  {moves}  {attitude} /\n"
 
 
-def restitution(e: float) -> None:
+def restitution(e: float, dt: float = 1e-3, solver: str = "springs") -> None:
     """Sphere and cubes at the floor, and blocks against one another; no friction."""
-    text = HEAD.format(what=f"restitution {e:g}", end=0.12, dt=1e-3) + TANK.format(height=0.2)
+    text = HEAD.format(what=f"restitution {e:g}", end=0.12, dt=dt) + TANK.format(height=0.2)
     text += NO_WEIGHT + SHAPES
-    text += f"&contact restitution = {e:g}  friction = 0  wall_friction = 0 /\n"
+    text += f"&contact restitution = {e:g}  friction = 0  wall_friction = 0"
+    text += f"  solver = '{solver}' /\n"
+    name = f"e{100 * e:03.0f}" + (f"_impulses_{1e3 * dt:g}ms" if solver == "impulses" else "")
     on_floor = "".join(
         body(shape, (0.05 + 0.1 * k, 0.05, 0.032), -DOWN, attitude)
         for k, (shape, attitude) in enumerate(ON_FLOOR)
     )
-    Path(f"e{100 * e:03.0f}.nml").write_text(text + on_floor + pairs(PAIRS))
-    Path(f"oblique_e{100 * e:03.0f}.nml").write_text(text + pairs(OBLIQUE))
+    Path(f"{name}.nml").write_text(text + on_floor + pairs(PAIRS))
+    Path(f"oblique_{name}.nml").write_text(text + pairs(OBLIQUE))
 
 
 def pairs(which: tuple[tuple[str, str, str, str], ...]) -> str:
@@ -101,6 +103,9 @@ def power_law(name: str, gamma: float, damping: float, speeds: list[float]) -> N
 
 for e in (0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
     restitution(e)
+for e in (0.25, 0.75):
+    for dt in (1e-3, 4e-3, 2e-2):
+        restitution(e, dt, "impulses")
 for h, e, _, _, second, _ in np.loadtxt(HERE / "D7.csv", delimiter=",", skiprows=2):
     for contact_time in (2e-3, 5e-4):
         ball(h, e, 1.1 * second, contact_time)

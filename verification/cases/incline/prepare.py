@@ -1,5 +1,5 @@
 """One case file for each row of D5.csv: a flat box and a sphere on a floor under tilted gravity.
-Below the friction angle also without sleep."""
+Below the friction angle also without sleep, which impulses have never; these in three steps."""
 
 from pathlib import Path
 
@@ -12,13 +12,13 @@ TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu
   title = 'incline'
   physics = 'dry'
   t_end = {end}
-  dt = 1.0e-2
+  dt = {dt:g}
   field_interval = 0.0
   restart_interval = 0.0
 /
 &grid  cells = 100, 20, 10  length = 16.0, 0.3, 0.1 /
 &fluid gravity = {along:.15g}, 0.0, {down:.15g} /
-&contact friction = {mu:g}  wall_friction = {mu:g}  sleep = {sleep} /
+&contact friction = {mu:g}  wall_friction = {mu:g}  sleep = {sleep}  solver = '{solver}' /
 &shape name = 'box'  kind = 'box'  size = 0.04, 0.04, 0.02 /
 &shape name = 'sphere'  kind = 'sphere'  size = 0.04 /
 &body  shape = 'box'  position = 0.1, 0.1, 0.01 /
@@ -27,7 +27,10 @@ TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu
 
 for theta, mu, a_block, _ in ROWS:
     slope = np.radians(theta)
-    for sleep in ("T",) if a_block > 0.0 else ("T", "F"):
+    runs = [("T", 1e-2, "springs")] + [("F", dt, "impulses") for dt in (1e-3, 4e-3, 2e-2)]
+    if a_block <= 0.0:
+        runs.append(("F", 1e-2, "springs"))
+    for sleep, dt, solver in runs:
         text = TEXT.format(
             theta=theta,
             mu=mu,
@@ -35,6 +38,9 @@ for theta, mu, a_block, _ in ROWS:
             along=9.81 * np.sin(slope),
             down=-9.81 * np.cos(slope),
             sleep=sleep,
+            dt=dt,
+            solver=solver,
         )
-        name = f"deg{theta:.0f}_mu{100 * mu:03.0f}{'' if sleep == 'T' else '_awake'}.nml"
+        kind = f"_impulses_{1e3 * dt:g}ms" if solver == "impulses" else "_awake"
+        name = f"deg{theta:.0f}_mu{100 * mu:03.0f}{'' if sleep == 'T' else kind}.nml"
         Path(name).write_text(text)

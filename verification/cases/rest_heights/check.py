@@ -16,7 +16,7 @@ LEGS = ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 BAND = 0.1  # [mm]
 TILT = 0.2  # [degrees]
 REST = 1e-4  # [m/s]
-VARIES = ("contact model", "shape spheres")
+VARIES = ("contact model", "contact solver", "shape spheres")
 
 
 def tilt(q: Array, legs: tuple[float, float, float]) -> float:
@@ -33,7 +33,7 @@ def check(runs: list[Run]) -> Checks:
     checks = Checks("rest heights of a hexapod")
     for run in runs:
         b, name = run.bodies, run.folder.name
-        counts = name == "surface"
+        counts = run.value("contact", "model", "surface") == "surface"
         for k, (height, legs) in enumerate(zip(HEIGHTS, LEGS, strict=True)):
             on = f"{name}, {k + 1} leg{'s' if k else ''}:"
             ours = 1e3 * float(b.position[-1, k, 2])

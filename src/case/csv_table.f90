@@ -1,0 +1,326 @@
+!> A table in a text file: a line with the names of the columns, then rows of cells.
+!!
+!! Commas part the cells; semicolons, or tabs, if the line of names holds any. A cell may stand
+!! between double quotes, a quote inside doubled. Blanks around a cell, empty lines, lines of empty
+!! cells and lines that begin with `#` mean nothing; neither do a byte-order mark, nor how lines
+!! end. Text is UTF-8; any other is taken as Latin-1.
+module csv_table_m
+  use kinds_m, only: wp, name_length
+  use errors_m, only: problems_t, to_text
+  use file_words_m, only: words_t, read_whole
+  use value_text_m, only: parse_real, nearest_name, lower_case, printable, quoted_text, &
+    byte_order_mark, value_ok, value_not_finite, value_too_large
+  use case_file_m, only: is_utf8, utf8_of_latin1
+  implicit none
+  private
+  public :: csv_table_t, read_table
+
+  integer, parameter :: max_columns = 64   !! of a table
+
+  type :: csv_table_t
+    integer :: n_rows = 0
+    integer :: head = 0                              !! line of the names
+    character(name_length), allocatable :: name(:)   !! (columns) in small letters
+    integer, allocatable :: line(:)                  !! (rows) of the file
+    character(:), allocatable, private :: text       !! the file; rows by their ends in it
+    integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, rows)
+  contains
+    procedure :: cell, column, number, complain => table_complain
+    procedure :: check_names
+  end type csv_table_t
+
+contains
+
+  !> Read a file; what is wrong with its form is told with line and column.
+  subroutine read_table(file, table, problems)
+    character(*), intent(in) :: file
+    type(csv_table_t), intent(out) :: table
+    type(problems_t), intent(inout) :: problems
+    type(words_t) :: words
+    character(1) :: separator
+    integer :: at, last, line, n, n_lines
+    integer :: first(max_columns), final(max_columns)
+
+    allocate (table%name(0), table%line(0), table%first(0, 0), table%last(0, 0))
+    call read_whole(file, words)
+    if (len(words%problem) == 0 .and. index(words%text, achar(0)) > 0) words%problem = &
+      'holds zero bytes; a table is plain text in UTF-8'
+    if (len(words%problem) > 0) then
+      call problems%add_message(words%problem)
+      return
+    end if
+    table%text = words%text
+    if (.not. is_utf8(table%text)) table%text = utf8_of_latin1(table%text)
+    n_lines = count_lines(table%text)
+    at = 1
+    if (index(table%text, byte_order_mark) == 1) at = len(byte_order_mark) + 1
+    line = 0
+    separator = ','
+    do while (at <= len(table%text))
+      line = line + 1
+      last = end_of_line(table%text, at)
+      if (.not. is_empty(table%text(at:last), separator)) then
+        if (size(table%name) == 0) separator = separator_of(table%text(at:last))
+        call cut_line(table%text, at, last, separator, line, n, first, final, problems)
+        if (size(table%name) == 0) then
+          call set_names(table, line, n, first, final, problems)
+          if (size(table%name) == 0) return
+          deallocate (table%line, table%first, table%last)
+          allocate (table%line(n_lines), table%first(size(table%name), n_lines), &
+                    table%last(size(table%name), n_lines))
+        else
+          call add_row(table, line, n, first, final, problems)
+        end if
+      end if
+      at = last + 2
+      if (last + 2 <= len(table%text)) then
+        if (table%text(last + 1:last + 2) == achar(13)//achar(10)) at = last + 3
+      end if
+    end do
+    if (size(table%name) == 0) call problems%add_message('the file is empty')
+  end subroutine read_table
+
+  !> At least as many as there are lines.
+  pure function count_lines(text) result(n)
+    character(*), intent(in) :: text
+    integer :: n
+    integer :: i
+
+    n = 1
+    do i = 1, len(text)
+      if (text(i:i) == achar(10) .or. text(i:i) == achar(13)) n = n + 1
+    end do
+  end function count_lines
+
+  !> The last character of the line that begins at `at`.
+  pure function end_of_line(text, at) result(last)
+    character(*), intent(in) :: text
+    integer, intent(in) :: at
+    integer :: last
+
+    last = scan(text(at:), achar(10)//achar(13)) + at - 2
+    if (last < at - 1) last = len(text)
+  end function end_of_line
+
+  !> Is there nothing in a line, or a remark?
+  pure function is_empty(line, separator) result(yes)
+    character(*), intent(in) :: line
+    character(1), intent(in) :: separator
+    logical :: yes
+
+    yes = verify(line, ' '//achar(9)//separator) == 0 .or. index(adjustl(line), '#') == 1
+  end function is_empty
+
+  !> What parts the cells, seen from the line of names.
+  pure function separator_of(line) result(separator)
+    character(*), intent(in) :: line
+    character(1) :: separator
+
+    separator = ','
+    if (index(line, ';') > 0) then
+      separator = ';'
+    else if (index(line, ',') == 0 .and. index(line, achar(9)) > 0) then
+      separator = achar(9)
+    end if
+  end function separator_of
+
+  !> The cells of a line: first and last character of each, quotes included.
+  subroutine cut_line(text, at, last, separator, line, n, first, final, problems)
+    character(*), intent(in) :: text
+    integer, intent(in) :: at, last, line
+    character(1), intent(in) :: separator
+    integer, intent(out) :: n                    !! cells; what is beyond `max_columns` is cut off
+    integer, intent(out) :: first(:), final(:)
+    type(problems_t), intent(inout) :: problems
+    character(*), parameter :: blank = ' '//achar(9)
+    integer :: i, begin
+    logical :: quoted
+
+    n = 0
+    begin = at
+    quoted = .false.
+    do i = at, last + 1
+      if (i <= last) then
+        if (text(i:i) == '"') quoted = .not. quoted
+        if (quoted .or. text(i:i) /= separator) cycle
+      end if
+      n = n + 1
+      if (n > size(first)) exit
+      first(n) = begin
+      final(n) = i - 1
+      do while (first(n) <= final(n))
+        if (verify(text(first(n):first(n)), blank) /= 0) exit
+        first(n) = first(n) + 1
+      end do
+      do while (final(n) >= first(n))
+        if (verify(text(final(n):final(n)), blank) /= 0) exit
+        final(n) = final(n) - 1
+      end do
+      begin = i + 1
+    end do
+    n = min(n, size(first))
+    if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
+      //': no second " closes the text on this line')
+  end subroutine cut_line
+
+  !> The names of the columns, in small letters; a unit in brackets after a name is left away.
+  subroutine set_names(table, line, n, first, final, problems)
+    type(csv_table_t), intent(inout) :: table
+    integer, intent(in) :: line, n, first(:), final(:)
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: word
+    character(name_length) :: name(n)
+    integer :: c, used
+
+    used = n
+    do while (used > 1)   ! a comma at the end of each line
+      if (final(used) >= first(used)) exit
+      used = used - 1
+    end do
+    do c = 1, used
+      word = lower_case(plain(table%text(first(c):final(c))))
+      if (scan(word, '[(') > 1) word = word(:scan(word, '[(') - 1)
+      name(c) = word
+      if (len_trim(word) == 0) call problems%add_message('line '//to_text(line)//', column ' &
+        //to_text(c)//': has no name')
+      if (any(name(:c - 1) == name(c)) .and. len_trim(word) > 0) call problems%add_message('line ' &
+        //to_text(line)//', column '//to_text(c)//' ('//printable(trim(word)) &
+        //'): is there twice')
+    end do
+    table%name = name(:used)
+    table%head = line
+  end subroutine set_names
+
+  !> A row, which has a cell for each name.
+  subroutine add_row(table, line, n, first, final, problems)
+    type(csv_table_t), intent(inout) :: table
+    integer, intent(in) :: line, n, first(:), final(:)
+    type(problems_t), intent(inout) :: problems
+    integer :: used, width
+
+    width = size(table%name)
+    used = n
+    do while (used > width)
+      if (final(used) >= first(used)) exit
+      used = used - 1
+    end do
+    if (used /= width) then
+      call problems%add_message('line '//to_text(line)//', column '//to_text(min(used, width) + 1) &
+        //': '//to_text(used)//trim(merge(' cell ', ' cells', used == 1)) &
+        //', but the table has '//to_text(width)//' columns')
+      return
+    end if
+    table%n_rows = table%n_rows + 1
+    table%line(table%n_rows) = line
+    table%first(:, table%n_rows) = first(:width)
+    table%last(:, table%n_rows) = final(:width)
+  end subroutine add_row
+
+  !> A cell without the quotes around it.
+  pure function plain(raw) result(text)
+    character(*), intent(in) :: raw
+    character(:), allocatable :: text
+    integer :: i
+
+    text = raw
+    if (len(raw) < 2) return
+    if (raw(1:1) /= '"' .or. raw(len(raw):len(raw)) /= '"') return
+    text = ''
+    i = 2
+    do while (i < len(raw))
+      text = text//raw(i:i)
+      if (raw(i:i + 1) == '""') i = i + 1
+      i = i + 1
+    end do
+    text = trim(adjustl(text))
+  end function plain
+
+  !> The text of a cell; empty where its column is not there.
+  pure function cell(self, row, column) result(text)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: row, column   !! column 0: not there
+    character(:), allocatable :: text
+
+    text = ''
+    if (column > 0) text = plain(self%text(self%first(column, row):self%last(column, row)))
+  end function cell
+
+  !> Number of the column of that name; 0 if there is none.
+  pure function column(self, name) result(c)
+    class(csv_table_t), intent(in) :: self
+    character(*), intent(in) :: name
+    integer :: c
+
+    do c = size(self%name), 1, -1
+      if (self%name(c) == name) return
+    end do
+  end function column
+
+  !> Tell what is wrong with a cell.
+  subroutine table_complain(self, row, column, what, problems)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: row, column
+    character(*), intent(in) :: what
+    type(problems_t), intent(inout) :: problems
+
+    call problems%add_message('line '//to_text(self%line(row))//', column '//to_text(column) &
+      //' ('//printable(trim(self%name(column)))//') = ' &
+      //quoted_text(printable(self%cell(row, column)))//': '//what)
+  end subroutine table_complain
+
+  !> Read a cell as a number. An empty one, or one whose column is not there, leaves `x` as it is;
+  !! it is a problem if the number is required.
+  subroutine number(self, row, column, required, x, ok, problems)
+    class(csv_table_t), intent(in) :: self
+    integer, intent(in) :: row, column
+    logical, intent(in) :: required
+    real(wp), intent(inout) :: x
+    logical, intent(inout) :: ok          !! false where something is wrong
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: text, what
+    integer :: info
+
+    text = self%cell(row, column)
+    what = ''
+    if (len(text) == 0) then
+      if (required .and. column > 0) what = 'is empty, a number is needed'
+    else
+      call parse_real(text, x, info)
+      select case (info)
+      case (value_ok)
+      case (value_not_finite); what = 'must be a finite number'
+      case (value_too_large); what = 'must be 0 or between 1e-20 and 1e20 in size'
+      case default
+        what = 'must be a number'
+        if (verify(text, '+-0123456789,') == 0) what = 'must be a number, with a decimal point'
+      end select
+    end if
+    if (len(what) == 0) return
+    ok = .false.
+    call self%complain(row, column, what, problems)
+  end subroutine number
+
+  !> Columns that are not known, and required ones that are missing.
+  subroutine check_names(self, known, n_required, problems)
+    class(csv_table_t), intent(in) :: self
+    character(*), intent(in) :: known(:)      !! the required ones first
+    integer, intent(in) :: n_required
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: list
+    integer :: c
+
+    do c = 1, size(self%name)
+      if (any(known == self%name(c)) .or. self%name(c) == '') cycle
+      call problems%add_message('line '//to_text(self%head)//', column '//to_text(c)//' (' &
+        //printable(trim(self%name(c)))//'): unknown, nearest known: ' &
+        //nearest_name(trim(self%name(c)), known))
+    end do
+    list = ''
+    do c = 1, n_required
+      if (.not. any(self%name == known(c))) list = list//', '//trim(known(c))
+    end do
+    if (len(list) > 0) call problems%add_message('line '//to_text(self%head) &
+      //': missing: '//list(3:))
+  end subroutine check_names
+
+end module csv_table_m

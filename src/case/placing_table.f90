@@ -1,0 +1,204 @@
+!> Places of blocks from the tables that `&drop file` names: who, where, when, how.
+!!
+!! Attitude: a quaternion, or three angles. The block stands as its shape is defined and is turned
+!! first by roll about x, then by pitch about y, then by yaw about z, axes of the tank, right-hand:
+!!
+!! $$ q = q_z(yaw) \, q_y(pitch) \, q_x(roll) . $$
+module placing_table_m
+  use kinds_m, only: wp, name_length, pi
+  use errors_m, only: problems_t, to_text
+  use vectors_m, only: quaternion_product, quaternion_from_axis, normalised
+  use case_types_m, only: case_t, drop_input_t, place_t, member_name
+  use csv_table_m, only: csv_table_t, read_table
+  use named_files_m, only: found_file
+  use value_text_m, only: quoted_text, nearest_name, lower_case, parse_logical, sanitise, value_ok
+  implicit none
+  private
+  public :: read_places, attitude_of_angles
+
+  integer, parameter :: max_rows = 100000
+  integer, parameter :: max_told = 100   !! problems of one table
+
+  !> Columns, the five that every table has first.
+  character(name_length), parameter :: known(*) = [character(name_length) :: 'shape', 'x', 'y', &
+    'z', 'time', 'qw', 'qx', 'qy', 'qz', 'yaw_deg', 'pitch_deg', 'roll_deg', 'vx', 'vy', 'vz', &
+    'fixed', 'name']
+  integer, parameter :: n_required = 5, c_shape = 1, c_x = 2, c_time = 5, c_q = 6, c_yaw = 10, &
+    c_v = 13, c_fixed = 16, c_name = 17
+
+contains
+
+  !> Read the tables of all drops; every problem is told with file, line and column.
+  subroutine read_places(case, problems)
+    type(case_t), intent(inout) :: case
+    type(problems_t), intent(inout) :: problems
+    type(problems_t) :: found
+    integer :: i, k
+
+    do i = 1, size(case%drop)
+      associate (drop => case%drop(i))
+        if (.not. allocated(drop%file)) cycle
+        if (len_trim(drop%file) == 0) cycle
+        found = problems_t()
+        call read_drop([case%shape%name, (member_name(case%shape(k), case%shape(k)%member), &
+          k=1, size(case%shape))], drop, found)
+        drop%faulty = drop%faulty .or. found%n > 0
+        do k = 1, min(found%n, max_told)
+          call problems%add_message('&drop file = '//quoted_text(drop%file)//': ' &
+            //found%message(k), drop%line)
+        end do
+        if (found%n > max_told) call problems%add_message('&drop file = ' &
+          //quoted_text(drop%file)//': '//to_text(found%n - max_told)//' more problems', drop%line)
+      end associate
+    end do
+  end subroutine read_places
+
+  !> The table of one drop.
+  subroutine read_drop(shapes, drop, problems)
+    character(name_length), intent(in) :: shapes(:)
+    type(drop_input_t), intent(inout) :: drop
+    type(problems_t), intent(inout) :: problems
+    type(csv_table_t) :: table
+    integer :: column(size(known)), r, k
+
+    call read_table(found_file(drop%folder, drop%file), table, problems)
+    drop%count = table%n_rows
+    allocate (drop%row(table%n_rows))
+    if (size(table%name) == 0) return
+    call table%check_names(known, n_required, problems)
+    column = [(table%column(known(k)), k=1, size(known))]
+    if (any(column(c_q:c_q + 3) > 0) .and. any(column(c_yaw:c_yaw + 2) > 0)) then
+      call problems%add_message('line '//to_text(table%head) &
+        //': give a quaternion or angles, not both')
+    else if (any(column(c_q:c_q + 3) > 0) .and. any(column(c_q:c_q + 3) == 0)) then
+      call problems%add_message('line '//to_text(table%head) &
+        //': a quaternion needs qw, qx, qy and qz')
+    end if
+    if (table%n_rows == 0) call problems%add_message('holds no places')
+    if (table%n_rows > max_rows) call problems%add_message('holds '//to_text(table%n_rows) &
+      //' places, at most '//to_text(max_rows))
+    do r = 1, table%n_rows
+      call read_row(table, r, column, shapes, drop, problems)
+    end do
+  end subroutine read_drop
+
+  !> One row; what is wrong with it keeps its default.
+  subroutine read_row(table, r, column, shapes, drop, problems)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: r, column(:)
+    character(name_length), intent(in) :: shapes(:)
+    type(drop_input_t), intent(inout) :: drop
+    type(problems_t), intent(inout) :: problems
+    integer :: d
+    logical :: ok
+
+    associate (row => drop%row(r))
+      row%line = table%line(r)
+      do d = 1, 3
+        ok = .true.
+        call table%number(r, column(c_x + d - 1), d < 3, row%x(d), ok, problems)
+        ok = .true.
+        call table%number(r, column(c_v + d - 1), .false., row%v(d), ok, problems)
+        if (ok .and. drop%handling%lowering_speed > 0.0_wp .and. abs(row%v(d)) > 0.0_wp) then
+          call table%complain(r, column(c_v + d - 1), 'has no meaning with lowering_speed > 0', &
+                              problems)
+        end if
+      end do
+      ok = .true.
+      call table%number(r, column(c_time), .true., row%time, ok, problems)
+      if (ok .and. row%time < 0.0_wp) call table%complain(r, column(c_time), &
+        'must not be negative', problems)
+      call read_words(table, r, column, shapes, row, problems)
+      if (row%fixed .and. drop%handling%lowering_speed > 0.0_wp) call table%complain(r, &
+        column(c_fixed), 'a fixed block is not lowered', problems)
+      call read_attitude(table, r, column, row%q, problems)
+    end associate
+  end subroutine read_row
+
+  !> Shape, name and whether the block is fixed.
+  subroutine read_words(table, r, column, shapes, row, problems)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: r, column(:)
+    character(name_length), intent(in) :: shapes(:)
+    type(place_t), intent(inout) :: row
+    type(problems_t), intent(inout) :: problems
+    character(:), allocatable :: text
+    integer :: info
+
+    if (column(c_shape) > 0) then
+      text = table%cell(r, column(c_shape))
+      if (size(shapes) == 0) then
+        call table%complain(r, column(c_shape), 'the case has no &shape group', problems)
+      else if (any(shapes == text) .and. len(text) > 0) then
+        row%shape = text
+      else
+        call table%complain(r, column(c_shape), 'no &shape has this name, nearest known: ' &
+          //quoted_text(nearest_name(text, shapes)), problems)
+      end if
+    end if
+    text = table%cell(r, column(c_name))
+    if (len(text) > name_length .or. sanitise(text) /= text) then
+      call table%complain(r, column(c_name), 'must have at most '//to_text(name_length) &
+        //' bytes and no control characters', problems)
+    else
+      row%name = text
+    end if
+    text = lower_case(table%cell(r, column(c_fixed)))
+    if (any(text == [character(3) :: '', '0', 'no'])) return
+    row%fixed = any(text == [character(3) :: '1', 'yes'])
+    if (row%fixed) return
+    call parse_logical(text, row%fixed, info)
+    if (info /= value_ok) call table%complain(r, column(c_fixed), &
+      'must be true or false, yes or no, 1 or 0', problems)
+  end subroutine read_words
+
+  !> Attitude from four columns or three; where they are empty the block stands as its shape does.
+  subroutine read_attitude(table, r, column, q, problems)
+    type(csv_table_t), intent(in) :: table
+    integer, intent(in) :: r, column(:)
+    real(wp), intent(inout) :: q(4)
+    type(problems_t), intent(inout) :: problems
+    real(wp) :: part(4), angle(3)
+    logical :: ok
+    integer :: k
+
+    ok = .true.
+    if (all(column(c_q:c_q + 3) > 0)) then
+      if (all([(len(table%cell(r, column(c_q + k))) == 0, k=0, 3)])) return
+      part = 0.0_wp
+      do k = 1, 4
+        call table%number(r, column(c_q + k - 1), .true., part(k), ok, problems)
+      end do
+      if (.not. ok) return
+      if (all(abs(part) <= 0.0_wp)) then
+        call table%complain(r, column(c_q), 'a quaternion must not be zero', problems)
+      else
+        q = normalised(part)
+      end if
+    else
+      angle = 0.0_wp
+      do k = 1, 3
+        call table%number(r, column(c_yaw + k - 1), .false., angle(k), ok, problems)
+      end do
+      q = attitude_of_angles(angle(1), angle(2), angle(3))
+    end if
+  end subroutine read_attitude
+
+  !> Attitude of a block turned by roll about x, then pitch about y, then yaw about z.
+  pure function attitude_of_angles(yaw_deg, pitch_deg, roll_deg) result(q)
+    real(wp), intent(in) :: yaw_deg, pitch_deg, roll_deg   !! [degrees]
+    real(wp) :: q(4)
+
+    q = quaternion_product(turn([0.0_wp, 0.0_wp, 1.0_wp], yaw_deg), &
+      quaternion_product(turn([0.0_wp, 1.0_wp, 0.0_wp], pitch_deg), &
+      turn([1.0_wp, 0.0_wp, 0.0_wp], roll_deg)))
+  contains
+    pure function turn(axis, angle_deg) result(t)
+      real(wp), intent(in) :: axis(3), angle_deg
+      real(wp) :: t(4)
+
+      t = quaternion_from_axis(axis, modulo(angle_deg, 720.0_wp)*pi/180.0_wp)
+    end function turn
+  end function attitude_of_angles
+
+end module placing_table_m

@@ -1,0 +1,322 @@
+"""Blocks placed from tables and by a crane: what is accepted, told, and becomes of them."""
+
+import csv
+import resource
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from micstools.reading.reader import Run
+from test_input import mics
+
+TANK = """&run t_end = 0.01  physics = 'dry'  dt = 0.01 /
+&grid cells = 6, 4, 4  length = 0.3, 0.2, 0.2 /
+&shape name = 'cube'  kind = 'cube'  size = 0.02 /
+&shape name = 'tetrapod'  kind = 'tetrapod'  size = 0.04 /
+"""
+HEAD = "shape,x,y,z,time,yaw_deg,pitch_deg,roll_deg,vx,vy,vz,fixed,name\n"
+ROW = "cube,0.1,0.1,0.1,0,0,0,0,0,0,0,no,A1\n"
+
+DAMAGED = {
+    "shape": (ROW.replace("cube", "cub"), "column 1 (shape) = 'cub': no &shape has this name, "
+              "nearest known: 'cube'"),
+    "no shape": (ROW.replace("cube", ""), "column 1 (shape) = '': no &shape has this name"),
+    "x": (ROW.replace("0.1,0.1,0.1", "east,0.1,0.1"), "column 2 (x) = 'east': must be a number"),
+    "x empty": (ROW.replace("0.1,0.1,0.1", ",0.1,0.1"), "column 2 (x) = '': is empty"),
+    "y nan": (ROW.replace("0.1,0.1,0.1", "0.1,nan,0.1"), "column 3 (y) = 'nan': must be a finite"),
+    "z inf": (ROW.replace("0.1,0.1,0.1", "0.1,0.1,inf"), "column 4 (z) = 'inf': must be a finite"),
+    "z huge": (ROW.replace("0.1,0.1,0.1", "0.1,0.1,1e99"), "column 4 (z) = '1e99': must be 0 or"),
+    "decimal comma": (ROW.replace("0.1,0.1,0.1", '"0,1",0.1,0.1'), "column 2 (x) = '0,1': must be "
+                      "a number, with a decimal point"),
+    "time": (ROW.replace("0.1,0,0,0", "0.1,soon,0,0"), "column 5 (time) = 'soon': must be a num"),
+    "no time": (ROW.replace("0.1,0,0,0", "0.1,,0,0"), "column 5 (time) = '': is empty"),
+    "before": (ROW.replace("0.1,0,0,0", "0.1,-1,0,0"), "column 5 (time) = '-1': must not be neg"),
+    "yaw": (ROW.replace("0.1,0,0,0", "0.1,0,N45E,0"), "column 6 (yaw_deg) = 'N45E': must be a n"),
+    "pitch": (ROW.replace("0.1,0,0,0", "0.1,0,0,up"), "column 7 (pitch_deg) = 'up': must be a n"),
+    "roll": (ROW.replace("0.1,0,0,0,0", "0.1,0,0,0,x"), "column 8 (roll_deg) = 'x': must be a n"),
+    "velocity": (ROW.replace("0,0,no", "0,fast,no"), "column 11 (vz) = 'fast': must be a number"),
+    "fixed": (ROW.replace("no", "maybe"), "column 12 (fixed) = 'maybe': must be true or false, "
+              "yes or no, 1 or 0"),
+    "name": (ROW.replace("A1", 80 * "A"), "column 13 (name) = '"),
+    "too few": ("cube,0.1,0.1\n", "column 4: 3 cells, but the table has 13 columns"),
+    "too many": (ROW.replace("A1", "A1,A2"), "column 14: 14 cells, but the table has 13 columns"),
+    "quote": (ROW.replace("A1", '"A1'), "column 13: no second \" closes the text on this line"),
+}  # fmt: skip
+"""A row of its own each, and what is told after its line."""
+
+HEADS = {
+    "unknown": ("shape,x,y,z,time,jaw_deg\ncube,0.1,0.1,0.1,0,0\n", "line 1, column 6 (jaw_deg): "
+                "unknown, nearest known: yaw_deg"),
+    "missing": ("shape,x,y\ncube,0.1,0.1\n", "line 1: missing: z, time"),
+    "twice": ("shape,x,y,z,time,x\ncube,0.1,0.1,0.1,0,0\n", "line 1, column 6 (x): is there twice"),
+    "no name": ("shape,x,,y,z,time\ncube,0.1,0,0.1,0.1,0\n", "line 1, column 3: has no name"),
+    "both attitudes": ("shape,x,y,z,time,qw,qx,qy,qz,yaw_deg\ncube,0.1,0.1,0.1,0,1,0,0,0,0\n",
+                       "line 1: give a quaternion or angles, not both"),
+    "half a quaternion": ("shape,x,y,z,time,qw\ncube,0.1,0.1,0.1,0,1\n",
+                          "line 1: a quaternion needs qw, qx, qy and qz"),
+    "no quaternion": ("shape,x,y,z,time,qw,qx,qy,qz\ncube,0.1,0.1,0.1,0,0,0,0,0\n",
+                      "line 2, column 6 (qw) = '0': a quaternion must not be zero"),
+    "part of one": ("shape,x,y,z,time,qw,qx,qy,qz\ncube,0.1,0.1,0.1,0,1,0,,0\n",
+                    "line 2, column 8 (qy) = '': is empty, a number is needed"),
+    "no rows": (HEAD, "holds no places"),
+    "nothing": ("# a remark\n\n", "the file is empty"),
+    "binary": ("shape,x\0", "holds zero bytes; a table is plain text in UTF-8"),
+    "wall": ("shape,x,y,z,time\ncube,0.005,0.1,0.1,0\n", "line 2: reaches 0.005 m through the wall "
+             "x_min; it could never be released"),
+    "two fixed": ("shape,x,y,z,time,fixed\ncube,0.1,0.1,0.1,0,1\ncube,0.11,0.1,0.1,1,1\n",
+                  "line 3: overlaps the block on line 2 of plan.csv by 0.01 m"),
+    "in a fixed one": ("shape,x,y,z,time,fixed\ncube,0.1,0.1,0.1,0,1\ncube,0.11,0.1,0.1,1,0\n",
+                       "line 3: lies inside the fixed block on line 2 of plan.csv"),
+}  # fmt: skip
+"""Whole tables, and what is told."""
+
+
+def put(folder: Path, table: str | bytes, drop: str = "", tank: str = TANK) -> str:
+    """A case with a table beside it; the name of the case."""
+    data = table.encode() if isinstance(table, str) else table
+    (folder / "plan.csv").write_bytes(data)
+    (folder / "case.nml").write_text(f"{tank}&drop file = 'plan.csv'  {drop}/\n")
+    return str(folder / "case.nml")
+
+
+def told(folder: Path, table: str | bytes, drop: str = "", tank: str = TANK) -> list[str]:
+    """What is wrong with a table, each told with the file."""
+    done = mics([put(folder, table, drop, tank)], folder)
+    assert done.returncode == 2 and done.stdout == ""
+    assert sorted(path.name for path in folder.iterdir()) == ["case.nml", "plan.csv"]
+    start = "mics: &drop file = 'plan.csv': "
+    assert all(line.startswith(start) for line in done.stderr.splitlines()), done.stderr
+    return [line.removeprefix(start) for line in done.stderr.splitlines()]
+
+
+def test_damaged_rows_are_told_at_once(tmp_path: Path) -> None:
+    """Every damaged row of one table is told with its line and column."""
+    lines = told(tmp_path, HEAD + "".join(row for row, _ in DAMAGED.values()))
+    for number, (name, (_, text)) in enumerate(DAMAGED.items(), start=2):
+        found = [line for line in lines if line.startswith(f"line {number}, ")]
+        assert found and text in found[0], (name, found)
+    assert {int(line.split()[1].strip(",:")) for line in lines} == set(range(2, len(DAMAGED) + 2))
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_damaged_tables_are_told(name: str, tmp_path: Path) -> None:
+    """What is wrong with a table as a whole."""
+    table, text = HEADS[name]
+    lines = told(tmp_path, table)
+    assert text in lines[0], lines
+
+
+def test_missing_file_and_idle_variables(tmp_path: Path) -> None:
+    """A table that is not there; variables that it leaves without a meaning."""
+    case = tmp_path / "case.nml"
+    case.write_text(f"{TANK}&drop file = 'no.csv' /\n")
+    done = mics([str(case)], tmp_path)
+    assert (done.returncode, done.stderr) == (
+        2, "mics: &drop file = 'no.csv': there is no such file, or it may not be read (line 5)\n"
+    )  # fmt: skip
+    put(tmp_path, HEAD + ROW, "shape = 'cube'  position = 3*0.1  count = 3  velocity = 3*0  ")
+    errors = mics([str(case)], tmp_path).stderr.splitlines()
+    assert len(errors) == 4 and all("the file has it" in line for line in errors), errors
+
+
+DIALECTS = {
+    "plain": "shape,x,y,z,time,name\ncube,0.1,0.15,0.05,0.5,A 1\ntetrapod,0.2,0.1,0.1,1,\n",
+    "semicolons": "shape;x;y;z;time;name\ncube;0.1;0.15;0.05;0.5;A 1\ntetrapod;0.2;0.1;0.1;1;\n",
+    "tabs": "shape\tx\ty\tz\ttime\tname\ncube\t0.1\t0.15\t0.05\t.5\tA 1\n"
+    "tetrapod\t0.2\t0.1\t0.1\t1\t\n",
+    "order": "name,time,z,y,x,shape\nA 1,0.5,0.05,0.15,0.1,cube\n,1,.1,.1,.2,tetrapod\n",
+    "office": "\ufeff# of the yard\r\n\r\nShape, X [m], Y [m] ,Z [m],Time [s],Name,,\r\n"
+    '"cube",0.1,0.15,0.05,0.5,"A 1",,\r\n,,,,,,,\r\ntetrapod,0.2,0.1,1e-1,1.0,,,\r\n',
+    "old": "shape,x,y,z,time,name\rcube,0.1,0.15,0.05,0.5,A 1\rtetrapod,0.2,0.1,0.1,1,\r",
+    "no end": "shape,x,y,z,time,name\ncube,0.1,0.15,0.05,0.5,A 1\ntetrapod,0.2,0.1,0.1,1,",
+}  # fmt: skip
+"""The same table as programs write it."""
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_dialects_mean_the_same(dialect: str, tmp_path: Path) -> None:
+    """Separators, order, quotes, units, remarks, ends of lines and a byte-order mark."""
+    done = mics([put(tmp_path, DIALECTS[dialect])], tmp_path)
+    assert done.returncode == 0, done.stderr
+    bodies = Run(tmp_path / "mics-out").bodies
+    assert bodies.shape == ["cube", "tetrapod"]
+    assert np.array_equal(bodies.position[0], [[0.1, 0.15, 0.05], [0.2, 0.1, 0.1]])
+    assert np.array_equal(bodies.release_time, [0.5, 1.0])
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as h5:
+        assert [name.decode() for name in h5["bodies/name"][:]] == ["A 1", ""]
+
+
+def test_names_in_other_letters(tmp_path: Path) -> None:
+    """Names are kept in UTF-8; a table in Latin-1 is taken as such."""
+    for code in ("utf-8", "latin-1"):
+        folder = tmp_path / code
+        folder.mkdir()
+        table = "shape,x,y,z,time,name\ncube,0.1,0.1,0.1,0,Pfähle 7\n"
+        assert mics([put(folder, table.encode(code))], folder).returncode == 0
+        with h5py.File(folder / "mics-out" / "run.h5") as h5:
+            assert h5["bodies/name"][0].decode() == "Pfähle 7"
+
+
+def rotation(axis: str, angle_deg: float) -> np.ndarray:
+    """Turn about an axis of the tank."""
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    return {
+        "x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
+        "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+        "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
+    }[axis]
+
+
+def test_angles_turn_as_documented(tmp_path: Path) -> None:
+    """Roll about x, then pitch about y, then yaw about z; a quaternion of any length."""
+    table = "shape,x,y,z,time,yaw_deg,pitch_deg,roll_deg\ncube,0.1,0.1,0.1,1,50,-20,110\n"
+    assert mics([put(tmp_path, table)], tmp_path).returncode == 0
+    w, x, y, z = Run(tmp_path / "mics-out").bodies.quaternion[0, 0]
+    turned = rotation("z", 50) @ rotation("y", -20) @ rotation("x", 110)
+    own = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    assert own == pytest.approx(turned, abs=1e-12)
+
+
+def test_a_long_plan_is_checked_quickly(tmp_path: Path) -> None:
+    """1000 rows, half of them fixed, take at most 10 s of processor time."""
+    rows = [
+        ["tetrapod", 0.5 + 0.1 * (k % 40), 0.5 + 0.1 * (k // 40), 0.3, k, 7 * k, k % 2]
+        for k in range(1000)
+    ]
+    with (tmp_path / "plan.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["shape", "x", "y", "z", "time", "yaw_deg", "fixed"], *rows])
+    tank = TANK.replace("0.3, 0.2, 0.2", "5, 4, 1")
+    (tmp_path / "case.nml").write_text(f"{tank}&drop file = 'plan.csv' /\n")
+    began = sum(_children())
+    done = mics(["--check", "--threads", "1", "case.nml"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "1000, the last one at 999 s" in done.stdout
+    assert sum(_children()) - began < 10
+
+
+def _children() -> tuple[float, float]:
+    """Processor time of the programs that were run [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime, used.ru_stime
+
+
+CRANE = """&run t_end = {end}  physics = '{physics}'  dt = 0.005  history_interval = 0.005
+  restart_interval = 0 {more} /
+&grid cells = 12, 12, 16  length = 0.12, 0.12, 0.16 /
+&fluid water_level = 0.1 /
+&shape name = 'cube'  kind = 'cube'  size = 0.03 /
+&shape name = 'tetrapod'  kind = 'tetrapod'  size = 0.05 /
+{blocks}
+"""
+
+
+def crane(folder: Path, blocks: str, end: float = 0.5, physics: str = "dry", more: str = "") -> str:
+    """A case of a small tank."""
+    folder.mkdir(exist_ok=True)
+    text = CRANE.format(end=end, physics=physics, more=more, blocks=blocks)
+    (folder / "case.nml").write_text(text)
+    return str(folder / "case.nml")
+
+
+def run(folder: Path, case: str, code: int = 0) -> tuple[dict[str, np.ndarray], str]:
+    """What `/bodies` holds at the end of a run, and what was told."""
+    done = mics([case], folder)
+    assert done.returncode == code, done.stderr
+    with h5py.File(folder / "mics-out" / "run.h5") as h5:
+        return {name: data[:] for name, data in h5["bodies"].items()}, done.stderr
+
+
+LYING = "&body shape = 'cube'  position = 0.06, 0.06, 0.015 /\n"
+
+
+def test_a_blocked_block_waits_is_raised_or_left_out(tmp_path: Path) -> None:
+    """The same blocked drop three ways: code 3, above the pile, not there."""
+    drop = LYING + "&drop shape = 'cube'  position = 0.06, 0.06, 0.03  first_time = 0.1 "
+    _, told = run(tmp_path / "a", crane(tmp_path / "a", drop + "/"), code=3)
+    assert "body 2 is due but its place is taken; it waits, t = 0.1 s" in told
+    bodies, told = run(tmp_path / "b", crane(tmp_path / "b", drop + "if_blocked = 'raise' /"))
+    assert "body 2 was raised by 0.015 m, its place is taken, t = 0.1 s" in told
+    assert bodies["raised"] == pytest.approx([0, 0.015], abs=2e-6)
+    assert list(bodies["status"]) == [2, 2]
+    assert bodies["position"][-1, 1] == pytest.approx([0.06, 0.06, 0.045], abs=1e-4)
+    bodies, told = run(tmp_path / "c", crane(tmp_path / "c", drop + "if_blocked = 'skip' /"))
+    assert "body 2 is left out, its place is taken, t = 0.1 s" in told
+    assert list(bodies["status"]) == [2, 3]
+    found = Run(tmp_path / "c" / "mics-out").bodies
+    assert found.release_time[1] == np.inf and list(found.present(-1)) == [True, False]
+
+
+def test_raised_out_of_the_water(tmp_path: Path) -> None:
+    """A pile that reaches to the top does not stop a crane; below a lid it has to wait."""
+    drop = "&drop shape = 'cube'  position = 0.06, 0.06, 0.02  count = 6  interval = 0.02 "
+    case = crane(tmp_path / "a", drop + "if_blocked = 'raise' /", end=0.2)
+    bodies, _ = run(tmp_path / "a", case)
+    assert list(bodies["status"]) == 6 * [2]
+    assert bodies["position"][-1, 5, 2] > 0.16
+    lid = "&boundary z_max = 'no_slip' /"
+    case = crane(tmp_path / "b", drop + "if_blocked = 'raise' /" + lid, end=0.2)
+    _, told = run(tmp_path / "b", case, code=3)
+    assert "body 6 is due but its place is taken; it waits" in told
+
+
+@pytest.mark.parametrize("physics", ["dry", "light"])
+def test_lowered_until_it_touches(physics: str, tmp_path: Path) -> None:
+    """A cube goes down at its speed until it touches the one below, and is let go there."""
+    drop = LYING + (
+        "&drop shape = 'cube'  position = 0.06, 0.06, 0.12  first_time = 0.1 "
+        "lowering_speed = 0.2  release = 'touch' /"
+    )
+    bodies, told = run(tmp_path, crane(tmp_path, drop, end=0.8, physics=physics))
+    assert "body" not in told
+    entry, released = bodies["entry_time"][1], bodies["release_time"][1]
+    assert (entry, list(bodies["status"])) == (0.1, [2, 2])
+    assert released == pytest.approx(0.1 + (0.12 - 0.045) / 0.2, abs=1e-4)
+    held = (bodies["time"] > entry + 1e-9) & (bodies["time"] <= released)
+    way = 0.12 - 0.2 * (bodies["time"][held] - entry)
+    assert bodies["position"][held, 1, 2] == pytest.approx(way, abs=1e-12)
+    assert bodies["position"][-1, 1] == pytest.approx([0.06, 0.06, 0.045], abs=1e-4)
+
+
+def test_lowered_to_a_height_or_a_place(tmp_path: Path) -> None:
+    """Release 2 cm above a cube, at a place, or where something is in the way."""
+    drop = LYING + "&drop shape = 'cube'  lowering_speed = 0.2  position = 0.06, 0.06, "
+    case = crane(tmp_path / "a", drop + "0.12  release = 'height'  release_height = 0.02 /")
+    bodies, _ = run(tmp_path / "a", case)
+    assert bodies["release_time"][1] == pytest.approx((0.12 - 0.065) / 0.2, abs=1e-4)
+    bodies, _ = run(tmp_path / "b", crane(tmp_path / "b", drop + "0.06 /", physics="light"))
+    assert bodies["position"][0, 1, 2] == pytest.approx(0.115)  # its lowest point is at the level
+    assert bodies["release_time"][1] == pytest.approx((0.115 - 0.06) / 0.2, abs=1e-4)
+    bodies, told = run(tmp_path / "c", crane(tmp_path / "c", drop + "0.04 /", end=0.8))
+    assert "body 2 touches what lies below and was let go 0.005 m above its place" in told
+    assert list(bodies["status"]) == [2, 2]
+
+
+def test_lowered_in_water_and_again_after_a_restart(tmp_path: Path) -> None:
+    """The flow meets the held block as a moving body; a restart in the middle changes no bit."""
+    drop = (
+        "&drop shape = 'tetrapod'  position = 0.06, 0.06, 0.14  lowering_speed = 0.4 "
+        "release = 'touch' /"
+    )
+    case = crane(tmp_path, drop, end=0.4, physics="coupled")
+    Path(case).write_text(
+        Path(case).read_text().replace("restart_interval = 0", "restart_interval = 0.2")
+    )
+    bodies, _ = run(tmp_path, case)
+    assert 0.25 < bodies["release_time"][0] < 0.4 and list(bodies["status"]) == [2]
+    held = (bodies["time"] > 0.1) & (bodies["time"] < bodies["release_time"][0] - 0.01)
+    assert bodies["velocity"][held, 0, 2] == pytest.approx(-0.4)
+    assert (bodies["fluid_force"][held, 0, 2] > 0).all()
+    with h5py.File(tmp_path / "mics-out" / "restart-a.h5") as h5:
+        assert list(h5["blocks/status"][:]) == [1]
+    words = ["--restart", "mics-out/restart-a.h5", "--output", "again", "case.nml"]
+    done = mics(words, tmp_path)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "again" / "run.h5") as h5:
+        for name, whole in bodies.items():
+            assert np.array_equal(h5["bodies"][name][:], whole), name
