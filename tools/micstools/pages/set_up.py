@@ -67,9 +67,10 @@ class SetUp:
         """Numbers, from 0, of the bodies that a remark concerns."""
         if remark.group == "shape":
             name = settings.value(self.text, "shape", "name", remark.occurrence)
-            wanted = str(name or "").strip()
+            wanted = re.escape(str(name or "").strip())
+            stones = re.compile(rf"{wanted}(-\d+)?")  # of a family of rock, too
             names = self.run.bodies.shape
-            return [names.index(wanted)] if wanted in names else []  # one stands for all
+            return [k for k, shape in enumerate(names) if stones.fullmatch(shape)][:1]  # for all
         if remark.group not in ("body", "drop"):
             return []
         found = [g for g in spans(self.text) if g[0] == remark.group]
