@@ -25,6 +25,7 @@ COMMANDS = {
     "ensemble": ("ensemble", "ENSEMBLE", "run a case many times with other random drops"),
     "shape": ("shape", "SHAPE", "make a block from a drawing"),
     "bed": ("bed", "BED", "make a bed from a map of measured ground"),
+    "calibrate": ("calibrate", "CALIBRATE", "fit the drag of a shape for light runs"),
     "harbour": ("harbour", "HARBOUR", "write the case of a breakwater of many blocks"),
 }
 _SUMMARY = "Run cases of mics, look at the results, make blocks and beds."

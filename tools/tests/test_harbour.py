@@ -74,6 +74,28 @@ def test_refuses(wanted: harbour.Harbour, said: str) -> None:
         harbour.case(wanted)
 
 
+@pytest.mark.parametrize("blocks", [1, 190, 2000])
+def test_one_by_one(blocks: int, tmp_path: Path) -> None:
+    """One after another, none two at a time, row by row up the slope, in a case that is sound."""
+    case = tmp_path / "light.nml"
+    write(case, "--light", "--blocks", str(blocks), "--every", "5")
+    drops = f90nml.reads(case.read_text())["drop"]
+    drops = drops if isinstance(drops, list) else [drops]
+    times = [d["first_time"] + k * d["interval"] for d in drops for k in range(d["count"])]
+    assert sorted(times) == [5.0 * k for k in range(blocks)]
+    first = sorted(drops, key=lambda drop: drop["first_time"])
+    assert [drop["position"][1] for drop in first] == sorted(d["position"][1] for d in drops)
+    if MICS.exists():
+        plan = subprocess.run([MICS, "--check", case], capture_output=True, text=True, timeout=60)
+        assert plan.returncode == 0 and "light: not resolved" in plan.stdout
+        assert "bed from" in plan.stdout
+
+
+def test_one_by_one_refuses() -> None:
+    with pytest.raises(BadRun, match="rows of places reach"):
+        harbour.one_by_one(harbour.Harbour((50.0, 100.0, 20.0), every=3.0), "bed.txt")
+
+
 def test_keeps_a_file_that_is_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case = tmp_path / "harbour.nml"
     case.write_text("mine")

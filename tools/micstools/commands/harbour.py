@@ -19,6 +19,14 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--blocks", type=int, default=PLAIN.blocks, help="their number (%(default)s)")
     add("--kind", default=PLAIN.kind, help="of the blocks, see &shape kind (%(default)s)")
     add("--height", type=float, default=PLAIN.height, help="of a block [m] (%(default)s)")
+    add("--light", action="store_true",
+        help="one by one on a slope along x, in a given water (physics = 'light')")  # fmt: skip
+    add(
+        "--every",
+        type=float,
+        default=3.0,
+        help="from one block to the next, with --light [s] (%(default)s)",
+    )
 
 
 def _harbour(given: argparse.Namespace) -> int:
@@ -27,13 +35,23 @@ def _harbour(given: argparse.Namespace) -> int:
     except ValueError:
         raise BadRun(f"--size {given.size}: must be X,Y,Z") from None
     wanted = harbour.Harbour(
-        (x, y, z), given.spacing, given.water, given.blocks, given.kind, given.height
-    )
-    text = harbour.case(wanted)
-    if given.out.exists():
-        raise BadRun(f"{given.out} is there already")
+        (x, y, z), given.spacing, given.water, given.blocks, given.kind, given.height,
+        given.every if given.light else 0.0,
+    )  # fmt: skip
+    if given.light and not given.every > 0:
+        raise BadRun(f"--every {given.every:g}: must be positive")
+    bed = given.out.with_suffix(".bed.txt")
+    files = {
+        given.out: harbour.one_by_one(wanted, bed.name) if given.light else harbour.case(wanted)
+    }
+    if given.light:
+        files[bed] = harbour.slope(wanted)
+    for path in files:
+        if path.exists():
+            raise BadRun(f"{path} is there already")
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    given.out.write_text(text)
+    for path, text in files.items():
+        path.write_text(text)
     print(f"{given.out}: see its memory and time with `./mics --check {given.out}`")
     return 0
 
@@ -43,6 +61,7 @@ HARBOUR = Command(
     "Write the case of a breakwater of many blocks in a basin, to plan with `./mics --check`.",
     (
         "harbour",
+        "harbour --light --blocks 200 --every 5",
         "harbour --spacing 0.5 --blocks 500 --kind dolos --height 3 --out coarse.nml",
     ),
     _arguments,

@@ -1,0 +1,52 @@
+"""`mics-tools calibrate`: a coefficient that is known is found again."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from micstools import cli
+from micstools.cases import calibrate
+from micstools.cases.calibrate import Calibration, Fall
+from micstools.reading.reader import BadRun
+
+MICS = Path(__file__).parents[2] / "mics"
+CASE = """
+&run t_end = 1 /
+&grid cells = 1, 1, 1  length = 1, 1, 1 /
+&shape name = 'other' kind = 'sphere' size = 1 /
+&shape name = 'unit' kind = 'cube' size = 2.0 density = 2400 drag_coefficient = 9 /
+"""
+
+
+@pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+def test_finds_what_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Light falls of C = 0.8 in place of resolved ones: 0.8 again, hardly any scatter or error."""
+    truth = Calibration.fall
+
+    def fall(self: Calibration, number: int, light: float | None = None) -> Fall:
+        return truth(self, number, 0.8 if light is None else light)
+
+    monkeypatch.setattr(Calibration, "fall", fall)
+    monkeypatch.setattr(calibrate, "DEEP", (2.0, 3.0))
+    case = tmp_path / "a.nml"
+    case.write_text(CASE)
+    words = ["calibrate", str(case), "--shape", "unit", "--falls", "2", "--program", str(MICS)]
+    with pytest.raises(SystemExit) as end:
+        cli.main([*words, "--out", str(tmp_path / "out")])
+    assert not end.value.code
+    found = json.loads((tmp_path / "out" / "calibrate.json").read_text())
+    assert found["drag_coefficient"] == pytest.approx(0.8, rel=0.03)
+    assert found["scatter"] < 0.03 and found["rms_speed"] < 0.02
+    assert abs(found["mean_time"]) < 0.02 and abs(found["mean_impact"]) < 0.02
+    assert len(found["falls"]) == 2 and found["falls"][1]["way"][-1] > found["falls"][0]["way"][-1]
+    assert "drag_coefficient = 0." in capsys.readouterr().out
+
+
+def test_a_shape_that_is_not_there(tmp_path: Path) -> None:
+    case = tmp_path / "a.nml"
+    case.write_text(CASE)
+    with pytest.raises(BadRun, match="no such &shape; it has: other, unit"):
+        Calibration(MICS, case, "block", tmp_path / "out")
