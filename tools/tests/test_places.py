@@ -145,6 +145,16 @@ def test_a_table_beside_a_track(tmp_path: Path) -> None:
     assert plan[:, :2] == pytest.approx(np.array([START[:2]] * 2 + [(0.1, 0.02)] * 2))
 
 
+def test_a_level_that_is_found_at_the_release(tmp_path: Path) -> None:
+    """Until then a block waits over the tank."""
+    run = write(tmp_path / "run")
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/position"][: round(2.0 / 0.05) + 1, 5, 2] = 0.22  # until 2 s
+        after = h5["bodies/position"][round(2.0 / 0.05) + 1, 5, 2]
+    plan = places.planned(Run(run.folder))
+    assert plan[5, 2] == after < 0.2 and plan[4, 2] == START[2]
+
+
 def test_the_status_says_what_is_there(tmp_path: Path) -> None:
     """A fixed block that nobody touched is there, one that was left out is not, wherever it is."""
     run = write(tmp_path / "run")

@@ -124,14 +124,20 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
     return 0
 
 
+def some(numbers: list[str]) -> str:
+    """The first ten of them, and how many more."""
+    more = len(numbers) - 10
+    return ", ".join(numbers[:10]) + (f" and {more} more" if more > 0 else "")
+
+
 def tell_rest(found: list[Place]) -> None:
     """How many units lie still."""
     free = [p for p in found if not p.fixed]
     out = [str(p.unit) for p in free if p.x != p.x]
     moving = [str(p.unit) for p in free if p.x == p.x and not p.at_rest]
     print(f"{len(free)} free units, {sum(p.at_rest for p in free)} of them at rest"
-          + (f"; moving: {', '.join(moving)}" if moving else "")
-          + (f"; not released: {', '.join(out)}" if out else ""))  # fmt: skip
+          + (f"; moving: {some(moving)}" if moving else "")
+          + (f"; not released: {some(out)}" if out else ""))  # fmt: skip
 
 
 def _of_ensemble(given: argparse.Namespace, formats: list[str], survey: Survey) -> int:

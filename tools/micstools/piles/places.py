@@ -109,6 +109,9 @@ def planned(run: Run) -> Array:
     rows = np.searchsorted(b.time, b.release_time + 1e-12, side="right") - 1
     released = b.present(-1)
     start = b.position[rows.clip(0), np.arange(b.n)]
+    found = b.position[(rows + 1).clip(0, len(b.time) - 1), np.arange(b.n), 2]
+    waits = start[:, 2] > run.grid.high[2]  # over the tank, until its level is found
+    start[waits, 2] = found[waits]
     for k, shift in _nominal(run):
         start[k, :2] = shift
     return np.where(released[:, None], start, np.nan)
