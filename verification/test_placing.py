@@ -284,7 +284,7 @@ def test_lowered_until_it_touches(physics: str, tmp_path: Path) -> None:
 
 
 def test_lowered_to_a_height_or_a_place(tmp_path: Path) -> None:
-    """Release 2 cm above a cube, at a place, or where something is in the way."""
+    """Release 2 cm above a cube; at a place, from the level; where something is in its way."""
     drop = LYING + "&drop shape = 'cube'  lowering_speed = 0.2  position = 0.06, 0.06, "
     case = crane(tmp_path / "a", drop + "0.12  release = 'height'  release_height = 0.02 /")
     bodies, _ = run(tmp_path / "a", case)

@@ -119,7 +119,7 @@ contains
     blocks%entry_time(b) = place%time
     blocks%given%v(:, b) = place%v
     blocks%x(:, b) = place%x
-    blocks%q(:, b) = normalised(place%q)
+    blocks%q(:, b) = place%q
     if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
     associate (shape => blocks%shapes(blocks%shape(b)), handling => blocks%handling(b))
       blocks%mass(b) = shape%density*shape%volume
