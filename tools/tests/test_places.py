@@ -197,6 +197,9 @@ def test_an_ellipse_holds_its_share_of_normal_landings() -> None:
     across = (points - middle) @ np.array([axis[1], -axis[0]]) / short
     assert np.mean(along**2 + across**2 <= 1) == pytest.approx(places.ELLIPSE, abs=0.005)
     assert math.isnan(places.ellipse(points[:1])[1])
+    in_line = np.stack([points[:9, 0], 0.3 * points[:9, 0]], axis=1)
+    assert places.ellipse(in_line)[2] == 0.0
+    assert places.ellipse(points[[0, 0, 0]])[1:3] == (0.0, 0.0)
 
 
 def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None:
@@ -242,6 +245,10 @@ def test_files_open_in_what_people_use(run: Run, tmp_path: Path, capsys) -> None
     at = [np.abs(surface.first[d] + surface.spacing[d] * np.arange(surface.z.shape[1 - d])
                  - (a2.x, a2.y)[d]).argmin() for d in (0, 1)]  # fmt: skip
     assert surface.z[at[1], at[0]] == pytest.approx(-12.5 + 2 * EDGE, abs=1e-4)
+    seen = height_maps.load(tmp_path / "places-mean.asc")
+    assert seen.z.shape == surface.z.shape and (seen.z <= surface.z + 1e-6).all()
+    assert seen.z[at[1], at[0]] == pytest.approx(-12.5 + 2 * EDGE, abs=1e-4)
+    assert seen.z.min() == pytest.approx(-12.5) and (surface.z - seen.z).max() > 0.7 * EDGE
     about = json.loads((tmp_path / "places.json").read_text())
     assert about["within"]["tolerance"] == pytest.approx(EDGE / 2)
     assert about["layer"]["nominal_diameter"] == pytest.approx(EDGE)

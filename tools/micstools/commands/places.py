@@ -113,9 +113,10 @@ def _of_run(given: argparse.Namespace, formats: list[str], survey: Survey) -> in
         path = folder / f"places.{name}"
         if name == "asc":
             if maps is not None:
-                print(
-                    handover.raster(path, maps.ball + survey.origin[2], survey, maps.low, maps.step)
-                )
+                level = survey.origin[2]
+                mean = path.with_name("places-mean.asc")
+                for file, surface in ((path, maps.ball), (mean, maps.seen)):
+                    print(handover.raster(file, surface + level, survey, maps.low, maps.step))
         elif name == "geojson":
             print(handover.to_geojson(handed, path, given.crs))
         else:

@@ -250,7 +250,8 @@ def ellipse(points: Array) -> tuple[Array, float, float, float]:
     if len(points) < 2:
         return middle, math.nan, math.nan, math.nan
     values, axes = np.linalg.eigh(np.cov(points.T))
-    short, long = np.sqrt(-2 * math.log(1 - ELLIPSE) * values.clip(0))
+    values[0] *= values[0] > 1e-12 * values[1]  # else it is round-off
+    short, long = np.sqrt(-2 * math.log(1 - ELLIPSE) * values)
     heading = math.degrees(math.atan2(*axes[:, 1])) % 180.0
     return middle, float(long), float(short), heading
 
