@@ -320,3 +320,47 @@ def test_lowered_in_water_and_again_after_a_restart(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "again" / "run.h5") as h5:
         for name, whole in bodies.items():
             assert np.array_equal(h5["bodies"][name][:], whole), name
+
+
+def test_the_plan_tells_of_table_and_crane(tmp_path: Path) -> None:
+    """--check tells of rows, of what is set down, and of what a crane does."""
+    table = "shape,x,y,z,time,fixed\ncube,0.1,0.1,,0,0\ncube,0.2,0.1,0.1,1,1\n"
+    case = put(tmp_path, table, "if_blocked = 'raise'  ")
+    plan = " ".join(mics(["--check", case], tmp_path).stdout.split())
+    assert "places from plan.csv: 2 rows, 1 on what lies there, 1 fixed" in plan
+    assert "where a place is taken, raised above what lies there" in plan
+    drop = "&drop shape = 'cube'  position = 0.06, 0.06, 0.12  lowering_speed = 0.2  release = "
+    case = crane(tmp_path / "crane", drop + "'height'  release_height = 0.01 /")
+    plan = " ".join(mics(["--check", case], tmp_path / "crane").stdout.split())
+    assert "lowered at 0.2 m/s, let go 0.01 m over what lies below" in plan
+
+
+IDLE = {
+    "release = 'touch'": "release = 'touch': needs lowering_speed above 0",
+    "release_height = 1": "release_height = 1: has no meaning with release = 'place'",
+    "lowering_speed = 1  release = 'height'": "release_height: missing, required",
+    "lowering_speed = 1  velocity = 0, 0, -1": "velocity = 0, 0, -1: has no meaning with "
+    "lowering_speed > 0",
+    "to = 1, 1, 1": "to = 1, 1, 1: has no meaning with count = 1",
+    "weights = 1, 2": "weights = 1, 2: has no meaning with one shape",
+    "shapes = 'cube', 'tetrapod'": "shape = 'cube': has no meaning with shapes",
+    "if_blocked = 'push'": "if_blocked = 'push': unknown, must be one of 'wait', 'raise', 'skip'",
+}
+"""Of a drop of cubes, and what is told."""
+
+
+@pytest.mark.parametrize("given", IDLE)
+def test_choices_without_meaning(given: str, tmp_path: Path) -> None:
+    """Variables that go with others only."""
+    text = f"{TANK}&drop shape = 'cube'  position = 0.1, 0.1, 0.1  {given} /"
+    done = mics([], tmp_path, text)
+    assert done.returncode == 2
+    assert IDLE[given] in done.stderr and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_weights_go_with_shapes(tmp_path: Path) -> None:
+    """One weight for each shape, of which one is above 0."""
+    drop = "&drop shapes = 'cube', 'tetrapod'  position = 0.1, 0.1, 0.1  weights = "
+    for given, told in (("1, 2, 3", "must be 2, one for each of shapes"), ("2*0", "above 0")):
+        done = mics([], tmp_path, f"{TANK}{drop}{given} /")
+        assert done.returncode == 2 and told in done.stderr, done.stderr

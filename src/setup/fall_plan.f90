@@ -2,7 +2,8 @@
 module fall_plan_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, place_t, is_given
+  use case_types_m, only: case_t, drop_input_t, place_t, is_given
+  use named_files_m, only: told_file
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
@@ -40,6 +41,7 @@ contains
     do i = 1, min(size(case%drop), max_told)
       call print_fall('&drop', place_of_block(case%drop(i), 1), case%drop(i)%line, &
                       case%drop(i)%count)
+      call print_handling(unit, case%drop(i))
     end do
     if (size(case%drop) > max_told) call entry(unit, '', 'and of ' &
       //to_text(size(case%drop) - max_told)//' more groups &drop')
@@ -92,6 +94,41 @@ contains
       end if
     end subroutine print_fall
   end subroutine print_falls
+
+  !> What a crane does with the blocks of a drop, and the table that they come from.
+  subroutine print_handling(unit, drop)
+    integer, intent(in) :: unit
+    type(drop_input_t), intent(in) :: drop
+    integer :: n
+
+    associate (handling => drop%handling)
+      if (allocated(drop%row)) then
+        n = count([(.not. is_given(drop%row(n)%x(3)), n=1, drop%count)])
+        call entry(unit, '', 'places from '//told_file(drop%folder, trim(drop%file))//': ' &
+          //to_text(drop%count)//' rows, '//to_text(n)//' on what lies there, ' &
+          //to_text(count(drop%row%fixed))//' fixed')
+      end if
+      if (handling%lowering_speed > 0.0_wp) then
+        select case (handling%release)
+        case ('touch'); call lowered('where it touches what lies below')
+        case ('height'); call lowered(brief(handling%release_height)//' m over what lies below')
+        case default; call lowered('at its place, from the water level or the top of the tank')
+        end select
+      end if
+      select case (handling%if_blocked)
+      case ('raise'); call entry(unit, '', 'where a place is taken, raised above what lies there')
+      case ('skip'); call entry(unit, '', 'where a place is taken, left out')
+      case default   ! it waits
+      end select
+    end associate
+  contains
+    subroutine lowered(until)
+      character(*), intent(in) :: until
+
+      call entry(unit, '', 'lowered at '//brief(drop%handling%lowering_speed) &
+        //' m/s, let go '//until)
+    end subroutine lowered
+  end subroutine print_handling
 
   !> Where the lowest point of a block is at the start.
   function start_text(case, bed, fall) result(text)
