@@ -19,8 +19,11 @@ WRITTEN = {
     "ensemble.csv",
     "ensemble.json",
     "mics-paper-ensemble/shares.md",
+    "landings.csv",
     "pile.csv",
     "pile.json",
+    "places.csv",
+    "places.json",
 }
 """Files that the tools write, which texts name."""
 
