@@ -193,8 +193,8 @@ contains
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
     message = ''
-    if (is_root() .and. len(options%plan) > 0) call write_set_up(options%plan, case, parameters(), &
-      shapes, bed, message)
+    if (len(options%plan) > 0) call write_set_up(options%plan, case, parameters(), shapes, bed, &
+      message)
     call broadcast(message)
     if (len(message) > 0) call fatal(exit_files, message)
     call finish()

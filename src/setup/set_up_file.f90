@@ -6,6 +6,7 @@
 module set_up_file_m
   use kinds_m, only: wp
   use errors_m, only: exit_ok
+  use parallel_m, only: is_root
   use case_types_m, only: case_t, drop_input_t, place_t, is_given
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
@@ -24,7 +25,8 @@ module set_up_file_m
 
 contains
 
-  !> Write the set-up of a case; `message` tells what went wrong, empty: nothing. The root calls.
+  !> Write the set-up of a case; `message` tells what went wrong, empty: nothing. All processes
+  !! call, the root writes and is told.
   subroutine write_set_up(path, case, parameters, shapes, bed, message)
     character(*), intent(in) :: path         !! of the new file
     type(case_t), intent(in) :: case         !! checked
@@ -76,6 +78,7 @@ contains
     real(wp) :: place(3, blocks%n), spread(3, blocks%n)
     integer :: line(blocks%n), b, i, k
 
+    if (.not. is_root()) return
     place = blocks%x
     spread = 0.0_wp
     line(:size(case%body)) = case%body%line
