@@ -73,7 +73,7 @@ def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
     """Status, headers and text of an answer; headers with `_` for `-`."""
     import http.client
 
-    link = http.client.HTTPConnection(ADDRESS, site.port, timeout=20)
+    link = http.client.HTTPConnection(ADDRESS, site.port, timeout=120)
     sent = {"Cookie": f"{site.cookie}={site.key}"} if known else {}
     sent |= {name.replace("_", "-"): value for name, value in headers.items()}
     link.request(method, path, json.dumps(body) if body is not None else None, sent)
@@ -83,7 +83,7 @@ def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
     return found
 
 
-def until(work: Callable[[], Any], patience: float = 30.0) -> Any:
+def until(work: Callable[[], Any], patience: float = 120.0) -> Any:
     """The first answer that is true."""
     end = time.monotonic() + patience
     while not (found := work()):
@@ -186,7 +186,7 @@ def test_an_ensemble_is_told_to_stop_by_its_process(tmp_path: Path) -> None:
     assert holder.stdout and holder.stdout.readline() == b"1\n"
     lock.write_text(f"{holder.pid} on {os.uname().nodename}\n")
     assert "same command goes on" in living.stop_ensemble(tmp_path, [])
-    assert holder.wait(20) == -15
+    assert holder.wait(120) == -15
     assert living.stop_ensemble(tmp_path, []) == "0 runs asked to stop"
 
 
@@ -236,7 +236,7 @@ def test_a_run_is_watched_and_stopped(tmp_path: Path, browser: Browser) -> None:
             until(lambda: browser.run("live.player.stage.time") > end)
             assert browser.run("live.player.stage.yaw") == 1.0
             browser.run("document.querySelector('[data-stop=restart]').click()")
-            assert process.wait(30) == 143
+            assert process.wait(120) == 143
             assert (folder / "restart-a.h5").is_file() and not (folder / "stop").exists()
             until(lambda: "Stopped at t" in browser.run("document.body.innerText"))
             assert browser.run("document.querySelectorAll('.chart .curve').length") > 3
@@ -260,7 +260,7 @@ def test_a_run_is_stopped_at_once(tmp_path: Path, browser: Browser) -> None:
             assert process.poll() is None
             browser.run("document.querySelector('[data-ask]').click()")
             browser.run("document.querySelector('[data-stop=now]').click()")
-            assert process.wait(30) == -9
+            assert process.wait(120) == -9
             until(lambda: "Was killed at t" in browser.run("document.body.innerText"))
             assert Run(tmp_path / "mics-here").bodies.time.size
     finally:
