@@ -15,10 +15,11 @@ program mics
   use command_line_m, only: options_t, read_command_line, print_help, restart_command
   use checksum_m, only: checksum_t
   use case_file_m, only: read_text
-  use case_types_m, only: case_t, place_t
+  use case_types_m, only: case_t, place_t, begun_t
   use case_input_m, only: read_case, parameters_text
   use named_files_m, only: look_beside
   use placing_table_m, only: read_places
+  use motion_file_m, only: read_motions
   use reference_m, only: reference_text
   use case_check_m, only: make_shapes, check_case
   use case_plan_m, only: print_plan
@@ -26,8 +27,10 @@ program mics
   use set_up_file_m, only: write_set_up
   use memory_plan_m, only: require_memory, require_memory_to_start
   use tet_mesh_m, only: shape_t
+  use given_motion_m, only: given_motion_t
   use bed_m, only: bed_t, make_bed
   use initial_state_m, only: check_initial_state
+  use start_bodies_m, only: read_start
   use output_m, only: output_t, check_output, open_output, write_due_output, close_output
   use restart_m, only: read_restart
   use diagnostics_m, only: step_report_t
@@ -102,6 +105,12 @@ contains
       if (allocated(case%drop(i)%row)) text = text//'! checksum of the places of &drop ' &
         //to_text(i)//' '//checksum_of_places(case%drop(i)%row)//new_line('a')
     end do
+    do s = 1, size(case%body)
+      if (case%body(s)%path%n > 0) text = text//'! checksum of the motion of body ' &
+        //to_text(s)//' '//checksum_of_path(case%body(s)%path)//new_line('a')
+    end do
+    if (case%begun%n > 0) text = text//'! checksum of the start '//checksum_of_start(case%begun) &
+      //new_line('a')
     if (bed%there) text = text//'! checksum of the bed '//bed%checksum//new_line('a')
   end function parameters
 
@@ -130,6 +139,33 @@ contains
     end do
     text = checksum%text()
   end function checksum_of_places
+
+  !> A checksum of where blocks begin that another run left.
+  function checksum_of_start(begun) result(text)
+    type(begun_t), intent(in) :: begun
+    character(:), allocatable :: text
+    type(checksum_t) :: checksum
+
+    call checksum%add_integers(begun%n, begun%drop)
+    call checksum%add_integers(begun%n, begun%block)
+    call checksum%add_reals(size(begun%x), begun%x)
+    call checksum%add_reals(size(begun%q), begun%q)
+    call checksum%add_reals(size(begun%v), begun%v)
+    call checksum%add_reals(size(begun%omega), begun%omega)
+    text = checksum%text()
+  end function checksum_of_start
+
+  !> A checksum of the rows of a table of motion.
+  function checksum_of_path(path) result(text)
+    type(given_motion_t), intent(in) :: path
+    character(:), allocatable :: text
+    type(checksum_t) :: checksum
+
+    call checksum%add_reals(path%n, path%time)
+    call checksum%add_reals(size(path%x), path%x)
+    call checksum%add_reals(size(path%q), path%q)
+    text = checksum%text()
+  end function checksum_of_path
 
   !> The program as it was called.
   function program_name() result(name)
@@ -177,7 +213,9 @@ contains
     call read_case(text, case, problems, warnings)
     call look_beside(options%case_file, case)
     call read_places(case, problems)
+    call read_motions(case, problems)
     call make_shapes(case, shapes, problems)
+    call read_start(case, shapes, problems)
     call make_bed(case, bed, problems)
     call check_case(case, shapes, bed, problems)
     call check_initial_state(case, problems)

@@ -38,7 +38,7 @@ module step_m
                                span_t
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
-  use rigid_body_m, only: fastest_point
+  use rigid_body_m, only: fastest_point, follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, noted_share
@@ -190,6 +190,7 @@ contains
     type(step_report_t), intent(inout) :: report
     logical :: released
 
+    call follow_motions(sim%clock%t, sim%blocks)
     call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
                             report%warnings, released)
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
@@ -271,6 +272,7 @@ contains
     if (sim%wet .and. sim%clock%step > 0) allowed = min(allowed, growth_max*sim%clock%dt)
     if (sim%light%on) allowed = min(allowed, step_in_water(sim%case%fluid%gravity, sim%blocks, &
       sim%light))
+    call look_ahead(allowed, sim%blocks)
     if (sim%wet) rate = courant_rate(sim%grid, sim%flow, sim%solid, sim%blocks)
     if (sim%case%run%cfl_max > 0.0_wp) then
       if (rate%followed > 0.0_wp) allowed = min(allowed, sim%case%run%cfl_max/rate%followed)

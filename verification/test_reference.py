@@ -33,12 +33,15 @@ CONTRACT = {
     "pressure_solver preconditioner divergence_tolerance max_pressure_passes",
     "contact": "model law restitution contact_time k_n gamma_n eta_n k_t gamma_t eta_t friction "
     "wall_friction substep_ratio courant_max sleep",
-    "shape": "name kind size density file scale refinement spheres sphere_spacing",
-    "body": "shape position quaternion axis angle_deg velocity angular_velocity fixed release_time",
+    "shape": "name kind size density file scale refinement spheres sphere_spacing seed variants "
+    "mass_50 uniformity mass_min mass_max elongation blockiness",
+    "body": "shape position quaternion axis angle_deg velocity angular_velocity fixed motion "
+    "release_time",
     "drop": "shape position count first_time interval spread orientation quaternion axis "
     "angle_deg tilt_deg velocity seed file to shapes weights if_blocked lowering_speed release "
     "release_height",
     "bed": "file kind",
+    "start": "file time shift",
 }
 """Groups and variables that users rely on; more may come."""
 
@@ -142,7 +145,11 @@ def write_files(folder: Path) -> None:
         "mics-shape 1\npoints 4\n0 0 0\n0.05 0 0\n0 0.05 0\n0 0 0.05\ntets 1\n1 2 3 4\n"
     )
     (folder / "plan.csv").write_text("shape,x,y,z,time\nhexapod,0.15,0.05,,0\n")
+    (folder / "door.csv").write_text("time,x,y,z\n0,0.15,0.05,0.1\n1,0.15,0.05,0.11\n")
     write_initial_state(folder / "start.h5", liquid=np.zeros((4, 2, 6)))
+    held = "&body shape = 'hexapod'  position = 0.15, 0.05, 0.1  fixed = T /\n"
+    run = "&run t_end = 0.01  physics = 'dry'  output = 'fill' /\n"
+    assert mics([], folder, run + TANK["grid"] + TANK["shape"] + held).returncode == 0
 
 
 REPLACED = {
@@ -179,6 +186,7 @@ GIVEN = {
     "drop": "shape = 'hexapod'  position = 0.05, 0.05, 0.1",
     "water": "min = 0, 0, 0  max = 1, 1, 1",
     "bed": "file = 'mound.txt'",
+    "start": "file = 'fill/run.h5'",
 }
 """A case with a group of each name that says no more than it must."""
 
@@ -193,6 +201,9 @@ CHOSEN = {
 }
 """The same with other choices, which give variables a meaning that have none by default."""
 
+ROCK = {**GIVEN, "shape": "name = 'hexapod'  kind = 'rock'"}
+"""The same with a family of stones."""
+
 NEEDED = {
     "rest_time": "stop_when_settled = .true.",
     "scale": "kind = 'file'",
@@ -202,6 +213,10 @@ NEEDED = {
     "release_height": "lowering_speed = 1  release = 'height'",
     "coupling_passes": "coupling = 'mics'",
     "subcells": "solid_fraction = 'subcell'",
+    **dict.fromkeys(
+        ("variants", "mass_50", "uniformity", "mass_min", "mass_max", "elongation", "blockiness"),
+        "kind = 'rock'",
+    ),
     **dict.fromkeys(("k_n", "gamma_n", "eta_n", "k_t", "gamma_t", "eta_t"), "law = 'constants'"),
 }
 """The choice that each of them needs."""
@@ -225,7 +240,7 @@ def test_defaults_are_those_of_the_program(rows: list[Row], tmp_path: Path) -> N
     """A run without a variable uses its printed default, and is the same when it is written; one
     without a meaning is not used."""
     seen = set()
-    for number, given in enumerate((GIVEN, CHOSEN)):
+    for number, given in enumerate((GIVEN, CHOSEN, ROCK)):
         used = used_by_program(tmp_path / f"without-{number}", given, {})
         defaults: dict[str, str] = {}
         for row in rows:

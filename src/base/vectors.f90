@@ -4,8 +4,8 @@ module vectors_m
   implicit none
   private
   public :: cross, norm, distance, normalised
-  public :: quaternion_product, quaternion_from_axis, quaternion_exp, rotation_matrix
-  public :: inverse3
+  public :: quaternion_product, quaternion_from_axis, quaternion_exp, quaternion_log
+  public :: rotation_matrix, inverse3
 
 contains
 
@@ -81,6 +81,19 @@ contains
     q(1) = cos(0.5_wp*angle)
     q(2:4) = sine_over_angle*w
   end function quaternion_exp
+
+  !> The rotation vector of a unit quaternion, the inverse of `quaternion_exp`, at most half a turn
+  !! [rad].
+  pure function quaternion_log(q) result(w)
+    real(wp), intent(in) :: q(4)
+    real(wp) :: w(3)
+    real(wp) :: sine
+
+    sine = norm(q(2:4))
+    w = 0.0_wp
+    if (sine > 0.0_wp) w = 2.0_wp*atan2(sine, abs(q(1)))/sine*q(2:4)
+    if (q(1) < 0.0_wp) w = -w
+  end function quaternion_log
 
   !> Matrix r from body to space axes, x_space = matmul(r, x_body), for a unit quaternion.
   pure function rotation_matrix(q) result(r)

@@ -4,7 +4,8 @@
 !! them the other half, so that springs are second order in time and a free fall is exact.
 module contacts_m
   use kinds_m, only: wp
-  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers
+  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers, look_ahead, &
+    follow_motions
   use walls_m, only: walls_t
   use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
                      all_still
@@ -37,16 +38,22 @@ contains
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(out) :: report
-    real(wp) :: left, dt_b, limit
+    real(wp) :: left, dt_b, limit, began
+    logical :: changed
 
     call begin_step(blocks)
+    began = blocks%time
+    call look_ahead(dt, blocks)
     if (contacts%sleep%active) call store_poses(blocks, contacts%sleep)
     call share_with_fluid(blocks, contacts%share, contacts%steady)
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
     contacts%met%n = 0
     call update_partners(walls, gravity, blocks, contacts%touching%partners)
-    if (contacts%sleep%active) call update_stillness(blocks)
+    if (contacts%sleep%active) then
+      call update_stillness(blocks, changed)
+      if (changed) call rouse(blocks, contacts)
+    end if
     if (.not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
     left = dt
@@ -69,6 +76,7 @@ contains
       left = merge(left - dt_b, 0.0_wp, dt_b < left)
       report%substeps = report%substeps + 1
     end do
+    call follow_motions(began + dt, blocks)
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
@@ -93,8 +101,9 @@ contains
     type(blocks_t), intent(inout) :: blocks
     real(wp), intent(out) :: dt_b         !! the substep [s]
     real(wp), parameter :: bearable = 1.3_wp   !! times the limit of stiffness: not worth going back
-    real(wp) :: longest, allowed
+    real(wp) :: longest, allowed, time
 
+    time = blocks%time
     contacts%start%x = blocks%x
     contacts%start%q = blocks%q
     contacts%start%l = blocks%l
@@ -110,6 +119,7 @@ contains
       blocks%q = contacts%start%q
       blocks%l = contacts%start%l
       blocks%omega = contacts%start%omega
+      blocks%time = time
       longest = allowed
     end do
   end subroutine go_half_way

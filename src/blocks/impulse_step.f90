@@ -6,7 +6,7 @@
 module impulse_step_m
   use kinds_m, only: wp
   use vectors_m, only: cross, distance, norm
-  use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body
+  use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body, haste, change_by_motion
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use contact_surface_m, only: contact_surface_t, find_surface_touches, cover_way, renew_pairs
@@ -91,7 +91,8 @@ contains
         cycle
       end if
       contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
-                               blocks%fixed(b))*left
+                               blocks%fixed(b))*left &
+        + haste(blocks, b, contacts%touching%surface%reach(b))
       speed = fastest(b)
       if (.not. speed <= two(2)) two(2) = speed
       if (.not. two(2) <= two(1)) two = two([2, 1])
@@ -168,7 +169,7 @@ contains
       call make_rows(h, contacts%contact_time, touching%touches, touching%law, touching%partners, &
                      blocks, contacts%springs, rows)
       if (rows%n > 0) then
-        call fall_freely(gravity, contacts, blocks, rows)
+        call fall_freely(gravity, step, contacts, blocks, rows)
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
         call restore(contacts%restitution, slow_hit*norm(gravity)*step, rows)
       end if
@@ -178,8 +179,8 @@ contains
   end subroutine solve_step
 
   !> Accelerations of all bodies with rows but for contact, at the start of the step.
-  pure subroutine fall_freely(gravity, contacts, blocks, rows)
-    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+  pure subroutine fall_freely(gravity, step, contacts, blocks, rows)
+    real(wp), intent(in) :: gravity(3), step   !! [m/s2, s]
     type(contacts_t), intent(in) :: contacts
     type(blocks_t), intent(in) :: blocks
     type(rows_t), intent(inout) :: rows
@@ -188,6 +189,9 @@ contains
     do k = 1, rows%n_active
       associate (b => rows%active(k))
         rows%a_free(:, b) = 0.0_wp
+        if (b > 0) then
+          if (blocks%path(b)%n > 0) rows%a_free(:, b) = change_by_motion(blocks, b, step)/step
+        end if
         if (rows%inverse_mass(b) <= 0.0_wp) cycle
         rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) &
           + rows%inverse_mass(b)*contacts%loads%film(:, b)
@@ -207,6 +211,7 @@ contains
     real(wp) :: force(3)
     integer :: b
 
+    blocks%time = blocks%time + step
     associate (rows => contacts%rows, loads => contacts%loads)
       do b = 1, blocks%n
         if (.not. blocks%present(b) .or. blocks%asleep(b)) cycle

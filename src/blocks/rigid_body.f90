@@ -13,6 +13,7 @@ module rigid_body_m
   use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, &
     normalised
   use tet_mesh_m, only: shape_t, reach_along
+  use given_motion_m, only: given_motion_t, pose_at, fastest_between
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   implicit none
   private
@@ -21,6 +22,7 @@ module rigid_body_m
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
   public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
+  public :: follow_motions, look_ahead, change_by_motion, haste
 
   real(wp), parameter :: turning_share = 0.02_wp
     !! least density with which a body turns, over that of the liquid: that of a layer of 1/250 of
@@ -58,6 +60,10 @@ module rigid_body_m
     logical, allocatable :: on_ground(:)         !! (n) its height is found at the release
     real(wp), allocatable :: goal(:)             !! (n) height to which it is lowered at most [m]
     type(given_t) :: given                       !! at release; of fixed bodies for ever
+    type(given_motion_t), allocatable :: path(:) !! (n) that moves a fixed body; 0 rows: none
+    real(wp) :: time = 0.0_wp                    !! at which the bodies are where they are [s]
+    real(wp), allocatable :: ahead(:, :)         !! (2, n) bounds of speed and spin on a path in the
+                                                 !! coming step [m/s], [rad/s]
     real(wp), allocatable :: x(:, :)             !! (3, n) centre of mass, never wrapped [m]
     real(wp), allocatable :: q(:, :)             !! (4, n) attitude w, x, y, z [-]
     real(wp), allocatable :: v(:, :)             !! (3, n) velocity [m/s]
@@ -92,6 +98,7 @@ contains
     do b = 1, size(case%body)
       call put_block(case, place_of_body(case%body(b)), b, blocks)
       blocks%given%omega(:, b) = case%body(b)%angular_velocity
+      blocks%path(b) = case%body(b)%path
       if (blocks%release_time(b) <= 0.0_wp) call release_body(0.0_wp, b, blocks)
     end do
     b = size(case%body)
@@ -102,6 +109,7 @@ contains
         call put_block(case, place_of_block(case%drop(i), k), b, blocks)
       end do
     end do
+    call begin_where_left(case, blocks)
   end subroutine blocks_init
 
   !> Block b where it is placed, before its release. One that is lowered to its place, or whose
@@ -154,6 +162,28 @@ contains
       top - reach_along(shape, turn(3, :)))
   end function height_at_level
 
+  !> Blocks that another run left somewhere begin there, as they moved then.
+  subroutine begin_where_left(case, blocks)
+    type(case_t), intent(in) :: case
+    type(blocks_t), intent(inout) :: blocks
+    integer :: i, b
+
+    associate (begun => case%begun)
+      do i = 1, begun%n
+        b = begun%block(i)
+        if (begun%drop(i) > 0) b = b + size(case%body) + sum(case%drop(:begun%drop(i) - 1)%count)
+        blocks%x(:, b) = begun%x(:, i)
+        blocks%q(:, b) = begun%q(:, i)
+        if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
+        blocks%given%v(:, b) = begun%v(:, i)
+        blocks%given%omega(:, b) = begun%omega(:, i)
+        blocks%handling(b) = handling_t()   ! no crane holds it
+        blocks%on_ground(b) = .false.
+        call release_body(0.0_wp, b, blocks)
+      end do
+    end associate
+  end subroutine begin_where_left
+
   !> Blocks lighter than a fiftieth of the liquid turn with the inertia of such a block, before the
   !! first step: what has less than the boundary layer that it drags along would spin up and down
   !! within a step.
@@ -191,6 +221,8 @@ contains
     allocate (blocks%status(n), source=to_come)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &
       source=0.0_wp)
+    allocate (blocks%path(n), blocks%ahead(2, n))
+    blocks%ahead = 0.0_wp
     allocate (blocks%given%v(3, n), blocks%given%omega(3, n), source=0.0_wp)
     allocate (blocks%v_start(3, n), blocks%l_start(3, n), source=0.0_wp)
     allocate (blocks%fluid_force(3, n), blocks%fluid_torque(3, n), source=0.0_wp)
@@ -214,6 +246,7 @@ contains
     blocks%v(:, b) = blocks%given%v(:, b)
     blocks%omega(:, b) = blocks%given%omega(:, b)
     call set_momentum(b, blocks)
+    if (blocks%path(b)%n > 0) call follow(b, blocks)
   end subroutine release_body
 
   !> A body for people: its number, and its name in the plan.
@@ -227,6 +260,70 @@ contains
     text = 'body '//trim(number)
     if (blocks%name(b) /= '') text = text//' ('//trim(blocks%name(b))//')'
   end function told_body
+
+  !> Put body b where its path has it at `blocks%time`; before its release where that has it then.
+  pure subroutine follow(b, blocks)
+    integer, intent(in) :: b
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: t
+
+    t = blocks%time
+    if (.not. blocks%present(b)) t = max(t, blocks%release_time(b))
+    call pose_at(blocks%path(b), t, blocks%x(:, b), blocks%q(:, b), blocks%v(:, b), &
+      blocks%omega(:, b))
+    if (.not. blocks%present(b)) then
+      blocks%v(:, b) = 0.0_wp
+      blocks%omega(:, b) = 0.0_wp
+    end if
+    call set_momentum(b, blocks)
+  end subroutine follow
+
+  !> Put all bodies on paths where these have them at a time.
+  pure subroutine follow_motions(time, blocks)
+    real(wp), intent(in) :: time   !! [s]
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    blocks%time = time
+    do b = 1, blocks%n
+      if (blocks%path(b)%n > 0) call follow(b, blocks)
+    end do
+  end subroutine follow_motions
+
+  !> How fast the bodies on paths get within a time dt from now.
+  pure subroutine look_ahead(dt, blocks)
+    real(wp), intent(in) :: dt   !! [s]
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      if (blocks%path(b)%n > 0) blocks%ahead(:, b) = fastest_between(blocks%path(b), blocks%time, &
+        blocks%time + dt)
+    end do
+  end subroutine look_ahead
+
+  !> By how much a body on a path may get faster in this step than it is now; 0 for others [m/s].
+  pure function haste(blocks, b, reach) result(more)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b
+    real(wp), intent(in) :: reach   !! [m]
+    real(wp) :: more
+
+    more = max(0.0_wp, blocks%ahead(1, b) - norm(blocks%v(:, b))) &
+      + max(0.0_wp, blocks%ahead(2, b) - norm(blocks%omega(:, b)))*reach
+  end function haste
+
+  !> By how much the velocity and spin of a body on a path change within a time dt from now.
+  pure function change_by_motion(blocks, b, dt) result(change)
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b
+    real(wp), intent(in) :: dt   !! [s]
+    real(wp) :: change(6)        !! [m/s], [rad/s]
+    real(wp) :: x(3), q(4)
+
+    call pose_at(blocks%path(b), blocks%time + dt, x, q, change(1:3), change(4:6))
+    change = change - [blocks%v(:, b), blocks%omega(:, b)]
+  end function change_by_motion
 
   !> Angular momentum of body b from its angular velocity.
   pure subroutine set_momentum(b, blocks)
@@ -252,6 +349,7 @@ contains
     type(blocks_t), intent(inout) :: blocks
     integer :: b
 
+    blocks%time = blocks%time + dt
     do b = 1, blocks%n
       if (blocks%present(b) .and. .not. blocks%asleep(b)) call drift_body(dt, b, blocks)
     end do
@@ -297,12 +395,16 @@ contains
       blocks%inverse_inertia(:, :, b))
   end subroutine place_body
 
-  !> Move a fixed body for a time dt at its constant given rate.
+  !> Move a fixed body for a time dt at its constant given rate, or to `blocks%time` on its path.
   pure subroutine drift_prescribed(dt, b, blocks)
     real(wp), intent(in) :: dt   !! [s]
     integer, intent(in) :: b
     type(blocks_t), intent(inout) :: blocks
 
+    if (blocks%path(b)%n > 0) then
+      call follow(b, blocks)
+      return
+    end if
     blocks%x(:, b) = blocks%x(:, b) + dt*blocks%v(:, b)
     if (all(abs(blocks%omega(:, b)) <= 0.0_wp)) return
     blocks%q(:, b) = normalised(quaternion_product(quaternion_exp(dt*blocks%omega(:, b)), &
@@ -460,8 +562,9 @@ contains
     integer, intent(in) :: b
     real(wp) :: speed
 
-    speed = norm2(blocks%v(:, b)) &
-            + norm2(blocks%omega(:, b))*blocks%shapes(blocks%shape(b))%radius
+    speed = max(norm2(blocks%v(:, b)), blocks%ahead(1, b)) &
+            + max(norm2(blocks%omega(:, b)), blocks%ahead(2, b)) &
+            *blocks%shapes(blocks%shape(b))%radius
   end function fastest_point
 
 end module rigid_body_m

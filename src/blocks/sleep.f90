@@ -50,14 +50,24 @@ contains
     call reserve_springs(1, sleep%rest)
   end subroutine sleep_init
 
-  !> Which bodies do not move: sleepers, and fixed ones without a given velocity.
-  pure subroutine update_stillness(blocks)
+  !> Which bodies do not move: sleepers, and fixed ones without a given velocity that no path moves
+  !! in this step. Where a body on a path starts or stops, all sleepers wake.
+  pure subroutine update_stillness(blocks, changed)
     type(blocks_t), intent(inout) :: blocks
+    logical, intent(out) :: changed   !! one has started or stopped
+    logical :: held
     integer :: b
 
+    changed = .false.
     do b = 1, blocks%n
-      blocks%still(b) = blocks%asleep(b) .or. (blocks%fixed(b) .and. &
-        all(abs(blocks%given%v(:, b)) <= 0.0_wp) .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp))
+      held = blocks%fixed(b) .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
+        .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp) .and. all(blocks%ahead(:, b) <= 0.0_wp)
+      if (blocks%path(b)%n > 0) changed = changed .or. (held .neqv. blocks%still(b))
+      blocks%still(b) = blocks%asleep(b) .or. held
+    end do
+    if (.not. changed) return
+    do b = 1, blocks%n
+      if (blocks%asleep(b)) call wake(b, blocks)
     end do
   end subroutine update_stillness
 

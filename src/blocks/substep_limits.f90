@@ -3,7 +3,7 @@ module substep_limits_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use vectors_m, only: distance, norm
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, haste
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use neighbours_m, only: pair_list_t
@@ -76,7 +76,8 @@ contains
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b)) cycle
-      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b)
+      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b) &
+        + haste(blocks, b, limits%reach(b))
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
       if (.not. speed <= near) then
@@ -106,7 +107,8 @@ contains
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
             > reach(a) + reach(b) + limits%clear) cycle
         speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
-          + norm(blocks%omega(:, b))*reach(b)
+          + norm(blocks%omega(:, b))*reach(b) + haste(blocks, a, reach(a)) &
+          + haste(blocks, b, reach(b))
       end associate
       if (.not. speed <= fastest) fastest = speed
     end do

@@ -4,7 +4,7 @@ module block_groups_m
   use vectors_m, only: quaternion_from_axis
   use errors_m, only: to_text
   use case_types_m, only: contact_input_t, shape_input_t, body_input_t, drop_input_t, &
-    bed_input_t, handling_t, absent, is_given, size_count, max_variants
+    bed_input_t, start_t, handling_t, absent, is_given, size_count, max_variants
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
     between
   use group_visitor_m, only: group_visitor_t
@@ -14,7 +14,7 @@ module block_groups_m
   use errors_m, only: to_text
   implicit none
   private
-  public :: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
+  public :: visit_contact, visit_bed, visit_start, visit_shape, visit_body, visit_drop
 
   integer, parameter :: max_drops = 100000, finest_shape = 8
 
@@ -100,6 +100,27 @@ contains
       //'triangles in m', example='file = ''slope.stl''  kind = ''stl''')
     call v%require('file', len_trim(bed%file) > 0, 'must name a file with the form of the bed')
   end subroutine visit_bed
+
+  !> `&start`
+  subroutine visit_start(v, start)
+    type(group_visitor_t), intent(inout) :: v
+    type(start_t), intent(inout) :: start
+
+    start%line = v%group%line
+    call v%about('free blocks begin where another run left them')
+    call v%text('file', start%file, 'results of that run; the group needs it. Its blocks that ' &
+      //'were released by then and move freely begin at their place, attitude and velocity of ' &
+      //'then: the first of a shape is the first free block of that shape here, and so on; a ' &
+      //'shape of which this case names no free block brings its own', example='''fill/run.h5''')
+    call v%real('time', start%time, any_number('s'), &
+      'time of that run, -1: its end; the last row until then counts', &
+      example='file = ''fill/run.h5''  time = 0.01')
+    call v%real('shift', start%shift, any_number('m'), 'these blocks are shifted by it', &
+      example='file = ''fill/run.h5''  shift = 0.1, 0, 0')
+    call v%require('file', len_trim(start%file) > 0, 'must name the run.h5 of a run')
+    call v%require('time', start%time >= 0.0_wp .or. abs(start%time + 1.0_wp) <= 0.0_wp, &
+      'must not be negative [s]; -1 means the end of that run')
+  end subroutine visit_start
 
   !> `&shape`
   subroutine visit_shape(v, shape)
@@ -225,16 +246,25 @@ contains
 
     body%line = v%group%line
     call v%about('one block, there from the start or released later')
+    if (.not. allocated(body%motion)) body%motion = ''
     call visit_shape_name(v, body%shape, shapes, required=.true.)
+    call v%text('motion', body%motion, 'a table that moves a fixed block: a CSV file of columns ' &
+      //'time, x, y, z and, if it turns, qw, qx, qy, qz; smooth between rows, held before the ' &
+      //'first and after the last', example='fixed = .true.  motion = ''door.csv''')
     call v%real('position', body%position, any_number('m'), 'the centre of mass', &
-      example='0.15, 0.05, 0.1', required=.true.)
+      example='0.15, 0.05, 0.1', required=len_trim(body%motion) == 0)
+    body%attitude_given = v%given('quaternion') .or. v%given('axis')
     call visit_attitude(v, body%quaternion)
+    call v%without_meaning(len_trim(body%motion) > 0, 'velocity angular_velocity', 'motion', &
+      'the table has the motion')
     call v%real('velocity', body%velocity, any_number('m/s'), &
       'velocity at the release; a fixed block keeps it', example='0, 0, -0.1')
     call v%real('angular_velocity', body%angular_velocity, any_number('rad/s'), &
       'spin about the axes of the tank, likewise', example='0, 0, 6.28')
     call v%logical('fixed', body%fixed, 'held in its place, or moved at its given velocity ' &
-      //'for ever')
+      //'for ever, or by motion')
+    if (len_trim(body%motion) > 0) call v%require('motion', body%fixed .or. .not. v%good('fixed'), &
+      'moves a fixed block, needs fixed = .true.')
     call v%real('release_time', body%release_time, not_negative('s'), &
       'when the block is let go; before, it displaces and touches nothing', example='2')
   end subroutine visit_body

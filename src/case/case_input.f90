@@ -14,7 +14,8 @@ module case_input_m
   use run_groups_m, only: visit_run, visit_grid, visit_boundary, side_name
   use fluid_groups_m, only: visit_fluid, visit_water, visit_numerics
   use idle_variables_m, only: find_idle
-  use block_groups_m, only: visit_contact, visit_bed, visit_shape, visit_body, visit_drop
+  use block_groups_m, only: visit_contact, visit_bed, visit_start, visit_shape, visit_body, &
+    visit_drop
   use value_text_m, only: nearest_name, lower_case, printable, quoted_text, &
     parse_integer, value_ok
   implicit none
@@ -23,8 +24,8 @@ module case_input_m
 
   !> The groups of the contract; those from `first_repeated` on may be repeated.
   character(name_length), parameter :: groups(*) = [character(name_length) :: 'run', 'grid', &
-    'boundary', 'fluid', 'numerics', 'contact', 'bed', 'water', 'shape', 'body', 'drop']
-  integer, parameter :: first_repeated = 8
+    'boundary', 'fluid', 'numerics', 'contact', 'bed', 'start', 'water', 'shape', 'body', 'drop']
+  integer, parameter :: first_repeated = 9
 
 contains
 
@@ -114,6 +115,7 @@ contains
     case%run%title = ''
     case%run%output = 'mics-out'
     case%bed%file = ''
+    case%start%file = ''
     case%fluid%initial_state = ''
   end subroutine set_empty
 
@@ -176,6 +178,7 @@ contains
     case ('body'); call visit_body(v, case%body(n), shapes)
     case ('drop'); call visit_drop(v, case%drop(n), shapes)
     case ('bed'); call visit_bed(v, case%bed)
+    case ('start'); call visit_start(v, case%start)
     case default; error stop 'visit_group: a group of the list has no procedure'
     end select
     call v%finish()
@@ -206,8 +209,8 @@ contains
       input%shape(n)%faulty = faulty('name kind size file scale refinement seed ' &
         //'variants mass_50 uniformity mass_min mass_max elongation blockiness')
     case ('body')
-      input%body(n)%faulty = faulty('shape position quaternion axis angle_deg')
-      input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time')
+      input%body(n)%faulty = faulty('shape position quaternion axis angle_deg motion')
+      input%body(n)%time_faulty = faulty('fixed velocity angular_velocity release_time motion')
     case ('drop')
       input%drop(n)%faulty = faulty('file shape shapes weights position count to ' &
         //'first_time interval spread orientation quaternion axis angle_deg tilt_deg seed')
@@ -479,6 +482,7 @@ contains
     case ('body'); n = size(case%body)
     case ('drop'); n = size(case%drop)
     case ('bed'); n = merge(1, 0, len_trim(case%bed%file) > 0)
+    case ('start'); n = merge(1, 0, len_trim(case%start%file) > 0)
     case default; n = 1
     end select
   end function number_of

@@ -4,12 +4,14 @@
 !! ends in `_deg`. `case_input_m` fills these types and checks them.
 module case_types_m
   use kinds_m, only: wp, name_length
+  use given_motion_m, only: given_motion_t
   implicit none
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
   public :: place_t, handling_t, most_shapes, max_variants
   public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved, member_name
+  public :: start_t, begun_t
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
   character(*), parameter :: not_resolved = 'light: not resolved, no flow is computed'
@@ -123,6 +125,10 @@ module case_types_m
     real(wp) :: velocity(3) = 0.0_wp                !! [m/s]
     real(wp) :: angular_velocity(3) = 0.0_wp        !! space frame [rad/s]
     logical :: fixed = .false.
+    character(:), allocatable :: motion             !! table that moves a fixed body; '': none
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
+    type(given_motion_t) :: path                    !! of the table
+    logical :: attitude_given = .false.             !! by the case itself
     real(wp) :: release_time = 0.0_wp               !! [s]
     integer :: line = 0                             !! of the case file, where the group begins
     logical :: faulty = .false.                     !! its shape, place or attitude is not known
@@ -173,6 +179,23 @@ module case_types_m
     logical :: faulty = .false.                     !! its places or times are not known
   end type drop_input_t
 
+  type :: start_t
+    character(:), allocatable :: file               !! run.h5 of another run; '': none
+    character(:), allocatable :: folder             !! of the case, see `named_files_m`
+    real(wp) :: time = -1.0_wp                      !! of that run [s]; -1: its end
+    real(wp) :: shift(3) = 0.0_wp                   !! [m]
+    integer :: line = 0                             !! of the case file, where the group begins
+  end type start_t
+
+  !> Blocks that begin where another run left them.
+  type :: begun_t
+    integer :: n = 0
+    real(wp) :: time = 0.0_wp                       !! of that run [s]
+    integer, allocatable :: drop(:), block(:)       !! (n) block of a drop, or (0, body)
+    character(name_length), allocatable :: shape(:)
+    real(wp), allocatable :: x(:, :), q(:, :), v(:, :), omega(:, :)   !! (3, n), q (4, n)
+  end type begun_t
+
   type :: bed_input_t
     character(:), allocatable :: file
     character(:), allocatable :: folder             !! of the case, see `named_files_m`
@@ -190,6 +213,8 @@ module case_types_m
     type(numerics_t) :: numerics
     type(contact_input_t) :: contact
     type(bed_input_t) :: bed
+    type(start_t) :: start
+    type(begun_t) :: begun                          !! of the file of `start`
     type(water_t), allocatable :: water(:)
     type(shape_input_t), allocatable :: shape(:)
     type(body_input_t), allocatable :: body(:)

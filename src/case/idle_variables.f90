@@ -27,7 +27,8 @@ contains
     select case (case%run%physics)
     case ('dry'); call pass_over_groups(list, 'water numerics', 'physics = ''dry''', v)
     case ('light'); call pass_over_groups(list, 'water numerics', 'physics = ''light''', v)
-    case ('fluid'); call pass_over_groups(list, 'contact shape body drop', 'physics = ''fluid''', v)
+    case ('fluid')
+      call pass_over_groups(list, 'contact start shape body drop', 'physics = ''fluid''', v)
     case default   ! all groups count
     end select
     do i = 1, list%n

@@ -19,11 +19,15 @@ contains
     if (index(folder, '/dev/') == 1 .or. index(folder, '/proc/') == 1) folder = ''
     case%fluid%folder = folder
     case%bed%folder = folder
+    case%start%folder = folder
     do s = 1, size(case%shape)
       case%shape(s)%folder = folder
     end do
     do s = 1, size(case%drop)
       case%drop(s)%folder = folder
+    end do
+    do s = 1, size(case%body)
+      case%body(s)%folder = folder
     end do
   end subroutine look_beside
 

@@ -163,7 +163,7 @@ contains
     call motion_after_fluid(gravity, dt, blocks, self)
     self%at_start = self%bodies
     do b = 1, blocks%n
-      if (.not. self%bodies%free(b)) cycle
+      if (.not. (self%bodies%free(b) .or. blocks%path(b)%n > 0)) cycle
       self%at_start%motion(1:3, b) = blocks%v_start(:, b)
       self%at_start%motion(4:6, b) = matmul(self%bodies%inverse_inertia(:, :, b), &
                                             blocks%l_start(:, b))

@@ -37,7 +37,7 @@ module monolithic_m
   use surface_tension_m, only: add_tension, force_from_tension
   use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
     accelerate_cells, keep_acceleration, predict_velocity, renew_acceleration, find_surface_force
-  use rigid_body_m, only: blocks_t
+  use rigid_body_m, only: blocks_t, change_by_motion
   use boundary_m, only: fill_velocity_halo
   use parallel_m, only: halo_exchange
   implicit none
@@ -153,6 +153,9 @@ contains
 
     self%extrapolated = 0.0_wp
     do b = 1, blocks%n
+      if (blocks%path(b)%n > 0 .and. blocks%present(b)) then
+        self%extrapolated(:, b) = change_by_motion(blocks, b, dt)
+      end if
       if (.not. self%bodies%free(b)) cycle
       self%extrapolated(1:3, b) = dt*(gravity + (blocks%fluid_force(:, b) &
                                                  + blocks%contact_force(:, b))/blocks%mass(b))

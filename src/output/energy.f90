@@ -59,7 +59,7 @@ contains
     do b = 1, blocks%n
       if (.not. (blocks%fixed(b) .or. blocks%handling(b)%lowering_speed > 0.0_wp)) cycle
       self%known = self%known .and. all(abs(blocks%given%v(:, b)) <= 0.0_wp) &
-                   .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp)
+                   .and. all(abs(blocks%given%omega(:, b)) <= 0.0_wp) .and. blocks%path(b)%n == 0
     end do
     if (.not. self%known) return
     g = norm2(case%fluid%gravity)

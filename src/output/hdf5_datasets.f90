@@ -8,7 +8,7 @@ module hdf5_datasets_m
   use hdf5, only: h5tset_size_f, h5tset_strpad_f
   use hdf5, only: H5D_FILL_TIME_ALLOC_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, H5S_SELECT_SET_F
   use hdf5, only: H5S_UNLIMITED_F, H5T_C_S1, H5T_STR_NULLPAD_F
-  use kinds_m, only: wp, i8
+  use kinds_m, only: wp, i8, name_length
   use parallel_m, only: is_root
   use hdf5_kinds_m, only: file_real64, file_integer32, file_integer64, type_in_file, memory_type
   use hdf5_attributes_m, only: h5_attributes_t
@@ -27,8 +27,8 @@ module hdf5_datasets_m
     procedure :: store_wide_integers
     procedure, private :: rewrite_reals
     generic :: rewrite => rewrite_reals
-    procedure, private :: read_reals, read_integers
-    generic :: read => read_reals, read_integers
+    procedure, private :: read_reals, read_integers, read_texts
+    generic :: read => read_reals, read_integers, read_texts
     procedure :: new_blocks, write_block, read_block
     procedure :: shape_of, get_extent
     procedure :: new_dataset, select   ! for columns
@@ -204,6 +204,36 @@ contains
     call read_whole(self, name, size(a), memory_type(file_integer32), data)
     if (self%info == 0) a = copy(:size(a))
   end subroutine read_integers
+
+  !> All texts of a dataset, cut or filled to the length of `a`.
+  subroutine read_texts(self, name, a)
+    class(h5_datasets_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    character(name_length), intent(inout) :: a(:)
+    character(kind=c_char), target :: letters(max(1, size(a)*len(a)))
+    integer(hid_t) :: text_type
+    type(c_ptr) :: data
+    integer :: status, i, j
+
+    if (self%info /= 0) return
+    call h5tcopy_f(H5T_C_S1, text_type, status)
+    call self%check(status, 'make a text type')
+    call h5tset_size_f(text_type, int(len(a), size_t), status)
+    call self%check(status, 'make a text type')
+    call h5tset_strpad_f(text_type, H5T_STR_NULLPAD_F, status)
+    call self%check(status, 'make a text type')
+    data = c_loc(letters)
+    call read_whole(self, name, size(a), text_type, data)
+    call h5tclose_f(text_type, status)
+    if (self%info /= 0) return
+    a = ''
+    do i = 1, size(a)
+      do j = 1, len(a)
+        if (letters(j + (i - 1)*len(a)) == c_null_char) exit
+        a(i)(j:j) = letters(j + (i - 1)*len(a))
+      end do
+    end do
+  end subroutine read_texts
 
   !> Read a whole dataset of n elements.
   subroutine read_whole(self, name, n, mem_type, data)

@@ -154,6 +154,7 @@ contains
       call visitor%logicals('/blocks/present', n, blocks%present)
       call visitor%logicals('/blocks/asleep', n, blocks%asleep)
       call visitor%integers('/blocks/status', [n], blocks%status)
+      call visitor%logicals('/blocks/still', n, blocks%still)
       call visitor%reals('/blocks/release_time', 's', [n], blocks%release_time)
       call visitor%reals('/blocks/entry_time', 's', [n], blocks%entry_time)
       call visitor%reals('/blocks/raised', 'm', [n], blocks%raised)

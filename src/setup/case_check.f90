@@ -17,6 +17,7 @@ module case_check_m
   use rigid_body_m, only: blocks_t, blocks_init
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
+  use start_bodies_m, only: with_begun
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
@@ -94,7 +95,7 @@ contains
     type(case_t) :: known   ! the case without the sides that are wrong
     integer :: i
 
-    known = case
+    known = with_begun(case)
     where (case%boundary%faulty) known%boundary%kind = 'open'   ! neither a wall nor a period
     if (.not. case%grid%extent_faulty) call check_water(case, problems)
     if (.not. (case%grid%extent_faulty .or. case%grid%cells_faulty)) then
@@ -245,7 +246,7 @@ contains
       do n = 1, scene%n
         scene%held(n) = blocks%fixed(n) .and. scene%dated(n) &
           .and. all(abs(blocks%given%v(:, n)) <= 0.0_wp) &
-          .and. all(abs(blocks%given%omega(:, n)) <= 0.0_wp)
+          .and. all(abs(blocks%given%omega(:, n)) <= 0.0_wp) .and. blocks%path(n)%n == 0
       end do
     end associate
   end subroutine set_scene
@@ -524,6 +525,7 @@ contains
     first = ''
     associate (drop => case%drop(i))
       do k = 1, drop%count
+        if (begins_elsewhere(case, i, k)) cycle
         place = place_of_block(drop, k)
         scene%blocks%shape(b) = shape_of_place(place, scene%blocks%shapes)
         if (scene%blocks%shape(b) == 0) cycle
@@ -577,6 +579,16 @@ contains
       end if
     end associate
   end function highest_place
+
+  !> Does a block of a drop begin where another run left it?
+  pure function begins_elsewhere(case, drop, block) result(yes)
+    type(case_t), intent(in) :: case
+    integer, intent(in) :: drop, block
+    logical :: yes
+
+    yes = case%begun%n > 0
+    if (yes) yes = any(case%begun%drop == drop .and. case%begun%block == block)
+  end function begins_elsewhere
 
   !> What stands for ever in the place of body b, the last of the scene; empty if nothing does.
   function hindrance(case, scene, b) result(text)

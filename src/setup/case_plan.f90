@@ -12,6 +12,7 @@ module case_plan_m
   use contact_load_m, only: load_of, give_share
   use rest_depth_m, only: heaviest_mass
   use tet_mesh_m, only: shape_t, extreme_of_family
+  use given_motion_m, only: fastest_between
   use bed_m, only: bed_t
   use wave_step_m, only: gravity_step, capillary_step
   use machine_memory_m, only: available_memory
@@ -264,7 +265,8 @@ contains
     type(bed_t), intent(in) :: bed
     type(place_t) :: place
     real(wp) :: last   ! release [s]
-    integer :: n_fixed, i, k
+    real(wp) :: fastest(2)   ! speed and spin [m/s], [rad/s]
+    integer :: n_fixed, n_moved, i, k
 
     n_fixed = count(case%body%fixed)
     call heading(unit, 'Bodies')
@@ -283,6 +285,18 @@ contains
       call entry(unit, 'dropped', to_text(sum(case%drop%count))//', the last one at ' &
                  //brief(last)//' s')
     end if
+    if (case%begun%n > 0) call entry(unit, 'begin elsewhere', to_text(case%begun%n)//', where ' &
+      //told_file(case%start%folder, case%start%file)//' left them at '//brief(case%begun%time) &
+      //' s')
+    n_moved = 0
+    fastest = 0.0_wp
+    do i = 1, size(case%body)
+      if (case%body(i)%path%n == 0) cycle
+      n_moved = n_moved + 1
+      fastest = max(fastest, fastest_between(case%body(i)%path, 0.0_wp, case%run%t_end))
+    end do
+    if (n_moved > 0) call entry(unit, 'moved by a table', to_text(n_moved)//', up to ' &
+      //brief(fastest(1))//' m/s and '//brief(fastest(2))//' rad/s')
     if (keeps_its_water(case, bed)) call print_rise(unit, case, shapes)
   end subroutine print_bodies
 

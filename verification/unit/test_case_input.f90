@@ -562,7 +562,7 @@ contains
     call expect(cube//'&drop shape=''c'' position=3*0 orientation=''any''/', &
       '&drop orientation = ''any'': unknown, must be one of ''given'', ''random'' (line 4)')
     call expect(cube//'&body shape=''c'' position=3*0 colour=''red''/', &
-      '&body colour = ''red'': unknown variable, nearest known: shape (line 4)')
+      '&body colour = ''red'': unknown variable, nearest known: motion (line 4)')
   end subroutine test_bodies
 
   !> What a choice leaves without meaning is an error, of its own group or of another.

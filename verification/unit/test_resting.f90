@@ -56,6 +56,7 @@ contains
     type(world_t), intent(out) :: world
     type(case_t) :: case
     integer :: b
+    logical :: changed
 
     case%grid%length = 1.0_wp
     case%contact%law = 'constants'
@@ -78,7 +79,7 @@ contains
     call walls_init(case%grid, case%boundary, world%walls)
     call contacts_init(case%contact, world%blocks, world%contacts)
     call update_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
-    call update_stillness(world%blocks)
+    call update_stillness(world%blocks, changed)
     call find_touches(world%walls, world%blocks, 0.0_wp, world%contacts%touching)
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin

@@ -10,7 +10,14 @@ from pathlib import Path
 from micstools.cases import settings
 from micstools.reading.reader import BadRun
 
-_FILES = (("shape", "file"), ("drop", "file"), ("bed", "file"), ("fluid", "initial_state"))
+_FILES = (
+    ("shape", "file"),
+    ("drop", "file"),
+    ("bed", "file"),
+    ("fluid", "initial_state"),
+    ("body", "motion"),
+    ("start", "file"),
+)
 
 
 def from_here(text: str, folder: Path) -> str:

@@ -1,0 +1,300 @@
+!> `&start`: free blocks begin where another run left them.
+!!
+!! Of each shape the first free block of that run becomes the first free block here, and so on, with
+!! place, attitude, velocity and spin of the last row until the time asked for; those not released
+!! by then begin as the case has them. A shape of which the case names no free block brings its
+!! blocks along as bodies. What contacts remember of their past is not taken over.
+module start_bodies_m
+  use kinds_m, only: wp, name_length
+  use errors_m, only: problems_t, to_text
+  use case_types_m, only: case_t, body_input_t, begun_t
+  use named_files_m, only: found_file
+  use value_text_m, only: quoted_text
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_t, blocks_init
+  use hdf5_file_m, only: h5_file_t
+  implicit none
+  private
+  public :: read_start, with_begun
+
+  real(wp), parameter :: same_time = 1.0e-9_wp   !! times this close are one [s]
+  real(wp), parameter :: same_mass = 1.0e-9_wp   !! masses this close are one [-]
+
+  !> The blocks of another run at a row.
+  type :: left_t
+    integer :: n = 0
+    real(wp) :: time = 0.0_wp                      !! [s]
+    character(name_length), allocatable :: shape(:)
+    logical, allocatable :: free(:), released(:)
+    real(wp), allocatable :: mass(:)               !! [kg]
+    real(wp), allocatable :: x(:, :), q(:, :), v(:, :), omega(:, :)
+  end type left_t
+
+contains
+
+  !> Read the file of `&start` and see which blocks begin there; `case%begun` tells it.
+  subroutine read_start(case, shapes, problems)
+    type(case_t), intent(inout) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(problems_t), intent(inout) :: problems
+    type(left_t) :: left
+    logical :: faultless
+
+    if (len_trim(case%start%file) == 0 .or. case%run%physics == 'fluid') return
+    faultless = problems%n == 0
+    call read_left(case, left, problems)
+    if (.not. faultless .or. problems%n > 0) return   ! what is wrong may be what would match
+    call match(case, shapes, left, problems)
+  end subroutine read_start
+
+  !> Report a problem with the group.
+  subroutine note(case, what, problems)
+    type(case_t), intent(in) :: case
+    character(*), intent(in) :: what
+    type(problems_t), intent(inout) :: problems
+
+    call problems%add_message('&start file = '//quoted_text(case%start%file)//': '//what, &
+                              case%start%line)
+  end subroutine note
+
+  !> The blocks in the file at the time asked for.
+  subroutine read_left(case, left, problems)
+    type(case_t), intent(in) :: case
+    type(left_t), intent(inout) :: left
+    type(problems_t), intent(inout) :: problems
+    type(h5_file_t) :: file
+    real(wp), allocatable :: time(:), release_time(:)
+    integer, allocatable :: extent(:), fixed(:)
+    integer :: row
+
+    call file%open(found_file(case%start%folder, case%start%file), .false., .false.)
+    if (file%info == 0) then
+      if (.not. file%has('/bodies/position')) then
+        call note(case, 'holds no blocks; must be the run.h5 of a run with blocks', problems)
+        call file%close()
+        return
+      end if
+    end if
+    call file%shape_of('/bodies/time', extent)
+    if (file%info == 0) then
+      allocate (time(product(extent)), source=0.0_wp)
+      call file%read('/bodies/time', time)
+    end if
+    call file%shape_of('/bodies/mass', extent)
+    if (file%info == 0) left%n = product(extent)
+    associate (n => left%n)
+      allocate (left%shape(n), left%free(n), left%released(n), left%mass(n), release_time(n))
+      allocate (left%x(3, n), left%q(4, n), left%v(3, n), left%omega(3, n), fixed(n))
+      call file%read('/bodies/shape', left%shape)
+      call file%read('/bodies/mass', left%mass)
+      call file%read('/bodies/fixed', fixed)
+      call file%read('/bodies/release_time', release_time)
+      if (file%info == 0) then
+        row = row_of(case, time, problems)
+        if (row > 0) then
+          left%time = time(row)
+          left%free = fixed == 0
+          left%released = release_time <= left%time + same_time
+          call read_row('position', 3, left%x)
+          call read_row('quaternion', 4, left%q)
+          call read_row('velocity', 3, left%v)
+          call read_row('angular_velocity', 3, left%omega)
+        end if
+      end if
+    end associate
+    if (file%info /= 0) call note(case, file%message, problems)
+    call file%close()
+  contains
+    !> One row of a column of vectors.
+    subroutine read_row(name, m, a)
+      character(*), intent(in) :: name
+      integer, intent(in) :: m   !! components
+      real(wp), intent(out) :: a(:, :)
+      real(wp) :: values(m*left%n)
+
+      values = 0.0_wp
+      call file%read_block('/bodies/'//name, [1, 1, row], [m, left%n, 1], values)
+      a = reshape(values, [m, left%n])
+    end subroutine read_row
+  end subroutine read_left
+
+  !> The last row until the time of the group; 0 with a problem if the run has none.
+  function row_of(case, time, problems) result(row)
+    type(case_t), intent(in) :: case
+    real(wp), intent(in) :: time(:)   !! of the rows [s]
+    type(problems_t), intent(inout) :: problems
+    integer :: row
+
+    row = size(time)
+    if (case%start%time < 0.0_wp .and. row > 0) return
+    row = count(time <= case%start%time + same_time)
+    if (size(time) == 0) then
+      call note(case, 'holds no rows', problems)
+    else if (row == 0 .or. case%start%time > time(size(time)) + same_time) then
+      row = 0
+      call problems%add_message('&start time = '//to_text(case%start%time)//': the run in ' &
+        //quoted_text(case%start%file)//' goes from '//to_text(time(1))//' to ' &
+        //to_text(time(size(time)))//' s', case%start%line)
+    end if
+  end function row_of
+
+  !> Give the blocks of the other run to those of the case, shape by shape.
+  subroutine match(case, shapes, left, problems)
+    type(case_t), intent(inout) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    type(left_t), intent(in) :: left
+    type(problems_t), intent(inout) :: problems
+    type(blocks_t) :: blocks
+    integer :: here(left%n)      ! the block of the case that each becomes; 0: none
+    logical :: taken(left%n)
+    integer :: i, s, n_there, n_here, b
+
+    call blocks_init(case, shapes, blocks)
+    taken = left%free .and. left%released
+    here = 0
+    do i = 1, left%n
+      if (.not. taken(i)) cycle
+      if (any(left%shape(:i - 1) == left%shape(i) .and. taken(:i - 1))) cycle   ! has been looked at
+      n_there = count(taken .and. left%shape == left%shape(i))
+      s = findloc(shapes%name == left%shape(i), .true., 1)
+      if (s == 0) then
+        call note(case, 'has '//to_text(n_there)//' free blocks of the shape ' &
+          //quoted_text(trim(left%shape(i)))//', which no &shape here has', problems)
+        cycle
+      end if
+      if (abs(left%mass(i) - shapes(s)%density*shapes(s)%volume) > same_mass*left%mass(i)) then
+        call note(case, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
+          //to_text(left%mass(i))//' kg there and '//to_text(shapes(s)%density*shapes(s)%volume) &
+          //' kg here; shapes must be the same', problems)
+        cycle
+      end if
+      n_here = count(blocks%shape == s .and. .not. blocks%fixed)
+      if (n_here == 0) cycle   ! they come along
+      if (last_taken(s) > n_here) then
+        call note(case, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
+          //' up to number '//to_text(last_taken(s))//', this case names '//to_text(n_here) &
+          //'; name as many, or none and they come along', problems)
+        cycle
+      end if
+      call assign(s)
+    end do
+    if (problems%n > 0) return
+    call bring_along(case, left, taken .and. here == 0)
+    call keep(case%begun)
+  contains
+    !> Number, among the free blocks of a shape there, of the last one that is taken.
+    integer function last_taken(s)
+      integer, intent(in) :: s
+      integer :: k, n
+
+      last_taken = 0
+      n = 0
+      do k = 1, left%n
+        if (left%shape(k) /= shapes(s)%name .or. .not. left%free(k)) cycle
+        n = n + 1
+        if (taken(k)) last_taken = n
+      end do
+    end function last_taken
+
+    !> The k-th free block of a shape there is the k-th here.
+    subroutine assign(s)
+      integer, intent(in) :: s
+      integer :: k
+
+      b = 0
+      do k = 1, left%n
+        if (left%shape(k) /= shapes(s)%name .or. .not. left%free(k)) cycle
+        b = b + 1
+        do while (b <= blocks%n)
+          if (blocks%shape(b) == s .and. .not. blocks%fixed(b)) exit
+          b = b + 1
+        end do
+        if (b > blocks%n) exit
+        if (taken(k)) here(k) = b
+      end do
+    end subroutine assign
+
+    !> Remember the blocks that the case names, by drop and number.
+    subroutine keep(begun)
+      type(begun_t), intent(inout) :: begun
+      integer :: named(count(here > 0)), k, d
+
+      named = pack([(k, k=1, left%n)], here > 0)
+      begun%n = size(named)
+      begun%time = left%time
+      begun%shape = left%shape(named)
+      begun%x = left%x(:, named) + spread(case%start%shift, 2, size(named))
+      begun%q = left%q(:, named)
+      begun%v = left%v(:, named)
+      begun%omega = left%omega(:, named)
+      begun%block = here(named)
+      allocate (begun%drop(size(named)), source=0)
+      do k = 1, size(named)
+        associate (block => begun%block(k))
+          if (block <= size(case%body) - count(taken .and. here == 0)) cycle
+          block = block - (size(case%body) - count(taken .and. here == 0))
+          do d = 1, size(case%drop)
+            begun%drop(k) = d
+            if (block <= case%drop(d)%count) exit
+            block = block - case%drop(d)%count
+          end do
+        end associate
+      end do
+    end subroutine keep
+  end subroutine match
+
+  !> The case with the blocks that begin elsewhere as bodies there, for the checks of places.
+  function with_begun(case) result(known)
+    type(case_t), intent(in) :: case
+    type(case_t) :: known
+    type(body_input_t), allocatable :: body(:)
+    integer :: i, b, n
+
+    known = case
+    if (case%begun%n == 0) return
+    n = size(case%body)
+    allocate (body(n + count(case%begun%drop > 0)))
+    body(:n) = case%body
+    do i = 1, case%begun%n
+      b = case%begun%block(i)
+      if (case%begun%drop(i) > 0) then
+        n = n + 1
+        b = n
+        body(b)%shape = case%begun%shape(i)
+        body(b)%line = case%start%line
+      end if
+      body(b)%position = case%begun%x(:, i)
+      body(b)%quaternion = case%begun%q(:, i)
+      body(b)%velocity = case%begun%v(:, i)
+      body(b)%angular_velocity = case%begun%omega(:, i)
+      body(b)%release_time = 0.0_wp
+    end do
+    call move_alloc(body, known%body)
+  end function with_begun
+
+  !> Blocks of the other run that become bodies of the case.
+  subroutine bring_along(case, left, along)
+    type(case_t), intent(inout) :: case
+    type(left_t), intent(in) :: left
+    logical, intent(in) :: along(:)
+    type(body_input_t), allocatable :: body(:)
+    integer :: k, n
+
+    n = size(case%body)
+    allocate (body(n + count(along)))
+    body(:n) = case%body
+    do k = 1, left%n
+      if (.not. along(k)) cycle
+      n = n + 1
+      body(n)%shape = left%shape(k)
+      body(n)%position = left%x(:, k) + case%start%shift
+      body(n)%quaternion = left%q(:, k)
+      body(n)%velocity = left%v(:, k)
+      body(n)%angular_velocity = left%omega(:, k)
+      body(n)%line = case%start%line
+      body(n)%motion = ''
+    end do
+    call move_alloc(body, case%body)
+  end subroutine bring_along
+
+end module start_bodies_m

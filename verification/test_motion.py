@@ -1,0 +1,202 @@
+"""Fixed bodies moved by a table: where they are, what they push, restarts, and damaged tables."""
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from run_cases import ROOT
+
+MICS = ROOT / "mics"
+TANK = "&grid cells = 16, 8, 12  length = 0.16, 0.08, 0.12 /\n"
+DRY = "&run t_end = {end}  dt = 0.01  physics = 'dry'  field_interval = 0 /\n" + TANK
+WET = (
+    "&run t_end = {end}  dt = 0.005  field_interval = 0  restart_interval = 0.02 /\n"
+    + TANK
+    + "&fluid water_level = 0.08 /\n"
+)
+PLATE = "&shape name = 'plate'  kind = 'box'  size = 0.01, 0.06, 0.06 /\n"
+MOVED = "&body shape = 'plate'  fixed = T  motion = 'way.csv' {more} /\n"
+CUBE = (
+    "&shape name = 'cube'  kind = 'cube'  size = 0.02 /\n"
+    "&body shape = 'cube'  position = 0.06, 0.04, 0.01 /\n"
+)
+STEADY = "time,x,y,z\n-1,-0.05,0.04,0.04\n0,0.04,0.04,0.04\n1,0.13,0.04,0.04\n2,0.22,0.04,0.04\n"
+DOOR = (
+    "time, x, y, z, qw, qx, qy, qz\n0, 0.05, 0.04, 0.05, 1, 0, 0, 0\n"
+    "0.05, 0.07, 0.04, 0.055, 0.96, 0, 0.28, 0\n0.1, 0.08, 0.04, 0.05, 0.8, 0, 0.6, 0\n"
+)
+pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
+
+
+def mics(work: Path, case: str, table: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run a case with its table beside it."""
+    work.mkdir(exist_ok=True)
+    (work / "way.csv").write_text(table)
+    (work / "case.nml").write_text(case)
+    return subprocess.run(
+        [str(MICS), "--threads", "1", "--quiet", *options, "case.nml"],
+        cwd=work,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def run(work: Path, case: str, table: str, *options: str) -> h5py.File:
+    """The results of a good run."""
+    done = mics(work, case, table, *options)
+    assert done.returncode == 0, done.stderr
+    return h5py.File(work / "mics-out" / "run.h5")
+
+
+@pytest.mark.parametrize("solver", ["springs", "impulses"])
+def test_a_plate_pushes_a_cube(solver: str, tmp_path: Path) -> None:
+    """Half way at half its time, through its rows, held at the end; the cube lies before it."""
+    table = "time,x,y,z\n0.1,0.02,0.04,0.03\n0.9,0.08,0.04,0.03\n"
+    case = DRY.format(end=1.2) + PLATE + MOVED.format(more="") + CUBE
+    case += f"&contact solver = '{solver}' /\n"
+    with run(tmp_path, case, table) as h5:
+        time, x, v = (h5[f"bodies/{name}"][:] for name in ("time", "position", "velocity"))
+        s = np.clip((time - 0.1) / 0.8, 0, 1)
+        assert x[:, 0, 0] == pytest.approx(0.02 + 0.06 * s**2 * (3 - 2 * s), abs=1e-15)
+        assert v[:, 0, 0] == pytest.approx(0.06 / 0.8 * 6 * s * (1 - s), abs=1e-15)
+        assert x[-1, 1, 0] == pytest.approx(0.095, abs=5e-4), "cube, plate and half of each"
+        assert np.abs(v[-1]).max() < 1e-6
+        pushed = h5["bodies/contact_force"][:, 1, 0].max()
+        assert pushed > 0.4 * 0.9 * 9.81 * 0.02**3 * 2300, "friction on the floor"
+
+
+def test_sleepers_wake_for_it(tmp_path: Path) -> None:
+    """A cube asleep on a held plate is carried when that begins to rise after two seconds."""
+    table = "time,x,y,z\n2,0.06,0.04,0.03\n2.5,0.06,0.04,0.05\n"
+    case = (
+        DRY.format(end=3.0)
+        + "&shape name = 'plate'  kind = 'box'  size = 0.06, 0.06, 0.01 /\n"
+        + MOVED.format(more="")
+        + CUBE.replace("0.04, 0.01 /", "0.04, 0.0451 /")
+    )
+    with run(tmp_path, case, table) as h5:
+        time, x = h5["bodies/time"][:], h5["bodies/position"][:, 1, 2]
+        before = h5["series/sleeping"][:][np.searchsorted(time, 1.99)]
+        assert before == 1
+        assert x[-1] - x[np.searchsorted(time, 1.99)] == pytest.approx(0.02, abs=1e-5)
+
+
+def test_steady_rows_are_a_given_velocity(tmp_path: Path) -> None:
+    """Between rows of a steady motion the flow is that of a body with `velocity`."""
+    case = WET.format(end=0.1) + PLATE
+    given = (
+        "&body shape = 'plate'  fixed = T  position = 0.04, 0.04, 0.04  velocity = 0.09, 0, 0 /\n"
+    )
+    with run(tmp_path / "a", case + MOVED.format(more=""), STEADY) as a, \
+            run(tmp_path / "b", case + given, STEADY) as b:  # fmt: skip
+        for name in ("bodies/position", "bodies/velocity", "bodies/fluid_force"):
+            scale = np.abs(b[name][:]).max()
+            assert np.abs(a[name][:] - b[name][:]).max() < 1e-7 * scale, name
+        assert np.abs(a["series/liquid_volume_drift"][:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("coupling", ["monolithic", "mics"])
+def test_fluid_of_a_door(coupling: str, tmp_path: Path) -> None:
+    """A door that starts, turns and stops in water: liquid kept, divergence met, its rates those of
+    its poses."""
+    case = WET.format(end=0.12) + PLATE + MOVED.format(more="")
+    case += f"&numerics coupling = '{coupling}' /\n"
+    with run(tmp_path, case, DOOR) as h5:
+        assert np.abs(h5["series/liquid_volume_drift"][:]).max() < 1e-12
+        if coupling == "monolithic":  # the other one paints bodies over the flow
+            assert h5["series/divergence_max"][:].max() < 1e-5
+        assert h5["series/cfl"][:].max() <= 0.5 * (1 + 1e-9)
+        b = h5["bodies"]
+        time, x, v = b["time"][:], b["position"][:, 0], b["velocity"][:, 0]
+        step = np.diff(time)[:, None]
+        mean = np.diff(x, axis=0) / step
+        assert np.abs(mean - 0.5 * (v[1:] + v[:-1])).max() < 0.05 * np.abs(v).max()
+        assert np.abs(v[time > 0.1 + 1e-9]).max() == 0
+        assert np.abs(b["fluid_force"][:]).max() > 0.1
+
+
+@pytest.mark.parametrize("physics", ["dry", "coupled"])
+def test_restart_changes_no_bit(physics: str, tmp_path: Path) -> None:
+    """Gone on with from the restart file before the last, in the middle of the motion."""
+    head = WET if physics == "coupled" else DRY.replace(" /", "  restart_interval = 0.02 /", 1)
+    case = (head + PLATE + MOVED.format(more="") + CUBE.replace("0.06,", "0.10,")).format(end=0.09)
+    run(tmp_path, case, DOOR).close()
+    files = sorted((tmp_path / "mics-out").glob("restart-?.h5"), key=lambda p: p.stat().st_mtime)
+    assert len(files) == 2
+    done = mics(tmp_path, case, DOOR, "--restart", str(files[0]), "--output", "again")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as whole, \
+            h5py.File(tmp_path / "again" / "run.h5") as parts:  # fmt: skip
+        assert len(whole["bodies/time"]) == len(parts["bodies/time"])
+        for name in ("time", "position", "quaternion", "velocity", "contact_force", "fluid_force"):
+            one, other = whole[f"bodies/{name}"][:], parts[f"bodies/{name}"][:]
+            assert np.array_equal(one, other, equal_nan=True), name
+    other = DOOR.replace("0.07,", "0.071,")
+    done = mics(tmp_path, case, other, "--restart", str(files[0]), "--output", "third")
+    assert done.returncode == 2 and "motion" in done.stderr, done.stderr
+
+
+DAMAGED = [
+    ("", "the file is empty"),
+    ("time,x,y,z\n", "has no rows"),
+    ("time,x,y\n0,1,2\n", "line 1: missing: z"),
+    ("time,x,y,z,w\n0,1,2,3,4\n", "column 5 (w): unknown"),
+    ("time,x,y,z,qw\n0,.05,.04,.05,1\n", "missing: qx"),
+    ("time,x,y,z\n0,1,2\n", "line 2, column 4: 3 cells, but the table has 4 columns"),
+    ("time,x,y,z\n0,.05,a,.05\n", "line 2, column 3 (y) = 'a': must be a number"),
+    ("time,x,y,z\n0,.05,,.05\n", "line 2, column 3 (y) = '': is empty"),
+    ("time,x,y,z\n0,nan,0,.05\n", "line 2, column 2 (x) = 'nan': must be a finite number"),
+    ("time,x,y,z\n0,1e30,0,.05\n", "line 2, column 2 (x) = '1e30': must be 0 or between"),
+    ("time,x,y,z\n1,.05,.04,.05\n1,.05,.04,.05\n", "line 3, column 1 (time) = '1': must be later"),
+    ("time,x,y,z\n1,.05,.04,.05\n\n0,.05,.04,.05\n", "line 4, column 1 (time) = '0'"),
+    ("time,x,y,z,qw,qx,qy,qz\n0,.05,.04,.05,0,0,0,0\n", "line 2, column 5 (qw) = '0'"),
+    (
+        "time,x,y,z,qw,qx,qy,qz\n0,.05,.04,.05,1,0,0,0\n1,.05,.04,.05,0,1,0,0\n",
+        "line 3, column 5 (qw) = '0': turns by 180 degrees since line 2",
+    ),
+    ("\0\1\2", "holds zero bytes"),
+]
+
+
+@pytest.mark.parametrize(("table", "message"), DAMAGED)
+def test_damaged_tables(table: str, message: str, tmp_path: Path) -> None:
+    """Each is refused with its line and column, nothing is written."""
+    done = mics(tmp_path, DRY.format(end=1) + PLATE + MOVED.format(more=""), table)
+    assert done.returncode == 2 and message in done.stderr, done.stderr
+    assert "&body motion = 'way.csv': " in done.stderr and "(line 4)" in done.stderr
+    assert not (tmp_path / "mics-out").exists()
+
+
+def test_all_problems_at_once(tmp_path: Path) -> None:
+    table = "time,x,y,z\n0,a,.04,.05\n1,.05,b,.05\n2,.05,.04,c\n"
+    done = mics(tmp_path, DRY.format(end=1) + PLATE + MOVED.format(more=""), table)
+    assert done.returncode == 2 and done.stderr.count("must be a number") == 3, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("velocity = 1, 0, 0", "&body velocity = 1, 0, 0: has no meaning with motion"),
+        ("position = 0.06, 0.04, 0.05", "has the body at 0.05, 0.04, 0.05 then"),
+        ("quaternion = 1, 0, 0, 0", "has an attitude, and so has the &body"),
+    ],
+)
+def test_what_a_table_takes_over(more: str, message: str, tmp_path: Path) -> None:
+    done = mics(tmp_path, DRY.format(end=1) + PLATE + MOVED.format(more=more), DOOR)
+    assert done.returncode == 2 and message in done.stderr, done.stderr
+
+
+def test_the_same_place_and_free_bodies(tmp_path: Path) -> None:
+    """The place of the table may be repeated; a free body cannot be moved; no such file."""
+    case = DRY.format(end=0.02) + PLATE
+    good = case + MOVED.format(more="position = 0.05, 0.04, 0.05")
+    assert mics(tmp_path / "good", good, DOOR).returncode == 0
+    free = mics(tmp_path / "free", case + MOVED.format(more="").replace("fixed = T", ""), DOOR)
+    assert "needs fixed = .true." in free.stderr and free.returncode == 2
+    none = mics(tmp_path / "none", good.replace("way.csv", "no.csv"), DOOR)
+    assert "there is no such file" in none.stderr and none.returncode == 2
