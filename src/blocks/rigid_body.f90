@@ -112,8 +112,9 @@ contains
     call begin_where_left(case, blocks)
   end subroutine blocks_init
 
-  !> Block b where it is placed, before its release. One that is lowered to its place, or whose
-  !! height what lies there gives, begins with its lowest point at the level of the water.
+  !> Block b where it is placed, before its release. One that is lowered to its place, or to what
+  !! lies there, begins with its lowest point at the level of the water; one that is set on what
+  !! lies there at once waits over the tank.
   subroutine put_block(case, place, b, blocks)
     type(case_t), intent(in) :: case
     type(place_t), intent(in) :: place
@@ -139,23 +140,24 @@ contains
                                                                     -handling%lowering_speed]
       if (blocks%on_ground(b) .or. (handling%lowering_speed > 0.0_wp .and. &
         handling%release == 'place')) blocks%x(3, b) = max(blocks%goal(b), &
-        height_at_level(case, shape, blocks%q(:, b)))
+        height_at_level(case, shape, blocks%q(:, b), handling%lowering_speed > 0.0_wp))
     end associate
   end subroutine put_block
 
   !> Height of the centre of a shape whose lowest point is at the level of the water, or at the top
-  !! of the tank where there is none; below a lid it touches that at most [m].
-  pure function height_at_level(case, shape, q) result(height)
+  !! of the tank where there is none or none is asked for; below a lid it touches that at most [m].
+  pure function height_at_level(case, shape, q, at_water) result(height)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: q(4)
+    logical, intent(in) :: at_water
     real(wp) :: height
     real(wp) :: turn(3, 3), top
 
     turn = rotation_matrix(q)
     top = case%grid%origin(3) + case%grid%length(3)
     height = top
-    if (case%run%physics /= 'dry' .and. .not. case%fluid%single_phase &
+    if (at_water .and. case%run%physics /= 'dry' .and. .not. case%fluid%single_phase &
         .and. is_given(case%fluid%water_level)) height = min(top, case%fluid%water_level)
     height = height + reach_along(shape, -turn(3, :))
     if (is_wall(side_code(case%boundary%kind(2, 3)))) height = min(height, &
