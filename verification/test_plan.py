@@ -173,6 +173,14 @@ def test_falls_are_foreseen(tmp_path: Path) -> None:
     assert "Falls" not in plan_of(tmp_path, "&body shape = 'cube' position = 2,2,2 fixed = T /")
 
 
+def test_a_block_on_a_crane_does_not_fall(tmp_path: Path) -> None:
+    lowered = CUBE + "2, 2, 3  lowering_speed = 0.5  release = "
+    plan = plan_of(tmp_path, lowered + "'height'  release_height = 0.2 /")
+    assert "lowered at 0.5 m/s, let go 0.2 m over what lies below" in plan
+    assert "meets the" not in plan
+    assert "where it touches" in plan_of(tmp_path, lowered + "'touch' /")
+
+
 def test_a_drop_far_above_the_tank_is_asked_about(tmp_path: Path) -> None:
     """From half its height on."""
     assert "warning" not in plan_of(tmp_path, f"{CUBE} 2, 2, 6.4 /")

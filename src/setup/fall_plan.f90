@@ -23,7 +23,7 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
-    logical :: under_water
+    logical :: under_water, any_falls
     integer :: i, b
 
     b = 0
@@ -37,15 +37,21 @@ contains
     if (size(case%drop) == 0 .and. b == 0) return
     call heading(unit, 'Falls')
     under_water = .false.
+    any_falls = .false.
     if (b > 0) call print_fall('&body', place_of_body(case%body(b)), case%body(b)%line, 1)
     do i = 1, min(size(case%drop), max_told)
-      call print_fall('&drop', place_of_block(case%drop(i), 1), case%drop(i)%line, &
-                      case%drop(i)%count)
+      if (case%drop(i)%handling%lowering_speed > 0.0_wp) then
+        call entry(unit, '&drop on line '//to_text(case%drop(i)%line), to_text( &
+          case%drop(i)%count)//' by crane')
+      else
+        call print_fall('&drop', place_of_block(case%drop(i), 1), case%drop(i)%line, &
+                        case%drop(i)%count)
+      end if
       call print_handling(unit, case%drop(i))
     end do
     if (size(case%drop) > max_told) call entry(unit, '', 'and of ' &
       //to_text(size(case%drop) - max_told)//' more groups &drop')
-    if (gravity_down(case%fluid%gravity) <= 0.0_wp) return
+    if (gravity_down(case%fluid%gravity) <= 0.0_wp .or. .not. any_falls) return
     call entry(unit, 'in air', 'v^2 = v_0^2 + 2 g h, without drag')
     if (.not. under_water) return
     call entry(unit, 'in water, estimates', 'v_t^2 = 2 (s - 1) g V / (C A), ' &
@@ -76,6 +82,7 @@ contains
         call entry(unit, label, start//'is set on what lies there')
         return
       end if
+      any_falls = .true.
       call find_fall(case, place, shapes(s), bed, fall)
       call entry(unit, label, start//start_text(case, bed, fall))
       if (fall%at_surface >= 0.0_wp) call entry(unit, '', 'meets the water at ' &
