@@ -59,12 +59,12 @@ contains
     if (file%file%info /= 0) message = file%file%message
   end subroutine write_set_up
 
-  !> Fixed bodies with a prescribed velocity.
+  !> Fixed bodies with a prescribed velocity, or on a path.
   pure function moves(blocks) result(yes)
     type(blocks_t), intent(in) :: blocks
     logical :: yes(blocks%n)
 
-    yes = blocks%fixed .and. (any(abs(blocks%given%v) > 0.0_wp, 1) &
+    yes = blocks%fixed .and. (blocks%path%n > 0 .or. any(abs(blocks%given%v) > 0.0_wp, 1) &
       .or. any(abs(blocks%given%omega) > 0.0_wp, 1))
   end function moves
 
