@@ -31,6 +31,7 @@ module impulse_step_m
   real(wp), parameter :: margin = 5.0e-3_wp       !! of a touch to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
   real(wp), parameter :: free_way = 0.5_wp        !! covered by the list of pairs, over a reach [-]
+  real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
   real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
 contains
@@ -103,7 +104,8 @@ contains
     associate (s => contacts%touching%surface)
       edge = contacts%smallest_edge
       longest = left
-      if (most*left > free_way*maxval(s%reach)) longest = min(left, &
+      if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
+      if (most*longest > free_way*maxval(s%reach)) longest = min(longest, &
         max(contacts%contact_time, free_way*maxval(s%reach)/most))
       call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
       call renew_pairs(walls, blocks, s)

@@ -5,7 +5,7 @@ import numpy as np
 from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
-VARIES = ("contact restitution",)
+VARIES = ("contact restitution", "contact solver")
 BAND = 0.05
 LATER = 3.0e-3  # s after the contact
 DIAMETER, COARSE = 0.02, 8  # m; cells along it, of the runs with different steps
@@ -31,9 +31,10 @@ def check(runs: list[Run]) -> Checks:
         )
         value = restitution(run)
         cells = round(DIAMETER / float(run.grid.spacing[0]))
-        name = f"step {share:g} contact times, {cells} cells per diameter: restitution"
+        solver = str(run.value("contact", "solver", "springs"))
+        name = f"{solver}, step {share:g} contact times, {cells} cells per diameter: restitution"
         checks.close(name, value, wanted, BAND)
-        if cells == COARSE:
+        if cells == COARSE and solver == "springs":
             found.append((share, value))
         sound(run, checks)
     if not found:
