@@ -146,7 +146,7 @@ contains
       real(wp), intent(in) :: gap, closing   !! [m], [m/s]
 
       if (gap > closing*longest) return
-      longest = min(longest, max(gap/closing, &
+      longest = min(longest, max(max(gap, 0.0_wp)/max(closing, tiny(closing)), &
         min(contacts%contact_time, max_way*edge/max(closing, tiny(closing)))))
     end subroutine limit_by
   end subroutine longest_step
