@@ -141,7 +141,7 @@ def test_older_paraview_gets_blocks_and_fields(loose_pile: Run, tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["--to", "png"], "'png' is none of glb, stl, obj, csv, pvd"),
+    [(["--to", "png"], "'png' is none of glb, stl, shapes, obj, csv, pvd"),
      (["--to", "stl", "--time", "99"], "the run goes from 0 to 8 s"),
      (["--to", "stl", "--final"], "--final is of csv")],
 )  # fmt: skip
