@@ -286,6 +286,16 @@ contains
       *light%density*wet/own_mass(blocks, b)
   end function growth
 
+  !> Mass of block b with the water that it carries [kg].
+  pure real(wp) function loaded_mass(light, blocks, b, wet)
+    type(light_t), intent(in) :: light
+    type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: b
+    real(wp), intent(in) :: wet   !! V_w [m3]
+
+    loaded_mass = own_mass(blocks, b) + light%added(blocks%shape(b))%mass*light%density*wet
+  end function loaded_mass
+
   !> Mass and inertia of a free block with the water that it carries.
   subroutine load_block(b, light, blocks)
     integer, intent(in) :: b
@@ -293,7 +303,7 @@ contains
     type(blocks_t), intent(inout) :: blocks
 
     associate (s => blocks%shape(b))
-      blocks%mass(b) = own_mass(blocks, b) + light%added(s)%mass*light%density*light%wet(b)
+      blocks%mass(b) = loaded_mass(light, blocks, b, light%wet(b))
       blocks%inverse_inertia(:, :, b) = inverse3(blocks%shapes(s)%inertia) &
         /growth(light, blocks, b, light%wet(b))
     end associate
@@ -309,9 +319,8 @@ contains
     type(blocks_t), intent(inout) :: blocks
     real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
 
-    left = blocks%mass(b)
     call load_block(b, light, blocks)
-    left = (left/blocks%mass(b))**entry_loss
+    left = (loaded_mass(light, blocks, b, before)/blocks%mass(b))**entry_loss
     turned = growth(light, blocks, b, before)/growth(light, blocks, b, light%wet(b))
     if (felt .and. light%wet(b) > before) then
       blocks%v(:, b) = light%current + left*(blocks%v(:, b) - light%current)

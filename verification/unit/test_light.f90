@@ -26,6 +26,7 @@ program test_light
   call check_floating()
   call check_neutral()
   call check_entry()
+  call check_let_go()
   call check_spin()
   call check_energy()
   call check_current()
@@ -269,6 +270,34 @@ contains
     call check('leaving the water takes none', abs(blocks%v(3, 1)/want - 1.0_wp) < 1.0e-12_wp)
     call check('nor leaves it any', abs(blocks%mass(1)/own_mass(blocks, 1) - 1.0_wp) < 1.0e-15_wp)
   end subroutine check_entry
+
+  !> A block that a crane has lowered half into the water and lets go loses nothing then.
+  subroutine check_let_go()
+    type(case_t) :: case
+    type(blocks_t) :: blocks
+    type(light_t) :: light
+    logical :: felt(1)
+    real(wp), parameter :: speed = -0.1_wp
+    integer :: i
+
+    call describe(2300.0_wp, [level + 0.5_wp*edge], case)
+    case%body(1)%fixed = .true.
+    case%body(1)%velocity = [0.0_wp, 0.0_wp, speed]
+    call start(case, blocks, light)
+    felt = .false.
+    do i = 1, 10
+      call step(1.0e-2_wp, blocks, felt, light)
+    end do
+    call check('it is half in the water', light%wet(1) > 0.3_wp*edge**3 .and. &
+               light%wet(1) < 0.6_wp*edge**3)
+    call check('a crane moves the block alone', &
+               abs(blocks%mass(1)/own_mass(blocks, 1) - 1.0_wp) < 1.0e-15_wp)
+    blocks%fixed = .false.
+    call step(1.0e-9_wp, blocks, felt, light)
+    call check('let go it carries water', blocks%mass(1) > 1.05_wp*own_mass(blocks, 1))
+    call check('and has kept its speed but for the last step', abs(blocks%v(3, 1)/speed &
+      - 1.0_wp) < 0.02_wp)
+  end subroutine check_let_go
 
   !> Spin: kept by a release in the water, braked by drag, slowed by entry and not by leaving.
   subroutine check_spin()

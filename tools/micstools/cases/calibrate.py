@@ -25,7 +25,8 @@ CELLS = 12  # along the block
 WIDE = 3.0  # tank over the length of the block
 DEEP = (2.5, 6.5)  # depths of the water, likewise: falls in turn
 ABOVE = 1.2  # of the tank over the water, likewise
-SPEEDS = (0.5, 6.0)  # depths of the lowest point that are compared, in lengths
+SPEEDS = 0.5  # way from which on speeds are compared, in lengths
+FILM = 0.25  # of the way over the floor that is left out: water between flat faces brakes
 PLACES = 25  # depths that are compared
 TRIED = np.geomspace(0.25, 2.0, 7)  # drag coefficients
 UPRIGHT = 2  # falls; the others are turned at random
@@ -42,10 +43,11 @@ class Fall:
     depth: Array  # (T) way from where it is let go [m]
     speed: Array  # (T) downwards [m/s]
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        """When it meets the floor [s], and how fast [m/s]."""
-        return float(self.time[-1]), float(self.speed[-1])
+    def at(self, way: float) -> tuple[float, float]:
+        """When it has come so far [s], and how fast it is then [m/s]."""
+        return float(np.interp(way, self.depth, self.time)), float(
+            np.interp(way, self.depth, self.speed)
+        )
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ class Errors:
     """Light over resolved, less one."""
 
     speed: float  # root of the mean square over depths
-    time: float  # to the floor
-    impact: float  # speed at the floor
+    time: float  # to a quarter length above the floor
+    impact: float  # speed there
 
 
 @dataclass(frozen=True)
@@ -83,12 +85,12 @@ def read_fall(folder: Path) -> Fall:
 
 def errors(light: Fall, resolved: Fall, length: float) -> Errors:
     """One fall against another over the depths that both have."""
-    last = min(resolved.depth[-1], light.depth[-1], SPEEDS[1] * length)
-    depths = np.linspace(SPEEDS[0] * length, last, PLACES)
+    last = min(resolved.depth[-1], light.depth[-1]) - FILM * length
+    depths = np.linspace(SPEEDS * length, last, PLACES)
     ratio = np.interp(depths, light.depth, light.speed) / np.interp(
         depths, resolved.depth, resolved.speed
     )
-    (t, v), (time, speed) = light.ends, resolved.ends
+    (t, v), (time, speed) = light.at(last), resolved.at(last)
     return Errors(float(np.sqrt(np.mean((ratio - 1) ** 2))), t / time - 1, v / speed - 1)
 
 
@@ -117,8 +119,8 @@ class Calibration:
         resolved = []
         for n in range(count):
             fall = self.fall(n)
-            time, speed = fall.ends
-            tell(f"fall {n + 1} of {count}: on the floor after {time:.3f} s, at {speed:.3f} m/s")
+            time, speed = fall.at(fall.depth[-1] - FILM * self.length)
+            tell(f"fall {n + 1} of {count}: near the floor after {time:.3f} s, at {speed:.3f} m/s")
             resolved.append(fall)
 
         squares = np.array([
@@ -179,7 +181,7 @@ class Calibration:
             "dt": 0.02 * time,
             "stop_when_settled": True,
             "rest_speed": 0.1 * self.length / time,
-            "rest_time": 0.1 * time,
+            "rest_time": 2.0 * time,  # a block let go is faster by then
             "field_interval": 0.0,
             "restart_interval": 0.0,
         }

@@ -25,7 +25,7 @@ def count(n: int, thing: str, things: str | None = None) -> str:
 
 LIGHT = (
     "No flow was computed: blocks fell in a given water with buoyancy, added mass and a drag "
-    "coefficient. Times and speeds of falls of compact blocks are within some 10 %; wakes, "
+    "coefficient. Times and speeds of falls of compact blocks are within 10 to 20 %; wakes, "
     "tumbling and tilted plates are not in it, and piles are as good as without water, no better."
 )
 
