@@ -294,7 +294,7 @@ def faults(value: Any, rule: dict[str, Any], schema: dict[str, Any], place: str)
     """What does not fit, by the words of JSON schema that the program uses."""
     if "$ref" in rule:
         rule = schema["$defs"][rule["$ref"].rsplit("/", 1)[1]]
-    if "anyOf" in rule:
+    if "anyOf" in rule and "type" not in rule:
         trials = [faults(value, one, schema, place) for one in rule["anyOf"]]
         return [] if [] in trials else trials[-1]
     if "enum" in rule:
@@ -316,9 +316,9 @@ def faults(value: Any, rule: dict[str, Any], schema: dict[str, Any], place: str)
         if not good or value <= rule.get("exclusiveMinimum", -np.inf):
             found.append(f"{place}: {value}")
     if isinstance(value, dict):
-        found += [
-            f"{place} {name}: missing" for name in rule.get("required", []) if name not in value
-        ]
+        ways = [one.get("required", []) for one in rule.get("anyOf", [rule])]
+        if not any(set(way) <= set(value) for way in ways):
+            found.append(f"{place}: none of {ways}")
         for name, inside in value.items():
             one = rule["properties"].get(name)
             found += faults(inside, one, schema, f"{place} {name}") if one else [f"{name}: unknown"]

@@ -85,9 +85,22 @@ contains
       end associate
     end do
     call lines%add_line('      },')
-    if (len(needed) > 0) call lines%add_line('      "required": ['//needed(3:)//'],')
+    if (trim(group%name) == 'drop') then
+      call lines%add_line('      "anyOf": ['//needs('shape position')//', ' &
+        //needs('shapes position')//', '//needs('file')//'],')
+    else if (len(needed) > 0) then
+      call lines%add_line('      "required": ['//needed(3:)//'],')
+    end if
     call lines%add_line('      "additionalProperties": false')
   end subroutine add_group
+
+  !> One of several ways to give what a group needs.
+  pure function needs(names) result(text)
+    character(*), intent(in) :: names   !! separated by blanks
+    character(:), allocatable :: text
+
+    text = '{"required": ['//words_json(names)//']}'
+  end function needs
 
   !> Meaning and unit, for editors that show only the description.
   pure function with_unit(variable) result(text)

@@ -83,6 +83,12 @@ class Draft:
         found: dict[str, Schema] = self.schema["$defs"]
         return found
 
+    def needed(self, group: str) -> list[str]:
+        """Variables that a group must have, where there are several ways by the first."""
+        about = self.groups[group]
+        found: list[str] = about.get("anyOf", [about])[0].get("required", [])
+        return found
+
     def repeats(self, group: str) -> bool:
         """May there be several of it?"""
         return "anyOf" in self.schema["properties"][group]
@@ -137,7 +143,7 @@ class Draft:
         group = str(order["group"])
         if group not in self.groups:
             raise BadRun(f"&{group}: no such group")
-        needed = self.groups[group].get("required", [])
+        needed = self.needed(group)
         given = {name: self._example(group, name) for name in needed} | _FIRST.get(group, {})
         self.text = self.text.rstrip("\n") + "\n\n" + settings.group_text(group, given)
 

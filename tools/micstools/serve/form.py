@@ -33,7 +33,7 @@ def _instance(draft: Draft, group: str, n: int, said: dict[str, str] | None, of:
     if said is None:
         words = "This group cannot be read: mend it in the text."
         return tag("p", words, class_="wrong", data_of=f"{group}.{n}")
-    needed = about.get("required", [])
+    needed = draft.needed(group)
     shown = [name for name in about["properties"] if name in needed or name in said]
     others = [name for name in about["properties"] if name not in shown]
     more = tag(
@@ -69,7 +69,7 @@ def _field(draft: Draft, group: str, n: int, name: str, said: dict[str, str]) ->
     key = f"{group}-{n}-{name}"
     unit = about.get("unit", "")
     label = tag("span", name, tag("small", f" [{unit}]") if unit not in ("", "-") else None)
-    needed = name in draft.groups[group].get("required", [])
+    needed = name in draft.needed(group)
     told = tag("small", class_="wrong", id=f"{key}-wrong", role="alert")
     hint = tag("small", _hint(about, needed), class_="hint-of")
     ours = {"data_group": group, "data_n": n, "data_variable": name, "aria_describedby":
