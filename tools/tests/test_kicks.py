@@ -45,6 +45,7 @@ def falling(step: float = 1e-3, kick: float = 0.0, **other: Any) -> Any:
     }
     return SimpleNamespace(
         value=lambda group, name, default: values.get((group, name), default),
+        physics=values.get(("run", "physics"), "coupled"),
         gravity=np.array([0.0, 0.0, -G]),
         bodies=SimpleNamespace(**(bodies | other)),
         series=SimpleNamespace(dt=np.full(time.size, dt)),

@@ -160,6 +160,8 @@ def test_the_status_says_what_is_there(tmp_path: Path) -> None:
     run = write(tmp_path / "run")
     with h5py.File(run.folder / "run.h5", "r+") as h5:
         h5["bodies/status"] = np.array([2.0, 2, 2, 2, 2, 3, 1])
+        h5["bodies/entry_time"] = h5["bodies/release_time"][:]
+        h5["bodies/raised"] = np.zeros(7)
     found = places.places(Run(run.folder))
     assert [p.x == p.x for p in found] == [True] * 5 + [False] * 2
     assert [p.at_rest for p in found] == [1] * 5 + [0] * 2
