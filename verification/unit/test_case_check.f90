@@ -189,14 +189,14 @@ contains
     call expect(tank//out//'/ &boundary xmin=''open''/', '&boundary xmin = ''open'': unknown ' &
       //'variable, nearest known: x_min (line 4)')
     call expect(tank//out//'colour=1/', '&body colour = 1: unknown variable, nearest known: ' &
-      //'shape (line 4)|'//is_out//' (line 4)')
+      //'motion (line 4)|'//is_out//' (line 4)')
     call expect(tank//out//'positoin=1/', '&body positoin = 1: unknown variable, nearest known: ' &
       //'position (line 4)')
     call expect(tank//two//'velocity=1/', '&body velocity = 1: 1 value given, 3 needed (line 5)')
     call expect(tank//two//'relase_time=1/', '&body relase_time = 1: unknown variable, nearest ' &
       //'known: release_time (line 5)')
     call expect(tank//two//'colour=1/', '&body colour = 1: unknown variable, nearest known: ' &
-      //'shape (line 5)|'//overlap)
+      //'motion (line 5)|'//overlap)
     call expect(run//grid//'&shape name = ''c'' kind = ''cube'' size = 0.02 density=-1 /'//lf//two &
       //'/', '&shape density = -1: must be positive [kg/m3] (line 3)|'//overlap)
     call expect(run//grid//'&shape name = ''c'' kind = ''cube'' /'//lf//two//'/', &
