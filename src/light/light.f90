@@ -47,6 +47,7 @@ module light_m
     real(wp) :: bottom = 0.0_wp                   !! of the tank [m]
     real(wp) :: level = 0.0_wp                    !! [m]
     real(wp), allocatable :: wet(:), wet_before(:)   !! (n) V_w now and in the step before [m3]
+    real(wp), allocatable :: moment(:, :)         !! (3, n) K_w about the centre [m4]
     real(wp), allocatable :: force(:, :)          !! (6, n) buoyancy and drag [N, N m]
     real(wp), allocatable :: start(:, :)
       !! (6, n) velocity and own angular momentum at the start of a step [m/s, kg m2/s]
@@ -61,7 +62,6 @@ contains
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     type(light_t), intent(out) :: light
-    real(wp) :: moment(3)
     integer :: s, b
 
     light%on = .true.
@@ -81,9 +81,11 @@ contains
       end associate
     end do
     allocate (light%wet(blocks%n), light%wet_before(blocks%n), source=0.0_wp)
-    allocate (light%force(6, blocks%n), light%start(6, blocks%n), source=0.0_wp)
+    allocate (light%moment(3, blocks%n), light%force(6, blocks%n), light%start(6, blocks%n), &
+      source=0.0_wp)
     do b = 1, blocks%n
-      if (blocks%present(b)) call submerge(blocks, b, light%level, light%wet(b), moment)
+      if (blocks%present(b)) call submerge(blocks, b, light%level, light%wet(b), &
+                                           light%moment(:, b))
     end do
     light%displaced_start = sum(light%wet)
     light%wet = 0.0_wp   ! felt with the first step, as by a block that is released
@@ -237,11 +239,11 @@ contains
   contains
     !> How much higher the level ought to be for what it makes the blocks displace [m].
     real(wp) function lack_of_level()
-      real(wp) :: ignored(3)
       integer :: b
 
       do b = 1, blocks%n
-        if (blocks%present(b)) call submerge(blocks, b, light%level, light%wet(b), ignored)
+        if (blocks%present(b)) call submerge(blocks, b, light%level, light%wet(b), &
+                                             light%moment(:, b))
       end do
       lack_of_level = 0.0_wp
       if (light%area > 0.0_wp) lack_of_level = light%level_start - light%level &
@@ -336,12 +338,11 @@ contains
     integer, intent(in) :: b
     type(blocks_t), intent(in) :: blocks
     type(light_t), intent(inout) :: light
-    real(wp) :: volume, moment(3), turn(3, 3), force(3), torque(3), height
+    real(wp) :: turn(3, 3), force(3), torque(3), height
 
-    call submerge(blocks, b, light%level, volume, moment)
-    light%force(1:3, b) = -light%density*volume*gravity
-    light%force(4:6, b) = -light%density*cross(moment, gravity)
-    if (volume <= 0.0_wp) return
+    light%force(1:3, b) = -light%density*light%wet(b)*gravity
+    light%force(4:6, b) = -light%density*cross(light%moment(:, b), gravity)
+    if (light%wet(b) <= 0.0_wp) return
     associate (s => blocks%shape(b))
       turn = rotation_matrix(blocks%q(:, b))
       height = light%level - blocks%x(3, b)
