@@ -16,7 +16,7 @@ module impulse_rows_m
   use contact_law_m, only: contact_law_t
   implicit none
   private
-  public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads
+  public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
 
   !> One touch: its frame, the masses it works on, and its impulse, on partner b.
   type :: row_t
@@ -120,7 +120,7 @@ contains
           gap=-touch%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
           friction=merge(law%wall_friction, law%friction, touch%b < 0))
         call weigh(touch%a, touch%b, rows, rows%row(r))
-        rows%closing(r) = dot_product(point_velocity(rows%v, touch%a, touch%b, rows%row(r)), &
+        rows%closing(r) = dot_product(past(rows%v(:, touch%a), rows%v(:, touch%b), rows%row(r)), &
                                       touch%normal)
         rows%largest(r) = 0.0_wp
         rows%total(:, r) = 0.0_wp
@@ -247,15 +247,28 @@ contains
     end do
   end subroutine add_response
 
-  !> Velocity (or way) of partner b past body a at a row: v_b + w_b x r_b - v_a - w_a x r_a.
-  pure function point_velocity(v, a, b, row) result(past)
-    real(wp), intent(in) :: v(:, bed_partner:)   !! (6, partners)
-    integer, intent(in) :: a, b
+  !> Velocity or way of the contact on b past that on a.
+  pure function past(a, b, row) result(v)
+    real(wp), intent(in) :: a(6), b(6)
     type(row_t), intent(in) :: row
-    real(wp) :: past(3)
+    real(wp) :: v(3)
 
-    past = v(1:3, b) - v(1:3, a) + (cross(v(4:6, b), row%arm_b) - cross(v(4:6, a), row%arm_a))
-  end function point_velocity
+    v(1) = (b(1) - a(1)) + b(5)*row%arm_b(3) - b(6)*row%arm_b(2) - a(5)*row%arm_a(3) &
+      + a(6)*row%arm_a(2)
+    v(2) = (b(2) - a(2)) + b(6)*row%arm_b(1) - b(4)*row%arm_b(3) - a(6)*row%arm_a(1) &
+      + a(4)*row%arm_a(3)
+    v(3) = (b(3) - a(3)) + b(4)*row%arm_b(2) - b(5)*row%arm_b(1) - a(4)*row%arm_a(2) &
+      + a(5)*row%arm_a(1)
+  end function past
+
+  !> An impulse along the normal and the tangents of a row in space axes.
+  pure function in_space(part, row) result(p)
+    real(wp), intent(in) :: part(3)   !! [N s]
+    type(row_t), intent(in) :: row
+    real(wp) :: p(3)
+
+    p = part(1)*row%n + part(2)*row%e1 + part(3)*row%e2
+  end function in_space
 
   !> What is remembered of a touch: the force that it bore, and its tangential way. Both lists are
   !! sorted; m is the place in the memory.
@@ -356,7 +369,7 @@ contains
       associate (a => rows%a(k), b => rows%b(k))
         do r = rows%first(k), rows%first(k + 1) - 1
           associate (row => rows%row(r))
-            p = (rows%total(1, r)*row%n + rows%total(2, r)*row%e1 + rows%total(3, r)*row%e2)/step
+            p = in_space(rows%total(:, r), row)/step
             force(:, a) = force(:, a) - p
             force(:, b) = force(:, b) + p
             torque(:, a) = torque(:, a) - cross(row%arm_a, p)
@@ -392,13 +405,13 @@ contains
           memory%key(m) = touch%key
           memory%other(m) = touch%other
           memory%k(m) = 0.0_wp
-          way = point_velocity(rows%way, touch%a, touch%b, row)
+          way = past(rows%way(:, touch%a), rows%way(:, touch%b), row)
           memory%xi(:, m) = 0.0_wp
           if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &
               + way - dot_product(way, row%n)*row%n
           end if
-          p = (row%impulse(1)*row%n + row%impulse(2)*row%e1 + row%impulse(3)*row%e2)/h
+          p = in_space(row%impulse, row)/h
           memory%force(:, m) = -p
           memory%torque_a(:, m) = -cross(row%arm_a, p)
           memory%torque_b(:, m) = cross(row%arm_b, p)

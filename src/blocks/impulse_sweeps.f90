@@ -14,7 +14,7 @@ module impulse_sweeps_m
   use kinds_m, only: wp
   use vectors_m, only: cross
   use bed_m, only: bed_partner
-  use impulse_rows_m, only: row_t, rows_t
+  use impulse_rows_m, only: row_t, rows_t, past, in_space
   implicit none
   private
   public :: solve_rows, restore
@@ -80,11 +80,11 @@ contains
       associate (a => rows%a(k), b => rows%b(k))
         do r = rows%first(k), rows%first(k + 1) - 1
           associate (row => rows%row(r))
-            p = row%impulse(1)*row%n + row%impulse(2)*row%e1 + row%impulse(3)*row%e2
+            p = in_space(row%impulse, row)
             rows%push(:, k) = rows%push(:, k) + p
-            call kick_body(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
+            call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
                            rows%by_contact(:, a))
-            call kick_body(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
+            call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
                            rows%by_contact(:, b))
           end associate
         end do
@@ -93,7 +93,7 @@ contains
   end subroutine apply_remembered
 
   !> Change of the velocity and spin of a body by an impulse at an arm.
-  pure subroutine kick_body(inverse_mass, inverse_inertia, arm, p, v)
+  pure subroutine add_impulse(inverse_mass, inverse_inertia, arm, p, v)
     real(wp), intent(in) :: inverse_mass, inverse_inertia(3, 3)   !! [1/kg], [1/(kg m2)]
     real(wp), intent(in) :: arm(3), p(3)                          !! [m], [N s]
     real(wp), intent(inout) :: v(6)                               !! [m/s], [rad/s]
@@ -104,7 +104,7 @@ contains
     v(1:3) = v(1:3) + inverse_mass*p
     v(4:6) = v(4:6) + (inverse_inertia(:, 1)*twist(1) + inverse_inertia(:, 2)*twist(2) &
                        + inverse_inertia(:, 3)*twist(3))
-  end subroutine kick_body
+  end subroutine add_impulse
 
   !> Begin a sub-sweep: free fall and the impulses of the one before. What `by_contact` holds until
   !! the sub-sweep ends are the velocities without contact.
@@ -192,8 +192,8 @@ contains
         associate (row => rows%row(r))
           call correct(h, push_max, bias, past(wa, wb, row), past(va, vb, row), row, p)
           rows%largest(r) = max(rows%largest(r), row%impulse(1))
-          call kick_body(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, va)
-          call kick_body(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, vb)
+          call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, va)
+          call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, vb)
         end associate
         total = total + p
         change = max(change, (abs(p(1)) + abs(p(2)) + abs(p(3)))*mass)
@@ -204,20 +204,6 @@ contains
       rows%turn(:, k) = rows%turn(:, k) + cross(half_way_past(k, rows), total)
     end associate
   end subroutine solve_pair
-
-  !> Velocity or way of the contact on b past that on a.
-  pure function past(a, b, row) result(v)
-    real(wp), intent(in) :: a(6), b(6)
-    type(row_t), intent(in) :: row
-    real(wp) :: v(3)
-
-    v(1) = (b(1) - a(1)) + b(5)*row%arm_b(3) - b(6)*row%arm_b(2) - a(5)*row%arm_a(3) &
-      + a(6)*row%arm_a(2)
-    v(2) = (b(2) - a(2)) + b(6)*row%arm_b(1) - b(4)*row%arm_b(3) - a(6)*row%arm_a(1) &
-      + a(4)*row%arm_a(3)
-    v(3) = (b(3) - a(3)) + b(4)*row%arm_b(2) - b(5)*row%arm_b(1) - a(4)*row%arm_a(2) &
-      + a(5)*row%arm_a(1)
-  end function past
 
   !> Correct the impulse of one row: along the normal, then friction with the velocity after that.
   pure subroutine correct(h, push_max, bias, way, v, row, p)
@@ -351,13 +337,13 @@ contains
           k = k + 1
         end do
         associate (row => rows%row(r), own => rows%returned(:, m), a => rows%a(k), b => rows%b(k))
-          p = -own(1)*row%n - own(2)*row%e1 - own(3)*row%e2
+          p = in_space(own, row)
           call bounce(e*rows%closing(r), past(rows%v(:, a), rows%v(:, b), row), row, &
                       rows%total(:, r), own)
-          p = p + own(1)*row%n + own(2)*row%e1 + own(3)*row%e2
-          call kick_body(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
+          p = in_space(own, row) - p
+          call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, &
                          rows%v(:, a))
-          call kick_body(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
+          call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, &
                          rows%v(:, b))
         end associate
       end do
@@ -421,7 +407,7 @@ contains
       end do
       way = half_way_past(k, rows)
       associate (row => rows%row(r), total => rows%total(:, r))
-        p = total(1)*row%n + total(2)*row%e1 + total(3)*row%e2
+        p = in_space(total, row)
         rows%turn(:, k) = rows%turn(:, k) - cross(way, p)
         row%arm_a = row%arm_a - way
         row%arm_b = row%arm_b + way

@@ -11,7 +11,6 @@ module block_groups_m
   use run_groups_m, only: shortest
   use fluid_groups_m, only: lightest
   use value_text_m, only: nearest_name, quoted_text
-  use errors_m, only: to_text
   implicit none
   private
   public :: visit_contact, visit_bed, visit_start, visit_shape, visit_body, visit_drop
