@@ -125,10 +125,17 @@ class Browser:
         self.visit(page.resolve().as_uri(), width, height, dark)
 
     def visit(self, url: str, width: int = 1100, height: int = 800, dark: bool = False) -> None:
-        """Open an address in a window of a size."""
+        """Open an address in a window of a size.
+
+        The page before is left first: what it still asks of a server that has gone is its own.
+        """
         self.look(width, height, dark)
+        self._go_to("about:blank")
         self.errors.clear()
         self.requests.clear()
+        self._go_to(url)
+
+    def _go_to(self, url: str) -> None:
         self.call("Page.navigate", url=url)
         for _ in range(200):
             if self.run("document.readyState") == "complete":
