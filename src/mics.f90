@@ -22,6 +22,7 @@ program mics
   use motion_file_m, only: read_motions
   use reference_m, only: reference_text
   use case_check_m, only: make_shapes, check_case
+  use resolved_width_m, only: check_widths
   use case_plan_m, only: print_plan
   use case_oddities_m, only: find_oddities
   use set_up_file_m, only: write_set_up
@@ -218,6 +219,7 @@ contains
     call read_start(case, shapes, problems)
     call make_bed(case, bed, problems)
     call check_case(case, shapes, bed, problems)
+    call check_widths(case, shapes, problems)
     call check_initial_state(case, problems)
     call check_output(case, options, problems)
     call check_plan_file(problems)
