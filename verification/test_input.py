@@ -19,7 +19,7 @@ GOOD = [*INPUT, *sorted(CASES.glob("*/*.nml"))]
 SERIAL = Machine(ROOT / "mics")
 
 TANK = """&run t_end = 1 /
-&grid cells = 6, 4, 4  length = 0.3, 0.2, 0.2 /
+&grid cells = 15, 10, 10  length = 0.3, 0.2, 0.2 /
 &shape name = 'cube'  kind = 'cube'  size = 0.02 /
 """
 BODY = "&body shape = 'cube'  position = "

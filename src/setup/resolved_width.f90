@@ -33,7 +33,7 @@ contains
       if (shapes(s)%volume > 0.0_wp) width(s) = width_of(shapes(s))
     end do
     do s = 1, size(shapes)
-      if (width(s) >= min_cells_wide*edge) cycle
+      if (width(s)*(1.0_wp + 1.0e-9_wp) >= min_cells_wide*edge) cycle   ! round-off apart
       if (shapes(s)%family /= '') then
         if (s /= minloc(width, 1, shapes%family == shapes(s)%family)) cycle
       end if

@@ -1,12 +1,14 @@
 """Gaps and depths of true shapes at places where they are known."""
 
+import time
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from micstools.reading.overlap import Placed, bed_gap, depth, gap, near_pairs, wall_gaps
+from micstools.reading import overlap
+from micstools.reading.overlap import Placed, apart, bed_gap, depth, gap, near_pairs, wall_gaps
 from micstools.shapes.geometry import quaternion_from_axis
 from micstools.shapes.shape import cube, hexapod
 
@@ -58,6 +60,43 @@ def test_hexapods_lying_in_one_anothers_notches_are_apart() -> None:
     beside = at(h, 0.0201, 0.0201, 0.0201)  # every leg in a notch of the other
     assert depth(at(h, 0, 0, 0), beside) == 0.0
     assert gap(at(h, 0, 0, 0), beside) == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_shadows_bound_the_gap() -> None:
+    """Exactly between faces; never more than the gap of hexapods in any attitude."""
+    c, h, rng = cube(0.02), hexapod(0.02), np.random.default_rng(4)
+    assert apart(at(c, 0, 0, 0), at(c, 0, 0.004, 0.0201)) == pytest.approx(1e-4, rel=1e-5)
+    for _ in range(20):
+        q = rng.normal(size=(2, 4))
+        way = rng.normal(size=3)
+        way *= 0.07 / np.linalg.norm(way)
+        one, other = at(h, 0, 0, 0, q[0]), at(h, *way, q[1])
+        assert apart(one, other) <= gap(one, other) + 1e-9
+
+
+def test_touches_of_a_thousand_cubes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four layers of 250 cubes 5 % of an edge apart; the two lower ones touch."""
+    c, n, count = cube(1.0), 16, 0
+    bodies = {}
+    for level in (0.5, 1.505, 2.55, 3.6):
+        for k in range(250):
+            bodies[count] = at(c, 1.05 * (k % n), 1.05 * (k // n), level)
+            count += 1
+    monkeypatch.setattr(overlap, "present_bodies", lambda run, row: bodies)
+    monkeypatch.setattr(overlap.scales, "reach", lambda run: 1 / 120)
+    sides = dict.fromkeys(WALLS, "open") | {"z_min": "no_slip"}
+    run: Any = SimpleNamespace(
+        period=np.zeros(3), periodic=(False,) * 3, sides=sides,
+        grid=SimpleNamespace(low=np.zeros(3), high=np.full(3, 20.0)),
+        parameters={}, value=lambda *words: words[-1],
+        bed=(np.zeros((0, 3)), np.zeros((0, 3), int)),
+    )  # fmt: skip
+    start = time.process_time()
+    found = overlap.touches(run, -1)
+    assert time.process_time() - start < 4.0, "CPU seconds; 45 with a gap and a depth of each pair"
+    assert sorted(found.blocks) == [(k, k + 250) for k in range(250)]
+    assert list(found.blocks.values()) == pytest.approx([0.005] * 250)
+    assert len(found.walls) == 250
 
 
 def test_pairs_are_near_through_periodic_sides_too() -> None:

@@ -25,6 +25,8 @@ program test_resolved_width
   call expect(rod//there//' fixed=t/', '')
   call expect(rod, '')
   call expect(rod//'&drop shape=''r'' position=0.1, 0.25, 0.1 /', '&shape r is 0.02 m wide')
+  ! one cell to round-off is enough
+  call expect('&shape name=''r'' kind=''cube'' size=0.024999999999 /'//lf//there//'/', '')
   ! a plate may be thinner
   call expect('&shape name=''r'' kind=''box'' size=0.005, 0.1, 0.026 /'//lf//there//'/', '')
   ! the least stone is told once, with the mass that it should have

@@ -7,6 +7,7 @@ these do. All lengths in metres.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from micstools.shapes.geometry import (
     distance_to_triangles,
     inside_tets,
     place,
+    rotation_matrix,
 )
 from micstools.shapes.shape import Shape
 
@@ -36,30 +38,35 @@ class Placed:
         """The block moved by `way` (3) [m]."""
         return replace(self, position=self.position + way)
 
-    @property
+    @cached_property
     def points(self) -> Array:
         """Corners (n, 3) [m]."""
         return place(self.shape.points, self.position, self.quaternion)
 
-    @property
+    @cached_property
     def tets(self) -> Array:
         """Corners of the tetrahedra (k, 4, 3) [m]."""
         return self.points[self.shape.tets]
 
-    @property
+    @cached_property
     def triangles(self) -> Array:
         """Corners of the surface triangles (m, 3, 3) [m]."""
         return self.points[self.shape.triangles]
 
-    @property
+    @cached_property
     def sphere_centres(self) -> Array:
         """Centres of the contact spheres (s, 3) [m]."""
         return place(self.shape.sphere_centre, self.position, self.quaternion)
 
-    @property
+    @cached_property
     def samples(self) -> Array:
         """Many points of the surface (n, 3) [m]."""
         return place(self.shape.samples, self.position, self.quaternion)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Directions (m, 3) across its faces."""
+        return np.asarray(self.shape.normals @ rotation_matrix(self.quaternion).T)
 
 
 def present_bodies(run: Run, row: int) -> dict[int, Placed]:
@@ -114,6 +121,15 @@ def near_pairs(
             yield i, numbers[n + 1 + int(k)]
 
 
+def apart(a: Placed, b: Placed) -> float:
+    """A bound of the distance of two blocks from below [m]: the widest gap between their shadows on
+    the normals of their faces; negative where there is none."""
+    normal = np.concatenate([a.normals, b.normals])
+    one, other = a.points @ normal.T, b.points @ normal.T
+    gaps = np.maximum(other.min(axis=0) - one.max(axis=0), one.min(axis=0) - other.max(axis=0))
+    return float(gaps.max())
+
+
 def gap(a: Placed, b: Placed) -> float:
     """Least distance between the surfaces of two blocks [m]; exact where they do not overlap.
 
@@ -121,10 +137,9 @@ def gap(a: Placed, b: Placed) -> float:
     edges, and only corners and edges at which the surface bends count.
     """
     pa, pb = a.points, b.points
-    corners_a, corners_b = np.unique(a.shape.edges), np.unique(b.shape.edges)
     return min(
-        float(distance_to_triangles(pa[corners_a], b.triangles).min()),
-        float(distance_to_triangles(pb[corners_b], a.triangles).min()),
+        float(distance_to_triangles(pa[a.shape.corners], b.triangles).min()),
+        float(distance_to_triangles(pb[b.shape.corners], a.triangles).min()),
         distance_between_segments(pa[a.shape.edges], pb[b.shape.edges]),
     )
 
@@ -178,7 +193,7 @@ def bed_gap(body: Placed, facets: Array, reach: float, spheres: bool = False) ->
     points = body.points
     edges = facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 3)
     return min(
-        float(distance_to_triangles(points[np.unique(body.shape.edges)], facets).min()),
+        float(distance_to_triangles(points[body.shape.corners], facets).min()),
         float(distance_to_triangles(facets.reshape(-1, 3), body.triangles).min()),
         distance_between_segments(points[body.shape.edges], edges),
     )
@@ -215,8 +230,9 @@ def touches(run: Run, row: int) -> Touches:
     for i, j in near_pairs(run, bodies, reach, balls):
         a = bodies[i]
         b = nearest(run, bodies[j], a)
-        distance = gap(a, b)
-        if distance > reach and depth(a, b) > 0:
+        far = apart(a, b)
+        distance = far if far > reach else gap(a, b)
+        if far <= reach < distance and depth(a, b) > 0:
             distance = 0.0
         if distance > reach and i in balls and j in balls:
             distance = sphere_gap(a, b)

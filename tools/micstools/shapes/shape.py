@@ -33,6 +33,21 @@ class Shape:
         return feature_edges(self.points, self.triangles)
 
     @cached_property
+    def corners(self) -> IntArray:
+        """Points (n) at which these meet."""
+        return np.unique(self.edges)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Directions (m, 3) across its faces, each once, of either sense."""
+        a, b, c = (self.points[self.triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        first = np.abs(np.round(normal, 6)) > 0
+        sign = np.sign(np.take_along_axis(normal, first.argmax(axis=1)[:, None], axis=1))
+        return np.asarray(np.unique(np.round(sign * normal, 6), axis=0))
+
+    @cached_property
     def radius(self) -> float:
         """Radius of the sphere about the centroid that holds the block [m]."""
         return float(np.linalg.norm(self.points, axis=1).max())
