@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from micstools import cli
-from micstools.piles import maps, pile_numbers
+from micstools.piles import layer, maps, pile_numbers
 from micstools.reading.overlap import Placed, present_bodies, sphere_gap, touches
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
@@ -37,6 +37,22 @@ def test_stacked_cubes(make_run) -> None:
     low, high = np.array(found.box[:3]), np.array(found.box[3:])
     assert low == pytest.approx((0.02, 0.02, 0.0))
     assert found.porosity == pytest.approx(1 - 7 * EDGE**3 / np.prod(high - low))
+
+
+def test_a_door_is_no_part_of_the_pile(make_run) -> None:
+    """One of the fixed cubes is moved by a table and hangs high: neither pile nor ground."""
+    places = [(np.array([0.2, 0.03, EDGE / 2]), UPRIGHT)]
+    run = make_run(Motion(shape=shapes.cube(EDGE), places=places, history_step=0.05))
+    with h5py.File(run.folder / "run.h5", "r+") as h5:
+        h5["bodies/position"][:, 1] = (0.2, 0.03, 0.15)
+        about = h5["provenance"].attrs
+        one, two, rest = str(about["parameters"]).split("fixed = .true. /", 2)
+        about["parameters"] = f"{one}fixed = .true. /{two}fixed = .true. motion = 'd.csv' /{rest}"
+    run = Run(run.folder)
+    found = pile_numbers.numbers(run, step=0.001)
+    assert (found.blocks, found.height) == (3, pytest.approx(run.points(0, -1)[:, 2].max()))
+    units, ground = layer.parted(run)
+    assert (sorted(units), ground) == ([0, 2, 3], {})
 
 
 def test_blocks_on_a_bed_lie_on_the_floor(make_run) -> None:

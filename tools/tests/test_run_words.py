@@ -9,6 +9,7 @@ import pytest
 from micstools.pages import run_words
 from micstools.reading.reader import Run
 from micstools.reading.units import LABORATORY, SITE
+from micstools.shapes import shape as shapes
 from synthetic import Motion
 
 
@@ -101,3 +102,20 @@ def test_blocks_that_waited_are_mentioned(make_run) -> None:
     object.__setattr__(run.bodies, "release_time", late)
     words = run_words.blocks(run, LABORATORY)
     assert words.endswith("Blocks waited for room: the last was let go at t = 6.5 s.")
+
+
+def test_stones_of_a_family_are_one_sentence() -> None:
+    """Not one for each of them; a block of its own keeps its sentence."""
+    stones = {f"rock-{k}": shapes.cube(0.8 + 0.2 * k, density=2500.0) for k in (1, 2)}
+    door = {"door": shapes.cube(3.0)}
+    groups = [{"name": "rock", "kind": "rock"}, {"name": "door", "kind": "cube"}]
+    run: Any = SimpleNamespace(
+        bodies=SimpleNamespace(shape=["door", "rock-1", "rock-2", "rock-1"]),
+        shapes=stones | door,
+        parameters={"shape": groups},
+    )
+    found = [text.replace("\u00a0", " ") for text in run_words.shapes(run, SITE)]
+    assert found[0] == (
+        "2 stones of 'rock' have masses of 2.5 to 4.32 t and are 1 to 1.2 m long (2500 kg/m³)."
+    )
+    assert len(found) == 2 and found[1].startswith("A block 'door' (cube) measures 3 x 3 x 3 m")

@@ -1,6 +1,7 @@
 """The case and the end of a run in words."""
 
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -43,9 +44,20 @@ def capital(text: str) -> str:
 
 
 def shapes(run: Run, units: Units) -> list[str]:
-    """A sentence for each shape that is used."""
-    found = []
+    """A sentence for each shape that is used, one for all stones of a family."""
+    found, stones = [], _stones(run)
+    for family, members in stones.items():
+        mass = [run.shapes[name].volume * run.shapes[name].density for name in members]
+        length = [run.shapes[name].length for name in members]
+        found.append(
+            f"{len(members)} stones of '{family}' have masses of {units.mass.figure(min(mass))} to "
+            f"{units.mass.text(max(mass))} and are {units.length.figure(min(length))} to "
+            f"{units.length.text(max(length))} long ({run.shapes[members[0]].density:.0f} kg/m³)."
+        )
+    told = [name for members in stones.values() for name in members]
     for name in dict.fromkeys(run.bodies.shape):
+        if name in told:
+            continue
         shape = run.shapes[name]
         size = units.length.row(np.ptp(shape.points, axis=0), " x ")
         form = _kind(run, name)
@@ -56,6 +68,16 @@ def shapes(run: Run, units: Units) -> list[str]:
             f"{units.mass.text(shape.volume * shape.density)} ({shape.density:.0f} kg/m³)."
         )
     return found
+
+
+def _stones(run: Run) -> dict[str, list[str]]:
+    """The stones in use of each family of which there are several."""
+    used = sorted(set(run.bodies.shape))
+    families = [str(s.get("name")).strip() for s in run.parameters.get("shape", [])
+                if str(s.get("kind")).strip() == "rock"]  # fmt: skip
+    found = {f: [name for name in used if re.fullmatch(rf"{re.escape(f)}-\d+", name)]
+             for f in families}  # fmt: skip
+    return {family: members for family, members in found.items() if len(members) > 1}
 
 
 def _kind(run: Run, name: str) -> str:

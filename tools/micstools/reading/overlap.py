@@ -80,6 +80,13 @@ def present_bodies(run: Run, row: int) -> dict[int, Placed]:
     }
 
 
+def machines(run: Run) -> set[int]:
+    """Numbers of the bodies that a table moves: doors, pushers, paddles. They are no part of a
+    pile, nor of the ground."""
+    bodies = run.parameters.get("body", [])
+    return {k for k, body in enumerate(bodies) if str(body.get("motion") or "").strip()}
+
+
 def images(run: Run, bodies: Iterable[Placed]) -> list[Placed]:
     """Bodies as the tank shows them: with the images of those that cross a periodic side."""
     found = list(bodies)
