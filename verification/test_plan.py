@@ -115,6 +115,19 @@ def test_the_bed_is_no_water(heights: str, volume: float, tmp_path: Path) -> Non
     assert "water level 2 m; 32 m3 below it, bodies included" in plan_of(tmp_path, "")
 
 
+def test_places_far_from_zero_keep_their_digits(tmp_path: Path) -> None:
+    """Coordinates of a survey are told to a ten-thousandth of the tank."""
+    text = """&run t_end = 1 /
+&grid cells = 8, 8, 8  length = 4, 4, 4  origin = 354207.125, 5621083.5, 1012.25 /
+&fluid water_level = 1014.375 /
+"""
+    done = mics(["--check"], tmp_path, text)
+    assert (done.returncode, done.stderr) == (0, "")
+    said = " ".join(done.stdout.split())
+    assert "lower corner 354207.125, 5621083.5, 1012.25 m" in said
+    assert "water level 1014.375 m;" in said
+
+
 def test_a_box_of_water_has_a_volume(tmp_path: Path) -> None:
     """The part of it in the tank; several may overlap."""
     box = "&water min = -1, 0, 0  max = 2, 4, 1 /"

@@ -17,7 +17,7 @@ module case_plan_m
   use wave_step_m, only: gravity_step, capillary_step
   use machine_memory_m, only: available_memory
   use memory_plan_m, only: planned_memory, size_text
-  use plan_text_m, only: heading, entry, left, right, triple, count_text
+  use plan_text_m, only: heading, entry, left, right, triple, place_text, count_text
   use bed_measure_m, only: bed_volume
   use fall_m, only: has_level
   use fall_plan_m, only: print_falls
@@ -90,7 +90,7 @@ contains
 
     call heading(unit, 'Tank')
     call entry(unit, 'length', triple(case%grid%length)//' m')
-    call entry(unit, 'lower corner', triple(case%grid%origin, ', ')//' m')
+    call entry(unit, 'lower corner', place(1)//', '//place(2)//', '//place(3)//' m')
     do d = 1, 3
       call entry(unit, 'sides in '//axis(d), trim(case%boundary%kind(1, d))//' and ' &
                  //trim(case%boundary%kind(2, d)))
@@ -101,6 +101,13 @@ contains
                  //to_text(product(n)))
     end associate
     call entry(unit, 'spacing', triple(case%grid%length/real(case%grid%cells, wp))//' m')
+  contains
+    function place(d) result(text)
+      integer, intent(in) :: d
+      character(:), allocatable :: text
+
+      text = place_text(case%grid%origin(d), case%grid%length)
+    end function place
   end subroutine print_grid
 
   subroutine print_bed(unit, case, bed)
@@ -113,7 +120,8 @@ contains
     high = maxval(bed%point, 2)
     call entry(unit, 'bed from', told_file(case%bed%folder, trim(case%bed%file))//', ' &
                //to_text(bed%n_given)//' facets, ' &
-               //'heights from '//brief(low(3))//' to '//brief(high(3))//' m')
+               //'heights from '//place_text(low(3), case%grid%length)//' to ' &
+               //place_text(high(3), case%grid%length)//' m')
   end subroutine print_bed
 
   subroutine print_liquid(unit, case, bed)
@@ -126,8 +134,8 @@ contains
     call heading(unit, 'Fluid')
     if (.not. has_flow(case%run)) then
       call entry(unit, 'liquid', brief(case%fluid%liquid_density)//' kg/m3')
-      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; rises by what is ' &
-        //'displaced, if no side is open')
+      call entry(unit, 'water level', place_text(case%fluid%water_level, case%grid%length) &
+                 //' m; rises by what is displaced, if no side is open')
       call entry(unit, 'current', triple(case%fluid%velocity, ', ')//' m/s')
       return
     end if
@@ -149,8 +157,8 @@ contains
         volume = volume - bed_volume(bed, case%grid%origin, high)
         without = ' without the bed'//without
       end if
-      call entry(unit, 'water level', brief(case%fluid%water_level)//' m; '//brief(volume) &
-                 //' m3 below it'//without)
+      call entry(unit, 'water level', place_text(case%fluid%water_level, case%grid%length)//' m; ' &
+                 //brief(volume)//' m3 below it'//without)
     end if
     if (size(case%water) == 1 .and. .not. bed%there) then
       volume = product(max(0.0_wp, min(case%water(1)%max, case%grid%origin + case%grid%length) &

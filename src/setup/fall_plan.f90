@@ -8,7 +8,7 @@ module fall_plan_m
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
   use fall_m, only: fall_t, find_fall, gravity_down
-  use plan_text_m, only: heading, entry
+  use plan_text_m, only: heading, entry, place_text
   implicit none
   private
   public :: print_falls
@@ -147,7 +147,7 @@ contains
 
     lower = case%grid%origin(3)
     if (fall%has_floor) lower = fall%floor
-    text = 'lowest point at '//brief(fall%bottom, 3)//' m'
+    text = 'lowest point at '//place_text(fall%bottom, case%grid%length)//' m'
     if (fall%has_floor) text = 'lowest point '//brief(fall%bottom - fall%floor, 3) &
       //' m above the '//ground(bed, fall, case)
     if (fall%has_water) then

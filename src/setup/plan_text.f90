@@ -2,9 +2,10 @@
 module plan_text_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
+  use value_text_m, only: fixed_text
   implicit none
   private
-  public :: heading, entry, left, right, triple, count_text
+  public :: heading, entry, left, right, triple, place_text, count_text
 
   integer, parameter :: label_width = 24      !! columns of the names
 
@@ -54,6 +55,19 @@ contains
     if (present(between)) gap = between
     text = brief(x(1))//gap//brief(x(2))//gap//brief(x(3))
   end function triple
+
+  !> A coordinate to a ten-thousandth of the tank, however far from zero the tank lies.
+  pure function place_text(x, length) result(text)
+    real(wp), intent(in) :: x           !! [m]
+    real(wp), intent(in) :: length(3)   !! of the tank [m]
+    character(:), allocatable :: text
+    character(400) :: buffer
+    real(wp) :: rounded
+
+    buffer = fixed_text(x, max(1, 4 - floor(log10(maxval(length)))))
+    read (buffer, *) rounded
+    text = to_text(rounded)
+  end function place_text
 
   !> A count that may be too large for an integer, rounded down with a little tolerance.
   pure function count_text(x) result(text)

@@ -18,7 +18,7 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 CASE = """\
 &run title = 'synthetic' t_end = {t_end} /
-&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = {tank} /
+&grid cells = {cells[0]}, {cells[1]}, {cells[2]}  length = {tank}  origin = {origin} /
 &fluid water_level = {level} /
 &shape name = 'hexapod' kind = 'hexapod' size = {size} /
 """
@@ -60,6 +60,7 @@ class Motion:
     turn_in_fall: float = 0.0  # degrees before the first touch
     more: str = ""  # groups of the case
     scale: float = 1.0  # of all lengths; times, speeds, forces and energies follow (Froude)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # lower corner of the tank [m]
 
 
 def write_run(folder: Path, motion: Motion | None = None) -> Path:
@@ -79,6 +80,8 @@ def write_run(folder: Path, motion: Motion | None = None) -> Path:
     _write_fields(folder / "fields.vtkhdf", motion, time, position, quaternion)
     if motion.scale != 1.0:
         _enlarge(folder, motion.scale)
+    if any(motion.origin):
+        _move(folder, motion.origin)
     return folder
 
 
@@ -108,6 +111,16 @@ def _enlarge(folder: Path, scale: float) -> None:
             h5.visititems(grow)
 
 
+def _move(folder: Path, origin: tuple[float, float, float]) -> None:
+    """The lower corner of the tank to `origin`."""
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        for axis, by in zip("xyz", origin, strict=True):
+            h5[f"grid/{axis}"][...] += by
+        h5["bodies/position"][...] += origin
+    with h5py.File(folder / "fields.vtkhdf", "r+") as h5:
+        h5["VTKHDF"].attrs["Origin"] = np.array(origin)
+
+
 def _paths(motion: Motion, time: Array) -> tuple[Array, Array, Array]:
     n = 3 + len(motion.places)
     position, quaternion = np.zeros((len(time), n, 3)), np.zeros((len(time), n, 4))
@@ -131,13 +144,15 @@ def _paths(motion: Motion, time: Array) -> tuple[Array, Array, Array]:
 def _write_provenance(h5: h5py.File, motion: Motion) -> None:
     scale = motion.scale
 
-    def row(*values: float) -> str:
-        return ", ".join(f"{scale * v:.10g}" for v in values)
+    def point(*values: float) -> str:
+        at = zip(motion.origin, values, strict=True)
+        return ", ".join(f"{low + scale * v:.14g}" for low, v in at)
 
-    case = CASE.format(cells=motion.cells, level=scale * motion.level, tank=row(*TANK),
-                       size=0.02 * scale, t_end=motion.t_end * scale**0.5)  # fmt: skip
-    case += "".join(BODY.format(row(x, 0.05, 0.0288675)) for x in (0.09, 0.15, 0.21))
-    start = row(0.15, 0.05, 0.16)
+    case = CASE.format(cells=motion.cells, level=motion.origin[2] + scale * motion.level,
+                       tank=", ".join(f"{scale * v:.10g}" for v in TANK), size=0.02 * scale,
+                       origin=point(0, 0, 0), t_end=motion.t_end * scale**0.5)  # fmt: skip
+    case += "".join(BODY.format(point(x, 0.05, 0.0288675)) for x in (0.09, 0.15, 0.21))
+    start = point(0.15, 0.05, 0.16)
     case += "".join(DROP.format(start, k * scale**0.5) for k in range(len(motion.places)))
     case += motion.more
     h5.create_group("provenance").attrs.update(

@@ -13,7 +13,7 @@ import trimesh
 from micstools import cli
 from micstools.pictures import exports, scene
 from micstools.reading.reader import Run
-from synthetic import Motion
+from synthetic import Motion, write_run
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())
 
@@ -118,6 +118,18 @@ def test_other_programs_read_the_film(loose_pile: Run, tmp_path: Path) -> None:
     turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
     wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
     assert found.bounds == pytest.approx(wanted, abs=1e-6)
+
+
+def test_a_film_keeps_the_coordinates_of_a_survey(tmp_path: Path) -> None:
+    """Places count from a node at the corner of the tank: single precision holds them there."""
+    corner = (354200.0, 5621080.0, -12.0)
+    run = Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=corner)))
+    path = exports.to_glb(run, 0, tmp_path)
+    assert parts_of(path)[0]["nodes"][-1]["translation"] == [354200.0, -12.0, -5621080.0]
+    points = np.concatenate([run.points(k, 0) for k in range(9)])
+    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+    wanted = np.array([turned.min(axis=0), turned.max(axis=0)])
+    assert np.abs(trimesh.load(path).bounds - wanted).max() < 1e-5
 
 
 @can_draw

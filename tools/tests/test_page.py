@@ -18,7 +18,7 @@ from micstools import cli
 from micstools.pages import charts, html, motion, run_page, run_words, views
 from micstools.pages.charts import Curve
 from micstools.piles import maps, pile_numbers
-from micstools.reading import block_numbers
+from micstools.reading import block_numbers, units
 from micstools.reading.overlap import Placed
 from micstools.reading.reader import Run
 from micstools.shapes import shape as shapes
@@ -168,10 +168,39 @@ def test_motions_are_those_of_the_run(loose_pile: Run) -> None:
     place = np.frombuffer(base64.b64decode(scene["place"]), "<f4").reshape(len(rows), b.n, 3)
     turn = np.frombuffer(base64.b64decode(scene["turn"]), "<i2").reshape(len(rows), b.n, 4)
     assert rows[0] == 0 and rows[-1] == len(b.time) - 1
-    assert place == pytest.approx(b.position[rows], abs=1e-7)
+    assert place == pytest.approx(b.position[rows], abs=1e-7)  # the lower corner is at 0
     assert turn / 32767 == pytest.approx(b.quaternion[rows], abs=2e-5)
     assert np.diff(b.time[rows]).max() <= 1.5 / motion.FRAMES_A_SECOND
     assert [body["release"] for body in scene["bodies"]][:4] == [0.0, 0.0, 0.0, 0.0]
+
+
+SURVEY = (354200.0, 5621080.0, -12.0)
+"""Where single precision knows places to 3 cm and half a metre."""
+
+
+@pytest.fixture
+def far_pile(tmp_path: Path) -> Run:
+    """A run of 2 m blocks in coordinates of a survey."""
+    return Run(write_run(tmp_path / "far", Motion(scale=100 / 3, origin=SURVEY)))
+
+
+def test_motions_do_not_depend_on_the_origin(far_pile: Run, tmp_path: Path) -> None:
+    near = Run(write_run(tmp_path / "near", Motion(scale=100 / 3)))
+    found, wanted = motion.scene(far_pile), motion.scene(near)
+    assert found["origin"] == list(SURVEY) and found["size"] == pytest.approx(wanted["size"])
+    place = [np.frombuffer(base64.b64decode(s["place"]), "<f4") for s in (found, wanted)]
+    assert place[0] == pytest.approx(place[1], abs=1e-6)
+    for name in ("x", "y"):
+        ends = [np.frombuffer(base64.b64decode(s["water"][name]), "<f4") for s in (found, wanted)]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    assert found["water"]["low"] == pytest.approx(wanted["water"]["low"], abs=1e-9)
+
+
+def test_places_in_a_survey_are_told_to_the_centimetre(far_pile: Run) -> None:
+    said = run_words.drops(far_pile, units.of_run(far_pile))[0]
+    page = run_page.page(far_pile)
+    assert re.search(r"354206\.\d\d?, 5621082\.\d\d?, -9\.\d\d?", page)  # of a block at the end
+    assert "x\u00a0=\u00a0354205, y\u00a0=\u00a05621081.67, z\u00a0=\u00a0-6.67 m" in said
 
 
 def test_the_surface_is_that_of_the_fields(loose_pile: Run) -> None:

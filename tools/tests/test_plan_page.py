@@ -3,6 +3,7 @@ that it works in a browser without a network."""
 
 import base64
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from browser import MISSING, Browser
 from micstools import cli
 from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import SetUp
+from micstools.reading import units
+from micstools.reading.reader import Grid, Run
 from test_page import scene_of
 
 ROOT = Path(__file__).parents[2]
@@ -96,10 +99,37 @@ def test_the_scene_has_what_comes(found: SetUp, page: Path) -> None:
     assert scene["water"] == {"level": 8}
 
 
-def test_faces_of_many_cells_are_thinned() -> None:
-    faces = np.linspace(0, 1, 1001)
-    assert len(plan_page._faces(faces)) < 160 and plan_page._faces(faces)[0] == 0.007
-    assert plan_page._faces(np.array([0.0, 1.0])) == []
+def test_the_scene_does_not_depend_on_the_origin(found: SetUp) -> None:
+    """Places count from the corner of the tank: single precision would not hold a survey's."""
+    corner = np.array([354200.0, 5621080.0, -12.0])
+
+    def moved(group: re.Match[str]) -> str:
+        place = np.array([float(v) for v in group[2].split(",")]) + corner
+        return group[1] + ", ".join(repr(v) for v in place.tolist())
+
+    text = re.sub(r"((?:position|min|max) = )([\d., ]+\d)", moved, CASE)
+    text = text.replace("24, 12, 8 /", "24, 12, 8  origin = 354200, 5621080, -12 /")
+    with set_up.read(MICS, text.replace("water_level = 9", "water_level = -3")) as far:
+        seen, wanted = plan_page.scene(far), plan_page.scene(found)
+        row = plan_page._row(far, [2], units.SITE, "#000000")
+    place = [np.frombuffer(base64.b64decode(s["place"]), "<f4") for s in (seen, wanted)]
+    assert place[0] == pytest.approx(place[1], abs=1e-5)
+    assert seen["water"] == pytest.approx(wanted["water"])
+    for name in ("cells", "reach", "liquid"):
+        for a, b in zip(seen["plan"][name], wanted["plan"][name], strict=True):
+            assert np.array(a) == pytest.approx(np.array(b), abs=1e-6), name
+    for a, b in zip(seen["plan"]["ways"], wanted["plan"]["ways"], strict=True):
+        assert np.array(a["way"]) == pytest.approx(np.array(b["way"]), abs=1e-6)
+    ends = [[m["at"] for m in s["plan"]["marks"] if m["at"]] for s in (seen, wanted)]
+    assert ends[0] == ends[1]
+    assert "354206, 5621083, -7" in row
+
+
+def test_faces_of_many_cells_are_thinned(loose_pile: Run) -> None:
+    many, one = np.linspace(3, 4, 1001), np.array([0.0, 1.0])
+    loose_pile.__dict__["grid"] = Grid(many, one, one)
+    x, *others = plan_page._cells(loose_pile)
+    assert len(x) < 160 and x[0] == 0.007 and others == [[], []]
 
 
 def test_the_plan_is_told_in_words(found: SetUp, page: Path) -> None:

@@ -209,6 +209,23 @@ def test_a_length_is_measured(browser: Browser, page: Path) -> None:
 
 
 @in_browser
+def test_places_are_those_of_a_survey(browser: Browser, tmp_path: Path) -> None:
+    """What is pointed at is told to the centimetre, where single precision knows half a metre."""
+    corner = np.array([354200.0, 5621080.0, -12.0])
+    folder = write_run(tmp_path / "far", Motion(t_end=0.1, scale=100 / 3, origin=tuple(corner)))
+    browser.open(save(Run(folder), tmp_path / "far.html"))
+    view(browser, "top")
+    box = browser.run("(r => [r.x, r.y])(document.querySelector('.stage').getBoundingClientRect())")
+    seen = [p + edge for p, edge in zip(at(browser, [5.0, 2.0, 0.0]), box, strict=True)]
+    browser.mouse("mouseMoved", *seen)
+    settled(browser)
+    x, y = (float(v.split()[1]) for v in browser.run("runPlayer.stage.overlay.told").split(","))
+    pixel = browser.run("2 * runPlayer.stage.half / runPlayer.stage.canvas.clientHeight")
+    assert abs(x - 354205) < pixel and abs(y - 5621082) < pixel
+    assert browser.errors == []
+
+
+@in_browser
 def test_lengths_have_the_unit_of_the_page(browser: Browser, page: Path) -> None:
     """What is below a metre is told in m beside blocks of metres, as all else on the page."""
     browser.open(page)

@@ -234,7 +234,7 @@ def _plan(ensemble: Ensemble) -> Markup:
 
 def _landings(ensemble: Ensemble) -> Markup:
     """Where each unit lands, for each choice of the varied variables."""
-    length, parts = ensemble.units.length, []
+    length, place, parts = ensemble.units.length, ensemble.units.place, []
     heads: list[object] = ["unit", "landings", f"mean x, y [{length.name}]",
                            f"half axes of the ellipse [{length.name}]", "long one heads [°]",
                            "within the tolerance"]  # fmt: skip
@@ -247,7 +247,7 @@ def _landings(ensemble: Ensemble) -> Markup:
             [
                 f"{k.unit} {k.name}".strip(),
                 k.landings,
-                f"{length.figure(k.x, 4)}, {length.figure(k.y, 4)}",
+                f"{place.figure(k.x)}, {place.figure(k.y)}",
                 f"{length.figure(k.long)}, {length.figure(k.short)}",
                 number(k.heading_deg, ".0f"),
                 in_words(k.within.count, k.within.units),

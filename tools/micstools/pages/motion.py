@@ -71,7 +71,7 @@ def blocks(run: Run, rows: IntArray) -> dict[str, Any]:
             for k in range(b.n)
         ],
         "times": packed(b.time[rows], "f4"),
-        "place": packed(run.into_tank(b.position[rows]), "f4"),
+        "place": packed(run.into_tank(b.position[rows]) - run.grid.low, "f4"),
         "turn": packed(np.round(32767 * unit(b.quaternion[rows])), "i2"),
         "speed": packed(np.round(255 * np.nan_to_num(speed) / fastest), "u1"),
         "fastest": fastest,
@@ -109,17 +109,22 @@ def unit(quaternion: Array) -> Array:
 
 def tank(run: Run, north: float | None = None) -> dict[str, Any]:
     """What stands still: the tank, the bed, and the shapes. `north`: its direction in the plan,
-    degrees from +y towards +x; +y where it is not known."""
+    degrees from +y towards +x; +y where it is not known. Places count from the lower corner of the
+    tank, the `origin`: single precision would not hold coordinates of a survey."""
     points, triangles = bed(run)
-    unit = units.of_run(run).length
+    shown, low = units.of_run(run), run.grid.low
     return {
-        "unit": {"name": unit.name, "size": unit.size},
+        "unit": {
+            "name": shown.length.name,
+            "size": shown.length.size,
+            "decimals": shown.place.decimals,
+        },
         "north": north or 0.0,
         "period": run.period.tolist(),
-        "low": run.grid.low.tolist(),
-        "high": run.grid.high.tolist(),
+        "origin": low.tolist(),
+        "size": (run.grid.high - low).tolist(),
         "shapes": [_surface_of(s.points, s.triangles, s.edges) for s in run.shapes.values()],
-        "bed": _surface_of(points, triangles, triangles[:0]) if len(triangles) else None,
+        "bed": _surface_of(points - low, triangles, triangles[:0]) if len(triangles) else None,
     }
 
 
@@ -197,7 +202,7 @@ def level(run: Run, seen: Columns) -> dict[str, Any] | None:
     if pile.has_level(run):
         return _surface(run, seen)
     still = pile.still_level(run)
-    return None if still is None else {"level": still}
+    return None if still is None else {"level": still - float(run.grid.low[2])}
 
 
 def speeds(run: Run) -> dict[str, Any]:
@@ -258,10 +263,11 @@ def _surface(run: Run, seen: Columns) -> dict[str, Any]:
     low, high = float(height.min()), float(height.max())
     span = high - low or 1.0
     x, y, _ = grid.centres
+    x, y = _to_ends(x[i], grid.x) - grid.x[0], _to_ends(y[j], grid.y) - grid.y[0]
     return {
         "times": packed(times, "f4"),
-        "x": packed(_to_ends(x[i], grid.x), "f4"),
-        "y": packed(_to_ends(y[j], grid.y), "f4"),
+        "x": packed(x, "f4"),
+        "y": packed(y, "f4"),
         "height": packed(np.round(255 * (height - low) / span), "u1"),
         "low": low,
         "span": span,
@@ -277,7 +283,7 @@ def _to_ends(centres: Array, faces: Array) -> Array:
 
 
 def _columns(run: Run, t: float) -> Array:
-    """Height (ny, nx) [m] at which the water of each column would stand; a block counts as the
-    water around it."""
+    """Height (ny, nx) [m] above the floor at which the water of each column would stand; a block
+    counts as the water around it."""
     height = np.diff(run.grid.z)[:, None, None]
-    return np.asarray(run.grid.z[0] + (run.fields_at(t).liquid * height).sum(axis=0))
+    return np.asarray((run.fields_at(t).liquid * height).sum(axis=0))

@@ -198,30 +198,32 @@ class Overlay {
   // Coordinates along the lower and the left edge.
   drawRulers() {
     const { stage, wide, high } = this, step = 2 * stage.half / high, [across, upward] = stage.flat;
-    const tick = roundBelow(90 * step), { unit } = stage.scene;
+    const tick = roundBelow(90 * step), { unit, origin } = stage.scene;
     const words = value => `${+(value / unit.size).toFixed(6)}`;
-    const middle = [stage.focus[across], stage.focus[upward]];
-    this.pen.fillStyle = this.paper;
-    this.pen.globalAlpha = 0.75;
-    this.pen.fillRect(0, high - 22, wide, 22);
-    this.pen.fillRect(0, 0, 44, high - 22);
-    this.pen.globalAlpha = 1;
+    const middle = [across, upward].map(d => stage.focus[d] + origin[d]);
     const ticks = (centre, extent) => {
       const found = [];
       for (let k = Math.ceil((centre - extent) / tick); k * tick <= centre + extent; k++) found.push(k * tick);
       return found;
     };
-    for (const value of ticks(middle[0], step * wide / 2)) {
+    const columns = ticks(middle[0], step * wide / 2), rows = ticks(middle[1], step * high / 2);
+    const edge = 12 + Math.max(32, ...rows.map(value => this.pen.measureText(words(value)).width));
+    this.pen.fillStyle = this.paper;
+    this.pen.globalAlpha = 0.75;
+    this.pen.fillRect(0, high - 22, wide, 22);
+    this.pen.fillRect(0, 0, edge, high - 22);
+    this.pen.globalAlpha = 1;
+    for (const value of columns) {
       const x = wide / 2 + (value - middle[0]) / step;
-      if (x < 50 || x > wide - 70) continue;
+      if (x < edge + 6 || x > wide - 70) continue;
       this.line([[x, high - 22], [x, high - 16]], this.ink, 1);
       this.write(words(value), x, high - 8);
     }
-    for (const value of ticks(middle[1], step * high / 2)) {
+    for (const value of rows) {
       const y = high / 2 - (value - middle[1]) / step;
       if (y < 90 || y > high - 30) continue;
-      this.line([[38, y], [44, y]], this.ink, 1);
-      this.write(words(value), 35, y, 'right');
+      this.line([[edge - 6, y], [edge, y]], this.ink, 1);
+      this.write(words(value), edge - 9, y, 'right');
     }
     this.write(`${'xyz'[across]} [${unit.name}]`, wide - 6, high - 8, 'right');
     this.write(`${'xyz'[upward]} [${unit.name}]`, 4, 82, 'left');
@@ -230,7 +232,8 @@ class Overlay {
   // The length that was dragged, and the place under the mouse.
   drawMeasured() {
     const { stage } = this, [across, upward] = stage.flat, names = ['xyz'[across], 'xyz'[upward]];
-    const inUnit = length => inWords(length, stage.scene.unit);
+    const { unit, origin } = stage.scene, inUnit = length => inWords(length, unit);
+    const place = d => `${+((origin[d] + stage.pointed[d]) / unit.size).toFixed(unit.decimals)} ${unit.name}`;
     const { from, to } = stage.measured || {};
     this.told = '';
     if (to && Math.hypot(...to.map((v, i) => v - from[i])) > 0) {
@@ -241,7 +244,7 @@ class Overlay {
       }
       this.told = `${inUnit(Math.hypot(...d))} (${names.map((n, i) => `Δ${n} ${inUnit(d[i])}`).join(', ')})`;
     } else if (stage.pointed)
-      this.told = names.map((n, i) => `${n} ${inUnit(stage.pointed[stage.flat[i]])}`).join(', ');
+      this.told = names.map((n, i) => `${n} ${place(stage.flat[i])}`).join(', ');
     this.write(this.told, 96, 38, 'left');
   }
 }

@@ -15,7 +15,7 @@ class PlanLayer {
     stage.layers.push(this);
   }
 
-  load({ plan, low, high }) {
+  load({ plan, size }) {
     [...(this.faces || []), this.reach, this.boxes].forEach(mesh => this.stage.free(mesh));
     this.plan = plan;
     const corner = (k, box) => [0, 1, 2].map(c => box[k >> c & 1][c]);
@@ -31,11 +31,11 @@ class PlanLayer {
     this.boxes = { ...strips(plan.liquid), faces: this.stage.buffer(liquid, liquid.length / 6) };
     // For each side of the tank the lines on it between two cells, and the way it faces.
     this.faces = [0, 1, 2].flatMap(d => [0, 1].map(end => {
-      const at = [low, high][end][d], ends = [];
+      const at = end * size[d], ends = [];
       for (const [e, f] of [[(d + 1) % 3, (d + 2) % 3], [(d + 2) % 3, (d + 1) % 3]])
-        for (const v of plan.cells[e]) for (const w of [low, high]) {
+        for (const v of plan.cells[e]) for (const w of [0, size[f]]) {
           const p = [0, 0, 0];
-          [p[d], p[e], p[f]] = [at, v, w[f]];
+          [p[d], p[e], p[f]] = [at, v, w];
           ends.push(p);
         }
       return { lines: this.stage.strips(ends), d, outward: 2 * end - 1 };

@@ -135,7 +135,7 @@ def _row(found: SetUp, blocks: list[int], shown: Units, colour: str) -> list[obj
     when = figure(float(due[0]))
     if due[-1] > due[0]:
         when += f" to {figure(float(due[-1]))}"
-    places = [", ".join(length.figure(v, 4) for v in found.place[m]) for m in (k, blocks[-1])]
+    places = [", ".join(shown.place.figure(v) for v in found.place[m]) for m in (k, blocks[-1])]
     where = " → ".join(dict.fromkeys(places))
     random = found.spread[blocks].max(axis=0)
     shift = ", ".join("±" + length.figure(v) if v else "0" for v in random) if random.any() else "–"
@@ -190,7 +190,7 @@ def scene(found: SetUp, north: float | None = None) -> dict[str, Any]:
             packed["bodies"][k]["release"] = 1e-6
     return packed | {
         "plan": {
-            "cells": [_faces(faces) for faces in run.grid.faces] if _wet(run) else [[], [], []],
+            "cells": _cells(run) if _wet(run) else [[], [], []],
             "reach": _reaches(found),
             "liquid": _boxes(run),
             "ways": _ways(found),
@@ -209,10 +209,14 @@ def _wet(run: Run) -> bool:
     return str(run.value("run", "physics", "coupled")).strip() in ("coupled", "fluid")
 
 
-def _faces(faces: Array) -> list[float]:
-    """Faces between cells; every second, third, ... where they are many."""
-    step = max(1, int(np.ceil((len(faces) - 1) / _LINES)))
-    return [round(float(v), 9) for v in faces[step:-1:step]]
+def _cells(run: Run) -> list[list[float]]:
+    """Faces between cells in x, y, z, from the lower corner of the tank [m]; every second, third,
+    ... where they are many."""
+    found = []
+    for faces in run.grid.faces:
+        step = max(1, int(np.ceil((len(faces) - 1) / _LINES)))
+        found.append([round(float(v), 9) for v in faces[step:-1:step] - faces[0]])
+    return found
 
 
 def _water(run: Run) -> dict[str, Any] | None:
@@ -221,11 +225,11 @@ def _water(run: Run) -> dict[str, Any] | None:
         return None
     low, high = float(run.grid.low[2]), float(run.grid.high[2])
     if bool(run.value("fluid", "single_phase", False)):
-        return {"level": high}
+        return {"level": high - low}
     level = run.value("fluid", "water_level", None)
     if level is None or not low < float(level):
         return None
-    return {"level": min(float(level), high)}
+    return {"level": min(float(level), high) - low}
 
 
 def _boxes(run: Run) -> list[list[list[float]]]:
@@ -234,14 +238,15 @@ def _boxes(run: Run) -> list[list[list[float]]]:
         return []
     low, high = run.grid.low, run.grid.high
     return [
-        [np.maximum(box["min"], low).tolist(), np.minimum(box["max"], high).tolist()]
+        [(np.clip(box[end], low, high) - low).tolist() for end in ("min", "max")]
         for box in run.parameters.get("water", [])
     ]
 
 
 def _reaches(found: SetUp) -> list[list[list[float]]]:
     """Two corners [m] of each box that the centroids of blocks to come may start in."""
-    boxes = np.stack([found.place - found.spread, found.place + found.spread], axis=1)
+    place = found.place - found.run.grid.low
+    boxes = np.stack([place - found.spread, place + found.spread], axis=1)
     return [box.tolist() for box in np.unique(boxes[found.spread.any(axis=1)], axis=0)]
 
 
@@ -258,17 +263,17 @@ def _ways(found: SetUp) -> list[dict[str, Any]]:
             tours[-1] += group
         else:
             tours.append(list(group))
-    said = []
+    said: list[tuple[Array, Array, str]] = []
     for tour in tours:
         order = sorted(tour, key=lambda k: float(due[k]))
-        way, when = found.place[order].tolist(), due[order].tolist()
-        if np.ptp(way, axis=0).any():
-            said.append({"way": way, "when": when, "name": f"drops {_span(sorted(tour))}"})
+        said.append((found.place[order], due[order], f"drops {_span(sorted(tour))}"))
     for k in np.flatnonzero(b.fixed):
-        way = b.position[:, k].tolist()
-        if np.ptp(way, axis=0).any():
-            said.append({"way": way, "when": b.time.tolist(), "name": f"body {k + 1}"})
-    return said
+        said.append((b.position[:, k], b.time, f"body {k + 1}"))
+    return [
+        {"way": (way - run.grid.low).tolist(), "when": when.tolist(), "name": name}
+        for way, when, name in said
+        if np.ptp(way, axis=0).any()
+    ]
 
 
 def _span(blocks: list[int]) -> str:
@@ -296,4 +301,4 @@ def _places(run: Run, remark: Remark) -> list[list[float]]:
         middle[2] = np.clip(float(run.value("fluid", "water_level", middle[2])), low[2], high[2])
     elif remark.group != "grid":
         return []
-    return [middle.tolist()]
+    return [(middle - low).tolist()]

@@ -171,7 +171,7 @@ def _places(run: Run, shown: Units) -> Markup:
         [
             p.unit,
             *([p.name] if "name" in heads else []),
-            ", ".join(length.figure(v, 4) for v in (p.x, p.y, p.z)),
+            ", ".join(shown.place.figure(v) for v in (p.x, p.y, p.z)),
             number(p.heading_deg, ".0f"),
             number(p.tilt_deg, ".0f"),
             "fixed" if p.fixed else length.figure(p.deviation),
@@ -225,7 +225,7 @@ def _blocks(run: Run, found: Found) -> Markup:
             figure(k.contact_force / k.weight) if k.weight else "–",
             force.figure(k.fluid_force),
             number(k.turned, ".0f"),
-            ", ".join(length.figure(v, 4) for v in k.place),
+            ", ".join(found.units.place.figure(v) for v in k.place),
         ]
         for k in found.blocks
     ]

@@ -174,9 +174,9 @@ def _places(group: list[dict[str, Any]], units: Units) -> str:
     for axis, low, high, by_chance in zip(
         "xyz", places.min(axis=0), places.max(axis=0), spread, strict=True
     ):
-        text = f"{axis}\u00a0=\u00a0{units.length.figure(low, 4)}"
+        text = f"{axis}\u00a0=\u00a0{units.place.figure(low)}"
         if high - low > 1e-9 * max(abs(low), abs(high)):
-            text += f" to {units.length.figure(high, 4)}"
+            text += f" to {units.place.figure(high)}"
         words.append(text + (f" ± {units.length.figure(by_chance)}" if by_chance else ""))
     several = (places != places[0]).any()
     return ("from " if several else "at ") + ", ".join(words) + f" {units.length.name}"

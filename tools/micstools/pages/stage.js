@@ -1,6 +1,6 @@
 'use strict';
 // Draws blocks, bed, tank and water of a scene at a moment: plain WebGL, nothing loaded. A scene is
-// what motion.py packs. Bed and walls are see-through where they stand before a block.
+// what motion.py packs: places count from the lower corner of the tank, `origin`. Bed and walls are see-through where they stand before a block.
 
 const BLOCK_VERTEX = `
 attribute vec3 place, normal;
@@ -17,11 +17,11 @@ void main() {
 const BLOCK_FRAGMENT = `
 precision highp float;
 uniform vec4 colour;
-uniform vec3 low, high;
+uniform vec3 size;
 uniform float lit, cut;
 varying vec3 facing, here;
 void main() {
-  if (cut > 0.5 && (any(lessThan(here.xy, low.xy)) || any(greaterThan(here.xy, high.xy)))) discard;
+  if (cut > 0.5 && (any(lessThan(here.xy, vec2(0.0))) || any(greaterThan(here.xy, size.xy)))) discard;
   vec3 n = normalize(facing);
   float sky = 0.5 + 0.5 * n.z;
   float sun = max(dot(n, normalize(vec3(-0.45, -0.6, 0.75))), 0.0);
@@ -82,7 +82,7 @@ class Stage {
     this.gl = canvas.getContext('webgl', { alpha: false, antialias: true, stencil: true });
     if (!this.gl) throw new Error('no WebGL');
     this.faces = compile(this.gl, BLOCK_VERTEX, BLOCK_FRAGMENT,
-      ['camera', 'shift', 'turn', 'colour', 'low', 'high', 'lit', 'cut']);
+      ['camera', 'shift', 'turn', 'colour', 'size', 'lit', 'cut']);
     this.edges = compile(this.gl, EDGE_VERTEX, EDGE_FRAGMENT,
       ['camera', 'shift', 'turn', 'colour', 'picture', 'width']);
     this.colouring = 'block';
@@ -107,9 +107,8 @@ class Stage {
     this.turn = unpack(scene.turn, Int16Array);
     this.speed = unpack(scene.speed, Uint8Array);
     this.contacts = unpack(scene.contacts, Uint8Array);
-    this.size = scene.high.map((c, i) => c - scene.low[i]);
-    this.middle = scene.high.map((c, i) => (c + scene.low[i]) / 2);
-    this.reach = Math.hypot(...this.size);
+    this.middle = scene.size.map(c => c / 2);
+    this.reach = Math.hypot(...scene.size);
     this.meshes = scene.shapes.map(shape => this.mesh(shape));
     this.bed = scene.bed && this.mesh(scene.bed);
     this.buildTank();
@@ -162,7 +161,7 @@ class Stage {
   }
 
   buildTank() {
-    const [x0, y0, z0] = this.scene.low, [x1, y1, z1] = this.scene.high, up = [0, 0, 1], ends = [];
+    const [x0, y0, z0] = [0, 0, 0], [x1, y1, z1] = this.scene.size, up = [0, 0, 1], ends = [];
     const line = (a, b) => ends.push(a, b);
     for (const z of [z0, z1]) {
       line([x0, y0, z], [x1, y0, z]); line([x1, y0, z], [x1, y1, z]);
@@ -188,13 +187,13 @@ class Stage {
   // Place and attitude (w, x, y, z) of a block at a moment, the present one by default; on the way
   // over a periodic side it goes on and comes in at the other.
   pose(k, moment = this.moment) {
-    const n = this.scene.bodies.length, [a, b, s] = moment, { low, period } = this.scene;
+    const n = this.scene.bodies.length, [a, b, s] = moment, { period } = this.scene;
     const i = 3 * (a * n + k), j = 3 * (b * n + k), p = 4 * (a * n + k), q = 4 * (b * n + k);
     const place = [0, 1, 2].map(c => {
       const step = this.place[j + c] - this.place[i + c], length = period[c];
       if (!length) return this.place[i + c] + s * step;
-      const there = this.place[i + c] + s * (step - length * Math.round(step / length)) - low[c];
-      return low[c] + there - length * Math.floor(there / length);
+      const there = this.place[i + c] + s * (step - length * Math.round(step / length));
+      return there - length * Math.floor(there / length);
     });
     const turn = [0, 1, 2, 3].map(c => this.turn[p + c] * (1 - s) + this.turn[q + c] * s);
     return { place, turn: unit(turn) };
@@ -240,8 +239,8 @@ class Stage {
 
   // The distance from which every corner of the tank is seen, and the rulers of a flat view.
   enough(right, up, away, slope, aspect) {
-    const { low, high } = this.scene, needed = [];
-    for (const x of [low[0], high[0]]) for (const y of [low[1], high[1]]) for (const z of [low[2], high[2]]) {
+    const [wide, deep, tall] = this.scene.size, needed = [];
+    for (const x of [0, wide]) for (const y of [0, deep]) for (const z of [0, tall]) {
       const p = [x, y, z].map((v, i) => v - this.middle[i]);
       needed.push((this.flat ? 0 : dot(p, away))
         + Math.max(Math.abs(dot(p, right)) / aspect, Math.abs(dot(p, up))) / slope);
@@ -353,8 +352,7 @@ class Stage {
   fill(part, colour, opacity = 1, lit = 0, cut = 0) {
     const gl = this.gl, at = this.begin(this.faces, part, colour, opacity);
     this.point();
-    gl.uniform3fv(at.low, this.scene.low);
-    gl.uniform3fv(at.high, this.scene.high);
+    gl.uniform3fv(at.size, this.scene.size);
     gl.uniform1f(at.lit, lit);
     gl.uniform1f(at.cut, cut);
     gl.enable(gl.POLYGON_OFFSET_FILL);

@@ -5,11 +5,11 @@
 const WATER_VERTEX = `
 attribute vec3 place, normal;
 uniform mat4 camera;
-uniform vec3 low, size, across, upward;
+uniform vec3 size, across, upward;
 varying vec3 facing;
 varying vec2 at;
 void main() {
-  vec3 share = (place - low) / size;
+  vec3 share = place / size;
   facing = normal;
   at = vec2(dot(share, across), dot(share, upward));
   gl_Position = camera * vec4(place, 1.0);
@@ -37,7 +37,7 @@ class Water {
   constructor(stage) {
     this.stage = stage;
     this.program = compile(stage.gl, WATER_VERTEX, WATER_FRAGMENT,
-      ['camera', 'low', 'size', 'across', 'upward', 'ramp', 'plain', 'coloured', 'map']);
+      ['camera', 'size', 'across', 'upward', 'ramp', 'plain', 'coloured', 'map']);
     this.buffer = stage.gl.createBuffer();
     this.textures = MAPS.map(() => stage.gl.createTexture());
   }
@@ -56,15 +56,14 @@ class Water {
   }
 
   paint(camera, coloured) {
-    const stage = this.stage, gl = stage.gl, { low, high } = this.scene, at = this.program.at;
+    const stage = this.stage, gl = stage.gl, at = this.program.at;
     gl.useProgram(this.program.program);
     const { values, counts } = this.faces();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(values), gl.DYNAMIC_DRAW);
     stage.point();
     gl.uniformMatrix4fv(at.camera, false, camera);
-    gl.uniform3fv(at.low, low);
-    gl.uniform3fv(at.size, high.map((c, i) => c - low[i] || 1));
+    gl.uniform3fv(at.size, this.scene.size);
     gl.uniform3fv(at.ramp, RAMP.flat());
     gl.uniform4f(at.plain, 0.2, 0.5, 0.78, 0.15);
     gl.uniform1f(at.coloured, coloured && this.speed ? 1 : 0);
@@ -104,8 +103,8 @@ class Water {
 
   // Triangles of the lid, of the front and back, and of the two sides.
   faces() {
-    const { low, high } = this.scene, s = this.surface, out = [];
-    const x = s ? s.x : [low[0], high[0]], y = s ? s.y : [low[1], high[1]];
+    const { size } = this.scene, s = this.surface, out = [];
+    const x = s ? s.x : [0, size[0]], y = s ? s.y : [0, size[1]];
     const [a, b, share] = s ? between(s.times, this.stage.time) : [0, 0, 0], n = x.length * y.length;
     const z = (i, j) => s ? s.low + s.step * (s.height[a * n + j * x.length + i] * (1 - share)
       + s.height[b * n + j * x.length + i] * share) : this.scene.water.level;
@@ -117,7 +116,7 @@ class Water {
     const top = (i, j) => out.push(x[i], y[j], z(i, j), ...normal(i, j));
     const side = (i, j, k, l, n) => {
       const p = [x[i], y[j], z(i, j)], q = [x[k], y[l], z(k, l)];
-      for (const v of [p, q, [q[0], q[1], low[2]], p, [q[0], q[1], low[2]], [p[0], p[1], low[2]]]) out.push(...v, ...n);
+      for (const v of [p, q, [q[0], q[1], 0], p, [q[0], q[1], 0], [p[0], p[1], 0]]) out.push(...v, ...n);
     };
     const nx = x.length - 1, ny = y.length - 1;
     for (let j = 0; j < ny; j++) for (let i = 0; i < nx; i++) {

@@ -1,7 +1,8 @@
 """A run as a glTF file (.glb): each shape once, a named node per block that moves and turns.
 
 Source: glTF 2.0 specification, Khronos Group. Its y axis is up, so all blocks hang in a node that
-turns ours, z, there.
+turns ours, z, there. That node stands at the lower corner of the tank, from which places count:
+single precision would not hold coordinates of a survey.
 """
 
 import json
@@ -63,10 +64,16 @@ def write(run: Run, rows: IntArray, path: Path) -> None:
     moves = _animation(buffer, run, rows, times) if len(rows) > 1 else None
     for k in range(b.n):
         nodes[k] |= {
-            "translation": b.position[rows[0], k].tolist(),
+            "translation": (b.position[rows[0], k] - run.grid.low).tolist(),
             "rotation": _turns(b.quaternion[rows[:1], k])[0].tolist(),
         }
-    root = {"name": "tank", "rotation": _UPRIGHT, "children": list(range(b.n))}
+    x, y, z = run.grid.low.tolist()
+    root = {
+        "name": "tank",
+        "translation": [x, z, -y],
+        "rotation": _UPRIGHT,
+        "children": list(range(b.n)),
+    }
     content: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "mics-tools export"},
         "scene": 0,
@@ -109,7 +116,7 @@ def _animation(buffer: _Buffer, run: Run, rows: IntArray, times: Array) -> dict[
             size = np.where(there, 1.0, _GONE)
             add(k, "scale", np.repeat(size[:, None], 3, axis=1), "VEC3", "STEP")
         if not b.fixed[k]:
-            add(k, "translation", b.position[rows, k], "VEC3")
+            add(k, "translation", b.position[rows, k] - run.grid.low, "VEC3")
             add(k, "rotation", _turns(b.quaternion[rows, k]), "VEC4")
     return {"name": "fall", "channels": channels, "samplers": samplers}
 

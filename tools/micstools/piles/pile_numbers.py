@@ -44,9 +44,9 @@ class PileNumbers:
 
 
 KINDS = {
-    "plan_area": "area", "top": "length", "centre": "length", "spread": "length",
+    "plan_area": "area", "top": "place", "centre": "place", "spread": "length",
     "time_to_rest": "time", "impact_speed": "speed", "contact_force": "force", "slopes": "angle",
-    "box": "length", "height": "length", "layer_thickness": "length", "footprint": "area",
+    "box": "place", "height": "length", "layer_thickness": "length", "footprint": "area",
     "thickness_ball": "length",
 }  # fmt: skip
 """What the numbers that have a unit are, as `Units` names it."""

@@ -90,33 +90,33 @@ def placing(runs: Sequence[Run], area: Area) -> Placing | None:
 def words(found: Placing, units: Units) -> str:
     """Where blocks lie, in a sentence or two."""
     length = units.length
-    point = _at("x", found.centre[:1], length) + ", " + _at("y", found.centre[1:], length)
+    point = ", ".join(_at("xy"[d], found.centre[d : d + 1], units.place) for d in (0, 1))
     point += f"\u00a0{length.name}"
     sx, sy = (length.figure(v) for v in found.spread)
     if found.blocks == 1:
         place = f"One block lies at {point}."
-        return place + _outside(found, length)
+        return place + _outside(found, units.place)
     said = (
         f"{found.blocks} blocks lie around {point}, with a standard "
         f"deviation of {sx} and {sy} {length.name} along x and y; half of them within "
         f"{length.text(found.half_within)} of that point, 90 % within "
         f"{length.text(found.most_within)}."
     )
-    return said + _outside(found, length)
+    return said + _outside(found, units.place)
 
 
-def _outside(found: Placing, length: Unit) -> str:
+def _outside(found: Placing, place: Unit) -> str:
     """The share of blocks outside of the area."""
     area = found.area
     low, high = (f"{100 * v:.0f}" for v in found.outside_of_runs)
-    x, y = (_at("xy"[d], (area.low[d], area.high[d]), length) for d in (0, 1))
+    x, y = (_at("xy"[d], (area.low[d], area.high[d]), place) for d in (0, 1))
     which = "wanted area" if area.given else "area of the drops"
     return (
         f" {100 * found.outside:.0f} % of them ({low} to {high} % in 90 % of the runs) lie "
-        f"outside the {which}, {x}, {y}\u00a0{length.name}."
+        f"outside the {which}, {x}, {y}\u00a0{place.name}."
     )
 
 
-def _at(axis: str, values: Sequence[float], length: Unit) -> str:
+def _at(axis: str, values: Sequence[float], place: Unit) -> str:
     """As in `x = 16.3 to 23.7`."""
-    return f"{axis}\u00a0=\u00a0" + " to ".join(length.figure(v) for v in values)
+    return f"{axis}\u00a0=\u00a0" + " to ".join(place.figure(v) for v in values)

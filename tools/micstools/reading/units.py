@@ -24,7 +24,11 @@ def figure(value: float, digits: int = 3) -> str:
     if rounded and not 1e-4 <= abs(rounded) < 1e6:
         return f"{rounded:.{digits}g}"
     places = digits - 1 - int(np.floor(np.log10(abs(rounded) or 1.0)))
-    text = f"{rounded:.{max(0, places)}f}"
+    return _without_zeros(f"{rounded:.{max(0, places)}f}")
+
+
+def _without_zeros(text: str) -> str:
+    """A number without zeros at the end of its decimals."""
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
@@ -34,14 +38,17 @@ class Unit:
 
     name: str
     size: float = 1.0
+    decimals: int | None = None  # of a place, which may be far from zero: a share of a block
 
     def of(self, value: Any) -> Any:
         """A number or an array in SI, in this unit."""
         return value / self.size
 
     def figure(self, value: float, digits: int = 3) -> str:
-        """A value in SI as a figure without its unit."""
-        return figure(self.of(value), digits)
+        """A value in SI as a figure without its unit; a place to its decimals, not to `digits`."""
+        if self.decimals is None or not np.isfinite(value):
+            return figure(self.of(value), digits)
+        return _without_zeros(f"{round(self.of(value), self.decimals) + 0.0:.{self.decimals}f}")
 
     def text(self, value: float, digits: int = 3) -> str:
         """A value in SI with its unit; a dash where it is nan."""
@@ -71,6 +78,7 @@ class Units:
     """The units of one run."""
 
     length: Unit
+    place: Unit
     area: Unit
     volume: Unit
     mass: Unit
@@ -87,12 +95,15 @@ class Units:
         return found
 
 
-_METRES = Unit("m"), Unit("m²"), Unit("m³")
 LABORATORY = Units(
-    Unit("mm", 1e-3), Unit("cm²", 1e-4), Unit("cm³", 1e-6), Unit("kg"), Unit("N"), Unit("mJ", 1e-3)
-)
-SI = Units(*_METRES, Unit("kg"), Unit("N"), Unit("J"))
-SITE = Units(*_METRES, Unit("t", 1e3), Unit("kN", 1e3), Unit("kJ", 1e3))
+    Unit("mm", 1e-3), Unit("mm", 1e-3, 1), Unit("cm²", 1e-4), Unit("cm³", 1e-6),
+    Unit("kg"), Unit("N"), Unit("mJ", 1e-3)
+)  # fmt: skip
+SI = Units(Unit("m"), Unit("m", 1.0, 3), Unit("m²"), Unit("m³"), Unit("kg"), Unit("N"), Unit("J"))
+SITE = Units(
+    Unit("m"), Unit("m", 1.0, 2), Unit("m²"), Unit("m³"),
+    Unit("t", 1e3), Unit("kN", 1e3), Unit("kJ", 1e3)
+)  # fmt: skip
 _SMALL, _LARGE = 0.2, 0.5  # [m] lengths of blocks that part the three
 _TANK = 0.1  # of the longest side of the tank stands for the length of a block where there is none
 
