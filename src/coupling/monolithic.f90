@@ -28,7 +28,7 @@ module monolithic_m
                          add_second_half, add_whole
   use buoyancy_m, only: displaced_force, mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
+  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
@@ -164,8 +164,8 @@ contains
     end do
   end subroutine extrapolate_motion
 
-  !> Stage 9: films at the new places and their masters, one momentum for each group; inertia of
-  !! the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
+  !> Stage 9: small cells at the new places and their targets, one momentum for each group; inertia
+  !! of the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
   !! flux of the unit motions of the bodies.
   subroutine merge_cells(self, case, grid, solid, dt, flow, scratch)
     class(monolithic_t), intent(inout) :: self
@@ -320,7 +320,7 @@ contains
       call predict_velocity(grid, self%rho, flow, self)
       call to_means(grid, merged, self%at_start, flow%u)
       call fill_velocity_halo(grid, flow%u, layers=1)
-      call follow_masters(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
+      call follow_targets(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
       bodies%motion = self%unforced_motion
       call push_bodies(dt, self%from_pressure + self%from_level + viscous%force, bodies)
@@ -551,7 +551,7 @@ contains
     call move_alloc(solid_flux, flow%solid_flux)
   end subroutine force_at_release
 
-  !> Cells in a body that hold no film move with it.
+  !> Cells in a body that hold no small cell move with it.
   subroutine impose_rigid_velocity(grid, solid, merged, bodies, u)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid

@@ -6,8 +6,8 @@
 !! + I \right] $$
 !! with delta u_f the change of velocity by the accelerations at the faces, delta u that which the
 !! group took and delta U that of the wall, whose part `mass_defect` counts. It is the part of
-!! the pressure on the wall that the trapezoid rule of the faces misses. I is the momentum of films
-!! that the wall bears as one end of a lever (`group_momentum_m`). In the same way the half of
+!! the pressure on the wall that the trapezoid rule of the faces misses. I is the momentum of small
+!! cells that the wall bears as one end of a lever (`group_momentum_m`). In the same way the half of
 !! the old pressure that acts before the transport (`half_kick_m`) does so on the surface of the
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
@@ -37,7 +37,7 @@ module wall_balance_m
     real(wp), allocatable :: pushed(:, :)   !! (3, *) change of velocity by the faces [m/s]
     real(wp), allocatable :: gained(:, :)   !! (3, *) that which the group took [m/s]
     real(wp), allocatable :: before(:, :)   !! (3, *) velocity noted before sharing [m/s]
-    real(wp), allocatable :: to_wall(:, :)  !! (3, *) momentum of films that the wall bears [kg m/s]
+    real(wp), allocatable :: to_wall(:, :)  !! (3, *) of small cells, borne by the wall [kg m/s]
   end type wall_balance_t
 
 contains

@@ -44,7 +44,7 @@ contains
     integer :: m
 
     !$omp parallel do private(slip) schedule(dynamic, 64)
-    do m = merged%n_films + 1, merged%n
+    do m = merged%n_small + 1, merged%n
       merged%centre(m) = 1.0_wp
       if (merged%middle(m) <= 0.0_wp) cycle
       associate (r => merged%ratio(m))
@@ -117,7 +117,7 @@ contains
     integer :: m
 
     !$omp parallel do private(wall) schedule(static)
-    do m = merged%n_films + 1, merged%n
+    do m = merged%n_small + 1, merged%n
       associate (c => merged%cell(:, m))
         if (.not. grid%owns(c) .or. abs(factor(m) - 1.0_wp) <= 0.0_wp) cycle
         wall = velocity_at_wall(grid, merged, m, bodies)

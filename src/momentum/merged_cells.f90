@@ -1,10 +1,10 @@
-!> One owner for the fluid in cut cells: films belong to the cells beside them.
+!> One owner for the fluid in cut cells: small cells belong to the cells beside them.
 !!
-!! A film is a cut cell whose centre lies in a body. What fluid it holds has no velocity of its own:
-!! it belongs to its masters, the cells with their centre in the fluid across its open faces, by
-!! shares that close with the face. A master and its parts of films are a group with one momentum
-!! (`group_momentum_m`). A film without such a neighbour (a gap narrower than a cell) is a group of
-!! its own. Derivation and trials: docs/decisions/cut_cells.md.
+!! A small cell is a cut cell whose centre lies in a body. What fluid it holds has no velocity of
+!! its own: it belongs to its targets, the cells with their centre in the fluid across its open
+!! faces, by shares that close with the face. A target and its parts of small cells are a group with
+!! one momentum (`group_momentum_m`). A small cell without such a neighbour (a gap narrower than a
+!! cell) is a group of its own. Derivation and trials: docs/decisions/cut_cells.md.
 module merged_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
@@ -17,40 +17,40 @@ module merged_cells_m
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: masters_at_most, is_alone, along_share, match_densities, open_shares
+  public :: targets_at_most, is_alone, along_share, match_densities, open_shares
   public :: velocity_at_wall
 
-  integer, parameter :: reach = 2            !! layers of the halo with films that are needed
-  integer, parameter :: masters_at_most = 3  !! of a film
+  integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
+  integer, parameter :: targets_at_most = 3  !! of a small cell
 
-  !> The cells at walls, and the groups among them. A wall cell is a cut cell or a master.
+  !> The cells at walls, and the groups among them. A wall cell is a cut cell or a target.
   type :: merged_cells_t
     integer :: poses = 0                         !! of the bodies (`solid%poses`), 0: of none
-    integer :: n = 0                             !! wall cells, films first
-    integer :: n_films = 0
+    integer :: n = 0                             !! wall cells, small cells first
+    integer :: n_small = 0
     integer, allocatable :: cell(:, :)           !! (3, *)
     integer, allocatable :: body(:)              !! (*) body whose wall it is
     integer, allocatable :: number(:, :, :)      !! number of a wall cell, else 0
     !> Wall cells of body b: `by_body(first_of_body(b):first_of_body(b+1)-1)`.
     integer, allocatable :: by_body(:), first_of_body(:)
     real(wp), allocatable :: normal(:, :)        !! (3, *) of the wall, into the fluid
-    integer, allocatable :: step(:, :)           !! (3*masters_at_most, films) to their masters
-    integer, allocatable :: master(:, :)         !! (masters_at_most, films) their numbers, 0: none
-    real(wp), allocatable :: share(:, :)         !! likewise: of the film, sum 1
+    integer, allocatable :: step(:, :)           !! (3*targets_at_most, n_small) to the targets
+    integer, allocatable :: target(:, :)         !! (targets_at_most, n_small) numbers, 0: none
+    real(wp), allocatable :: share(:, :)         !! likewise: of the small cell, sum 1
     real(wp), allocatable :: by_wall(:, :)       !! likewise: 1 - r
-    real(wp), allocatable :: nearer(:, :)        !! likewise, less under heavy films
+    real(wp), allocatable :: nearer(:, :)        !! likewise, less under heavy small cells
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
-    real(wp), allocatable :: slip(:, :, :)       !! of the layer at the film in a cell, 0 to 1
+    real(wp), allocatable :: slip(:, :, :)       !! of the layer at the small cell in a cell, 0 to 1
     !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
     !! [m], and that of its centre over it; no distance where the centre is no nearer.
     real(wp), allocatable :: middle(:), ratio(:)
     !> Of a wall cell: share of its velocity, seen from the wall, that its centre has.
     real(wp), allocatable :: centre(:)
-    integer :: n_groups = 0                      !! with a master beside an own cell
-    integer, allocatable :: leader(:)            !! (groups) number of the master
-    integer, allocatable :: first(:)             !! (groups + 1) of its parts of films in `part`
-    integer, allocatable :: part(:, :)           !! (2, *) film, which of its masters
-    integer, allocatable :: group(:)             !! of each master while the groups are found
+    integer :: n_groups = 0                      !! with a target beside an own cell
+    integer, allocatable :: leader(:)            !! (groups) number of the target
+    integer, allocatable :: first(:)             !! (groups + 1) of its parts in `part`
+    integer, allocatable :: part(:, :)           !! (2, *) small cell, which of its targets
+    integer, allocatable :: group(:)             !! of each target while the groups are found
   end type merged_cells_t
 
 contains
@@ -66,16 +66,16 @@ contains
     allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%middle(0), self%ratio(0), self%centre(0))
-    allocate (self%step(3*masters_at_most, 0), self%master(masters_at_most, 0))
-    allocate (self%share(masters_at_most, 0), self%by_wall(masters_at_most, 0))
-    allocate (self%nearer(masters_at_most, 0), self%distance(masters_at_most, 0))
+    allocate (self%step(3*targets_at_most, 0), self%target(targets_at_most, 0))
+    allocate (self%share(targets_at_most, 0), self%by_wall(targets_at_most, 0))
+    allocate (self%nearer(targets_at_most, 0), self%distance(targets_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
   end subroutine merged_cells_init
 
-  !> Find films, masters and groups of a geometry, those of the halo too that own cells belong to;
-  !! nothing is done where they are known already.
+  !> Find small cells, targets and groups of a geometry, those of the halo too that own cells belong
+  !! to; nothing is done where they are known already.
   subroutine find_merged_cells(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -91,20 +91,20 @@ contains
     self%n = 0
     do m = 1, solid%n_cut
       c = solid%cut_cell(:, m)
-      if (is_film(grid, solid, c)) call add_cell(c, solid%inside(c(1), c(2), c(3)), self)
+      if (is_small(grid, solid, c)) call add_cell(c, solid%inside(c(1), c(2), c(3)), self)
     end do
-    self%n_films = self%n
+    self%n_small = self%n
     call add_cut_cells(grid, solid, self)
-    call find_masters(grid, solid, self)
+    call find_targets(grid, solid, self)
     call find_middles(grid, solid, self)
     call order_by_body(size(solid%body_cell) - 1, self)
-    call group_films(grid, self)
+    call group_small_cells(grid, self)
     call ensure_room(self%n, self%centre)
     self%centre(:self%n) = 1.0_wp
   end subroutine find_merged_cells
 
-  !> Is a cut cell a film of this process or of the halo that matters?
-  pure function is_film(grid, solid, c) result(yes)
+  !> Is a cut cell a small cell of this process or of the halo that matters?
+  pure function is_small(grid, solid, c) result(yes)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
@@ -118,7 +118,7 @@ contains
       e = c + unit_step(:, d)
       yes = yes .or. solid%open(e(1), e(2), e(3), d) > 0.0_wp
     end do
-  end function is_film
+  end function is_small
 
   !> In the domain, and an own cell or one of the layers of the halo that matter.
   pure function is_near(grid, c, layers) result(yes)
@@ -213,59 +213,59 @@ contains
     end associate
   end subroutine order_by_body
 
-  !> Masters, normal and profile of each film.
-  subroutine find_masters(grid, solid, self)
+  !> Targets, normal and profile of each small cell.
+  subroutine find_targets(grid, solid, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, o(3), body
 
-    call ensure_room(self%n_films, self%normal)
-    call ensure_room(self%n_films, self%step)
-    call ensure_room(self%n_films, self%master)
-    call ensure_room(self%n_films, self%share)
-    call ensure_room(self%n_films, self%by_wall)
-    call ensure_room(self%n_films, self%nearer)
-    call ensure_room(self%n_films, self%distance)
+    call ensure_room(self%n_small, self%normal)
+    call ensure_room(self%n_small, self%step)
+    call ensure_room(self%n_small, self%target)
+    call ensure_room(self%n_small, self%share)
+    call ensure_room(self%n_small, self%by_wall)
+    call ensure_room(self%n_small, self%nearer)
+    call ensure_room(self%n_small, self%distance)
     !$omp parallel do schedule(static)
-    do m = 1, self%n_films
+    do m = 1, self%n_small
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
                      self%share(:, m), self%by_wall(:, m), self%distance(:, m))
       self%nearer(:, m) = self%by_wall(:, m)
     end do
-    do m = 1, self%n_films
+    do m = 1, self%n_small
       body = self%body(m)
-      self%master(:, m) = 0
-      do n = 1, masters_at_most
+      self%target(:, m) = 0
+      do n = 1, targets_at_most
         o = self%cell(:, m) + self%step(3*n - 2:3*n, m)
         if (self%share(n, m) <= 0.0_wp .or. .not. is_near(grid, o, n_halo)) cycle
         call add_cell(o, body, self)
-        self%master(n, m) = self%number(o(1), o(2), o(3))
+        self%target(n, m) = self%number(o(1), o(2), o(3))
       end do
     end do
-  end subroutine find_masters
+  end subroutine find_targets
 
-  !> Normal of the wall of film c, the steps to its masters, their shares of it, 1 - r, and the
-  !! distances of their fluid; r and distances as without a wall where there is no normal, r also
-  !! where the wall has an edge, which the stream of the masters passes straight.
+  !> Normal of the wall of small cell c, the steps to its targets, their shares of it, 1 - r, and
+  !! the distances of their fluid; r and distances as without a wall where there is no normal, r
+  !! also where the wall has an edge, which the stream of the targets passes straight.
   subroutine find_wall(grid, solid, c, normal, steps, share, nearer, distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(out) :: normal(3)
-    integer, intent(out) :: steps(3, masters_at_most)
-    real(wp), intent(out), dimension(masters_at_most) :: share, nearer, distance
+    integer, intent(out) :: steps(3, targets_at_most)
+    real(wp), intent(out), dimension(targets_at_most) :: share, nearer, distance
     integer, parameter :: here(3) = 0
-    real(wp) :: own   !! distance of the fluid of the film [m]
+    real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: n
 
     normal = wall_normal(grid, solid, c)
     nearer = 0.0_wp
     distance = 0.0_wp
-    call to_masters(grid, solid, c, normal, steps, share)
+    call to_targets(grid, solid, c, normal, steps, share)
     if (all(abs(normal) <= 0.0_wp)) return
     own = distance_to_fluid(grid, solid, c, here, normal)
-    do n = 1, masters_at_most
+    do n = 1, targets_at_most
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
       distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
       nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
@@ -287,7 +287,7 @@ contains
     call ensure_room(self%n, self%middle)
     call ensure_room(self%n, self%ratio)
     !$omp parallel do private(middle, y) schedule(dynamic, 64)
-    do m = self%n_films + 1, self%n
+    do m = self%n_small + 1, self%n
       associate (c => self%cell(:, m), n => self%normal(:, m))
         self%middle(m) = 0.0_wp
         if (.not. grid%owns(c) .or. solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) cycle
@@ -303,16 +303,16 @@ contains
     end do
   end subroutine find_middles
 
-  !> Steps from film c to its masters, and their shares of it, zero where there is none: cells
+  !> Steps from small cell c to its targets, and their shares of it, zero where there is none: cells
   !! across its open faces whose centre lies in the fluid, by open area along the normal; without
   !! any the one of the 26 around it that is most along the normal.
-  pure subroutine to_masters(grid, solid, c, normal, steps, share)
+  pure subroutine to_targets(grid, solid, c, normal, steps, share)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(in) :: normal(3)   !! of the wall
-    integer, intent(out) :: steps(3, masters_at_most)
-    real(wp), intent(out) :: share(masters_at_most)
+    integer, intent(out) :: steps(3, targets_at_most)
+    real(wp), intent(out) :: share(targets_at_most)
     integer :: d, f(3), i, j, k
     real(wp) :: along, way(3)
 
@@ -349,26 +349,26 @@ contains
       is_fluid = .not. grid%outside(o)
       if (is_fluid) is_fluid = solid%inside(o(1), o(2), o(3)) == 0
     end function is_fluid
-  end subroutine to_masters
+  end subroutine to_targets
 
-  !> The parts of films of each master beside an own cell, in the order of their places around it,
-  !! so that sums over a group do not depend on the process.
-  subroutine group_films(grid, self)
+  !> The parts of small cells of each target beside an own cell, in the order of their places around
+  !! it, so that sums over a group do not depend on the process.
+  subroutine group_small_cells(grid, self)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, f, g, n_parts
 
     call ensure_room(self%n, self%group)
     self%group(:self%n) = 0
-    do f = 1, self%n_films   ! count the parts of each master
-      do n = 1, masters_at_most
-        m = self%master(n, f)
+    do f = 1, self%n_small   ! count the parts of each target
+      do n = 1, targets_at_most
+        m = self%target(n, f)
         if (m > 0) self%group(m) = self%group(m) + 1
       end do
     end do
     self%n_groups = 0
     n_parts = 0
-    do m = self%n_films + 1, self%n
+    do m = self%n_small + 1, self%n
       if (self%group(m) == 0) cycle
       n = self%group(m)
       self%group(m) = 0
@@ -383,9 +383,9 @@ contains
     end do
     self%first(self%n_groups + 1) = n_parts + 1
     call ensure_room(n_parts, self%part, rows=2)
-    do f = 1, self%n_films
-      do n = 1, masters_at_most
-        m = self%master(n, f)
+    do f = 1, self%n_small
+      do n = 1, targets_at_most
+        m = self%target(n, f)
         if (m == 0) cycle
         g = self%group(m)
         if (g == 0) cycle
@@ -398,9 +398,9 @@ contains
       call sort_parts(self%cell(:, self%leader(g)), self%cell, &
                       self%part(:, self%first(g):self%first(g + 1) - 1))
     end do
-  end subroutine group_films
+  end subroutine group_small_cells
 
-  !> Parts of films in the order of the films' places around the leader.
+  !> Parts of small cells in the order of the small cells' places around the leader.
   pure subroutine sort_parts(leader, cell, part)
     integer, intent(in) :: leader(3), cell(:, :)
     integer, intent(inout) :: part(:, :)   !! (2, *)
@@ -415,39 +415,39 @@ contains
       part(:, n) = moved
     end do
   contains
-    pure integer function place(film)
-      integer, intent(in) :: film
+    pure integer function place(small)
+      integer, intent(in) :: small
 
-      place = dot_product(cell(:, film) - leader, [1, 3, 9])
+      place = dot_product(cell(:, small) - leader, [1, 3, 9])
     end function place
   end subroutine sort_parts
 
-  !> Is this film a group of its own?
-  elemental function is_alone(self, film) result(yes)
+  !> Is this small cell a group of its own?
+  elemental function is_alone(self, small) result(yes)
     type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: film
+    integer, intent(in) :: small
     logical :: yes
 
-    yes = all(self%master(:, film) == 0)
+    yes = all(self%target(:, small) == 0)
   end function is_alone
 
-  !> Share of the velocity of its master number n along the wall, seen from the wall, that a film
-  !! has.
-  pure function along_share(self, film, n) result(share)
+  !> Share of the velocity of its target number n along the wall, seen from the wall, that a small
+  !! cell has.
+  pure function along_share(self, small, n) result(share)
     type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: film, n
+    integer, intent(in) :: small, n
     real(wp) :: share
 
-    associate (c => self%cell(:, film), nearer => self%nearer(n, film))
+    associate (c => self%cell(:, small), nearer => self%nearer(n, small))
       share = 1.0_wp - nearer*(1.0_wp - slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - nearer))
     end associate
   end function along_share
 
-  !> Flatten the profile of films that are heavier than their master.
+  !> Flatten the profile of small cells that are heavier than their target.
   !!
-  !! What a heavy film does would else be extrapolated to the light cell beside it, which amplifies
-  !! it by up to 1/r. With 1 - r times the ratio of the densities a group of water under gas is
-  !! as well conditioned as one of gas alone.
+  !! What a heavy small cell does would else be extrapolated to the light cell beside it, which
+  !! amplifies it by up to 1/r. With 1 - r times the ratio of the densities a group of water under
+  !! gas is as well conditioned as one of gas alone.
   subroutine match_densities(grid, rho, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -456,11 +456,11 @@ contains
     integer :: m, n
 
     !$omp parallel do private(n) schedule(static)
-    do m = 1, self%n_films
+    do m = 1, self%n_small
       self%nearer(:, m) = self%by_wall(:, m)
-      do n = 1, masters_at_most
-        if (self%master(n, m) == 0) cycle
-        associate (c => self%cell(:, m), p => self%cell(:, self%master(n, m)))
+      do n = 1, targets_at_most
+        if (self%target(n, m) == 0) cycle
+        associate (c => self%cell(:, m), p => self%cell(:, self%target(n, m)))
           self%nearer(n, m) = self%by_wall(n, m) &
                               *min(1.0_wp, rho(p(1), p(2), p(3))/rho(c(1), c(2), c(3)))
         end associate
@@ -468,15 +468,15 @@ contains
     end do
   end subroutine match_densities
 
-  !> Velocity of the wall of a film [m/s].
-  pure function velocity_at_wall(grid, self, film, bodies) result(v)
+  !> Velocity of the wall of a small cell [m/s].
+  pure function velocity_at_wall(grid, self, small, bodies) result(v)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: film
+    integer, intent(in) :: small
     type(rigid_motion_t), intent(in) :: bodies
     real(wp) :: v(3)
 
-    associate (b => self%body(film), c => self%cell(:, film))
+    associate (b => self%body(small), c => self%cell(:, small))
       v = wall_velocity(bodies%motion(:, b), arm_to_cell(grid, c, bodies%x(:, b)))
     end associate
   end function velocity_at_wall

@@ -6,8 +6,8 @@
 !! for div u = 0, is zero in one fluid, but makes half of the dissipation of waves: without it the
 !! surface feels no stress mu du/dn instead of no stress at all. It is added explicitly; it is never
 !! larger than the implicit part, so the step stays stable whatever its length. Cells beside bodies
-!! are left out: before the viscous stage their thin films may carry any velocity (with them a block
-!! thrown into water ended two runs).
+!! are left out: before the viscous stage their thin small cells may carry any velocity (with them a
+!! block thrown into water ended two runs).
 module surface_stress_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step

@@ -3,7 +3,7 @@
 !! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
 !! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
 !! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
-!! that of its group (`merged_cells_m`). A film without a master keeps its velocity.
+!! that of its group (`merged_cells_m`). A small cell without a target keeps its velocity.
 !! Where the cells are too coarse for the boundary layer, wall legs pull with the stress of a rough
 !! one instead (`wall_shear_m`).
 module viscous_legs_m
@@ -37,7 +37,7 @@ contains
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
-    type(merged_cells_t), intent(in), optional :: merged   !! none where there are no films
+    type(merged_cells_t), intent(in), optional :: merged   !! none where there are no small cells
     real(wp), intent(in), optional :: wall_speed(:)
       !! past the walls at the ends of the legs, with `merged` [m/s]; absent: no rough layers
     integer :: d, k
@@ -113,8 +113,8 @@ contains
     end do
   end subroutine unknown_masses
 
-  !> The films' mass goes to their masters, as the lever has it (`group_momentum_m`); those without
-  !! one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
+  !> The small cells' mass goes to their targets, as the lever has it (`group_momentum_m`); those
+  !! without one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
   !! (`centre_velocity_m`).
   subroutine masses_of_groups(grid, solid, rho, dt, merged, self)
     type(grid_t), intent(in) :: grid
@@ -129,9 +129,10 @@ contains
       associate (c => merged%cell(:, merged%leader(g)))
         if (.not. grid%owns(c)) cycle
         do m = merged%first(g), merged%first(g + 1) - 1
-          associate (film => merged%part(1, m), master => merged%part(2, m))
-            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) + merged%share(master, film) &
-              *along_share(merged, film, master)**2*film_mass(merged%cell(:, film))
+          associate (small => merged%part(1, m), target => merged%part(2, m))
+            self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3)) &
+              + merged%share(target, small) &
+              *along_share(merged, small, target)**2*small_mass(merged%cell(:, small))
           end associate
         end do
       end associate
@@ -139,19 +140,19 @@ contains
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
         if (.not. grid%owns(c)) cycle
-        if (m > merged%n_films) then
+        if (m > merged%n_small) then
           self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/merged%centre(m)
         else if (is_alone(merged, m)) then
-          self%mass(c(1), c(2), c(3)) = film_mass(c)
+          self%mass(c(1), c(2), c(3)) = small_mass(c)
         end if
       end associate
     end do
   contains
-    pure real(wp) function film_mass(c)
+    pure real(wp) function small_mass(c)
       integer, intent(in) :: c(3)
 
-      film_mass = rho(c(1), c(2), c(3))*(1.0_wp - solid%alpha(c(1), c(2), c(3)))*grid%volume/dt
-    end function film_mass
+      small_mass = rho(c(1), c(2), c(3))*(1.0_wp - solid%alpha(c(1), c(2), c(3)))*grid%volume/dt
+    end function small_mass
   end subroutine masses_of_groups
 
   !> Ordinary legs in direction d, between neighbours with their centres in the fluid and nothing

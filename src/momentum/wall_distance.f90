@@ -42,8 +42,8 @@ contains
                + level_of(grid, n, 0.5_wp*(1.0_wp + solid%alpha(o(1), o(2), o(3))))
   end function distance_to_fluid
 
-  !> Distance of the centre of a cut cell c from its wall, taken as a plane; below zero in a film
-  !! [m].
+  !> Distance of the centre of a cut cell c from its wall, taken as a plane; below zero in a small
+  !! cell [m].
   pure function distance_to_centre(grid, solid, c, n) result(distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid

@@ -1,15 +1,15 @@
-!> How fast the fluid of a film runs along the wall.
+!> How fast the fluid of a small cell runs along the wall.
 !!
-!! Between the wall and the cell behind its master the velocity along the wall is taken as that of
+!! Between the wall and the cell behind its target the velocity along the wall is taken as that of
 !! a layer, \( U y/(y + \delta) \), which is linear where the layer is thick against the cells and
 !! free slip where it is thin, as without viscosity. The two cells tell its thickness: with y_m and
 !! y_n their distances from the wall and a the ratio of their velocities along it,
 !! $$ \frac{\delta}{y_m} = \frac{1 - a}{a - y_m/y_n}, \qquad
 !! s = \frac{1}{1 + \delta/y_m} = \frac{a - y_m/y_n}{1 - y_m/y_n} $$
-!! s is the slip of the layer; films and the faces beside them take their velocity along the wall by
-!! it (`wall_profile_m`).
-!! If films had all of the velocity of their masters, the wall layer would carry momentum that no
-!! fluid has, and friction be too large (docs/decisions/cut_cells.md).
+!! s is the slip of the layer; small cells and the faces beside them take their velocity along the
+!! wall by it (`wall_profile_m`).
+!! If small cells had all of the velocity of their targets, the wall layer would carry momentum that
+!! no fluid has, and friction be too large (docs/decisions/cut_cells.md).
 module wall_layer_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo
@@ -23,9 +23,9 @@ module wall_layer_m
 
 contains
 
-  !> The slip of the layer at each film: the mean over its masters with fluid behind them, by
-  !! share times 1 - r (what lies as far out as its master tells little of the layer); none in gaps
-  !! where there is no such master.
+  !> The slip of the layer at each small cell: the mean over its targets with fluid behind them, by
+  !! share times 1 - r (what lies as far out as its target tells little of the layer); none in gaps
+  !! where there is no such target.
   subroutine find_slip(grid, solid, bodies, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -37,14 +37,14 @@ contains
     integer :: m, n, behind(3)
 
     !$omp parallel do private(n, behind, slip, weight, weights) schedule(static)
-    do m = 1, merged%n_films
+    do m = 1, merged%n_small
       associate (f => merged%cell(:, m))
         if (.not. grid%owns(f)) cycle
         slip = 0.0_wp
         weights = 0.0_wp
-        do n = 1, size(merged%master, 1)
-          if (merged%master(n, m) == 0) cycle
-          behind = 2*merged%cell(:, merged%master(n, m)) - f
+        do n = 1, size(merged%target, 1)
+          if (merged%target(n, m) == 0) cycle
+          behind = 2*merged%cell(:, merged%target(n, m)) - f
           if (.not. is_fluid(behind)) cycle
           weight = merged%share(n, m)*merged%nearer(n, m)
           if (weight <= 0.0_wp) cycle
@@ -64,13 +64,13 @@ contains
       if (is_fluid) is_fluid = solid%inside(c(1), c(2), c(3)) == 0
     end function is_fluid
 
-    !> Slip of the layer at film m by its master number n and the cell behind that one.
+    !> Slip of the layer at small cell m by its target number n and the cell behind that one.
     pure real(wp) function slip_beside(m, n)
       integer, intent(in) :: m, n
       real(wp) :: wall(3)
       integer :: next(3)
 
-      associate (f => merged%cell(:, m), c => merged%cell(:, merged%master(n, m)), &
+      associate (f => merged%cell(:, m), c => merged%cell(:, merged%target(n, m)), &
                  normal => merged%normal(:, m))
         next = 2*c - f
         wall = velocity_at_wall(grid, merged, m, bodies)
@@ -108,7 +108,7 @@ contains
 
   !> Slip of a layer: 0 if its velocity is linear to the wall, 1 if it is the same everywhere.
   elemental function layer_slip(ratio, distances) result(slip)
-    real(wp), intent(in) :: ratio       !! of the velocities of the master and the next cell
+    real(wp), intent(in) :: ratio       !! of the velocities of the target and the next cell
     real(wp), intent(in) :: distances   !! of their distances from the wall, below 1
     real(wp) :: slip
 

@@ -72,7 +72,7 @@ contains
 
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
   !! that of the cell to that of the wall, where the leg through the face ends; the rest by the
-  !! layer along the wall, as with the film on the other side of the face.
+  !! layer along the wall, as with the small cell on the other side of the face.
   !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
   !! `solid%edge` goes to 1: the stream leaves the edge straight.
   !!
@@ -190,8 +190,8 @@ contains
       time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
     end function time_in_liquid
 
-    !> Slip along the wall at r times the distance of the cell, by the layer at the film o beyond
-    !! the face; free slip where there is fluid again.
+    !> Slip along the wall at r times the distance of the cell, by the layer at the small cell o
+    !! beyond the face; free slip where there is fluid again.
     pure function slip_beyond(o, r) result(s)
       integer, intent(in) :: o(3)
       real(wp), intent(in) :: r

@@ -261,7 +261,8 @@ contains
     end do
   end function wave_error
 
-  !> Without advection the predictor is the viscous stage, with a free body, wall legs and films.
+  !> Without advection the predictor is the viscous stage, with a free body, wall legs and small
+  !! cells.
   subroutine without_advection()
     character(8), parameter :: sides(2, 3) = reshape([character(8) :: &
       'no_slip', 'slip', 'periodic', 'periodic', 'no_slip', 'open'], [2, 3])

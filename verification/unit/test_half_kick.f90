@@ -56,7 +56,7 @@ program test_half_kick
     call check('liquid gets half a step', maxval(abs(change(7, 3, 2) - half)), 0.0_wp, 1.0e-14_wp)
     call check('a cut cell, too', box%solid%alpha(5, 3, 3) > 0.0_wp &
                .and. maxval(abs(change(5, 3, 3) - half)) < 1.0e-14_wp)
-    call check('a film moves as its master', merged%number(4, 5, 3) <= merged%n_films &
+    call check('a small moves as its target', merged%number(4, 5, 3) <= merged%n_small &
                .and. maxval(abs(change(4, 5, 3) - half)) < 1.0e-14_wp)
     call check('none in the box', maxval(abs(change(3, 4, 3))), 0.0_wp, 0.0_wp)
     call check('none at the surface and beside it', &

@@ -1,11 +1,11 @@
-!> Films and their masters at a box, and what groups share: momentum is kept with what the wall
-!! bears, a film moves between its master and the wall, what moves as one keeps moving as one.
+!> Small cells and their targets at a box, and what groups share: momentum is kept with what the wall
+!! bears, a small cell moves between its target and the wall, what moves as one keeps moving as one.
 program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities, &
     is_alone
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_masters
+  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -18,7 +18,7 @@ program test_merged_cells
   integer, parameter :: top = 4                                     !! open share 0.3 above the box
   real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
     !! of the box [m/s, rad/s]
-  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top film over its master, from the wall
+  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top cell over its target, from the wall
   type(one_body_t) :: box
   type(merged_cells_t) :: merged
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
@@ -41,7 +41,7 @@ program test_merged_cells
   call the_shares()
   call the_accelerations()
   call the_rest()
-  call heavy_films()
+  call heavy_small()
   call closing_face()
   call finish_checks()
 
@@ -51,9 +51,9 @@ contains
   subroutine the_links()
     call check('all know their body', all(merged%body(:merged%n) == 1))
     call check('each cell once', count(merged%number > 0) == merged%n)
-    call check('films have their centre in the box', all([(centre_in_box(m), m=1, merged%n_films)]))
+    call check('small have their centre in the box', all([(centre_in_box(m), m=1, merged%n_small)]))
     call check('the top layer belongs to the cells above', &
-               all(master_of(4, 5, top) == [4, 5, top + 1]))
+               all(target_of(4, 5, top) == [4, 5, top + 1]))
     call check('at an edge to both beside it, most to the one along the normal', &
                merged%share(:, merged%number(4, 6, top)), &
                [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
@@ -61,13 +61,13 @@ contains
                spread(0.0_wp, 1, 3), 0.0_wp)
     call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
-    call check('the middle of a film lies at half of it', &
+    call check('the middle of a small lies at half of it', &
                1.0_wp - merged%nearer(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
-    call check('no film is alone', .not. any([(is_alone(merged, m), m=1, merged%n_films)]))
-    call check('the shares of a film are one', sum(merged%share(:, :merged%n_films), 1), &
-               spread(1.0_wp, 1, merged%n_films), 1.0e-13_wp)
+    call check('no small is alone', .not. any([(is_alone(merged, m), m=1, merged%n_small)]))
+    call check('the shares of a small are one', sum(merged%share(:, :merged%n_small), 1), &
+               spread(1.0_wp, 1, merged%n_small), 1.0e-13_wp)
     call check('every part is in one group', merged%first(merged%n_groups + 1) - 1, &
-               count(merged%master(:, :merged%n_films) > 0))
+               count(merged%target(:, :merged%n_small) > 0))
   end subroutine the_links
 
   !> Momentum, profile, and a fluid that moves with the box.
@@ -79,11 +79,11 @@ contains
     call check('the momentum is kept', momentum(u), total, 1.0e-11_wp*sum(mass))
     call check('with free slip the wall bears nothing', maxval(abs(to_wall)), 0.0_wp, &
                1.0e-14_wp*sum(mass))
-    call check('across the wall a film lies between wall and master', u(4, 5, top, 3), &
+    call check('across the wall a small lies between wall and target', u(4, 5, top, 3), &
                r*u(4, 5, top + 1, 3) + (1.0_wp - r)*wall(4, 5, 3), 1.0e-12_wp)
     call check('with free slip all move alike along it', u(4, 5, top, 1:2), &
                u(4, 5, top + 1, 1:2), 1.0e-12_wp)
-    merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the film
+    merged%slip = 0.25_wp/(0.25_wp + 0.75_wp*r)   ! 0.25 at the small cell
     call fill(u)
     total = momentum(u)
     before = u
@@ -91,7 +91,7 @@ contains
     call check('with a layer the momentum is kept too', momentum(u) + sum(to_wall, 2), total, &
                1.0e-11_wp*sum(mass))
     call the_lever(before(4, 5, top, :), before(4, 5, top + 1, :))
-    call check('along the wall a film has more of the velocity of its master', u(4, 5, top, 1:2), &
+    call check('along the wall a small has more of the velocity of its target', u(4, 5, top, 1:2), &
                [(wall(4, 5, m) + (r + (1.0_wp - r)*0.25_wp)*(u(4, 5, top + 1, m) - wall(4, 5, m)), &
                  m=1, 2)], 1.0e-12_wp)
     before = u
@@ -109,27 +109,27 @@ contains
     box%bodies%motion(:, 1) = motion
   end subroutine the_shares
 
-  !> A film of the top and its only master: along the wall it has a share t of the master's velocity
-  !! and gives it the share t of what it has too much.
-  subroutine the_lever(film, master)
-    real(wp), intent(in) :: film(3), master(3)   !! velocities before [m/s]
+  !> A small cell of the top and its only target: along the wall it has a share t of the target's
+  !! velocity and gives it the share t of what it has too much.
+  subroutine the_lever(small, target)
+    real(wp), intent(in) :: small(3), target(3)   !! velocities before [m/s]
     real(wp), parameter :: t = r + (1.0_wp - r)*0.25_wp
     real(wp) :: excess, change
     integer :: f, d
 
     f = merged%number(4, 5, top)
-    associate (m_film => mass(f), m => mass(merged%master(3, f)))
+    associate (m_small => mass(f), m => mass(merged%target(3, f)))
       do d = 1, 2
-        excess = film(d) - wall(4, 5, d) - t*(master(d) - wall(4, 5, d))
-        change = t*m_film*excess/(m + t**2*m_film)
-        call check('the master gets its end of the lever', u(4, 5, top + 1, d), &
-                   master(d) + change, 1.0e-12_wp)
+        excess = small(d) - wall(4, 5, d) - t*(target(d) - wall(4, 5, d))
+        change = t*m_small*excess/(m + t**2*m_small)
+        call check('the target gets its end of the lever', u(4, 5, top + 1, d), &
+                   target(d) + change, 1.0e-12_wp)
         call check('the wall the other one', to_wall(d, f), &
-                   (1.0_wp - t)*m_film*(excess - t*change), 1.0e-12_wp)
+                   (1.0_wp - t)*m_small*(excess - t*change), 1.0e-12_wp)
       end do
-      excess = film(3) - wall(4, 5, 3) - r*(master(3) - wall(4, 5, 3))
-      call check('across the wall the master gets all', u(4, 5, top + 1, 3), &
-                 master(3) + m_film*excess/(m + r*m_film), 1.0e-12_wp)
+      excess = small(3) - wall(4, 5, 3) - r*(target(3) - wall(4, 5, 3))
+      call check('across the wall the target gets all', u(4, 5, top + 1, 3), &
+                 target(3) + m_small*excess/(m + r*m_small), 1.0e-12_wp)
     end associate
   end subroutine the_lever
 
@@ -157,62 +157,62 @@ contains
     before = u
     call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, u)
     w = 3.0_wp*0.5_wp   ! its lower face is closed
-    call check('up: the film counts half', u(4, 5, top, 3), &
+    call check('up: the small counts half', u(4, 5, top, 3), &
                (w*before(4, 5, top, 3) + before(4, 5, top + 1, 3))/(w + 1.0_wp), 1.0e-13_wp)
     w = 3.0_wp*0.3_wp
     call check('along the wall by its open share', u(4, 5, top, 1), &
                (w*before(4, 5, top, 1) + before(4, 5, top + 1, 1))/(w + 1.0_wp), 1.0e-13_wp)
-    call check('the master likewise', u(4, 5, top + 1, :), u(4, 5, top, :), 0.0_wp)
+    call check('the target likewise', u(4, 5, top + 1, :), u(4, 5, top, :), 0.0_wp)
     call check('others keep theirs', maxval(abs(u(1, 1, :, :) - before(1, 1, :, :))), 0.0_wp, &
                0.0_wp)
     box%flow%rho = box%case%fluid%liquid_density
   end subroutine the_accelerations
 
-  !> Films follow what their masters do, along the wall and across it by their share there.
+  !> Small cells follow what their targets do, along the wall and across it by their share there.
   subroutine the_rest()
     real(wp) :: t
-    integer :: film, n
+    integer :: small, n
     real(wp), parameter :: change(3) = [1.0_wp, 2.0_wp, 3.0_wp]
 
-    film = merged%number(4, 5, top)
+    small = merged%number(4, 5, top)
     t = r + (1.0_wp - r)*0.25_wp
     call fill(u)
     call note()
     before = u
     u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
     u(4, 5, top, :) = 99.0_wp
-    call follow_masters(box%grid, merged, mass, noted, u, to_wall)
-    call check('films change with their master', u(4, 5, top, :) - before(4, 5, top, :), t*change, &
+    call follow_targets(box%grid, merged, mass, noted, u, to_wall)
+    call check('small change with their target', u(4, 5, top, :) - before(4, 5, top, :), t*change, &
                1.0e-14_wp)
     call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
                1.0e-14_wp)
-    n = merged%master(3, film)
-    call check('masters, film and wall have what the group of the legs has', &
-               mass(film)*t*change + to_wall(:, film), mass(film)*t**2*change, 1.0e-13_wp)
-    call check('a master of one film', count(merged%master(:, :merged%n_films) == n), 1)
+    n = merged%target(3, small)
+    call check('targets, small and wall have what the group of the legs has', &
+               mass(small)*t*change + to_wall(:, small), mass(small)*t**2*change, 1.0e-13_wp)
+    call check('a target of one small', count(merged%target(:, :merged%n_small) == n), 1)
   end subroutine the_rest
 
-  !> A film of water under gas is not extrapolated to the gas.
-  subroutine heavy_films()
-    integer :: film
+  !> A small cell of water under gas is not extrapolated to the gas.
+  subroutine heavy_small()
+    integer :: small
 
-    film = merged%number(4, 5, top)
+    small = merged%number(4, 5, top)
     box%flow%rho(4, 5, top) = 1000.0_wp
     box%flow%rho(4, 5, top + 1) = 1.0_wp
     call match_densities(box%grid, box%flow%rho, merged)
-    call check('a heavy film moves with its master', merged%nearer(3, film), &
+    call check('a heavy small moves with its target', merged%nearer(3, small), &
                1.0e-3_wp*(1.0_wp - r), 1.0e-12_wp)
     call check('others keep their profile', merged%nearer(3, merged%number(5, 5, top)), &
                1.0_wp - r, 1.0e-12_wp)
-  end subroutine heavy_films
+  end subroutine heavy_small
 
-  !> The share of a master goes with the open part of the face to it.
+  !> The share of a target goes with the open part of the face to it.
   subroutine closing_face()
-    associate (film => merged%number(4, 6, top))
+    associate (small => merged%number(4, 6, top))
       box%solid%open(4, 7, top, 2) = 0.5_wp
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
-      call check('shares close with the face', merged%share(:, film), &
+      call check('shares close with the face', merged%share(:, small), &
                  [0.0_wp, 0.5_wp*0.2_wp, 0.8_wp]/0.9_wp, 1.0e-12_wp)
     end associate
   end subroutine closing_face
@@ -225,13 +225,13 @@ contains
     end associate
   end function centre_in_box
 
-  !> Cell of the master above film i, j, k.
-  function master_of(i, j, k) result(c)
+  !> Cell of the target above small cell i, j, k.
+  function target_of(i, j, k) result(c)
     integer, intent(in) :: i, j, k
     integer :: c(3)
 
-    c = merged%cell(:, merged%master(3, merged%number(i, j, k)))
-  end function master_of
+    c = merged%cell(:, merged%target(3, merged%number(i, j, k)))
+  end function target_of
 
   !> Momentum of the wall cells [kg m/s].
   function momentum(u) result(p)

@@ -294,9 +294,9 @@ contains
 
   !> The old pressure of gas is a guess that the solve replaces. Noise in it hardly changes the
   !! velocity of a block that falls through the level, with gas in its cut cells: without viscosity
-  !! by 7e-5 of what the noise as a pressure under the block would give, by films; with it by 0.017,
-  !! as the walls rub the gas before the solve. With the old acceleration of gas in the faces at
-  !! walls it is 0.18 either way. C-ISMAC carries the noise into the liquid, and is not tried.
+  !! by 7e-5 of what the noise as a pressure under the block would give, by small cells; with it by
+  !! 0.017, as the walls rub the gas before the solve. With the old acceleration of gas in the faces
+  !! at walls it is 0.18 either way. C-ISMAC carries the noise into the liquid, and is not tried.
   subroutine noise_in_gas(viscosity, most)
     real(wp), intent(in) :: viscosity   !! of both fluids over that of water and air
     real(wp), intent(in) :: most        !! change, in that unit

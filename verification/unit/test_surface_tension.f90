@@ -30,7 +30,7 @@ program test_surface_tension
   call known_curvature(3, -1)
   call known_curvature(1, 1)
   call known_curvature(2, -1)
-  call film_on_the_floor()
+  call small_on_the_floor()
   call curvature_beyond_heights()
   call two_basins()
   call balance_at_faces()
@@ -163,7 +163,7 @@ contains
   end subroutine ready
 
   !> Columns that end at the floor before a full cell are whole.
-  subroutine film_on_the_floor()
+  subroutine small_on_the_floor()
     type(surface_tension_t) :: tension
     real(wp) :: worst, cases
 
@@ -173,10 +173,10 @@ contains
     call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
     call worst_error(tension, 3, 1, worst, cases)
-    call check('a film of half a cell: curvature [1/m]', worst, 0.0_wp, 1.0e-11_wp)
-    call check('a film has heights', tension%surface%fallback, 0)
-    call check('there is a film', cases > 0.0_wp)
-  end subroutine film_on_the_floor
+    call check('a small of half a cell: curvature [1/m]', worst, 0.0_wp, 1.0e-11_wp)
+    call check('a small has heights', tension%surface%fallback, 0)
+    call check('there is a small', cases > 0.0_wp)
+  end subroutine small_on_the_floor
 
   !> A drop of one cell has no heights: the divergence of the normals, sum of 1/h.
   subroutine curvature_beyond_heights()

@@ -1,4 +1,5 @@
-!> Implicit viscosity: exact shear past a wall inside the cells, film cells, momentum of the stage.
+!> Implicit viscosity: exact shear past a wall inside the cells, small cell cells, momentum of the
+!! stage.
 program test_viscous
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use kinds_m, only: wp
@@ -25,7 +26,7 @@ program test_viscous
     lid = -1.1_wp, long_time = 1.0e14_wp
   real(wp), parameter :: heights(3) = [0.13_wp, 0.22_wp, 0.26_wp]
     !! of the surface, cell height 1/8
-  real(wp) :: z, worst, momentum(2), film
+  real(wp) :: z, worst, momentum(2), small
   integer :: k, n
 
   call parallel_init()
@@ -97,21 +98,21 @@ program test_viscous
              -matmul(viscous%body_matrix(:, :, 1), wall%motion(:, 1)), 1.0e-13_wp)
   call check('they do', norm2(viscous%force(4:6, 1)) > 1.0e-3_wp)
 
-  ! The film above the wall, centre inside, hangs on the cell above it as on a lever, its middle at
-  ! r of the distance of that cell from the wall, and has no legs. A cell that is known at its
-  ! centre is heavier by the part that this has of its velocity.
+  ! The small cell above the wall, centre inside, hangs on the cell above it as on a lever, its
+  ! middle at r of the distance of that cell from the wall, and has no legs. A cell that is known at
+  ! its centre is heavier by the part that this has of its velocity.
   call make_wall(heights(2))
   call merged_cells_init(grid, merged)
   call find_merged_cells(grid, solid, merged)
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, merged)
-  film = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
+  small = 2.0_wp - heights(2)/grid%h(3)   ! open share of the second cell
   call check('mass of a group', viscous%mass(2, 2, 3), &
-             rho*(1.0_wp + (0.5_wp*film/(film + 0.5_wp))**2*film)*grid%volume/5.0_wp, 1.0e-12_wp)
+             rho*(1.0_wp + (0.5_wp*small/(small + 0.5_wp))**2*small)*grid%volume/5.0_wp, 1.0e-12_wp)
   merged%centre(merged%number(2, 2, 3)) = 0.5_wp
-  film = viscous%mass(2, 2, 3)
+  small = viscous%mass(2, 2, 3)
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous, merged)
-  call check('mass at a centre', viscous%mass(2, 2, 3), 2*film, 1.0e-12_wp)
-  call check('the film is no unknown', viscous%mass(2, 2, 2), 0.0_wp, 0.0_wp)
+  call check('mass at a centre', viscous%mass(2, 2, 3), 2*small, 1.0e-12_wp)
+  call check('the small is no unknown', viscous%mass(2, 2, 2), 0.0_wp, 0.0_wp)
 
   ! The upper side moves too: shear flow between two moving walls.
   grid%side_velocity(1, 2, 3) = lid
@@ -126,14 +127,14 @@ program test_viscous
   end do
   call check('linear profile below a moving side', worst, 0.0_wp, 1.0e-7_wp)
 
-  ! A film between two walls closer than a cell has no master: viscosity leaves it alone.
+  ! A small cell between two walls closer than a cell has no target: viscosity leaves it alone.
   grid%side_velocity = 0.0_wp
   call make_gap(3.65_wp*grid%h(3), 3.95_wp*grid%h(3), 2)
   flow%u(:, :, :, 1) = speed
   call find_merged_cells(grid, solid, merged)
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, long_time, viscous, merged)
   call solve_viscous(grid, wall, flow, viscous)
-  call check('film between two walls', flow%u(2, 2, 4, 1), speed, 0.0_wp)
+  call check('small between two walls', flow%u(2, 2, 4, 1), speed, 0.0_wp)
   call waves_in_odd_box(0.3_wp)
   call check('odd box: by sweeps', viscous%iterations > 10 .and. viscous%iterations <= 25)   ! 21
   call waves_in_odd_box(5.0_wp)

@@ -46,7 +46,7 @@ program test_wall_balance
   at_start = box%bodies
   call still_water()
   call agreement()
-  call one_film()
+  call one_small()
   call part_of_the_wall()
   call momentum_of_all()
   call two_halves()
@@ -119,8 +119,8 @@ contains
     call check('what gains as the box: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
   end subroutine agreement
 
-  !> A film at the side of the box, which takes 0.7 of it, and known changes of velocity.
-  subroutine one_film()
+  !> A small cell at the side of the box, which takes 0.7 of it, and known changes of velocity.
+  subroutine one_small()
     real(wp), parameter :: pushed(3) = [0.2_wp, -0.1_wp, 0.3_wp]
     real(wp), parameter :: taken(3) = [0.1_wp, 0.4_wp, 0.2_wp]
     integer, parameter :: c(3) = [6, 4, 5]
@@ -135,10 +135,10 @@ contains
     call find(spread(0.0_wp, 1, 6))
     f = box%case%fluid%liquid_density*box%grid%volume &
         *([0.5_wp, 0.3_wp, 0.3_wp]*pushed - 0.3_wp*taken)/dt
-    call check('one film: force', force(1:3, 1), f, 1.0e-10_wp)
-    call check('one film: torque', force(4:6, 1), cross([0.16_wp, -0.05_wp, 0.02_wp], f), &
+    call check('one small: force', force(1:3, 1), f, 1.0e-10_wp)
+    call check('one small: torque', force(4:6, 1), cross([0.16_wp, -0.05_wp, 0.02_wp], f), &
                1.0e-10_wp)
-  end subroutine one_film
+  end subroutine one_small
 
   !> What the wall's own change takes off is the inertia that `mass_defect` counts, where faces
   !! move only what the box holds.

@@ -14,7 +14,7 @@ program test_wall_layer
   real(wp), parameter :: edges(3) = [0.36_wp, 0.36_wp, 0.37_wp]     !! of the box [m]
   real(wp), parameter :: middle(3) = [0.39_wp, 0.40_wp, 0.185_wp]
   integer, parameter :: top = 4                                     !! open share 0.3 above the box
-  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top film over its master, from the wall
+  real(wp), parameter :: r = 0.15_wp/0.8_wp   !! middle of a top cell over its target, from the wall
   real(wp), parameter :: motion(6) = [0.3_wp, -0.5_wp, 0.4_wp, 2.0_wp, -1.0_wp, 3.0_wp]
     !! of the box [m/s, rad/s]
   type(one_body_t) :: box
@@ -52,7 +52,7 @@ contains
     call check('faster at the wall: likewise', layer_slip(1.5_wp, 0.4_wp), 1.0_wp, 0.0_wp)
   end subroutine the_formula
 
-  !> Flows over the top of a box that moves and turns; the master lies 0.8 cells above it.
+  !> Flows over the top of a box that moves and turns; the target lies 0.8 cells above it.
   subroutine above_the_box()
     call run_along(1.0e6_wp)
     call check('shear: linear', slip(), 0.0_wp, 1.0e-5_wp)
@@ -63,7 +63,8 @@ contains
                /layer(0.8_wp, 1.0_wp), 1.0e-12_wp)
   end subroutine above_the_box
 
-  !> A layer of thickness delta [cells] along x2, in the frame of the box at the film's centre.
+  !> A layer of thickness delta [cells] along x2, in the frame of the box at the small cell's
+  !! centre.
   subroutine run_along(delta)
     real(wp), intent(in) :: delta
     integer :: k
