@@ -247,7 +247,7 @@ contains
   end subroutine begin
 
   !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which
-  !! nobody asks for the legs and the free share.
+  !! nobody asks for the links and the free share.
   subroutine voxelise(sim)
     type(simulation_t), intent(inout) :: sim
     type(solid_geometry_t), allocatable :: keep

@@ -19,10 +19,10 @@ module polyhedron_m
     integer :: n = 0                     !! corners in use; 0: empty
     real(wp) :: x(3, max_corners)        !! [m]
     !> The three neighbours of each corner, counter-clockwise as seen from outside.
-    integer :: link(3, max_corners)
+    integer :: adjacent(3, max_corners)
   end type polyhedron_t
 
-  integer, parameter :: before(3) = [3, 1, 2]   !! slot before a slot of `link`, cyclic
+  integer, parameter :: before(3) = [3, 1, 2]   !! slot before a slot of `adjacent`, cyclic
 
 contains
 
@@ -148,10 +148,10 @@ contains
     p%n = 4
     p%x(:, 1:4) = corner
     if (tet_volume(corner) < 0.0_wp) p%x(:, 3:4) = corner(:, 4:3:-1)
-    p%link(:, 1) = [2, 4, 3]
-    p%link(:, 2) = [1, 3, 4]
-    p%link(:, 3) = [1, 4, 2]
-    p%link(:, 4) = [1, 2, 3]
+    p%adjacent(:, 1) = [2, 4, 3]
+    p%adjacent(:, 2) = [1, 3, 4]
+    p%adjacent(:, 3) = [1, 4, 2]
+    p%adjacent(:, 4) = [1, 2, 3]
   end subroutine polyhedron_of_tet
 
   !> The polyhedron of a box; corner 1 + a + 2b + 4c takes `hi` in x, y, z where a, b, c = 1.
@@ -168,9 +168,9 @@ contains
         step(d) = v + merge(-1, 1, bit(d) == 1)*2**(d - 1)
       end do
       if (mod(sum(bit), 2) == 0) then
-        p%link(:, v) = [step(1), step(3), step(2)]
+        p%adjacent(:, v) = [step(1), step(3), step(2)]
       else
-        p%link(:, v) = step
+        p%adjacent(:, v) = step
       end if
     end do
   end subroutine polyhedron_of_box
@@ -216,12 +216,12 @@ contains
     do v = 1, n_old
       if (s(v) > 0.0_wp) cycle
       do slot = 1, 3
-        w = p%link(slot, v)
+        w = p%adjacent(slot, v)
         if (s(w) <= 0.0_wp) cycle
         n_new = n_new + 1
         p%x(:, n_new) = p%x(:, v) + share_below(s(v), s(w))*(p%x(:, w) - p%x(:, v))
-        p%link(:, n_new) = [v, 0, 0]
-        p%link(slot, v) = n_new
+        p%adjacent(:, n_new) = [v, 0, 0]
+        p%adjacent(slot, v) = n_new
       end do
     end do
     if (n_new == n_old) then
@@ -244,26 +244,26 @@ contains
 
     do start = n_old + 1, p%n
       from = start
-      here = p%link(1, start)
+      here = p%adjacent(1, start)
       do step = 1, p%n
-        to = p%link(before(slot_of(p%link(:, here), from)), here)
+        to = p%adjacent(before(slot_of(p%adjacent(:, here), from)), here)
         from = here
         here = to
         if (here > n_old) exit
       end do
-      p%link(2, start) = here
-      p%link(3, here) = start
+      p%adjacent(2, start) = here
+      p%adjacent(3, here) = start
     end do
   end subroutine close_cut
 
   !> Slot of a neighbour in the list of a corner.
-  pure function slot_of(link, neighbour) result(slot)
-    integer, intent(in) :: link(3), neighbour
+  pure function slot_of(adjacent, neighbour) result(slot)
+    integer, intent(in) :: adjacent(3), neighbour
     integer :: slot
 
     slot = 3
-    if (link(1) == neighbour) slot = 1
-    if (link(2) == neighbour) slot = 2
+    if (adjacent(1) == neighbour) slot = 1
+    if (adjacent(2) == neighbour) slot = 2
   end function slot_of
 
   !> Number the corners anew without those of positive height.
@@ -281,10 +281,10 @@ contains
       n = n + 1
       number(v) = n
       p%x(:, n) = p%x(:, v)
-      p%link(:, n) = p%link(:, v)
+      p%adjacent(:, n) = p%adjacent(:, v)
     end do
     do v = 1, n
-      p%link(:, v) = number(p%link(:, v))
+      p%adjacent(:, v) = number(p%adjacent(:, v))
     end do
     p%n = n
   end subroutine drop_corners
@@ -308,12 +308,12 @@ contains
         done(slot, v) = .true.
         a = p%x(:, v) - p%x(:, 1)
         from = v
-        here = p%link(slot, v)
+        here = p%adjacent(slot, v)
         b = p%x(:, here) - p%x(:, 1)
         do step = 1, p%n
-          at = before(slot_of(p%link(:, here), from))
+          at = before(slot_of(p%adjacent(:, here), from))
           done(at, here) = .true.
-          to = p%link(at, here)
+          to = p%adjacent(at, here)
           if (to == v) exit
           c = p%x(:, to) - p%x(:, 1)
           six_v = triple(a, b, c)
@@ -351,8 +351,8 @@ contains
           done(at, from) = .true.
           m = m + 1
           corner(m) = from
-          here = p%link(at, from)
-          at = before(slot_of(p%link(:, here), from))
+          here = p%adjacent(at, from)
+          at = before(slot_of(p%adjacent(:, here), from))
           from = here
           if (from == v) exit
         end do
@@ -380,7 +380,7 @@ contains
 
     to%n = from%n
     to%x(:, 1:from%n) = from%x(:, 1:from%n)
-    to%link(:, 1:from%n) = from%link(:, 1:from%n)
+    to%adjacent(:, 1:from%n) = from%adjacent(:, 1:from%n)
   end subroutine copy_polyhedron
 
   !> The part of a tetrahedron in a box; cut it again by planes with `polyhedron_moments_below`.

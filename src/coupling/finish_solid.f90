@@ -1,15 +1,15 @@
 !> What follows when all bodies are painted: faces and cells that close, cut cells and their
-!! tetrahedra, legs that round-off left open.
+!! tetrahedra, links that round-off left open.
 module finish_solid_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, set_faces
   use share_lists_m, only: body_shares_t, full_cell, full_face
-  use voxels_m, only: voxels_t, shorten_leg
+  use voxels_m, only: voxels_t, shorten_link
   implicit none
   private
-  public :: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
+  public :: make_way, finish_faces, finish_cells, guard_links, tets_of_cut_cells
 
 contains
 
@@ -75,9 +75,9 @@ contains
     end do
   end subroutine finish_cells
 
-  !> A leg from a centre inside to one outside always has a hit, also where round-off sees the
+  !> A link from a centre inside to one outside always has a hit, also where round-off sees the
   !! centre now on this, now on that side of the surface: then the wall is at the centre inside.
-  subroutine guard_legs(voxels, solid)
+  subroutine guard_links(voxels, solid)
     type(voxels_t), intent(in) :: voxels
     type(solid_geometry_t), intent(inout) :: solid
     integer :: m, d, b, i(3), n(3)
@@ -88,16 +88,16 @@ contains
       if (b == 0) cycle
       do d = 1, 3
         n = i - unit_step(:, d)
-        if (n(d) >= voxels%low(d) .and. solid%leg_number(i(1), i(2), i(3), d) == 0) then
-          if (solid%inside(n(1), n(2), n(3)) == 0) call shorten_leg([i, d], 1.0_wp, b, solid)
+        if (n(d) >= voxels%low(d) .and. solid%link_number(i(1), i(2), i(3), d) == 0) then
+          if (solid%inside(n(1), n(2), n(3)) == 0) call shorten_link([i, d], 1.0_wp, b, solid)
         end if
         n = i + unit_step(:, d)
         if (n(d) > voxels%high(d)) cycle
         if (solid%inside(n(1), n(2), n(3)) == 0 .and. &
-            solid%leg_number(n(1), n(2), n(3), d) == 0) call shorten_leg([n, d], 0.0_wp, b, solid)
+            solid%link_number(n(1), n(2), n(3), d) == 0) call shorten_link([n, d], 0.0_wp, b, solid)
       end do
     end do
-  end subroutine guard_legs
+  end subroutine guard_links
 
   !> Lists of tetrahedra by cut cell: those of its bodies one after the other.
   pure subroutine tets_of_cut_cells(body, source, solid)

@@ -18,7 +18,7 @@ module mass_average_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, nearest_arm
   use viscous_system_m, only: take_arrays, give_arrays
-  use viscous_legs_m, only: build_viscous
+  use viscous_links_m, only: build_viscous
   use momentum_c_ismac_m, only: flux_of_faces, advected_velocity
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, divergence

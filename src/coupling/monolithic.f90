@@ -15,7 +15,7 @@ module monolithic_m
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity
   use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
   use viscous_system_m, only: take_arrays, give_arrays
-  use viscous_legs_m, only: build_viscous
+  use viscous_links_m, only: build_viscous
   use wall_shear_m, only: find_wall_speeds
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
@@ -54,7 +54,7 @@ module monolithic_m
     type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
-    real(wp), allocatable :: wall_speed(:)         !! at the ends of the legs (`wall_shear_m`) [m/s]
+    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_shear_m`) [m/s]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before

@@ -29,8 +29,8 @@ module share_lists_m
     real(wp), allocatable :: beta(:)           !! share of the face [-]
     real(wp), allocatable :: face_centroid(:, :)   !! (3, *) likewise
     integer :: n_hit = 0
-    integer, allocatable :: hit(:, :)          !! (4, *) leg: cell and direction of the lower face
-    real(wp), allocatable :: at(:)             !! (*) place on the leg, 0: lower centre, 1: upper
+    integer, allocatable :: hit(:, :)          !! (4, *) link: cell and direction of the lower face
+    real(wp), allocatable :: at(:)             !! (*) place on the link, 0: lower centre, 1: upper
   end type body_shares_t
 
 contains
@@ -110,8 +110,8 @@ contains
   end subroutine ensure_face
 
   !> Append a hit.
-  subroutine add_hit(leg, at, self)
-    integer, intent(in) :: leg(4)
+  subroutine add_hit(link, at, self)
+    integer, intent(in) :: link(4)
     real(wp), intent(in) :: at          !! 0 < at <= 1
     type(body_shares_t), intent(inout) :: self
     integer :: n
@@ -119,7 +119,7 @@ contains
     n = self%n_hit + 1
     self%n_hit = n
     call ensure_hit(n, self)
-    self%hit(:, n) = leg
+    self%hit(:, n) = link
     self%at(n) = at
   end subroutine add_hit
 

@@ -20,8 +20,8 @@ module solid_fraction_m
   use cut_tets_m, only: cut_tets_t, list_cut_tets
   use subcell_shares_m, only: subcell_work_t, count_subcells
   use voxels_m, only: voxels_t, voxels_init, find_images, ensure_lists, place_bodies, &
-    voxelise_cells, voxelise_faces, voxelise_legs
-  use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs, tets_of_cut_cells
+    voxelise_cells, voxelise_faces, voxelise_links
+  use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links, tets_of_cut_cells
   use wall_edges_m, only: find_edges
   use held_fluid_m, only: hold_fluid
   use pockets_m, only: pockets_t, pockets_init, close_pockets
@@ -105,14 +105,14 @@ contains
     !$omp section
     call voxelise_cells(grid, self%body, self%voxels, solid)
     !$omp section
-    call voxelise_legs(grid, self%body, self%voxels, solid)
+    call voxelise_links(grid, self%body, self%voxels, solid)
     !$omp end parallel sections
     !$omp parallel sections
     !$omp section
     call finish_cells(grid, solid)
     call tets_of_cut_cells(self%body, self%voxels%source, solid)
     !$omp section
-    call guard_legs(self%voxels, solid)
+    call guard_links(self%voxels, solid)
     !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
     call find_edges(grid, solid)

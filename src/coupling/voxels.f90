@@ -1,17 +1,18 @@
-!> Bodies with their images in other periods, painted into the cells kept here: shares, legs, lists.
+!> Bodies with their images in other periods, painted into the cells kept here: shares, links,
+!! lists.
 module voxels_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces, clear_legs
+  use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces, clear_links
   use share_lists_m, only: body_shares_t
   implicit none
   private
   public :: voxels_t, voxels_init, find_images, ensure_lists, place_bodies
-  public :: voxelise_cells, voxelise_faces, voxelise_legs, shorten_leg
+  public :: voxelise_cells, voxelise_faces, voxelise_links, shorten_link
 
-  real(wp), parameter :: min_leg = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
-  real(wp), parameter :: no_hit = 2.0_wp            !! longer than any leg
+  real(wp), parameter :: min_link = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
+  real(wp), parameter :: no_hit = 2.0_wp            !! longer than any link
 
   !> What is painted where.
   type :: voxels_t
@@ -86,7 +87,7 @@ contains
     type(body_shares_t), intent(in) :: body(:)
     type(voxels_t), intent(inout) :: self
     type(solid_geometry_t), intent(inout) :: solid
-    integer :: b, copies, images, cells, faces, legs, tets, n
+    integer :: b, copies, images, cells, faces, links, tets, n
 
     n = size(body) + 1
     if (size(solid%body_cell) /= n) then
@@ -96,7 +97,7 @@ contains
     images = 0
     cells = 0
     faces = 0
-    legs = 0
+    links = 0
     tets = 0
     do b = 1, n - 1
       if (.not. self%near(b)) cycle
@@ -104,7 +105,7 @@ contains
       images = images + copies
       cells = cells + copies*body(b)%n_cell
       faces = faces + copies*body(b)%n_face
-      legs = legs + copies*(body(b)%n_hit + 6*body(b)%n_cell)
+      links = links + copies*(body(b)%n_hit + 6*body(b)%n_cell)
       tets = tets + (1 + copies)*size(body(b)%corner, 3)
     end do
     call ensure_room(images, self%image, rows=4)
@@ -119,9 +120,9 @@ contains
     call ensure_room(faces, solid%face)
     call ensure_room(faces, solid%face_beta)
     call ensure_room(faces, solid%face_centroid)
-    call ensure_room(legs, solid%leg)
-    call ensure_room(legs, solid%leg_length)
-    call ensure_room(legs, solid%leg_body)
+    call ensure_room(links, solid%link)
+    call ensure_room(links, solid%link_length)
+    call ensure_room(links, solid%link_body)
     if (size(solid%tets%corner, 3) < tets) then
       tets = max(tets, 2*size(solid%tets%corner, 3))
       deallocate (solid%tets%corner)
@@ -257,15 +258,15 @@ contains
     kept_face = all(f(1:3) >= self%low) .and. all(f(1:3) <= high)
   end function kept_face
 
-  !> Nearest hits from both ends of the legs; what lies behind a side of the domain does not count.
-  pure subroutine voxelise_legs(grid, body, self, solid)
+  !> Nearest hits from both ends of the links; what lies behind a side of the domain does not count.
+  pure subroutine voxelise_links(grid, body, self, solid)
     type(grid_t), intent(in) :: grid
     type(body_shares_t), intent(in) :: body(:)
     type(voxels_t), intent(in) :: self
     type(solid_geometry_t), intent(inout) :: solid
     integer :: b, image, m, f(4)
 
-    call clear_legs(solid)
+    call clear_links(solid)
     do b = 1, size(body)
       do image = self%first_image(b), self%first_image(b + 1) - 1
         do m = 1, body(b)%n_hit
@@ -276,30 +277,30 @@ contains
             if (f(f(4)) == 1 .and. body(b)%at(m) < 0.5_wp) cycle
             if (f(f(4)) == grid%n(f(4)) + 1 .and. body(b)%at(m) > 0.5_wp) cycle
           end if
-          call shorten_leg(f, body(b)%at(m), b, solid)
+          call shorten_link(f, body(b)%at(m), b, solid)
         end do
       end do
     end do
-  end subroutine voxelise_legs
+  end subroutine voxelise_links
 
-  !> Body b meets a leg at a place between 0 (lower centre) and 1.
-  pure subroutine shorten_leg(f, at, b, solid)
+  !> Body b meets a link at a place between 0 (lower centre) and 1.
+  pure subroutine shorten_link(f, at, b, solid)
     integer, intent(in) :: f(4), b
     real(wp), intent(in) :: at
     type(solid_geometry_t), intent(inout) :: solid
 
-    associate (m => solid%leg_number(f(1), f(2), f(3), f(4)))
+    associate (m => solid%link_number(f(1), f(2), f(3), f(4)))
       if (m == 0) then
-        solid%n_leg = solid%n_leg + 1
-        m = solid%n_leg
-        solid%leg(:, m) = f
-        solid%leg_length(:, m) = no_hit
+        solid%n_link = solid%n_link + 1
+        m = solid%n_link
+        solid%link(:, m) = f
+        solid%link_length(:, m) = no_hit
       end if
-      where (max([at, 1.0_wp - at], min_leg) < solid%leg_length(:, m))
-        solid%leg_length(:, m) = max([at, 1.0_wp - at], min_leg)
-        solid%leg_body(:, m) = b
+      where (max([at, 1.0_wp - at], min_link) < solid%link_length(:, m))
+        solid%link_length(:, m) = max([at, 1.0_wp - at], min_link)
+        solid%link_body(:, m) = b
       end where
     end associate
-  end subroutine shorten_leg
+  end subroutine shorten_link
 
 end module voxels_m

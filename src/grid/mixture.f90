@@ -43,7 +43,7 @@ contains
     m = 0.5_wp*(a + b)
   end function face_mean
 
-  !> Viscosity on the leg between two cells: continuous stress across a jump halfway, none between
+  !> Viscosity on the link between two cells: continuous stress across a jump halfway, none between
   !! two fluids without.
   elemental function harmonic_mean(a, b) result(m)
     real(wp), intent(in) :: a, b

@@ -8,8 +8,8 @@ module solid_geometry_m
   implicit none
   private
   public :: solid_geometry_t, solid_geometry_init, set_faces, openings, wall_area, edge_in
-  public :: leg_to_wall, bounded_leg
-  public :: clear_cells, clear_faces, clear_legs, hand_over_faces
+  public :: link_to_wall, bounded_link
+  public :: clear_cells, clear_faces, clear_links, hand_over_faces
 
   !> Tetrahedra of all bodies present, in space. Of the bed some may have negative volume: what they
   !! hold is taken away again (see `bed_solid_m`).
@@ -31,15 +31,15 @@ module solid_geometry_m
     !! with a body (`held_fluid_m`).
     real(wp), allocatable :: free(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
-    !> Legs between the centres of the two cells of a lower face d: `leg_number(i,j,k,d)` is the
+    !> Links between the centres of the two cells of a lower face d: `link_number(i,j,k,d)` is the
     !! number of one that meets a surface in the lists, 0 where it is free.
-    integer, allocatable :: leg_number(:, :, :, :)
-    integer :: n_leg = 0
-    integer, allocatable :: leg(:, :)           !! (4, n_leg) cell index and direction of the face
+    integer, allocatable :: link_number(:, :, :, :)
+    integer :: n_link = 0
+    integer, allocatable :: link(:, :)           !! (4, n_leg) cell index and direction of the face
     !> Distances from the lower cell (i-1) up to the first surface and from the upper cell (i) down
     !! to the first surface, in units of h(d), 0..1, and the bodies that are hit there.
-    real(wp), allocatable :: leg_length(:, :)   !! (2, n_leg)
-    integer, allocatable :: leg_body(:, :)      !! (2, n_leg)
+    real(wp), allocatable :: link_length(:, :)   !! (2, n_leg)
+    integer, allocatable :: link_body(:, :)      !! (2, n_leg)
 
     type(solid_tets_t) :: tets
     !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0.
@@ -88,8 +88,8 @@ contains
     allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
     allocate (solid%free, source=solid%open)
     allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (solid%leg_number(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
-    allocate (solid%leg(4, 0), solid%leg_length(2, 0), solid%leg_body(2, 0))
+    allocate (solid%link_number(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
+    allocate (solid%link(4, 0), solid%link_length(2, 0), solid%link_body(2, 0))
     allocate (solid%cut(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (solid%tets%corner(3, 4, 0), solid%tets%list(0), solid%tets%of_cell(2, 0))
     allocate (solid%tets%first(1), source=1)
@@ -141,9 +141,9 @@ contains
     if (solid%cut(c(1), c(2), c(3)) > 0) edge = solid%edge(solid%cut(c(1), c(2), c(3)))
   end function edge_in
 
-  !> Length of the leg from the centre of cell c along +d or -d to the surface of a body [cells]; 0:
-  !! it meets none.
-  pure function leg_to_wall(solid, c, d, sense) result(length)
+  !> Length of the link from the centre of cell c along +d or -d to the surface of a body [cells];
+  !! 0: it meets none.
+  pure function link_to_wall(solid, c, d, sense) result(length)
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3), d, sense
     real(wp) :: length
@@ -151,19 +151,19 @@ contains
 
     f = c
     if (sense > 0) f = c + unit_step(:, d)
-    m = solid%leg_number(f(1), f(2), f(3), d)
+    m = solid%link_number(f(1), f(2), f(3), d)
     length = 0.0_wp
-    if (m > 0) length = bounded_leg(solid%leg_length(merge(1, 2, sense > 0), m))
-  end function leg_to_wall
+    if (m > 0) length = bounded_link(solid%link_length(merge(1, 2, sense > 0), m))
+  end function link_to_wall
 
-  !> Length of a leg that pulls: no centre is nearer to a wall than this [cells].
-  elemental function bounded_leg(theta) result(length)
+  !> Length of a link that pulls: no centre is nearer to a wall than this [cells].
+  elemental function bounded_link(theta) result(length)
     real(wp), intent(in) :: theta   !! to the surface [cells]
     real(wp) :: length
     real(wp), parameter :: least = 1.0e-3_wp
 
     length = min(max(theta, least), 1.0_wp)
-  end function bounded_leg
+  end function bounded_link
 
   !> Take away what the lists of the last time say was there: what bodies fill of cells.
   pure subroutine clear_cells(solid)
@@ -196,30 +196,30 @@ contains
     solid%n_closed = 0
   end subroutine clear_faces
 
-  !> The same of legs.
-  pure subroutine clear_legs(solid)
+  !> The same of links.
+  pure subroutine clear_links(solid)
     type(solid_geometry_t), intent(inout) :: solid
     integer :: m
 
-    do m = 1, solid%n_leg
-      associate (i => solid%leg(:, m))
-        solid%leg_number(i(1), i(2), i(3), i(4)) = 0
+    do m = 1, solid%n_link
+      associate (i => solid%link(:, m))
+        solid%link_number(i(1), i(2), i(3), i(4)) = 0
       end associate
     end do
-    solid%n_leg = 0
-  end subroutine clear_legs
+    solid%n_link = 0
+  end subroutine clear_links
 
-  !> Free shares and legs go from one geometry to another.
+  !> Free shares and links go from one geometry to another.
   subroutine hand_over_faces(from, to)
     type(solid_geometry_t), intent(inout) :: from, to
 
     call move_alloc(from%free, to%free)
-    call move_alloc(from%leg_number, to%leg_number)
-    call move_alloc(from%leg, to%leg)
-    call move_alloc(from%leg_length, to%leg_length)
-    call move_alloc(from%leg_body, to%leg_body)
-    to%n_leg = from%n_leg
-    from%n_leg = 0
+    call move_alloc(from%link_number, to%link_number)
+    call move_alloc(from%link, to%link)
+    call move_alloc(from%link_length, to%link_length)
+    call move_alloc(from%link_body, to%link_body)
+    to%n_link = from%n_link
+    from%n_link = 0
   end subroutine hand_over_faces
 
   !> Give the six faces of a cell an open share, as far as they are in the arrays.

@@ -78,11 +78,11 @@ contains
         if (done(slot, v)) cycle
         done(slot, v) = .true.
         from = v
-        here = p%link(slot, v)
+        here = p%adjacent(slot, v)
         do step = 1, p%n   ! along the face to the left of the edge, back to v
-          at = slot_before(p%link(:, here), from)
+          at = slot_before(p%adjacent(:, here), from)
           done(at, here) = .true.
-          to = p%link(at, here)
+          to = p%adjacent(at, here)
           if (to == v) exit
           call add_piece(p%x(:, 1), p%x(:, v), p%x(:, here), p%x(:, to), sense, self)
           from = here
@@ -93,13 +93,13 @@ contains
   end subroutine add_tetrahedron
 
   !> Slot before the one that holds a neighbour, cyclic.
-  pure function slot_before(link, neighbour) result(slot)
-    integer, intent(in) :: link(3), neighbour
+  pure function slot_before(adjacent, neighbour) result(slot)
+    integer, intent(in) :: adjacent(3), neighbour
     integer :: slot
 
     slot = 2
-    if (link(1) == neighbour) slot = 3
-    if (link(2) == neighbour) slot = 1
+    if (adjacent(1) == neighbour) slot = 3
+    if (adjacent(2) == neighbour) slot = 1
   end function slot_before
 
   !> Add one tetrahedron inside the unit cube.

@@ -1,17 +1,17 @@
 !> The velocity at the centre of a cut cell, where viscosity acts, and the mean over its fluid.
 !!
 !! Transport and pressure know the mean over the open part of a cut cell whose centre lies in the
-!! fluid; legs of viscosity pull at the centre, which lies nearer to the wall. With the layer along
+!! fluid; links of viscosity pull at the centre, which lies nearer to the wall. With the layer along
 !! the wall (`wall_layer_m`),
 !! $$ u_c = U_w + T_c (u - U_w), \qquad T_c = r + (1 - r) s $$
 !! with r the distance y of the centre from the wall over that of the middle of the fluid and s the
 !! slip of the layer there (`wall_profile_m`). The viscous stage solves for u_c with the mass m/T_c,
-!! so that m du is what the legs give. In a plane layer the shear at the wall is then right wherever
-!! the wall lies in the cell; with the mean at the centre the layer is pulled too hard.
+!! so that m du is what the links give. In a plane layer the shear at the wall is then right
+!! wherever the wall lies in the cell; with the mean at the centre the layer is pulled too hard.
 !!
-!! A leg pulls with mu over its length, so T_c must fall with that when the wall passes the centre,
+!! A link pulls with mu over its length, so T_c must fall with that when the wall passes the centre,
 !! or a body that moves pays for every centre that it passes. Two things see to it: y is that of a
-!! plane wall that pulls as the legs of the cell do together, and no layer is taken for thinner
+!! plane wall that pulls as the links of the cell do together, and no layer is taken for thinner
 !! than the middle of the fluid is far from the wall (docs/decisions/cut_cells.md).
 module centre_velocity_m
   use kinds_m, only: wp
@@ -26,7 +26,7 @@ module centre_velocity_m
   public :: find_centres, to_centres, to_means
 
   real(wp), parameter :: min_share = 1.0e-3_wp
-    !! T_c of a centre on the wall: what it has of the velocity means nothing, its leg holds it
+    !! T_c of a centre on the wall: what it has of the velocity means nothing, its link holds it
   real(wp), parameter :: max_slip = 0.5_wp
     !! s of a layer as thick as the middle of the fluid is far from the wall
 

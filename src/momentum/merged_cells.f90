@@ -12,7 +12,7 @@ module merged_cells_m
   use solid_geometry_m, only: solid_geometry_t, openings, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use wall_distance_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_legs
+  use wall_distance_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
   use wall_profile_m, only: slip_at
   implicit none
   private
@@ -294,7 +294,7 @@ contains
         n = wall_normal(grid, solid, c)
         if (all(abs(n) <= 0.0_wp)) cycle
         middle = distance_to_fluid(grid, solid, c, here, n)
-        y = distance_by_legs(grid, solid, c, n)
+        y = distance_by_links(grid, solid, c, n)
         if (y <= 0.0_wp) y = max(0.0_wp, distance_to_centre(grid, solid, c, n))
         if (middle <= y) cycle
         self%middle(m) = middle

@@ -8,7 +8,7 @@
 !! The right side has the accurate advection (fifth order, or the donor's value), the left side
 !! that of first order, whose matrix is diagonally dominant at any Courant number. Where the flow is
 !! steady delta is zero, so neither the step nor the first-order operator leaves a trace in it. The
-!! viscous part, the wall legs and the motion of the free bodies are those of `viscous_legs_m`, in
+!! viscous part, the wall links and the motion of the free bodies are those of `viscous_links_m`, in
 !! the same system; the bodies are eliminated, the rest is solved with BiCGSTAB.
 !!
 !! Advection is written with the volumes q that pass the open faces in the step,
@@ -32,7 +32,7 @@ module momentum_c_ismac_m
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, mp_scheme
   use viscous_system_m, only: viscous_t, wrench
-  use viscous_m, only: apply_viscous, force_of_legs, velocity_scale, inertial_momentum
+  use viscous_m, only: apply_viscous, force_of_links, velocity_scale, inertial_momentum
   use linear_operator_m, only: linear_operator_t, identity_t
   use solve_control_m, only: solve_control_t, solve_report_t, solved
   use krylov_m, only: krylov_work_t, krylov_init, bicgstab
@@ -56,7 +56,7 @@ module momentum_c_ismac_m
     real(wp), allocatable :: low(:, :, :, :), high(:, :, :, :)
     real(wp), allocatable :: inverse(:, :, :, :)   !! of the diagonal, 0: not an unknown [s/kg]
     real(wp), allocatable :: x(:, :, :, :), y(:, :, :, :)   !! by component, one halo cell
-    ! Wall legs by body, as in viscous_t, and the bodies eliminated.
+    ! Wall links by body, as in viscous_t, and the bodies eliminated.
     integer :: n = 0                               !! bodies
     logical, allocatable :: free(:)
     integer, allocatable :: first(:), cell(:, :)
@@ -213,10 +213,10 @@ contains
       if (bodies%free(b)) bodies%motion(:, b) = motion(:, b) &
         + matmul(self%operator%mobility(:, :, b), pull_of_walls(self%operator, b))
     end do
-    call force_of_legs(bodies, flow, viscous)
+    call force_of_links(bodies, flow, viscous)
   end subroutine solve_predictor
 
-  !> Coefficients of the left side from the viscous legs and the inflow of each cell.
+  !> Coefficients of the left side from the viscous links and the inflow of each cell.
   subroutine set_operator(grid, rho, bodies, dt, viscous, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -241,9 +241,9 @@ contains
                                              -self%q(i + e(1), j + e(2), k + e(3), d), &
                                              i*e(1) + j*e(2) + k*e(3), 2, d)
               inflow = inflow + op%low(i, j, k, d) + op%high(i, j, k, d)
-              op%low(i, j, k, d) = op%low(i, j, k, d) + viscous%leg(i, j, k, d)
+              op%low(i, j, k, d) = op%low(i, j, k, d) + viscous%link(i, j, k, d)
               op%high(i, j, k, d) = op%high(i, j, k, d) &
-                                    + viscous%leg(i + e(1), j + e(2), k + e(3), d)
+                                    + viscous%link(i + e(1), j + e(2), k + e(3), d)
             end do
             do m = 1, 3
               op%inverse(i, j, k, m) = 0.0_wp
@@ -269,7 +269,7 @@ contains
     end function share_of
   end subroutine set_operator
 
-  !> Wall legs, and the motion that an impulse rate gives each free body when the legs hold it.
+  !> Wall links, and the motion that an impulse rate gives each free body when the links hold it.
   subroutine eliminate_bodies(bodies, dt, viscous, op)
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt
@@ -388,7 +388,7 @@ contains
     end do
   end subroutine seven_points
 
-  !> Force and torque per velocity of what stands in `op%x` on body b, through its wall legs.
+  !> Force and torque per velocity of what stands in `op%x` on body b, through its wall links.
   function pull_of_walls(op, b) result(pull)
     type(predictor_operator_t), intent(inout) :: op
     integer, intent(in) :: b
@@ -460,9 +460,9 @@ contains
             rate = rho(i, j, k)*self%gain(i, j, k, :)/dt
             do d = 1, 3
               e = unit_step(:, d)
-              rate = rate + (op%low(i, j, k, d) - viscous%leg(i, j, k, d)) &
+              rate = rate + (op%low(i, j, k, d) - viscous%link(i, j, k, d)) &
                      *(x(i - e(1), j - e(2), k - e(3), :) - x(i, j, k, :)) &
-                     + (op%high(i, j, k, d) - viscous%leg(i + e(1), j + e(2), k + e(3), d)) &
+                     + (op%high(i, j, k, d) - viscous%link(i + e(1), j + e(2), k + e(3), d)) &
                      *(x(i + e(1), j + e(2), k + e(3), :) - x(i, j, k, :))
             end do
             do m = 1, 3

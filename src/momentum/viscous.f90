@@ -1,7 +1,7 @@
 !> Implicit viscosity with no-slip on the bodies: the velocities of cells and bodies are unknowns of
 !! one system.
 !!
-!! The force on a body is the sum over its wall legs (`viscous_legs_m`), so the stage conserves
+!! The force on a body is the sum over its wall links (`viscous_links_m`), so the stage conserves
 !! momentum. Departure from the paper: its overlay gives a drag that depends on the time step.
 !!
 !! Solved by overrelaxation of two colours of cells, without scalar products, unless a step is so
@@ -12,20 +12,20 @@ module viscous_m
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
-  use viscous_system_m, only: viscous_t, wall_legs_t, wrench
+  use viscous_system_m, only: viscous_t, wall_links_t, wrench
   use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms, &
     terms_at_once
   use parallel_m, only: halo_exchange, global_max, nproc
   implicit none
   private
   public :: solve_viscous
-  public :: apply_viscous, force_of_legs, velocity_scale, inertial_momentum   ! for C-ISMAC
+  public :: apply_viscous, force_of_links, velocity_scale, inertial_momentum   ! for C-ISMAC
 
   real(wp), parameter :: tolerance = 1.0e-9_wp      !! of the largest velocity
   real(wp), parameter :: max_sweeps = 100.0_wp     !! of relaxation; CG may be quicker then
   real(wp), parameter :: smallest_rate = 1.0e-3_wp  !! at which a sweep is taken to converge
   integer, parameter :: max_iterations = 500        !! sweeps included
-  integer, parameter :: worth_threads = 1000        !! fewer legs are looked at by one thread
+  integer, parameter :: worth_threads = 1000        !! fewer links are looked at by one thread
 
 contains
 
@@ -56,7 +56,7 @@ contains
     call relaxation(grid, momentum, inverse, bound, bodies, flow%u, self)
     if (.not. self%converged) call conjugate_gradients(grid, momentum, inverse, bound, bodies, &
                                                        flow%u, self)
-    call force_of_legs(bodies, flow, self)
+    call force_of_links(bodies, flow, self)
   end subroutine solve_viscous
 
   !> Successive overrelaxation: cells whose numbers have an even sum, those of an odd one, bodies.
@@ -102,11 +102,11 @@ contains
 
   !> Twice the sweeps that should reach the tolerance; none if they are too many, or if the weight
   !! would be too large for the first and the last cell of a period of an odd number of cells. These
-  !! are of one colour: a weight w converges as long as 2/w - 1 exceeds the share that their leg has
-  !! in the diagonal, at most the spread s, and w is in the end 2/(1 + sqrt(1 - s^2)).
+  !! are of one colour: a weight w converges as long as 2/w - 1 exceeds the share that their link
+  !! has in the diagonal, at most the spread s, and w is in the end 2/(1 + sqrt(1 - s^2)).
   pure integer function sweeps_allowed(grid, s)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: s   !! largest share of the legs to other cells in the diagonal
+    real(wp), intent(in) :: s   !! largest share of the links to other cells in the diagonal
     real(wp) :: rate
 
     sweeps_allowed = 0
@@ -186,7 +186,7 @@ contains
     do j = grid%lo(2), grid%hi(2)
       do c = 1, 3
         do i = grid%lo(1) + modulo(grid%lo(1) + j + k + colour - 1, 2), grid%hi(1), 2
-          associate (l => self%leg)
+          associate (l => self%link)
             change = (self%r(i, j, k, c) &
                       + l(i, j, k, 1)*u(i - 1, j, k, c) + l(i + 1, j, k, 1)*u(i + 1, j, k, c) &
                       + l(i, j, k, 2)*u(i, j - 1, k, c) + l(i, j + 1, k, 2)*u(i, j + 1, k, c) &
@@ -398,7 +398,7 @@ contains
     do c = 1, 3
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
-          call apply_row(grid, self%diagonal, self%leg, self%s, j, k, c, &
+          call apply_row(grid, self%diagonal, self%link, self%s, j, k, c, &
                          self%y(grid%lo(1):grid%hi(1), j, k, c))
         end do
       end do
@@ -407,26 +407,26 @@ contains
     y_body = rows_of_bodies(bodies, self, self%s, x_body)
   end subroutine apply_viscous
 
-  !> One line of the system, the legs to bodies left out, applied to component c of s.
-  pure subroutine apply_row(grid, diagonal, leg, s, j, k, c, y)
+  !> One line of the system, the links to bodies left out, applied to component c of s.
+  pure subroutine apply_row(grid, diagonal, link, s, j, k, c, y)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: diagonal, leg, s
+      contiguous :: diagonal, link, s
     integer, intent(in) :: j, k, c
     real(wp), intent(inout), contiguous :: y(grid%lo(1):)
     integer :: i
 
     do i = grid%lo(1), grid%hi(1)
       y(i) = diagonal(i, j, k, c)*s(i, j, k, c) &
-        - leg(i, j, k, 1)*s(i - 1, j, k, c) - leg(i + 1, j, k, 1)*s(i + 1, j, k, c) &
-        - leg(i, j, k, 2)*s(i, j - 1, k, c) - leg(i, j + 1, k, 2)*s(i, j + 1, k, c) &
-        - leg(i, j, k, 3)*s(i, j, k - 1, c) - leg(i, j, k + 1, 3)*s(i, j, k + 1, c)
+        - link(i, j, k, 1)*s(i - 1, j, k, c) - link(i + 1, j, k, 1)*s(i + 1, j, k, c) &
+        - link(i, j, k, 2)*s(i, j - 1, k, c) - link(i, j + 1, k, 2)*s(i, j + 1, k, c) &
+        - link(i, j, k, 3)*s(i, j, k - 1, c) - link(i, j, k + 1, 3)*s(i, j, k + 1, c)
     end do
   end subroutine apply_row
 
-  !> Add to the cells what the legs to bodies do that move, times a factor.
+  !> Add to the cells what the links to bodies do that move, times a factor.
   pure subroutine add_walls(walls, motion, factor, first, y)
-    type(wall_legs_t), intent(in) :: walls
+    type(wall_links_t), intent(in) :: walls
     real(wp), intent(in) :: motion(:, :)   !! (6, bodies)
     real(wp), intent(in) :: factor
     integer, intent(in) :: first(4)
@@ -458,25 +458,25 @@ contains
 
     y = 0.0_wp
     if (.not. any(bodies%free)) return
-    call pull_of_legs(self, u, motion, pull)
+    call pull_of_links(self, u, motion, pull)
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
       y(:, b) = inertial_momentum(bodies, b, self%dt, motion(:, b)) - pull(:, b)
     end do
   end function rows_of_bodies
 
-  !> Viscous force and torque on each body, from its wall legs [N, N m].
-  subroutine force_of_legs(bodies, flow, self)
+  !> Viscous force and torque on each body, from its wall links [N, N m].
+  subroutine force_of_links(bodies, flow, self)
     type(rigid_motion_t), intent(in) :: bodies
     type(flow_t), intent(in) :: flow
     type(viscous_t), intent(inout) :: self
 
-    call pull_of_legs(self, flow%u, bodies%motion, self%force)
-  end subroutine force_of_legs
+    call pull_of_links(self, flow%u, bodies%motion, self%force)
+  end subroutine force_of_links
 
-  !> Force and torque on each body of its wall legs, and of the stress that they leave out, for
+  !> Force and torque on each body of its wall links, and of the stress that they leave out, for
   !! velocities of the cells and motions of the bodies [N, N m].
-  subroutine pull_of_legs(self, u, motion, pull)
+  subroutine pull_of_links(self, u, motion, pull)
     type(viscous_t), intent(in) :: self
     real(wp), intent(in), contiguous :: &
       u(lbound(self%mass, 1):, lbound(self%mass, 2):, lbound(self%mass, 3):, :)   !! [m/s]
@@ -511,6 +511,6 @@ contains
     do b = 1, size(pull, 2)
       pull(4:6, b) = pull(4:6, b) - self%spin_drag(b)*motion(4:6, b)
     end do
-  end subroutine pull_of_legs
+  end subroutine pull_of_links
 
 end module viscous_m

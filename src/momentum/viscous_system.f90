@@ -1,6 +1,6 @@
-!> The system of the viscous stage as data: masses, legs between cells, legs to walls.
+!> The system of the viscous stage as data: masses, links between cells, links to walls.
 !!
-!! `viscous_legs_m` fills it, `viscous_m` and `momentum_c_ismac_m` solve it.
+!! `viscous_links_m` fills it, `viscous_m` and `momentum_c_ismac_m` solve it.
 module viscous_system_m
   use kinds_m, only: wp
   use vectors_m, only: cross
@@ -9,42 +9,42 @@ module viscous_system_m
   use scratch_m, only: scratch_t, take, give
   implicit none
   private
-  public :: viscous_t, wall_legs_t, viscous_init, add_wall, room_for_walls, set_wall, add_side
+  public :: viscous_t, wall_links_t, viscous_init, add_wall, room_for_walls, set_wall, add_side
   public :: wrench, take_arrays, give_arrays
 
-  !> Legs between cells and bodies, grouped by body.
-  type :: wall_legs_t
+  !> Links between cells and bodies, grouped by body.
+  type :: wall_links_t
     integer :: n = 0
     integer, allocatable :: first(:)          !! (bodies + 1)
     integer, allocatable :: cell(:, :)        !! (3, *)
     real(wp), allocatable :: k(:)             !! conductance [kg/s]
     real(wp), allocatable :: arm(:, :)        !! (3, *) from the centre of mass to the wall [m]
-    integer, allocatable :: found_body(:)     !! body of each leg as found, before grouping; 0: none
+    integer, allocatable :: found_body(:)     !! body of each link before grouping; 0: none
     integer, allocatable :: found_cell(:, :)
     real(wp), allocatable :: found_k(:), found_arm(:, :)
-  end type wall_legs_t
+  end type wall_links_t
 
-  !> Half legs to sides of the domain that move.
-  type :: side_legs_t
+  !> Half links to sides of the domain that move.
+  type :: side_links_t
     integer :: n = 0
     integer, allocatable :: cell(:, :)     !! (3, *)
     real(wp), allocatable :: pull(:, :)    !! (3, *) conductance times velocity [kg m/s2]
-  end type side_legs_t
+  end type side_links_t
 
   !> The system, what solves it, and what came out.
   type :: viscous_t
     real(wp) :: dt = 0.0_wp   !! [s]
     real(wp), allocatable :: mass(:, :, :)
       !! rho m V/dt, 0: the velocity is not an unknown [kg/s]
-    real(wp), allocatable :: leg(:, :, :, :)
-      !! conductance of the leg across the lower face [kg/s]
+    real(wp), allocatable :: link(:, :, :, :)
+      !! conductance of the link across the lower face [kg/s]
     real(wp), allocatable :: diagonal(:, :, :, :)   !! 1 where the velocity is not an unknown [kg/s]
     real(wp) :: spread = 1.0_wp
-      !! largest share of the diagonal that legs to other cells have, of all processes [-]
-    type(wall_legs_t) :: walls
-    type(side_legs_t) :: sides
+      !! largest share of the diagonal that links to other cells have, of all processes [-]
+    type(wall_links_t) :: walls
+    type(side_links_t) :: sides
     real(wp), allocatable :: body_matrix(:, :, :)
-      !! (6, 6, n) wall legs seen by the body [kg/s, kg m, kg m2/s]
+      !! (6, 6, n) wall links seen by the body [kg/s, kg m, kg m2/s]
     real(wp), allocatable :: spin_drag(:)
       !! 2 mu V of the body: torque per angular velocity [N m s]
     real(wp), allocatable :: r(:, :, :, :)   !! right side; of conjugate gradients the residual
@@ -73,8 +73,8 @@ contains
     allocate (self%sides%cell(3, n), self%sides%pull(3, n))
     if (.not. present(pooled)) then
       allocate (self%mass(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-      allocate (self%leg(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-      allocate (self%diagonal, self%r, self%s, self%y, source=self%leg)
+      allocate (self%link(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
+      allocate (self%diagonal, self%r, self%s, self%y, source=self%link)
     end if
     allocate (self%body_matrix(6, 6, n_bodies), source=0.0_wp)
     allocate (self%force(6, n_bodies), source=0.0_wp)
@@ -93,7 +93,7 @@ contains
     type(viscous_t), intent(inout) :: self
 
     call take(scratch, self%mass)
-    call take(scratch, self%leg)
+    call take(scratch, self%link)
     call take(scratch, self%diagonal)
     call take(scratch, self%r)
     call take(scratch, self%s)
@@ -106,14 +106,14 @@ contains
     type(viscous_t), intent(inout) :: self
 
     call give(scratch, self%mass)
-    call give(scratch, self%leg)
+    call give(scratch, self%link)
     call give(scratch, self%diagonal)
     call give(scratch, self%r)
     call give(scratch, self%s)
     call give(scratch, self%y)
   end subroutine give_arrays
 
-  !> Note a wall leg of conductance k between a cell and a body.
+  !> Note a wall link of conductance k between a cell and a body.
   subroutine add_wall(self, c, body, k, arm)
     type(viscous_t), intent(inout) :: self
     integer, intent(in) :: c(3), body
@@ -125,10 +125,10 @@ contains
     call set_wall(self%walls%n, c, body, k, arm, self%walls)
   end subroutine add_wall
 
-  !> Room for n wall legs.
+  !> Room for n wall links.
   subroutine room_for_walls(n, walls)
     integer, intent(in) :: n
-    type(wall_legs_t), intent(inout) :: walls
+    type(wall_links_t), intent(inout) :: walls
 
     call ensure_room(n, walls%found_cell)
     call ensure_room(n, walls%found_body)
@@ -144,7 +144,7 @@ contains
     integer, intent(in) :: n, c(3), body
     real(wp), intent(in) :: k        !! [kg/s]
     real(wp), intent(in) :: arm(3)   !! [m]
-    type(wall_legs_t), intent(inout) :: walls
+    type(wall_links_t), intent(inout) :: walls
 
     walls%found_cell(:, n) = c
     walls%found_body(n) = body

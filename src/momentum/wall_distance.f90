@@ -2,11 +2,11 @@
 module wall_distance_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, wall_area, leg_to_wall
+  use solid_geometry_m, only: solid_geometry_t, wall_area, link_to_wall
   use plic_m, only: unit_constant
   implicit none
   private
-  public :: wall_normal, distance_to_fluid, distance_to_centre, distance_by_legs
+  public :: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
 
 contains
 
@@ -63,26 +63,26 @@ contains
     level = unit_constant(n*grid%h, share) - 0.5_wp*sum(n*grid%h)
   end function level_of
 
-  !> Distance of the centre of cell c from a plane wall of normal n that pulls as its wall legs do
+  !> Distance of the centre of cell c from a plane wall of normal n that pulls as its wall links do
   !! together; 0 if it has none [m].
-  pure function distance_by_legs(grid, solid, c, n) result(y)
+  pure function distance_by_links(grid, solid, c, n) result(y)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(in) :: n(3)
     real(wp) :: y
-    real(wp) :: length, seen, pull   !! cells; area of the wall along the legs, area over length
+    real(wp) :: length, seen, pull   !! cells; area of the wall along the links, area over length
     integer :: d
 
     seen = 0.0_wp
     pull = 0.0_wp
     do d = 1, 3
-      length = leg_to_wall(solid, c, d, -nint(sign(1.0_wp, n(d))))
+      length = link_to_wall(solid, c, d, -nint(sign(1.0_wp, n(d))))
       if (length <= 0.0_wp) cycle
       seen = seen + grid%area(d)*abs(n(d))
       pull = pull + grid%area(d)/(length*grid%h(d))
     end do
     y = seen/max(pull, tiny(pull))
-  end function distance_by_legs
+  end function distance_by_links
 
 end module wall_distance_m

@@ -5,7 +5,7 @@
 !! array that is missing here is missing in every one of them.
 !!
 !! Halo cells are not part of the state: whoever reads one fills them, and computes what follows
-!! from the state (density, viscosity, legs to the surfaces), before the next step.
+!! from the state (density, viscosity, links to the surfaces), before the next step.
 module state_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, n_halo, unit_step

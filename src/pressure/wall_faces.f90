@@ -71,7 +71,7 @@ contains
   end subroutine shorten_at_walls
 
   !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
-  !! that of the cell to that of the wall, where the leg through the face ends; the rest by the
+  !! that of the cell to that of the wall, where the link through the face ends; the rest by the
   !! layer along the wall, as with the small cell on the other side of the face.
   !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
   !! `solid%edge` goes to 1: the stream leaves the edge straight.
@@ -109,11 +109,11 @@ contains
     integer :: m
 
     !$omp parallel do schedule(static)
-    do m = 1, solid%n_leg
-      call set_face(m, solid%leg(1:3, m), solid%leg(4, m))
+    do m = 1, solid%n_link
+      call set_face(m, solid%link(1:3, m), solid%link(4, m))
     end do
   contains
-    !> The lower face of cell f in direction d, with leg m: mean of what the cells of the leg see.
+    !> The lower face of cell f in direction d, with link m: mean of what the cells of the link see.
     subroutine set_face(m, f, d)
       integer, intent(in) :: m, f(3), d
       integer :: low(3), sides
@@ -128,11 +128,11 @@ contains
         if (solid%open(i, j, k, d) <= 0.0_wp) return
         if (solid%inside(low(1), low(2), low(3)) == 0) then
           sides = sides + 1
-          total = total + seen_from(low, 1, solid%leg_length(1, m), solid%leg_body(1, m), f, d)
+          total = total + seen_from(low, 1, solid%link_length(1, m), solid%link_body(1, m), f, d)
         end if
         if (solid%inside(i, j, k) == 0) then
           sides = sides + 1
-          total = total + seen_from(f, -1, solid%leg_length(2, m), solid%leg_body(2, m), f, d)
+          total = total + seen_from(f, -1, solid%link_length(2, m), solid%link_body(2, m), f, d)
         end if
         if (sides == 0) return
         plane = behind_plane(low, f, d)
@@ -151,7 +151,7 @@ contains
       end if
     end function behind_plane
 
-    !> Velocity of face f as seen from cell c, whose leg along +d or -d ends at theta cells.
+    !> Velocity of face f as seen from cell c, whose link along +d or -d ends at theta cells.
     pure function seen_from(c, sense, theta, body, f, d) result(velocity)
       integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
@@ -204,10 +204,10 @@ contains
     !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
     !! centre of the cell is.
     pure function near_wall(theta, n, d, open) result(b)
-      real(wp), intent(in) :: theta, n(3), open   !! leg [cells], normal, open share
-      integer, intent(in) :: d                    !! direction of the leg
+      real(wp), intent(in) :: theta, n(3), open   !! link [cells], normal, open share
+      integer, intent(in) :: d                    !! direction of the link
       real(wp) :: b
-      real(wp) :: cell, face   !! distances from the wall [spacings along the leg]
+      real(wp) :: cell, face   !! distances from the wall [spacings along the link]
 
       cell = theta*abs(n(d))
       if (open >= 1.0_wp) then

@@ -120,7 +120,7 @@ contains
       longest = edge
       stone%n = form%n
       stone%x(:, :form%n) = form%x(:, :form%n)
-      stone%link(:, :form%n) = form%link(:, :form%n)
+      stone%adjacent(:, :form%n) = form%adjacent(:, :form%n)
       if (edge >= min_edge) exit
     end do
     if (stone%n == 0) return
@@ -256,7 +256,7 @@ contains
     length = huge(length)
     do v = 1, stone%n
       do k = 1, 3
-        length = min(length, norm2(stone%x(:, stone%link(k, v)) - stone%x(:, v)))
+        length = min(length, norm2(stone%x(:, stone%adjacent(k, v)) - stone%x(:, v)))
       end do
     end do
   end function shortest_edge

@@ -32,16 +32,16 @@ contains
     part = p
     call cut_polyhedron(part, n, d)
     first = n_kept + 1
-    here = part%link(2, first)
+    here = part%adjacent(2, first)
     moment = 0.0_wp
     do v = n_kept + 2, part%n
-      if (part%link(2, here) == first) exit
+      if (part%adjacent(2, here) == first) exit
       a = part%x(:, here) - part%x(:, first)
-      b = part%x(:, part%link(2, here)) - part%x(:, first)
+      b = part%x(:, part%adjacent(2, here)) - part%x(:, first)
       twice = dot_product(n, cross(a, b))/norm2(n)
       area = area + twice
       moment = moment + twice*(a + b)
-      here = part%link(2, here)
+      here = part%adjacent(2, here)
     end do
     if (abs(area) > 0.0_wp) centroid = part%x(:, first) + moment/(3.0_wp*area)
     area = 0.5_wp*abs(area)

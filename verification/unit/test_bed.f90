@@ -8,7 +8,7 @@ program test_bed
   use case_types_m, only: case_t
   use grid_m, only: grid_t, grid_init, n_halo
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use legs_on_grid_m, only: legs_t, legs_on_grid
+  use links_on_grid_m, only: links_t, links_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
   use shapes_builtin_m, only: make_shape
@@ -280,7 +280,7 @@ contains
   end function worst_level_face
 
   !> A hexapod as a bed, closed and overhanging, fills the grid as the same hexapod does as a body:
-  !! shares, faces, legs, and the liquid below any plane in its cut cells.
+  !! shares, faces, links, and the liquid below any plane in its cut cells.
   subroutine volume_of_closed_form()
     type(case_t) :: case
     type(grid_t) :: grid
@@ -288,7 +288,7 @@ contains
     type(blocks_t) :: blocks
     type(solid_fraction_t) :: fraction
     type(solid_geometry_t) :: solid, of_bed
-    type(legs_t) :: legs, legs_of_bed
+    type(links_t) :: links, links_of_bed
     type(bed_form_t) :: form
     type(cut_cell_t) :: a, b
     character(:), allocatable :: message
@@ -311,10 +311,10 @@ contains
       call fill(case, form, grid, of_bed)
       worst(1) = max(worst(1), maxval(abs(solid%alpha - of_bed%alpha)))
       worst(2) = max(worst(2), maxval(abs(solid%open - of_bed%open)))
-      legs = legs_on_grid(solid)
-      legs_of_bed = legs_on_grid(of_bed)
-      worst(3) = max(worst(3), maxval(abs(legs%low - legs_of_bed%low)))
-      worst(4) = max(worst(4), maxval(abs(legs%high - legs_of_bed%high)))
+      links = links_on_grid(solid)
+      links_of_bed = links_on_grid(of_bed)
+      worst(3) = max(worst(3), maxval(abs(links%low - links_of_bed%low)))
+      worst(4) = max(worst(4), maxval(abs(links%high - links_of_bed%high)))
       worst(5) = max(worst(5), real(maxval(abs(solid%inside - of_bed%inside)), wp))
       do k = 1, grid%n(3)
         do j = 1, grid%n(2)
@@ -335,8 +335,8 @@ contains
     message = 'hexapod as body and as bed: '
     call check(message//'cells', worst(1), 0.0_wp, 1.0e-12_wp)
     call check(message//'faces', worst(2), 0.0_wp, 1.0e-12_wp)
-    call check(message//'legs up', worst(3), 0.0_wp, 1.0e-11_wp)
-    call check(message//'legs down', worst(4), 0.0_wp, 1.0e-11_wp)
+    call check(message//'links up', worst(3), 0.0_wp, 1.0e-11_wp)
+    call check(message//'links down', worst(4), 0.0_wp, 1.0e-11_wp)
     call check(message//'centres', worst(5), 0.0_wp, 0.0_wp)
     call check(message//'liquid in cut cells', worst(6), 0.0_wp, 1.0e-11_wp)
   end subroutine volume_of_closed_form

@@ -1,4 +1,4 @@
-!> One body in the grid by itself: shares, legs, tetrahedra of cut cells, counted shares.
+!> One body in the grid by itself: shares, links, tetrahedra of cut cells, counted shares.
 program test_body_shares
   use kinds_m, only: wp
   use vectors_m, only: quaternion_from_axis
@@ -71,7 +71,7 @@ contains
       call check('volume', volume, shape%volume, 1.0e-13_wp*shape%volume)
       call check('centroid', first/volume, position, 1.0e-14_wp)
       call check('cut cells by their tetrahedra', worst_cell(), 0.0_wp, 1.0e-12_wp)
-      call check('legs end in pairs', modulo(body%n_hit, 2), 0)
+      call check('links end in pairs', modulo(body%n_hit, 2), 0)
       call find_body_shares(grid, shape, position, q, row, body, changed)
       call check('known already', .not. changed)
       call find_body_shares(grid, shape, position + [0.0_wp, 0.0_wp, 1.0e-6_wp], q, row, body, &
@@ -100,7 +100,7 @@ contains
     end do
   end function worst_cell
 
-  !> A box of 4 x 3 x 3 cells: full cells, closed faces all round, two hits on each leg through it;
+  !> A box of 4 x 3 x 3 cells: full cells, closed faces all round, two hits on each link through it;
   !! counting gives the same.
   subroutine box_on_the_grid()
     type(subcell_work_t) :: work
@@ -119,7 +119,7 @@ contains
     n_face = 5*3*3 + 4*4*3 + 4*3*4
     beta = minval(body%beta(:body%n_face))
     call check('closed faces', body%n_face == n_face .and. beta >= 1.0_wp)
-    call check('two hits on each leg', body%n_hit, 2*(3*3 + 4*3 + 4*3))
+    call check('two hits on each link', body%n_hit, 2*(3*3 + 4*3 + 4*3))
     call check('half way between centres', body%at(:body%n_hit), spread(0.5_wp, 1, body%n_hit), &
                1.0e-12_wp)
     call check('no cell is cut', body%first_tet(body%n_cell + 1), 1)

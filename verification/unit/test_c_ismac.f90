@@ -8,7 +8,7 @@ program test_c_ismac
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init
   use viscous_system_m, only: viscous_t, viscous_init
-  use viscous_legs_m, only: build_viscous
+  use viscous_links_m, only: build_viscous
   use viscous_m, only: solve_viscous
   use momentum_c_ismac_m, only: c_ismac_t, c_ismac_init, begin_predictor, solve_predictor, &
                                 advected_velocity
@@ -261,7 +261,7 @@ contains
     end do
   end function wave_error
 
-  !> Without advection the predictor is the viscous stage, with a free body, wall legs and small
+  !> Without advection the predictor is the viscous stage, with a free body, wall links and small
   !! cells.
   subroutine without_advection()
     character(8), parameter :: sides(2, 3) = reshape([character(8) :: &

@@ -39,7 +39,7 @@ program test_centre_velocity
   call run_along(1.0_wp)
   call check('a layer of one cell', centre(), &
              layer(at_centre, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
-  call as_the_legs_pull()
+  call as_the_links_pull()
   call finish_checks()
 
 contains
@@ -55,24 +55,24 @@ contains
     call check('there and back', maxval(abs(u - means)), 0.0_wp, 1.0e-13_wp)
   end subroutine there_and_back
 
-  !> A leg that ends elsewhere than the plane of the solid share, as at a curved wall, in a layer of
-  !! one cell.
-  subroutine as_the_legs_pull()
+  !> A link that ends elsewhere than the plane of the solid share, as at a curved wall, in a layer
+  !! of one cell.
+  subroutine as_the_links_pull()
     real(wp), parameter :: near = 0.01_wp   !! [cells]
 
-    associate (leg => box%solid%leg_number(4, 5, top, 3))
-      box%solid%leg_length(2, leg) = near
+    associate (link => box%solid%link_number(4, 5, top, 3))
+      box%solid%link_length(2, link) = near
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
       call find_centres(box%grid, box%solid, box%bodies, u, merged)
-      call check('a short leg', centre(), layer(near, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
-      box%solid%leg_length(2, leg) = 0.0_wp
+      call check('a short link', centre(), layer(near, 1.0_wp)/layer(of_fluid, 1.0_wp), 1.0e-12_wp)
+      box%solid%link_length(2, link) = 0.0_wp
       call find_merged_cells(box%grid, box%solid, merged)
       call find_centres(box%grid, box%solid, box%bodies, u, merged)
       call check('the shortest', centre(), layer(1.0e-3_wp, 1.0_wp)/layer(of_fluid, 1.0_wp), &
                  1.0e-12_wp)
     end associate
-  end subroutine as_the_legs_pull
+  end subroutine as_the_links_pull
 
   real(wp) function centre()
     centre = merged%centre(merged%number(4, 5, top))

@@ -1,11 +1,11 @@
-!> Faces and cells that two bodies share, and legs that round-off left open, made by hand.
+!> Faces and cells that two bodies share, and links that round-off left open, made by hand.
 program test_finish_solid
   use kinds_m, only: wp
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init, clear_cells, clear_faces
-  use legs_on_grid_m, only: legs_t, legs_on_grid, no_hit
+  use links_on_grid_m, only: links_t, links_on_grid, no_hit
   use voxels_m, only: voxels_t, voxels_init
-  use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_legs
+  use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links
   use box_solid_m, only: simple_grid
   use check_m, only: check, finish_checks
   implicit none
@@ -13,7 +13,7 @@ program test_finish_solid
   type(grid_t) :: grid
   type(solid_geometry_t) :: solid
   type(voxels_t) :: voxels
-  type(legs_t) :: legs
+  type(links_t) :: links
 
   call simple_grid([6, 5, 4], [0.6_wp, 0.5_wp, 0.4_wp], grid)
   call voxels_init(grid, 2, voxels)
@@ -46,14 +46,14 @@ program test_finish_solid
   call finish_cells(grid, solid)
   call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
 
-  call guard_legs(voxels, solid)
-  legs = legs_on_grid(solid)
-  call check('the wall is at the centre inside, below', legs%high(c(1), c(2), c(3), 1), &
+  call guard_links(voxels, solid)
+  links = links_on_grid(solid)
+  call check('the wall is at the centre inside, below', links%high(c(1), c(2), c(3), 1), &
              1.0e-3_wp, 0.0_wp)
-  call check('and above', legs%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
-  call check('six legs, of the body', solid%n_leg == 6 &
-             .and. legs%body_low(c(1), c(2), c(3), 2) == 1)
-  call check('no others', count(legs%low < no_hit), 6)
+  call check('and above', links%low(c(1) + 1, c(2), c(3), 1), 1.0e-3_wp, 0.0_wp)
+  call check('six links, of the body', solid%n_link == 6 &
+             .and. links%body_low(c(1), c(2), c(3), 2) == 1)
+  call check('no others', count(links%low < no_hit), 6)
   call finish_checks()
 
 contains
@@ -77,9 +77,9 @@ contains
     solid%body_cell = [1, 2, 3]
     solid%cell = reshape([c, c], [3, 2])
     solid%cell_alpha = [first, second]
-    deallocate (solid%cut_cell, solid%closed_cell, solid%leg, solid%leg_length, solid%leg_body)
-    allocate (solid%cut_cell(3, 2), solid%closed_cell(3, 2), solid%leg(4, 12), &
-              solid%leg_length(2, 12), solid%leg_body(2, 12))
+    deallocate (solid%cut_cell, solid%closed_cell, solid%link, solid%link_length, solid%link_body)
+    allocate (solid%cut_cell(3, 2), solid%closed_cell(3, 2), solid%link(4, 12), &
+              solid%link_length(2, 12), solid%link_body(2, 12))
     solid%alpha(c(1), c(2), c(3)) = first + second
     solid%inside(c(1), c(2), c(3)) = 1
   end subroutine shared_cell

@@ -1,5 +1,6 @@
-!> Small cells and their targets at a box, and what groups share: momentum is kept with what the wall
-!! bears, a small cell moves between its target and the wall, what moves as one keeps moving as one.
+!> Small cells and their targets at a box, and what groups share: momentum is kept with what the
+!! wall bears, a small cell moves between its target and the wall, what moves as one keeps moving as
+!! one.
 program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
@@ -187,7 +188,7 @@ contains
     call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
                1.0e-14_wp)
     n = merged%target(3, small)
-    call check('targets, small and wall have what the group of the legs has', &
+    call check('targets, small and wall have what the group of the links has', &
                mass(small)*t*change + to_wall(:, small), mass(small)*t**2*change, 1.0e-13_wp)
     call check('a target of one small', count(merged%target(:, :merged%n_small) == n), 1)
   end subroutine the_rest

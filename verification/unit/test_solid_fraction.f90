@@ -1,4 +1,4 @@
-!> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, legs, pockets,
+!> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, links, pockets,
 !! periods, and the same bits for any part of the grid.
 program test_solid_fraction
   use kinds_m, only: wp, pi
@@ -12,7 +12,7 @@ program test_solid_fraction
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
-  use legs_on_grid_m, only: legs_t, legs_on_grid
+  use links_on_grid_m, only: links_t, links_on_grid
   use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
   implicit none
 
@@ -30,9 +30,9 @@ program test_solid_fraction
   call faces_on_grid_planes()
   call both_sides_alike()
   call degenerate_poses()
-  call three_legs_on_the_floor()
-  call legs_of_a_box()
-  call legs_of_a_sphere()
+  call three_links_on_the_floor()
+  call links_of_a_box()
+  call links_of_a_sphere()
   call partly_outside()
   call touching_bodies()
   call sealed_pocket()
@@ -322,7 +322,7 @@ contains
   end subroutine faces_on_grid_planes
 
   !> A cube with its sides on planes of the grid or of centres, a little to the left or right of
-  !! them: the same cells are inside, the same faces open, the same legs end at it on either side.
+  !! them: the same cells are inside, the same faces open, the same links end at it on either side.
   subroutine both_sides_alike()
     real(wp), parameter :: edges(2) = [0.04_wp, 0.035_wp]   !! in cells of 5 mm
     real(wp), parameter :: little(3) = [0.0_wp, 3.0e-6_wp, -3.0e-6_wp]   !! [cells]
@@ -330,13 +330,13 @@ contains
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
     real(wp) :: x(3)
-    logical :: inside, open, legs
+    logical :: inside, open, links
     integer :: e, m, i
 
     grid = make_grid([20, 20, 20], [0.1_wp, 0.1_wp, 0.1_wp])
     inside = .true.
     open = .true.
-    legs = .true.
+    links = .true.
     do e = 1, 2
       do m = 1, 3
         x = [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp]
@@ -348,18 +348,18 @@ contains
                                     == solid%inside(21 - i, 1:20, 1:20))
           open = open .and. all(abs(solid%open(i, 1:20, 1:20, 1) &
                                     - solid%open(22 - i, 1:20, 1:20, 1)) <= 0.0_wp)
-          legs = legs .and. all((solid%leg_number(i, 1:20, 1:20, 1) > 0) &
-                                .eqv. (solid%leg_number(22 - i, 1:20, 1:20, 1) > 0))
+          links = links .and. all((solid%link_number(i, 1:20, 1:20, 1) > 0) &
+                                .eqv. (solid%link_number(22 - i, 1:20, 1:20, 1) > 0))
         end do
       end do
     end do
     call check('both sides alike: centres inside', inside)
     call check('both sides alike: open faces', open)
-    call check('both sides alike: legs', legs)
+    call check('both sides alike: links', links)
   end subroutine both_sides_alike
 
   !> Corners, edges and sides on grid planes and cell centres, or nearly: volume, open and solid
-  !! share of each face, a hit on every leg between inside and outside.
+  !! share of each face, a hit on every link between inside and outside.
   subroutine degenerate_poses()
     type(grid_t) :: grid
     type(blocks_t) :: blocks
@@ -397,14 +397,14 @@ contains
       call fill(grid, blocks, solid)
       worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
       worst(2) = max(worst(2), largest_gap(solid))
-      complete = complete + legs_without_hit(grid, solid)
+      complete = complete + links_without_hit(grid, solid)
       closed = closed .and. full_cells_closed(grid, solid)
     end do
     ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
     call check('degenerate: volume', worst(1), 0.0_wp, 1e-5_wp)
     call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
     call check('degenerate: full cells are closed all round', closed)
-    call check('degenerate: legs between inside and outside without a hit', complete, 0)
+    call check('degenerate: links between inside and outside without a hit', complete, 0)
   end subroutine degenerate_poses
 
   !> Largest |1 - open - sum of the shares of the bodies| of a face.
@@ -441,7 +441,7 @@ contains
     end do
   end function full_cells_closed
 
-  function legs_without_hit(grid, solid) result(n)
+  function links_without_hit(grid, solid) result(n)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer :: n, i, j, k, m, low(3)
@@ -452,16 +452,16 @@ contains
         do j = 2, grid%n(2)
           do i = 2, grid%n(1)
             low = [i, j, k] - unit_step(:, m)
-            if (solid%leg_number(i, j, k, m) > 0) cycle
+            if (solid%link_number(i, j, k, m) > 0) cycle
             if (solid%inside(i, j, k) /= solid%inside(low(1), low(2), low(3))) n = n + 1
           end do
         end do
       end do
     end do
-  end function legs_without_hit
+  end function links_without_hit
 
   !> The pose of the fixed blocks: three corners on the floor, nothing below it.
-  subroutine three_legs_on_the_floor()
+  subroutine three_links_on_the_floor()
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
@@ -473,19 +473,19 @@ contains
                      reshape([0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], [3, 1]), &
                      reshape(q, [4, 1]), blocks)
     call fill(grid, blocks, solid)
-    call check('three legs: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
+    call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
                1e-7_wp*d**3)
-    call check('three legs: the floor is open', minval(solid%open(1:60, 1:20, 1, 3)), 1.0_wp, &
+    call check('three links: the floor is open', minval(solid%open(1:60, 1:20, 1, 3)), 1.0_wp, &
                1e-6_wp)
-    call check('three legs: no pockets', solid%n_sealed, 0)
-  end subroutine three_legs_on_the_floor
+    call check('three links: no pockets', solid%n_sealed, 0)
+  end subroutine three_links_on_the_floor
 
   !> Hits against the exact intersections of grid lines with a turned box.
-  subroutine legs_of_a_box()
+  subroutine links_of_a_box()
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
-    type(legs_t) :: legs
+    type(links_t) :: links
     real(wp) :: worst, r(3, 3), a(3), b(3), enter, leave, e(3)
     integer :: p, i, j, k, m, n(3)
     logical :: same, flags
@@ -502,7 +502,7 @@ contains
       if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
       e = maxval(blocks%shapes(1)%point, 2)
       call fill(grid, blocks, solid)
-      legs = legs_on_grid(solid)
+      links = links_on_grid(solid)
       r = transpose(rotation_matrix(blocks%q(:, 1)))
       do k = 1, grid%n(3)
         do j = 1, grid%n(2)
@@ -514,20 +514,20 @@ contains
               if (n(m) < 1) cycle
               a = matmul(r, grid%centre(n, [1, 2, 3]) - blocks%x(:, 1))
               call cross_box(a, b, e, enter, leave)
-              same = same .and. ((enter <= 1) .eqv. (legs%low(i, j, k, m) <= 1)) .and. &
-                     ((enter <= 1) .eqv. (legs%body_high(i, j, k, m) == 1))
-              if (enter > 1 .or. legs%low(i, j, k, m) > 1) cycle
-              worst = max(worst, abs(legs%low(i, j, k, m) - max(enter, 1e-3_wp)), &
-                          abs(legs%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
+              same = same .and. ((enter <= 1) .eqv. (links%low(i, j, k, m) <= 1)) .and. &
+                     ((enter <= 1) .eqv. (links%body_high(i, j, k, m) == 1))
+              if (enter > 1 .or. links%low(i, j, k, m) > 1) cycle
+              worst = max(worst, abs(links%low(i, j, k, m) - max(enter, 1e-3_wp)), &
+                          abs(links%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
             end do
           end do
         end do
       end do
     end do
-    call check('box: a leg is cut where the line meets the box', same)
+    call check('box: a link is cut where the line meets the box', same)
     call check('box: centres inside', flags)
     call check('box: places of the first hits', worst, 0.0_wp, 1e-12_wp)
-  end subroutine legs_of_a_box
+  end subroutine links_of_a_box
 
   !> First and last place, 0..1 from a to b, where a line meets the surface of a box of half
   !! edges e; both 2 if it does not.
@@ -557,13 +557,13 @@ contains
     end if
   end subroutine cross_box
 
-  !> A sphere: hits within the distance between its polyhedron and the sphere; no leg without a hit
+  !> A sphere: hits within the distance between its polyhedron and the sphere; no link without a hit
   !! between inside and outside.
-  subroutine legs_of_a_sphere()
+  subroutine links_of_a_sphere()
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
-    type(legs_t) :: legs
+    type(links_t) :: links
     real(wp) :: x(3), worst
     integer :: i, j, k, m, n(3)
     logical :: complete
@@ -573,7 +573,7 @@ contains
                      reshape([0.041_wp, 0.0405_wp, 0.039_wp], [3, 1]), &
                      reshape(identity, [4, 1]), blocks)
     call fill(grid, blocks, solid)
-    legs = legs_on_grid(solid)
+    links = links_on_grid(solid)
     worst = 0.0_wp
     complete = .true.
     do m = 1, 3
@@ -581,11 +581,11 @@ contains
         do j = 2, 16
           do i = 2, 16
             n = [i, j, k] - unit_step(:, m)
-            if (legs%low(i, j, k, m) > 1) then
+            if (links%low(i, j, k, m) > 1) then
               complete = complete .and. (solid%inside(i, j, k) == solid%inside(n(1), n(2), n(3)))
             else
               x = grid%centre(n, [1, 2, 3]) - blocks%x(:, 1)
-              x(m) = x(m) + legs%low(i, j, k, m)*grid%h(m)
+              x(m) = x(m) + links%low(i, j, k, m)*grid%h(m)
               worst = max(worst, abs(norm2(x) - 0.025_wp))
             end if
           end do
@@ -593,9 +593,9 @@ contains
       end do
     end do
     call check('sphere: hits lie on the sphere', worst/0.025_wp, 0.0_wp, 0.012_wp)
-    call check('sphere: legs between inside and outside are cut', complete)
-    call check('sphere: most legs are free', solid%n_leg < 1000)
-  end subroutine legs_of_a_sphere
+    call check('sphere: links between inside and outside are cut', complete)
+    call check('sphere: most links are free', solid%n_link < 1000)
+  end subroutine links_of_a_sphere
 
   !> A box through the open top: what is outside the domain is not in the grid.
   subroutine partly_outside()
@@ -615,11 +615,11 @@ contains
     call check('half outside: lists end at the side', &
                maxval(solid%face(3, 1:solid%body_face(2) - 1)) == 11 .and. &
                maxval(solid%cell(3, 1:solid%body_cell(2) - 1)) == 10)
-    call check('half outside: no leg beyond the side', all(solid%leg_number(:, :, 11:, 3) == 0))
+    call check('half outside: no link beyond the side', all(solid%link_number(:, :, 11:, 3) == 0))
     blocks%x(3, 1) = 0.049_wp - 0.01_wp   ! its top 1 mm below the side
     call fill(grid, blocks, solid)
-    call check('below the side: leg from the last centre', &
-               solid%leg_length(1, solid%leg_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
+    call check('below the side: link from the last centre', &
+               solid%link_length(1, solid%link_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
   end subroutine partly_outside
 
   !> Two boxes that overlap by half a cell, and two that share a cell without overlap.
@@ -693,7 +693,7 @@ contains
     type(grid_t) :: grid
     type(blocks_t) :: blocks, far
     type(solid_geometry_t) :: solid, other
-    type(legs_t) :: legs
+    type(links_t) :: links
     real(wp) :: worst
     integer :: i, m
 
@@ -708,14 +708,14 @@ contains
     far%x(1, 1) = far%x(1, 1) - 3*grid%length(1)
     call fill(grid, blocks, solid)
     call fill(grid, far, other)
-    legs = legs_on_grid(solid)
+    links = links_on_grid(solid)
     call check('periods: the whole volume', sum(solid%alpha(1:24, 1:24, 1:24))*grid%volume, &
                7*0.015_wp**3, 1e-12_wp*0.015_wp**3)
     worst = 0.0_wp
     do i = 1, n_halo
       worst = max(worst, maxval(abs(solid%alpha(i, :, :) - solid%alpha(24 + i, :, :))), &
                   maxval(abs(solid%open(:, :, i, :) - solid%open(:, :, 24 + i, :))), &
-                  maxval(abs(legs%low(1 - i, :, 4:20, :) - legs%low(25 - i, :, 4:20, :))))
+                  maxval(abs(links%low(1 - i, :, 4:20, :) - links%low(25 - i, :, 4:20, :))))
     end do
     call check('periods: halos are images, bit by bit', worst, 0.0_wp, 0.0_wp)
     call check('periods: three periods away the same bits', same_bits(solid, other))
@@ -751,10 +751,10 @@ contains
   function same_bits(a, b) result(same)
     type(solid_geometry_t), intent(in) :: a, b
     logical :: same
-    type(legs_t) :: of_a, of_b
+    type(links_t) :: of_a, of_b
 
-    of_a = legs_on_grid(a)
-    of_b = legs_on_grid(b)
+    of_a = links_on_grid(a)
+    of_b = links_on_grid(b)
     same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. maxval(abs(a%open - b%open)) <= 0 .and. &
            maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) <= 0 &
            .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) .and. &
@@ -766,7 +766,7 @@ contains
     type(grid_t) :: grid, part
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: whole, piece
-    type(legs_t) :: of_whole, of_piece
+    type(links_t) :: of_whole, of_piece
     real(wp) :: x(3, 3), q(4, 3)
     integer :: lo(3), a(3), b(3), i, c
     logical :: same, tets
@@ -778,7 +778,7 @@ contains
     end do
     call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
     call fill(grid, blocks, whole)
-    of_whole = legs_on_grid(whole)
+    of_whole = links_on_grid(whole)
     same = .true.
     tets = .true.
     do i = 0, 3
@@ -786,7 +786,7 @@ contains
       lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
       call part%own(lo, lo + [15, 15, 11])
       call fill(part, blocks, piece)
-      of_piece = legs_on_grid(piece)
+      of_piece = links_on_grid(piece)
       a = part%first
       b = part%last
       associate (low => max(a, 1), high => min(b, grid%n))

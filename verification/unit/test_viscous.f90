@@ -10,9 +10,9 @@ program test_viscous
   use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
   use viscous_system_m, only: viscous_t, viscous_init
-  use viscous_legs_m, only: build_viscous
+  use viscous_links_m, only: build_viscous
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use viscous_m, only: solve_viscous, force_of_legs
+  use viscous_m, only: solve_viscous, force_of_links
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
   implicit none
@@ -68,7 +68,7 @@ program test_viscous
   wall%free = .true.
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 1.0e4_wp, viscous)
   call solve_viscous(grid, wall, flow, viscous)
-  call check('legs to other cells beside the rest', viscous%spread > 0.5_wp &
+  call check('links to other cells beside the rest', viscous%spread > 0.5_wp &
              .and. viscous%spread < 0.95_wp)
   call check('sweeps as the bound promises', viscous%iterations > 10 .and. viscous%iterations &
              <= 0.7_wp*log(1.0e-9_wp)/log(viscous%spread/(1.0_wp + sqrt(1.0_wp &
@@ -93,14 +93,14 @@ program test_viscous
   wall%motion(:, 1) = [0.3_wp, -0.2_wp, 0.5_wp, 0.7_wp, -0.4_wp, 0.6_wp]
   flow%u = 0.0_wp
   call build_viscous(grid, solid, wall, flow%rho, flow%mu, 5.0_wp, viscous)
-  call force_of_legs(wall, flow, viscous)
-  call check('the block of a body in the system holds it as its legs do', viscous%force(:, 1), &
+  call force_of_links(wall, flow, viscous)
+  call check('the block of a body in the system holds it as its links do', viscous%force(:, 1), &
              -matmul(viscous%body_matrix(:, :, 1), wall%motion(:, 1)), 1.0e-13_wp)
   call check('they do', norm2(viscous%force(4:6, 1)) > 1.0e-3_wp)
 
   ! The small cell above the wall, centre inside, hangs on the cell above it as on a lever, its
-  ! middle at r of the distance of that cell from the wall, and has no legs. A cell that is known at
-  ! its centre is heavier by the part that this has of its velocity.
+  ! middle at r of the distance of that cell from the wall, and has no links. A cell that is known
+  ! at its centre is heavier by the part that this has of its velocity.
   call make_wall(heights(2))
   call merged_cells_init(grid, merged)
   call find_merged_cells(grid, solid, merged)
@@ -272,31 +272,31 @@ contains
       if (grid%centre(k, 3) < z0) solid%inside(:, :, k) = 1
       if (k == 1) cycle
       if (grid%centre(k - 1, 3) < z0 .and. grid%centre(k, 3) > z0) then
-        call list_legs(k, (grid%centre(k, 3) - z0)/grid%h(3))
+        call list_links(k, (grid%centre(k, 3) - z0)/grid%h(3))
       end if
     end do
     call list_slab(1, 0.0_wp, z0)
   end subroutine make_wall
 
-  !> The legs through the lower faces of the cells of plane k, so long above the wall of body 1.
-  subroutine list_legs(k, length)
+  !> The links through the lower faces of the cells of plane k, so long above the wall of body 1.
+  subroutine list_links(k, length)
     integer, intent(in) :: k
     real(wp), intent(in) :: length   !! [h]
     integer :: i, j
 
-    call ensure_room(product(grid%n), solid%leg)
-    call ensure_room(product(grid%n), solid%leg_length)
-    call ensure_room(product(grid%n), solid%leg_body)
+    call ensure_room(product(grid%n), solid%link)
+    call ensure_room(product(grid%n), solid%link_length)
+    call ensure_room(product(grid%n), solid%link_body)
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
-        solid%n_leg = solid%n_leg + 1
-        solid%leg(:, solid%n_leg) = [i, j, k, 3]
-        solid%leg_number(i, j, k, 3) = solid%n_leg
-        solid%leg_length(:, solid%n_leg) = [1.0_wp - length, length]
-        solid%leg_body(:, solid%n_leg) = 1
+        solid%n_link = solid%n_link + 1
+        solid%link(:, solid%n_link) = [i, j, k, 3]
+        solid%link_number(i, j, k, 3) = solid%n_link
+        solid%link_length(:, solid%n_link) = [1.0_wp - length, length]
+        solid%link_body(:, solid%n_link) = 1
       end do
     end do
-  end subroutine list_legs
+  end subroutine list_links
 
   !> Two held bodies with a gap between them, or the floor and a body above it that moves along x;
   !! the gap is narrower than a cell, whose centre lies in a body.

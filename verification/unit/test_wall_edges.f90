@@ -19,7 +19,7 @@ program test_wall_edges
 
 contains
 
-  !> A triangle of solid with legs of a half, one that reaches past the next faces, a flat wall.
+  !> A triangle of solid with links of a half, one that reaches past the next faces, a flat wall.
   subroutine behind_planes()
     call check('small triangle', openings_of_plane([1.0_wp, 1.0_wp, 0.0_wp], 0.125_wp), &
                [1.5_wp, 1.5_wp, 1.75_wp], 1.0e-12_wp)

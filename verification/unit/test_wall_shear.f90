@@ -1,8 +1,8 @@
 !> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
 program test_wall_shear
   use kinds_m, only: wp, pi
-  use wall_shear_m, only: find_wall_speeds, distance_of_legs, rough_viscosity
-  use viscous_legs_m, only: build_viscous
+  use wall_shear_m, only: find_wall_speeds, distance_of_links, rough_viscosity
+  use viscous_links_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use rigid_motion_m, only: wall_velocity
@@ -60,18 +60,18 @@ contains
                rough_viscosity(rho, 1.0_wp, 0.5_wp*h, h)/(rho*h), 1.0_wp/54.5_wp, 1.0e-4_wp)
   end subroutine law
 
-  !> The leg of a cell beside one wall, pulled as the cell runs past that wall.
+  !> The link of a cell beside one wall, pulled as the cell runs past that wall.
   subroutine at_one_wall()
     real(wp) :: past, y
 
     past = norm2(stream - wall_velocity(motion, (beside - 0.5_wp)*h - middle))
-    y = distance_of_legs(box%grid, box%solid, beside)
+    y = distance_of_links(box%grid, box%solid, beside)
     call check('distance from one wall', y, 0.08_wp, 1.0e-12_wp)
-    call check('a cell without walls', distance_of_legs(box%grid, box%solid, [9, 9, 9]) > 1.0e9_wp)
-    call check('pull of the leg', leg_of(beside, thin, speed), &
+    call check('a cell without walls', distance_of_links(box%grid, box%solid, [9, 9, 9]) > 1.0e9_wp)
+    call check('pull of the link', link_of(beside, thin, speed), &
                rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
     merged%centre = 0.5_wp
-    call check('by the velocity at the centre', leg_of(beside, thin, speed), &
+    call check('by the velocity at the centre', link_of(beside, thin, speed), &
                0.5_wp*rough_viscosity(rho, past, y, h)*h/0.8_wp, 1.0e-9_wp)
     merged%centre = 1.0_wp
   end subroutine at_one_wall
@@ -80,17 +80,17 @@ contains
   subroutine what_is_left_alone()
     real(wp), allocatable :: none(:)
 
-    call check('no viscosity, no stress', leg_of(beside, 0.0_wp, speed), 0.0_wp, 0.0_wp)
-    call check('a resolved layer', leg_of(beside, thick, speed), leg_of(beside, thick), 0.0_wp)
-    call check('one that is not', leg_of(beside, thin, speed) > 10.0_wp*leg_of(beside, thin))
+    call check('no viscosity, no stress', link_of(beside, 0.0_wp, speed), 0.0_wp, 0.0_wp)
+    call check('a resolved layer', link_of(beside, thick, speed), link_of(beside, thick), 0.0_wp)
+    call check('one that is not', link_of(beside, thin, speed) > 10.0_wp*link_of(beside, thin))
     allocate (none(0))
     do d = 1, 3
       box%flow%u(:, :, :, d) = motion(d)
     end do
     box%bodies%motion(6, 1) = 0.0_wp
     call find_wall_speeds(box%grid, box%solid, box%bodies, box%flow%u, none)
-    call check('fluid that moves with the block', maxval(none(:2*box%solid%n_leg)), 0.0_wp, 0.0_wp)
-    call check('its leg', leg_of(beside, thin, none), leg_of(beside, thin), 0.0_wp)
+    call check('fluid that moves with the block', maxval(none(:2*box%solid%n_link)), 0.0_wp, 0.0_wp)
+    call check('its link', link_of(beside, thin, none), link_of(beside, thin), 0.0_wp)
   end subroutine what_is_left_alone
 
   !> A cube of 0.5 m turned by 30 degrees about z: its wall lies at n.x = 0.25 from its middle.
@@ -104,12 +104,12 @@ contains
     cube%case%body(1)%quaternion = [cos(pi/12.0_wp), 0.0_wp, 0.0_wp, sin(pi/12.0_wp)]
     call place(cube)
     call check('distance from an oblique wall', &
-               distance_of_legs(cube%grid, cube%solid, beside_wall), &
+               distance_of_links(cube%grid, cube%solid, beside_wall), &
                0.25_wp*cos_30 + 0.15_wp*0.5_wp - 0.25_wp, 1.0e-12_wp)
   end subroutine across_an_oblique_wall
 
-  !> Conductance of the one wall leg of a cell [kg/s].
-  real(wp) function leg_of(c, mu, wall_speed)
+  !> Conductance of the one wall link of a cell [kg/s].
+  real(wp) function link_of(c, mu, wall_speed)
     integer, intent(in) :: c(3)
     real(wp), intent(in) :: mu   !! of the fluid [Pa s]
     real(wp), intent(in), optional :: wall_speed(:)
@@ -120,10 +120,10 @@ contains
     call viscous_init(box%grid, 1, viscous)
     call build_viscous(box%grid, box%solid, box%bodies, box%flow%rho, box%flow%mu, 0.01_wp, &
                        viscous, merged, wall_speed)
-    leg_of = 0.0_wp
+    link_of = 0.0_wp
     do m = 1, viscous%walls%n
-      if (all(viscous%walls%cell(:, m) == c)) leg_of = leg_of + viscous%walls%k(m)
+      if (all(viscous%walls%cell(:, m) == c)) link_of = link_of + viscous%walls%k(m)
     end do
-  end function leg_of
+  end function link_of
 
 end program test_wall_shear

@@ -1,21 +1,21 @@
-!> Legs of the viscous stage: between neighbours, to the exact surface of bodies, to sides.
+!> Links of the viscous stage: between neighbours, to the exact surface of bodies, to sides.
 !!
-!! A cell whose centre lies in the fluid is joined to its six neighbours by legs. A leg that meets a
-!! surface at distance theta h becomes a wall leg of conductance mu A/(theta h) (symmetric
-!! Shortley-Weller legs, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
+!! A cell whose centre lies in the fluid is joined to its six neighbours by links. A link that meets
+!! a surface at distance theta h becomes a wall link of conductance mu A/(theta h) (symmetric
+!! Shortley-Weller links, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
 !! that of its group (`merged_cells_m`). A small cell without a target keeps its velocity.
-!! Where the cells are too coarse for the boundary layer, wall legs pull with the stress of a rough
+!! Where the cells are too coarse for the boundary layer, wall links pull with the stress of a rough
 !! one instead (`wall_shear_m`).
-module viscous_legs_m
+module viscous_links_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: drags, is_wall, no_side
-  use solid_geometry_m, only: solid_geometry_t, bounded_leg
+  use solid_geometry_m, only: solid_geometry_t, bounded_link
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, wall_legs_t, room_for_walls, set_wall, add_side
-  use wall_shear_m, only: distance_of_legs, rough_viscosity
+  use viscous_system_m, only: viscous_t, wall_links_t, room_for_walls, set_wall, add_side
+  use wall_shear_m, only: distance_of_links, rough_viscosity
   use merged_cells_m, only: merged_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
   use parallel_m, only: global_max
@@ -23,12 +23,12 @@ module viscous_legs_m
   private
   public :: build_viscous
 
-  integer, parameter :: worth_threads = 1000        !! fewer wall legs are the work of one thread
+  integer, parameter :: worth_threads = 1000        !! fewer wall links are the work of one thread
   real(wp), parameter :: min_mass = 1.0e-6_wp     !! share below which a velocity is the wall's
 
 contains
 
-  !> Assemble masses, legs and wall legs for the geometry and the fluid at the end of the step.
+  !> Assemble masses, links and wall links for the geometry and the fluid at the end of the step.
   subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, merged, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -39,7 +39,7 @@ contains
     type(viscous_t), intent(inout) :: self
     type(merged_cells_t), intent(in), optional :: merged   !! none where there are no small cells
     real(wp), intent(in), optional :: wall_speed(:)
-      !! past the walls at the ends of the legs, with `merged` [m/s]; absent: no rough layers
+      !! past the walls at the ends of the links, with `merged` [m/s]; absent: no rough layers
     integer :: d, k
 
     self%dt = dt
@@ -52,38 +52,38 @@ contains
     call unknown_masses(grid, solid, rho, dt, self)
     if (present(merged)) call masses_of_groups(grid, solid, rho, dt, merged, self)
     do d = 1, 3
-      call ordinary_legs(grid, solid, mu, d, self%leg(:, :, :, d))
-      call legs_to_sides(grid, solid, mu, d, self)
+      call ordinary_links(grid, solid, mu, d, self%link(:, :, :, d))
+      call links_to_sides(grid, solid, mu, d, self)
     end do
-    call legs_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
+    call links_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
     call group_by_body(bodies%n, self)
-    call bodies_seen_by_legs(solid, bodies, mu, grid, self)
-    call finish_diagonal(grid, self%leg, self%mass, self%diagonal, self%spread)
+    call bodies_seen_by_links(solid, bodies, mu, grid, self)
+    call finish_diagonal(grid, self%link, self%mass, self%diagonal, self%spread)
   end subroutine build_viscous
 
-  !> The ordinary legs and the masses into the diagonal, which is 1 where there is no unknown.
-  !! `spread` is the largest share of the legs.
-  subroutine finish_diagonal(grid, leg, mass, diagonal, spread)
+  !> The ordinary links and the masses into the diagonal, which is 1 where there is no unknown.
+  !! `spread` is the largest share of the links.
+  subroutine finish_diagonal(grid, link, mass, diagonal, spread)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: link(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: &
       diagonal(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(out) :: spread
     integer :: i, j, k, c
-    real(wp) :: legs, most(1)
+    real(wp) :: links, most(1)
 
     most = 0.0_wp
-    !$omp parallel do collapse(2) private(i, j, legs) reduction(max: most) schedule(static)
+    !$omp parallel do collapse(2) private(i, j, links) reduction(max: most) schedule(static)
     do c = 1, 3
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            legs = leg(i, j, k, 1) + leg(i + 1, j, k, 1) + leg(i, j, k, 2) + leg(i, j + 1, k, 2) &
-                   + leg(i, j, k, 3) + leg(i, j, k + 1, 3)
-            diagonal(i, j, k, c) = merge(diagonal(i, j, k, c) + mass(i, j, k) + legs, 1.0_wp, &
+            links = link(i, j, k, 1) + link(i + 1, j, k, 1) + link(i, j, k, 2) &
+                    + link(i, j + 1, k, 2) + link(i, j, k, 3) + link(i, j, k + 1, 3)
+            diagonal(i, j, k, c) = merge(diagonal(i, j, k, c) + mass(i, j, k) + links, 1.0_wp, &
                                          mass(i, j, k) > 0.0_wp)
-            if (mass(i, j, k) > 0.0_wp) most(1) = max(most(1), legs/diagonal(i, j, k, c))
+            if (mass(i, j, k) > 0.0_wp) most(1) = max(most(1), links/diagonal(i, j, k, c))
           end do
         end do
       end do
@@ -155,14 +155,14 @@ contains
     end function small_mass
   end subroutine masses_of_groups
 
-  !> Ordinary legs in direction d, between neighbours with their centres in the fluid and nothing
+  !> Ordinary links in direction d, between neighbours with their centres in the fluid and nothing
   !! between them; none where a cell would be its own neighbour.
-  subroutine ordinary_legs(grid, solid, mu, d, leg)
+  subroutine ordinary_links(grid, solid, mu, d, link)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: d
-    real(wp), intent(inout), contiguous :: leg(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(inout), contiguous :: link(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k, e(3), upper(3)
     real(wp) :: conductance   !! A/h [m]
     logical :: ordinary
@@ -177,16 +177,16 @@ contains
         do i = grid%lo(1), upper(1)
           ordinary = solid%inside(i, j, k) == 0 &
                      .and. solid%inside(i - e(1), j - e(2), k - e(3)) == 0 &
-                     .and. solid%leg_number(i, j, k, d) == 0
-          leg(i, j, k) = merge(conductance*harmonic_mean(mu(i - e(1), j - e(2), k - e(3)), &
+                     .and. solid%link_number(i, j, k, d) == 0
+          link(i, j, k) = merge(conductance*harmonic_mean(mu(i - e(1), j - e(2), k - e(3)), &
                                                          mu(i, j, k)), 0.0_wp, ordinary)
         end do
       end do
     end do
-  end subroutine ordinary_legs
+  end subroutine ordinary_links
 
-  !> Wall legs, of one or both cells of each face through which a leg meets a surface.
-  subroutine legs_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
+  !> Wall links, of one or both cells of each face through which a link meets a surface.
+  subroutine links_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -199,22 +199,22 @@ contains
     integer :: m, f(3)
 
     spacing = grid%volume**(1.0_wp/3.0_wp)
-    self%walls%n = 2*solid%n_leg
+    self%walls%n = 2*solid%n_link
     call room_for_walls(self%walls%n, self%walls)
     !$omp parallel do private(f) schedule(static)
-    do m = 1, solid%n_leg
+    do m = 1, solid%n_link
       self%walls%found_body(2*m - 1:2*m) = 0
-      f = solid%leg(1:3, m)
-      associate (d => solid%leg(4, m), theta => solid%leg_length(:, m), &
-                 body => solid%leg_body(:, m))
+      f = solid%link(1:3, m)
+      associate (d => solid%link(4, m), theta => solid%link_length(:, m), &
+                 body => solid%link_body(:, m))
         if (grid%side_of_face(f(d), d) /= no_side) cycle
-        call wall_leg(2*m - 1, f - unit_step(:, d), d, theta(1), 1, body(1))
-        call wall_leg(2*m, f, d, theta(2), -1, body(2))
+        call wall_link(2*m - 1, f - unit_step(:, d), d, theta(1), 1, body(1))
+        call wall_link(2*m, f, d, theta(2), -1, body(2))
       end associate
     end do
   contains
-    !> Leg n from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
-    subroutine wall_leg(n, c, d, theta, sense, body)
+    !> Link n from the centre of an own cell c in the fluid along +d or -d to the surface of a body.
+    subroutine wall_link(n, c, d, theta, sense, body)
       integer, intent(in) :: n, c(3), d, sense, body
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: x_wall(3), t, viscosity
@@ -222,7 +222,7 @@ contains
 
       if (any(c < grid%lo) .or. any(c > grid%hi)) return
       if (solid%inside(c(1), c(2), c(3)) /= 0) return
-      t = bounded_leg(theta)
+      t = bounded_link(theta)
       do a = 1, 3
         x_wall(a) = grid%centre(c(a), a)
       end do
@@ -231,9 +231,9 @@ contains
       if (present(wall_speed)) viscosity = max(viscosity, viscosity_at_wall(n, c))
       call set_wall(n, c, body, viscosity*grid%area(d)/(grid%h(d)*t), &
                     nearest_arm(grid, x_wall, bodies%x(:, body)), self%walls)
-    end subroutine wall_leg
+    end subroutine wall_link
 
-    !> That of a rough layer, for leg n of cell c [Pa s]. A fluid without viscosity slips.
+    !> That of a rough layer, for link n of cell c [Pa s]. A fluid without viscosity slips.
     pure function viscosity_at_wall(n, c) result(mu_w)
       integer, intent(in) :: n, c(3)
       real(wp) :: mu_w
@@ -246,13 +246,13 @@ contains
         if (m > 0) at_centre = merged%centre(m)
       end associate
       mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*wall_speed(n), &
-                             distance_of_legs(grid, solid, c), spacing)
+                             distance_of_links(grid, solid, c), spacing)
     end function viscosity_at_wall
-  end subroutine legs_to_bodies
+  end subroutine links_to_bodies
 
-  !> Half a leg in direction d to a wall of the domain or to an inflow, which pulls the cell towards
-  !! the velocity of the side; slip walls hold the normal component only.
-  subroutine legs_to_sides(grid, solid, mu, d, self)
+  !> Half a link in direction d to a wall of the domain or to an inflow, which pulls the cell
+  !! towards the velocity of the side; slip walls hold the normal component only.
+  subroutine links_to_sides(grid, solid, mu, d, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -263,7 +263,7 @@ contains
 
     do s = 1, 2
       call grid%side_faces(s, d, a, b)
-      self%leg(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
+      self%link(a(1):b(1), a(2):b(2), a(3):b(3), d) = 0.0_wp
       ! Only a side that moves goes into a list.
       !$omp parallel do collapse(2) private(i, c, value) schedule(static) &
       !$omp if (all(abs(grid%side_velocity(:, s, d)) <= 0.0_wp))
@@ -282,9 +282,9 @@ contains
         end do
       end do
     end do
-  end subroutine legs_to_sides
+  end subroutine links_to_sides
 
-  !> Bring the wall legs into the order of the bodies, keeping the order in which they were found,
+  !> Bring the wall links into the order of the bodies, keeping the order in which they were found,
   !! and into the diagonal.
   subroutine group_by_body(n_bodies, self)
     integer, intent(in) :: n_bodies
@@ -322,11 +322,11 @@ contains
     self%walls%n = self%walls%first(n_bodies + 1) - 1
   end subroutine group_by_body
 
-  !> What the legs do to a body that moves: its 6 x 6 block of the system, with mass and inertia
+  !> What the links do to a body that moves: its 6 x 6 block of the system, with mass and inertia
   !! over dt added by the solver. With the sums K = sum k, S = sum k r, M = sum k r r^T over the
-  !! legs of arm r, a motion (v, w) is held by the force K v + w x S and the torque
-  !! S x v + (tr(M) 1 - M) w; and by 2 mu V w, the part of the wall stress that the legs leave out.
-  subroutine bodies_seen_by_legs(solid, bodies, mu, grid, self)
+  !! links of arm r, a motion (v, w) is held by the force K v + w x S and the torque
+  !! S x v + (tr(M) 1 - M) w; and by 2 mu V w, the part of the wall stress that the links leave out.
+  subroutine bodies_seen_by_links(solid, bodies, mu, grid, self)
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
     type(grid_t), intent(in) :: grid
@@ -374,12 +374,12 @@ contains
       end do
       !$omp end do nowait
     end subroutine add_viscosity_times_volume
-  end subroutine bodies_seen_by_legs
+  end subroutine bodies_seen_by_links
 
-  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the legs of a body to their sums; the threads share
+  !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the links of a body to their sums; the threads share
   !! the work.
   subroutine add_moments(walls, body, bins)
-    type(wall_legs_t), intent(in) :: walls
+    type(wall_links_t), intent(in) :: walls
     integer, intent(in) :: body
     integer(i8), intent(inout) :: bins(:, :)   !! (bin_size, 10)
     real(wp) :: term(terms_at_once, 10)
@@ -422,4 +422,4 @@ contains
     end associate
   end function held_by
 
-end module viscous_legs_m
+end module viscous_links_m
