@@ -1,17 +1,21 @@
-!> Sums over all cells of all processes that give the same bits in any order (see `exact_bins_m`).
+!> Sums over all cells of all processes that give the same bits in any order (see
+!! `exact_accumulator_m`).
 !!
 !! `exact_sum`, `exact_sums`, `exact_dot` and `exact_dots` need one message each. For terms that
-!! arise here and there, like forces on bodies, keep bins: start from `no_terms`, `exact_add` terms,
-!! `merge_bins` of threads, and turn all bins into numbers with one `exact_totals`.
+!! arise here and there, like forces on bodies, keep accumulators: start from `no_terms`,
+!! `exact_add` terms, `merge_accumulators` of threads, and turn all of them into numbers with one
+!! `exact_totals`.
 module exact_sum_m
   use kinds_m, only: wp, i8
-  use exact_bins_m, only: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
-  use parallel_m, only: global_sum_bins
+  use exact_accumulator_m, only: accumulator_size, no_terms, chunk_size, add_terms, &
+                                 merge_accumulators, accumulator_value
+  use parallel_m, only: global_sum_accumulators
   use timers_m, only: timer, tic, toc
   implicit none
   private
   public :: exact_sum, exact_sums, exact_dot, exact_dots
-  public :: bin_size, no_terms, exact_add, exact_add_columns, merge_bins, exact_totals
+  public :: accumulator_size, no_terms, exact_add, exact_add_columns, merge_accumulators, &
+    exact_totals
   public :: terms_at_once
 
   integer, parameter :: terms_at_once = 256    !! for `exact_add_columns`: they stay in the cache
@@ -23,12 +27,12 @@ contains
   function exact_sum(a) result(s)
     real(wp), intent(in) :: a(:)
     real(wp) :: s
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
     real(wp) :: total(1)
 
-    bins(:, 1) = no_terms
-    call add_column(a, bins(:, 1))
-    call exact_totals(bins, total)
+    accumulator(:, 1) = no_terms
+    call add_column(a, accumulator(:, 1))
+    call exact_totals(accumulator, total)
     s = total(1)
   end function exact_sum
 
@@ -36,14 +40,14 @@ contains
   function exact_sums(a) result(s)
     real(wp), intent(in) :: a(:, :)   !! (terms, sums); the terms may differ by process
     real(wp) :: s(size(a, 2))
-    integer(i8) :: bins(bin_size, size(a, 2))
+    integer(i8) :: accumulator(accumulator_size, size(a, 2))
     integer :: m
 
     do m = 1, size(a, 2)
-      bins(:, m) = no_terms
-      call add_column(a(:, m), bins(:, m))
+      accumulator(:, m) = no_terms
+      call add_column(a(:, m), accumulator(:, m))
     end do
-    call exact_totals(bins, s)
+    call exact_totals(accumulator, s)
   end function exact_sums
 
   !> Sum of x*y over the inner cells of all processes.
@@ -54,12 +58,12 @@ contains
       !! (2, j, k) first and last cell of each line that take part, from 1; all if not given (not
       !! contiguous: handing one on that is not given, gfortran would look into it)
     real(wp) :: s
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
     real(wp) :: total(1)
 
-    bins(:, 1) = no_terms
-    call add_products(x, y, width, line, bins(:, 1))
-    call exact_totals(bins, total)
+    accumulator(:, 1) = no_terms
+    call add_products(x, y, width, line, accumulator(:, 1))
+    call exact_totals(accumulator, total)
     s = total(1)
   end function exact_dot
 
@@ -69,34 +73,34 @@ contains
     integer, intent(in) :: width   !! halo cells on every side of all four
     integer, intent(in), optional :: line(:, :, :)   !! see `exact_dot`
     real(wp) :: s(2)
-    integer(i8) :: bins(bin_size, 2)
+    integer(i8) :: accumulator(accumulator_size, 2)
 
-    bins(:, 1) = no_terms
-    bins(:, 2) = no_terms
-    call add_products(x1, y1, width, line, bins(:, 1))
-    call add_products(x2, y2, width, line, bins(:, 2))
-    call exact_totals(bins, s)
+    accumulator(:, 1) = no_terms
+    accumulator(:, 2) = no_terms
+    call add_products(x1, y1, width, line, accumulator(:, 1))
+    call add_products(x2, y2, width, line, accumulator(:, 2))
+    call exact_totals(accumulator, s)
   end function exact_dots
 
-  !> Add terms of this process to a sum kept in bins.
-  pure subroutine exact_add(terms, bins)
+  !> Add terms of this process to a sum kept in accumulators.
+  pure subroutine exact_add(terms, accumulator)
     real(wp), intent(in) :: terms(:)
-    integer(i8), intent(inout) :: bins(bin_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
     real(wp) :: p(chunk_size)
     integer :: first, n
 
     do first = 1, size(terms), chunk_size
       n = min(chunk_size, size(terms) - first + 1)
       p(:n) = terms(first:first + n - 1)
-      call add_terms(p(:n), bins)
+      call add_terms(p(:n), accumulator)
     end do
   end subroutine exact_add
 
-  !> Add the columns of `a` to as many sums kept in bins, which the threads share.
-  subroutine exact_add_columns(a, bins)
+  !> Add the columns of `a` to as many sums kept in accumulators, which the threads share.
+  subroutine exact_add_columns(a, accumulator)
     real(wp), intent(in) :: a(:, :)              !! (terms, sums)
-    integer(i8), intent(inout) :: bins(:, :)     !! (bin_size, sums)
-    integer(i8) :: mine(bin_size, size(a, 2))
+    integer(i8), intent(inout) :: accumulator(:, :)     !! (accumulator_size, sums)
+    integer(i8) :: mine(accumulator_size, size(a, 2))
     integer :: m
 
     do m = 1, size(a, 2)
@@ -105,32 +109,32 @@ contains
     end do
     !$omp critical (merge_shared)
     do m = 1, size(a, 2)
-      call merge_bins(mine(:, m), bins(:, m))
+      call merge_accumulators(mine(:, m), accumulator(:, m))
     end do
     !$omp end critical (merge_shared)
   end subroutine exact_add_columns
 
-  !> Values of sums kept in bins, over all processes, with one message.
-  subroutine exact_totals(bins, s)
-    integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, sums); all processes after
+  !> Values of sums kept in accumulators, over all processes, with one message.
+  subroutine exact_totals(accumulator, s)
+    integer(i8), intent(inout), contiguous :: accumulator(:, :)   !! (accumulator_size, sums)
     real(wp), intent(out) :: s(:)
     integer, save :: phase = 0   ! its number, once named
     integer :: m
 
     if (phase == 0) phase = timer('sums over processes')
     call tic(phase)
-    call global_sum_bins(bins)
+    call global_sum_accumulators(accumulator)
     call toc(phase)
     do m = 1, size(s)
-      s(m) = bins_value(bins(:, m))
+      s(m) = accumulator_value(accumulator(:, m))
     end do
   end subroutine exact_totals
 
   !> Add all elements of a column, chunk by chunk, on all threads if it is long.
-  subroutine add_column(a, bins)
+  subroutine add_column(a, accumulator)
     real(wp), intent(in) :: a(:)
-    integer(i8), intent(inout) :: bins(bin_size)
-    integer(i8) :: mine(bin_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
+    integer(i8) :: mine(accumulator_size)
     integer :: first
 
     !$omp parallel private(mine) if (size(a) > worth_threads)
@@ -141,18 +145,18 @@ contains
     end do
     !$omp end do nowait
     !$omp critical (merge_columns)
-    call merge_bins(mine, bins)
+    call merge_accumulators(mine, accumulator)
     !$omp end critical (merge_columns)
     !$omp end parallel
   end subroutine add_column
 
   !> Add the products of the inner cells, plane by plane, on all threads if there are many.
-  subroutine add_products(x, y, width, line, bins)
+  subroutine add_products(x, y, width, line, accumulator)
     real(wp), intent(in), contiguous :: x(:, :, :), y(:, :, :)
     integer, intent(in) :: width
     integer, intent(in), optional :: line(:, :, :)
-    integer(i8), intent(inout) :: bins(bin_size)
-    integer(i8) :: mine(bin_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
+    integer(i8) :: mine(accumulator_size)
     integer :: k, first(3), last(3), range(2, size(x, 2))
 
     first = width + 1
@@ -169,17 +173,17 @@ contains
     end do
     !$omp end do nowait
     !$omp critical (merge_products)
-    call merge_bins(mine, bins)
+    call merge_accumulators(mine, accumulator)
     !$omp end critical (merge_products)
     !$omp end parallel
   end subroutine add_products
 
   !> Add the products of one plane, gathered row by row into chunks.
-  pure subroutine add_plane(x, y, range, above, bins)
+  pure subroutine add_plane(x, y, range, above, accumulator)
     real(wp), intent(in), contiguous :: x(:, :), y(:, :)
     integer, intent(in), contiguous :: range(:, :)   !! (2, rows) first and last cell of each row
     integer, intent(in) :: above                     !! rows of the halo before them
-    integer(i8), intent(inout) :: bins(bin_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
     real(wp) :: p(chunk_size)
     integer :: i, j, row, start, n, held
 
@@ -189,7 +193,7 @@ contains
       do start = range(1, row), range(2, row), chunk_size
         n = min(chunk_size, range(2, row) - start + 1)
         if (held + n > chunk_size) then
-          call add_terms(p(:held), bins)
+          call add_terms(p(:held), accumulator)
           held = 0
         end if
         do i = 0, n - 1
@@ -198,7 +202,7 @@ contains
         held = held + n
       end do
     end do
-    if (held > 0) call add_terms(p(:held), bins)
+    if (held > 0) call add_terms(p(:held), accumulator)
   end subroutine add_plane
 
 end module exact_sum_m

@@ -11,7 +11,7 @@ module parallel_m
   public :: parallel_init, parallel_final, parallel_abort, parallel_pause
   public :: is_root, nproc, my_rank, set_threads, get_threads, spins_for_long
   public :: decompose, halo_exchange, gather_all
-  public :: global_max, global_min, global_sum, global_sum_bins, broadcast
+  public :: global_max, global_min, global_sum, global_sum_accumulators, broadcast
   public :: set_file_access, set_collective, share_trouble
 
   !> Fill the halos of a block with `width` halo cells on every side.
@@ -133,10 +133,11 @@ module parallel_m
       integer(i8), intent(inout), contiguous :: n(:)
     end subroutine global_sum
 
-    !> Sum over all processes of the bins of several order-free sums, in place, in one message.
-    module subroutine global_sum_bins(bins)
-      integer(i8), intent(inout), contiguous :: bins(:, :)   !! (bin_size, number of sums)
-    end subroutine global_sum_bins
+    !> Sum over all processes of the accumulators of several order-free sums, in place, in one
+    !! message.
+    module subroutine global_sum_accumulators(accumulator)
+      integer(i8), intent(inout), contiguous :: accumulator(:, :)   !! (accumulator_size, sums)
+    end subroutine global_sum_accumulators
 
     !> Let all processes open a file together: property list of its access, as an HDF5 identifier.
     module subroutine set_file_access(access, status)

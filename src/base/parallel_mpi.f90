@@ -13,7 +13,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
   use decomposition_m, only: best_pieces, last_cell, min_cells
-  use exact_bins_m, only: bin_size, merge_bins
+  use exact_accumulator_m, only: accumulator_size, merge_accumulators
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   use halo_copy_m, only: pack_wp, pack_sp, pack_integer, unpack_wp, unpack_sp, unpack_integer
   implicit none
@@ -21,8 +21,8 @@ submodule (parallel_m) parallel_mpi_m
   integer :: n_processes = 1, rank = 0
   integer :: neighbour(2, 3) = MPI_PROC_NULL  !! rank below and above in each direction
   logical :: wraps(3) = .false.   !! periodic and not cut
-  type(MPI_Datatype) :: bins_type !! one set of bins of an order-free sum
-  type(MPI_Op) :: bins_sum
+  type(MPI_Datatype) :: accumulator_type !! an accumulator of an order-free sum
+  type(MPI_Op) :: accumulator_sum
 
   !> Memory of the layers going out and coming in, lower and upper side. MPI hands it out, so every
   !! kind of number may see it as its own and one set of messages serves them all; it only grows.
@@ -39,9 +39,9 @@ contains
     call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     call MPI_Comm_size(MPI_COMM_WORLD, n_processes)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
-    call MPI_Type_contiguous(bin_size, MPI_INTEGER8, bins_type)
-    call MPI_Type_commit(bins_type)
-    call MPI_Op_create(add_bins, .true., bins_sum)
+    call MPI_Type_contiguous(accumulator_size, MPI_INTEGER8, accumulator_type)
+    call MPI_Type_commit(accumulator_type)
+    call MPI_Op_create(add_accumulators, .true., accumulator_sum)
   end procedure parallel_init
 
   !> Let a process that waits give its core away, unless the user has it otherwise: with more
@@ -63,8 +63,8 @@ contains
 
   module procedure parallel_final
     call free_buffers()
-    call MPI_Op_free(bins_sum)
-    call MPI_Type_free(bins_type)
+    call MPI_Op_free(accumulator_sum)
+    call MPI_Type_free(accumulator_type)
     call MPI_Finalize()
   end procedure parallel_final
 
@@ -370,27 +370,28 @@ contains
     call MPI_Allreduce(MPI_IN_PLACE, n, size(n), MPI_INTEGER8, MPI_SUM, MPI_COMM_WORLD)
   end procedure global_sum
 
-  module procedure global_sum_bins
-    call MPI_Allreduce(MPI_IN_PLACE, bins, size(bins, 2), bins_type, bins_sum, MPI_COMM_WORLD)
-  end procedure global_sum_bins
+  module procedure global_sum_accumulators
+    call MPI_Allreduce(MPI_IN_PLACE, accumulator, size(accumulator, 2), accumulator_type, &
+                       accumulator_sum, MPI_COMM_WORLD)
+  end procedure global_sum_accumulators
 
-  !> The operation of `global_sum_bins`, in the form MPI asks for.
-  subroutine add_bins(from, into, length, datatype)
+  !> The operation of `global_sum_accumulators`, in the form MPI asks for.
+  subroutine add_accumulators(from, into, length, datatype)
     type(c_ptr), value :: from, into
     ! allow(C061)
     integer :: length
     ! allow(C061)
     type(MPI_Datatype) :: datatype
-    integer(i8), pointer :: part(:, :), bins(:, :)
+    integer(i8), pointer :: part(:, :), accumulator(:, :)
     integer :: m
 
     if (datatype%MPI_VAL == MPI_DATATYPE_NULL%MPI_VAL) return
-    call c_f_pointer(from, part, [bin_size, length])
-    call c_f_pointer(into, bins, [bin_size, length])
+    call c_f_pointer(from, part, [accumulator_size, length])
+    call c_f_pointer(into, accumulator, [accumulator_size, length])
     do m = 1, length
-      call merge_bins(part(:, m), bins(:, m))
+      call merge_accumulators(part(:, m), accumulator(:, m))
     end do
-  end subroutine add_bins
+  end subroutine add_accumulators
 
   module procedure broadcast_character
     integer :: length

@@ -93,9 +93,9 @@ contains
     n = n   ! the only process holds the result
   end procedure global_sum
 
-  module procedure global_sum_bins
-    bins = bins   ! the only process holds the result
-  end procedure global_sum_bins
+  module procedure global_sum_accumulators
+    accumulator = accumulator   ! the only process holds the result
+  end procedure global_sum_accumulators
 
   module procedure broadcast_character
     x = x

@@ -25,7 +25,7 @@ module buoyancy_m
   use surface_normal_m, only: surface_normal, vertical_of
   use polyhedron_m, only: polyhedron_t, polyhedron_of_box, polyhedron_moments_below, &
                           box_clip_moments_below
-  use exact_sum_m, only: bin_size, no_terms, exact_add_columns, exact_totals, &
+  use exact_sum_m, only: accumulator_size, no_terms, exact_add_columns, exact_totals, &
     terms_at_once
   implicit none
   private
@@ -97,11 +97,11 @@ contains
       !! liquid share of the fluid [-]
     logical, intent(in) :: wanted(:)   !! (bodies)
     type(displaced_t) :: displaced(bodies%n)
-    integer(i8) :: bins(bin_size, 4*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 4*bodies%n)
     real(wp) :: term(terms_at_once, 4), total(4*bodies%n)
     integer :: b, m, n, from, i(3)
 
-    bins = spread(no_terms, 2, 4*bodies%n)
+    accumulator = spread(no_terms, 2, 4*bodies%n)
     !$omp parallel private(b, m, n, i, term)
     do b = 1, bodies%n
       if (.not. wanted(b)) cycle
@@ -114,12 +114,12 @@ contains
           n = n + 1
           term(n, :) = fluid_in_cell(grid, fluid, solid, bodies%x(:, b), c, m)
         end do
-        call exact_add_columns(term(:n, :), bins(:, 4*b - 3:4*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 4*b - 3:4*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     do b = 1, bodies%n
       displaced(b) = displaced_t(total(4*b - 3), total(4*b - 2:4*b))
     end do
@@ -197,11 +197,11 @@ contains
     type(rigid_flux_t), intent(in) :: flux
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp) :: counted(4, 3, bodies%n)   !! [kg, kg m]
-    integer(i8) :: bins(bin_size, 12*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 12*bodies%n)
     real(wp) :: term(terms_at_once, 4), total(12*bodies%n)
     integer :: b, d, m, n, from, row
 
-    bins = spread(no_terms, 2, 12*bodies%n)
+    accumulator = spread(no_terms, 2, 12*bodies%n)
     !$omp parallel private(b, d, m, n, row, term)
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
@@ -215,13 +215,13 @@ contains
             term(n, :) = mass_between(grid, rho, flux%face(1:3, m), d)*flux%s([d, 4, 5, 6], m)
           end do
           row = 12*(b - 1) + 4*(d - 1)
-          call exact_add_columns(term(:n, :), bins(:, row + 1:row + 4))
+          call exact_add_columns(term(:n, :), accumulator(:, row + 1:row + 4))
         end do
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     counted = reshape(total, shape(counted))
   end function mass_at_faces
 

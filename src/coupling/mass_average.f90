@@ -33,7 +33,7 @@ module mass_average_m
   use boundary_m, only: fill_velocity_halo, fill_scalar_halo
   use parallel_m, only: halo_exchange
   use growing_m, only: ensure_rows
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms
   implicit none
   private
   public :: mass_average_t, mass_average_init, density_of_mixture
@@ -338,11 +338,11 @@ contains
     real(wp), intent(in) :: dt
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     class(mass_average_t), intent(inout) :: self
-    integer(i8) :: bins(bin_size, 6*self%bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*self%bodies%n)
     real(wp) :: total(6*self%bodies%n), f(3)
     integer :: b, m, n
 
-    bins = spread(no_terms, 2, 6*self%bodies%n)
+    accumulator = spread(no_terms, 2, 6*self%bodies%n)
     do b = 1, self%bodies%n
       n = 0
       call ensure_rows(solid%body_cell(b + 1) - solid%body_cell(b), self%terms)
@@ -357,9 +357,9 @@ contains
                                                   self%bodies%x(:, b)), f)
         end associate
       end do
-      call exact_add_columns(self%terms(1:n, :), bins(:, 6*b - 5:6*b))
+      call exact_add_columns(self%terms(1:n, :), accumulator(:, 6*b - 5:6*b))
     end do
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     self%from_pressure(:, :self%bodies%n) = reshape(total, [6, self%bodies%n])
   end subroutine momentum_gained
 

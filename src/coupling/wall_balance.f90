@@ -23,7 +23,7 @@ module wall_balance_m
   use half_kick_m, only: half_kick_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
+  use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   implicit none
   private
   public :: wall_balance_t, wall_balance_init, begin_balance, store_change, store_velocity
@@ -121,13 +121,13 @@ contains
       !! [kg/m3]
     type(wall_balance_t), intent(in) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
-    integer(i8) :: bins(bin_size, 6*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n), term(terms_at_once, 6), load(6)
     real(wp) :: faster(6, bodies%n)   ! than at the start
     integer :: b, e, n, from
 
     faster = bodies%motion(:, :bodies%n) - at_start%motion(:, :bodies%n)
-    bins = spread(no_terms, 2, 6*bodies%n)
+    accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, e, n, term, load) if (merged%n > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
@@ -139,12 +139,12 @@ contains
           load = of_cell(merged%by_body(e), b)
           term(n, :) = load
         end do
-        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
     !> Force and torque that wall cell m owes body b.
@@ -177,18 +177,18 @@ contains
       !! [m/s2]
     type(half_kick_t), intent(in) :: half_kick
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
-    integer(i8) :: bins(bin_size, 6*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n)
     integer :: b
 
-    bins = spread(no_terms, 2, 6*bodies%n)
+    accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b) if (merged%n > worth_threads)
     do b = 1, bodies%n
       call add_cells(merged, .false., b)
       call add_cells(before, .true., b)
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
     !> Add the wall cells of body b in a list; of those of the start only what is none at the end.
@@ -211,7 +211,7 @@ contains
           load = of_cell(c, b)
           term(n, :) = load
         end do
-        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end subroutine add_cells

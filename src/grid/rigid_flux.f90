@@ -12,7 +12,7 @@ module rigid_flux_m
   use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use exact_sum_m, only: bin_size, no_terms, exact_add_columns, exact_totals, &
+  use exact_sum_m, only: accumulator_size, no_terms, exact_add_columns, exact_totals, &
     terms_at_once
   implicit none
   private
@@ -306,11 +306,11 @@ contains
     real(wp), intent(out) :: force(:, :)
       !! (6, bodies) force, torque about the centre of mass [N, N m]
     type(outflow_t), intent(in), optional :: sides(2, 3)
-    integer(i8) :: bins(bin_size, 6*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
     integer :: b, m, n, from, f(3), e(3)
 
-    bins = spread(no_terms, 2, 6*bodies%n)
+    accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, m, n, f, e, term) if (self%first_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
@@ -323,12 +323,12 @@ contains
           n = n + 1
           term(n, :) = self%s(:, m)*(side_value(f - e) - side_value(f))
         end do
-        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
   contains
     !> Pressure of a cell, or outside the tank; zero outside an open side.
@@ -354,12 +354,12 @@ contains
     integer, intent(in) :: lower(3)        !! lower bounds of phi
     real(wp), intent(in), contiguous :: phi(lower(1):, lower(2):, lower(3):)   !! [Pa]
     real(wp), intent(out) :: force(:, :)   !! (6, bodies) [N, N m]
-    integer(i8) :: bins(bin_size, 6*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n), term(terms_at_once, 6), pressure
     integer :: b, e, n, from
 
     force = 0.0_wp
-    bins = spread(no_terms, 2, 6*bodies%n)
+    accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, e, n, term, pressure) if (self%first(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       if (.not. bodies%free(b)) cycle
@@ -372,12 +372,12 @@ contains
           end associate
           term(e, :) = self%j(from + e - 1, :)*pressure
         end do
-        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     force(:, :bodies%n) = reshape(total, [6, bodies%n])
   end subroutine force_from_cells
 

@@ -10,7 +10,7 @@ module flux_band_m
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side
-  use exact_sum_m, only: exact_add, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_add, exact_totals, accumulator_size, no_terms
   use linear_operator_m, only: linear_operator_t
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
@@ -26,7 +26,7 @@ module flux_band_m
                                              !! number of the part; then work
     integer(i8), allocatable :: home(:)      !! (parts) labels, rising
     integer(i8), allocatable :: held(:)      !! (0:processes-1) labels that each process gave
-    integer(i8), allocatable :: bins(:, :)   !! of the sums
+    integer(i8), allocatable :: accumulator(:, :)   !! of the sums
   end type part_finder_t
 
   type, extends(linear_operator_t) :: flux_band_t
@@ -87,7 +87,7 @@ contains
     type(flux_band_t), intent(inout) :: self
 
     allocate (self%first(n + 1), self%vents(n), self%largest(n), self%total(2*n))
-    allocate (self%finder%home(n), self%finder%bins(bin_size, 2*n))
+    allocate (self%finder%home(n), self%finder%accumulator(accumulator_size, 2*n))
   end subroutine allocate_parts
 
   !> Room in the lists for all cells.
@@ -306,7 +306,7 @@ contains
     self%parts = int(sum(self%finder%held))
     if (self%parts > size(self%finder%home)) then
       deallocate (self%first, self%vents, self%largest, self%total)
-      deallocate (self%finder%home, self%finder%bins)
+      deallocate (self%finder%home, self%finder%accumulator)
       call allocate_parts(2*self%parts, self)
     end if
     self%finder%home(1:self%parts) = 0_i8
@@ -408,20 +408,20 @@ contains
 
     n = self%parts
     self%vents(1:n) = 0_i8
-    associate (bins => self%finder%bins)
+    associate (accumulator => self%finder%accumulator)
       do c = 1, n
         associate (a => self%first(c), b => self%first(c + 1) - 1)
           do l = a, b
             if (at_open_side(self%cell(:, l))) self%vents(c) = self%vents(c) + 1_i8
           end do
-          bins(:, c) = no_terms
-          bins(:, n + c) = no_terms
-          call exact_add(self%r(a:b), bins(:, c))
-          call exact_add(self%open(a:b), bins(:, n + c))
+          accumulator(:, c) = no_terms
+          accumulator(:, n + c) = no_terms
+          call exact_add(self%r(a:b), accumulator(:, c))
+          call exact_add(self%open(a:b), accumulator(:, n + c))
         end associate
       end do
       call global_sum(self%vents(1:n))
-      call exact_totals(bins(:, 1:2*n), self%total(1:2*n))
+      call exact_totals(accumulator(:, 1:2*n), self%total(1:2*n))
     end associate
   contains
     !> Can this cell exchange through an open side of the domain?

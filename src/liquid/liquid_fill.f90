@@ -10,7 +10,7 @@ module liquid_fill_m
   use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
   use surface_normal_m, only: vertical_t, vertical_of, surface_normal
   use extended_fraction_m, only: extended_fraction_t, extend_fraction, liquid_share, nearly_pure
-  use exact_sum_m, only: exact_sum, exact_add, exact_totals, bin_size, no_terms
+  use exact_sum_m, only: exact_sum, exact_add, exact_totals, accumulator_size, no_terms
   use parallel_m, only: global_max
   implicit none
   private
@@ -26,17 +26,17 @@ contains
     real(wp), intent(in), contiguous :: liquid(grid%first(1):, grid%first(2):, grid%first(3):)
       !! W [m3]
     real(wp) :: volume
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
     real(wp) :: total(1)
     integer :: j, k
 
-    bins(:, 1) = no_terms
+    accumulator(:, 1) = no_terms
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        call exact_add(liquid(grid%lo(1):grid%hi(1), j, k), bins(:, 1))
+        call exact_add(liquid(grid%lo(1):grid%hi(1), j, k), accumulator(:, 1))
       end do
     end do
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     volume = total(1)
   end function liquid_volume
 
@@ -220,12 +220,12 @@ contains
     type(flow_t), intent(inout) :: flow
     real(wp), intent(out) :: displaced   !! [m3]
     type(cut_cell_t) :: cut
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
     real(wp) :: share, m(3), below, room, kept, total(1)
     integer :: i, j, k
 
     call cut_cell_init(cut)
-    bins(:, 1) = no_terms
+    accumulator(:, 1) = no_terms
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
@@ -240,13 +240,13 @@ contains
             call open_below(cut, m, unit_constant(m, flow%c(i, j, k)), below)
             kept = room*min(max(below/max(cut%open, tiny(below)), 0.0_wp), 1.0_wp)
           end if
-          call exact_add([flow%liquid(i, j, k), -kept], bins(:, 1))
+          call exact_add([flow%liquid(i, j, k), -kept], accumulator(:, 1))
           flow%liquid(i, j, k) = kept
           flow%room(i, j, k) = room
         end do
       end do
     end do
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     displaced = total(1)
   end subroutine take_from_solid
 

@@ -21,7 +21,7 @@ module surface_tension_m
   use face_weight_m, only: weight_at_faces
   use surface_curvature_m, only: surface_curvature_t, surface_curvature_init, find_curvature, &
                                  no_surface
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
+  use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   implicit none
   private
   public :: surface_tension_t, surface_tension_init, find_tension, add_tension, force_from_tension
@@ -135,12 +135,12 @@ contains
     type(rigid_flux_t), intent(in) :: flux
     type(surface_tension_t), intent(in) :: self
     real(wp), intent(inout) :: force(:, :)   !! (6, bodies) about the centre of mass [N, N m]
-    integer(i8) :: bins(bin_size, 6*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n), term(terms_at_once, 6)
     integer :: b, m, n, from
 
     if (.not. self%acts) return
-    bins = spread(no_terms, 2, 6*bodies%n)
+    accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel private(b, m, n, term) if (flux%first_face(bodies%n + 1) > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
@@ -153,12 +153,12 @@ contains
             term(n, :) = flux%s(:, m)*grid%h(f(4))*self%force(f(1), f(2), f(3), f(4))
           end associate
         end do
-        call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     force(:, :bodies%n) = force(:, :bodies%n) + reshape(total, [6, bodies%n])
   end subroutine force_from_tension
 

@@ -13,7 +13,7 @@ module viscous_m
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use viscous_system_m, only: viscous_t, wall_links_t, wrench
-  use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, bin_size, no_terms, &
+  use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, accumulator_size, no_terms, &
     terms_at_once
   use parallel_m, only: halo_exchange, global_max, nproc
   implicit none
@@ -482,11 +482,11 @@ contains
       u(lbound(self%mass, 1):, lbound(self%mass, 2):, lbound(self%mass, 3):, :)   !! [m/s]
     real(wp), intent(in) :: motion(:, :)   !! (6, bodies)
     real(wp), intent(out) :: pull(:, :)    !! (6, bodies)
-    integer(i8) :: bins(bin_size, size(pull))
+    integer(i8) :: accumulator(accumulator_size, size(pull))
     real(wp) :: total(size(pull)), term(terms_at_once, 6), slip(3)
     integer :: b, m, n, from
 
-    bins = spread(no_terms, 2, size(pull))
+    accumulator = spread(no_terms, 2, size(pull))
     associate (walls => self%walls)
       !$omp parallel private(b, m, n, term, slip) if (walls%n > worth_threads)
       do b = 1, size(pull, 2)
@@ -500,13 +500,13 @@ contains
               term(n, :) = wrench(walls%k(m)*slip, walls%arm(:, m))
             end associate
           end do
-          call exact_add_columns(term(:n, :), bins(:, 6*b - 5:6*b))
+          call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
         end do
         !$omp end do nowait
       end do
       !$omp end parallel
     end associate
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     pull = reshape(total, shape(pull))
     do b = 1, size(pull, 2)
       pull(4:6, b) = pull(4:6, b) - self%spin_drag(b)*motion(4:6, b)

@@ -17,7 +17,7 @@ module viscous_links_m
   use viscous_system_m, only: viscous_t, wall_links_t, room_for_walls, set_wall, add_side
   use wall_shear_m, only: distance_of_links, rough_viscosity
   use merged_cells_m, only: merged_cells_t, is_alone, along_share
-  use exact_sum_m, only: exact_add_columns, exact_totals, bin_size, no_terms, terms_at_once
+  use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   use parallel_m, only: global_max
   implicit none
   private
@@ -333,18 +333,18 @@ contains
     real(wp), intent(in), contiguous :: mu(grid%first(1):, grid%first(2):, grid%first(3):)
     type(viscous_t), intent(inout) :: self
     integer, parameter :: sums = 11   ! K, S, M and viscosity times volume
-    integer(i8) :: bins(bin_size, sums*bodies%n)
+    integer(i8) :: accumulator(accumulator_size, sums*bodies%n)
     real(wp) :: total(sums*bodies%n)
     integer :: b, c
 
-    bins = spread(no_terms, 2, sums*bodies%n)
+    accumulator = spread(no_terms, 2, sums*bodies%n)
     !$omp parallel private(b) if (self%walls%n > worth_threads)
     do b = 1, bodies%n
-      call add_moments(self%walls, b, bins(:, sums*b - 10:sums*b - 1))
-      call add_viscosity_times_volume(b, bins(:, sums*b:sums*b))
+      call add_moments(self%walls, b, accumulator(:, sums*b - 10:sums*b - 1))
+      call add_viscosity_times_volume(b, accumulator(:, sums*b:sums*b))
     end do
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     do b = 1, bodies%n
       self%body_matrix(:, :, b) = held_by(total(sums*b - 10:sums*b - 1))
       self%spin_drag(b) = 2.0_wp*total(sums*b)
@@ -355,9 +355,9 @@ contains
   contains
     !> Integral of the fluid's viscosity over the own cells of the body [Pa s m3]; the threads share
     !! the work.
-    subroutine add_viscosity_times_volume(body, bins)
+    subroutine add_viscosity_times_volume(body, accumulator)
       integer, intent(in) :: body
-      integer(i8), intent(inout) :: bins(:, :)
+      integer(i8), intent(inout) :: accumulator(:, :)
       real(wp) :: term(terms_at_once, 1)
       integer :: m, n, from, i(3)
 
@@ -370,7 +370,7 @@ contains
           n = n + 1
           term(n, 1) = mu(i(1), i(2), i(3))*solid%cell_alpha(m)*grid%volume
         end do
-        call exact_add_columns(term(:n, :), bins)
+        call exact_add_columns(term(:n, :), accumulator)
       end do
       !$omp end do nowait
     end subroutine add_viscosity_times_volume
@@ -378,10 +378,10 @@ contains
 
   !> Add K, S and M (xx, yy, zz, xy, yz, zx) of the links of a body to their sums; the threads share
   !! the work.
-  subroutine add_moments(walls, body, bins)
+  subroutine add_moments(walls, body, accumulator)
     type(wall_links_t), intent(in) :: walls
     integer, intent(in) :: body
-    integer(i8), intent(inout) :: bins(:, :)   !! (bin_size, 10)
+    integer(i8), intent(inout) :: accumulator(:, :)   !! (accumulator_size, 10)
     real(wp) :: term(terms_at_once, 10)
     integer :: from, m, n
 
@@ -396,7 +396,7 @@ contains
           term(m, 8:10) = k*[r(1)*r(2), r(2)*r(3), r(3)*r(1)]
         end associate
       end do
-      call exact_add_columns(term(:n, :), bins)
+      call exact_add_columns(term(:n, :), accumulator)
     end do
     !$omp end do nowait
   end subroutine add_moments

@@ -3,7 +3,7 @@ module diagnostics_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
   use parallel_m, only: global_max
-  use exact_sum_m, only: bin_size, no_terms, exact_add, merge_bins, exact_totals
+  use exact_sum_m, only: accumulator_size, no_terms, exact_add, merge_accumulators, exact_totals
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
@@ -154,13 +154,13 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(fluid_sums_t) :: sums
     integer, parameter :: n = 3
-    integer(i8) :: bins(bin_size, n), mine(bin_size, n)
+    integer(i8) :: accumulator(accumulator_size, n), mine(accumulator_size, n)
     real(wp), allocatable :: terms(:, :)   ! of one plane
     real(wp) :: total(n), excess(1)
     integer :: k, m
 
     do m = 1, n
-      bins(:, m) = no_terms
+      accumulator(:, m) = no_terms
     end do
     excess = 0.0_wp
     !$omp parallel private(mine, terms, k, m) reduction(max: excess)
@@ -179,11 +179,11 @@ contains
     !$omp end do nowait
     !$omp critical (merge_fluid_sums)
     do m = 1, n
-      call merge_bins(mine(:, m), bins(:, m))
+      call merge_accumulators(mine(:, m), accumulator(:, m))
     end do
     !$omp end critical (merge_fluid_sums)
     !$omp end parallel
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     call global_max(excess)
     sums = fluid_sums_t(total(1), total(2), total(3), excess(1))
   end function measure_fluid
@@ -195,17 +195,17 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp) :: energy
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
     real(wp) :: total(1), depth, g
     integer :: j, k, d
 
-    bins(:, 1) = no_terms
+    accumulator(:, 1) = no_terms
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
-        call exact_add(c(grid%lo(1):grid%hi(1), j, k), bins(:, 1))
+        call exact_add(c(grid%lo(1):grid%hi(1), j, k), accumulator(:, 1))
       end do
     end do
-    call exact_totals(bins, total)
+    call exact_totals(accumulator, total)
     d = maxloc(abs(fluid%gravity), 1)
     g = abs(fluid%gravity(d))
     associate (area => product(grid%length)/grid%length(d), length => grid%length(d))

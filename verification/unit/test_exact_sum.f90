@@ -6,7 +6,7 @@ program test_exact_sum
   use kinds_m, only: wp, i8
   use check_m, only: check, finish_checks
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_dots, exact_add, exact_totals, &
-    exact_add_columns, merge_bins, no_terms, bin_size
+    exact_add_columns, merge_accumulators, no_terms, accumulator_size
   use parallel_m, only: parallel_init, parallel_final, set_threads
   implicit none
   integer, parameter :: n = 20000
@@ -71,23 +71,23 @@ contains
 
   !> Sums of parts of any lengths, merged in any order.
   subroutine test_blocks()
-    integer(i8) :: bins(bin_size, 1), part(bin_size)
+    integer(i8) :: accumulator(accumulator_size, 1), part(accumulator_size)
     real(wp) :: s(1), r
     integer :: trial, first, last, different
 
     different = 0
     do trial = 1, 40
-      bins(:, 1) = no_terms
+      accumulator(:, 1) = no_terms
       first = 1
       do while (first <= n)
         call random_number(r)
         last = min(n, first + int(r**4*9000))
         part = no_terms
         call exact_add(a(first:last), part)
-        call merge_bins(part, bins(:, 1))
+        call merge_accumulators(part, accumulator(:, 1))
         first = last + 1
       end do
-      call exact_totals(bins, s)
+      call exact_totals(accumulator, s)
       if (transfer(s(1), 1_i8) /= transfer(exact_sum(a), 1_i8)) different = different + 1
     end do
     call check('same bits in 40 random blockings', different, 0)
@@ -116,19 +116,19 @@ contains
     integer, parameter :: first = 4096, doublings(2) = [19, 28]
     real(wp), parameter :: terms(4) = [1.0_wp, 0.7_wp, -1.0_wp/3.0_wp, &
       (1.0_wp - epsilon(1.0_wp))*2.0_wp**35]
-    integer(i8) :: bins(bin_size, 1), half(bin_size)
+    integer(i8) :: accumulator(accumulator_size, 1), half(accumulator_size)
     real(wp) :: s(1), expected
     integer :: t, d, m
 
     do t = 1, size(terms)
       do m = 1, size(doublings)
-        bins(:, 1) = no_terms
-        call exact_add(spread(terms(t), 1, first), bins(:, 1))
+        accumulator(:, 1) = no_terms
+        call exact_add(spread(terms(t), 1, first), accumulator(:, 1))
         do d = 1, doublings(m)
-          half = bins(:, 1)
-          call merge_bins(half, bins(:, 1))
+          half = accumulator(:, 1)
+          call merge_accumulators(half, accumulator(:, 1))
         end do
-        call exact_totals(bins, s)
+        call exact_totals(accumulator, s)
         expected = scale(first*terms(t), doublings(m))
         call check('a sum of very many terms', s(1), expected, abs(expected)*epsilon(1.0_wp))
       end do
@@ -137,7 +137,7 @@ contains
 
   subroutine test_columns()
     real(wp) :: c(500, 3), s(3), by_blocks(3)
-    integer(i8) :: bins(bin_size, 3)
+    integer(i8) :: accumulator(accumulator_size, 3)
     integer :: m, from
 
     call mixed_numbers(c(:, 1))
@@ -149,12 +149,12 @@ contains
     end do
     call check('constant column', s(3), 500.0e-200_wp, 1.0e-213_wp)
 
-    bins = spread(no_terms, 2, 3)
+    accumulator = spread(no_terms, 2, 3)
     !$omp parallel do schedule(dynamic, 1)
     do from = 1, 500, 70
-      call exact_add_columns(c(from:min(from + 69, 500), :), bins)
+      call exact_add_columns(c(from:min(from + 69, 500), :), accumulator)
     end do
-    call exact_totals(bins, by_blocks)
+    call exact_totals(accumulator, by_blocks)
     call check('columns are summed block by block as at once', by_blocks, s, 0.0_wp)
   end subroutine test_columns
 

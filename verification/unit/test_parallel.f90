@@ -3,9 +3,9 @@
 program test_parallel
   use kinds_m, only: wp, sp, i8
   use check_m, only: check, finish_checks
-  use exact_bins_m, only: bins_value
+  use exact_accumulator_m, only: accumulator_value
   use exact_sum_m, only: exact_sum, exact_sums, exact_dot, exact_add, exact_totals, &
-    no_terms, bin_size
+    no_terms, accumulator_size
   use parallel_m, only: parallel_init, parallel_final, decompose, halo_exchange, gather_all, &
     global_max, global_min, global_sum, broadcast, nproc, my_rank, is_root, set_threads, get_threads
   implicit none
@@ -188,7 +188,7 @@ contains
     logical :: at_side(2, 3)
     real(wp), allocatable :: x(:, :, :), mine(:)
     real(wp) :: s, pair(2), total(1)
-    integer(i8) :: bins(bin_size, 1)
+    integer(i8) :: accumulator(accumulator_size, 1)
 
     call decompose(n, all_open, lo, hi, at_side)
     allocate (x(1 - w:n(1) + w, 1 - w:n(2) + w, 1 - w:n(3) + w))
@@ -205,10 +205,10 @@ contains
     call check('sum', exact_sum(mine), s, 0.0_wp)
     pair = exact_sums(reshape([mine, 2*mine], [size(mine), 2]))
     call check('two sums', pair, [s, 2*s], 0.0_wp)
-    bins(:, 1) = no_terms
-    if (my_rank() == nproc() - 1) call exact_add([2.0_wp**(-30), 3.0e10_wp], bins(:, 1))
-    if (is_root()) call exact_add([-3.0e10_wp], bins(:, 1))
-    call exact_totals(bins, total)
+    accumulator(:, 1) = no_terms
+    if (my_rank() == nproc() - 1) call exact_add([2.0_wp**(-30), 3.0e10_wp], accumulator(:, 1))
+    if (is_root()) call exact_add([-3.0e10_wp], accumulator(:, 1))
+    call exact_totals(accumulator, total)
     call check('terms of different size on different processes', total(1), 2.0_wp**(-30), 0.0_wp)
   end subroutine test_sums
 
@@ -224,11 +224,11 @@ contains
   function whole_sum(x) result(s)
     real(wp), intent(in) :: x(:)
     real(wp) :: s
-    integer(i8) :: bins(bin_size)
+    integer(i8) :: accumulator(accumulator_size)
 
-    bins = no_terms
-    call exact_add(x, bins)
-    s = bins_value(bins)
+    accumulator = no_terms
+    call exact_add(x, accumulator)
+    s = accumulator_value(accumulator)
   end function whole_sum
 
   subroutine test_broadcast()

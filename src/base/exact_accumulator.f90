@@ -6,20 +6,21 @@
 !! Adding whole numbers is exact, so any order, blocking, thread or process count gives the same
 !! three numbers. They hold at least 73 digits below the largest term, far more than a plain sum.
 !!
-!! A set of bins is a plain `integer(i8) :: bins(bin_size)`: the index of the highest bin, the lower
-!! 32 digits of the three counts from high to low, then what is above these. A term adds up to 2**35
-!! to a count, so one word would hold 2**28 terms; two hold 2**50, more than any grid has cells.
+!! An accumulator is a plain `integer(i8) :: accumulator(accumulator_size)`: the index of the
+!! highest bin, the lower 32 digits of the three counts from high to low, then what is above these.
+!! A term adds up to 2**35 to a count, so one word would hold 2**28 terms; two hold 2**50, more than
+!! any grid has cells.
 !!
 !! Source: the pre-rounded sums of Demmel and Nguyen, IEEE Trans. Comput. 64 (2015), with whole
 !! numbers as accumulators so that no carry is ever needed.
-module exact_bins_m
+module exact_accumulator_m
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
   use kinds_m, only: wp, i8
   implicit none
   private
-  public :: bin_size, no_terms, chunk_size, add_terms, merge_bins, bins_value
+  public :: accumulator_size, no_terms, chunk_size, add_terms, merge_accumulators, accumulator_value
 
-  integer, parameter :: bin_size = 7         !! index of the highest bin, three counts of two words
+  integer, parameter :: accumulator_size = 7   !! index of the highest bin, counts of three in two
   integer, parameter :: chunk_size = 1024    !! most terms in one call of `add_terms`, on the stack
   integer, parameter :: bin_digits = 36
   integer, parameter :: low_digits = 32      !! of a count, in its lower word
@@ -28,16 +29,16 @@ module exact_bins_m
   integer, parameter :: not_a_number = highest + 1
 
   !> Bins of an empty sum.
-  integer(i8), parameter :: no_terms(bin_size) = [int(lowest, i8), 0_i8, 0_i8, 0_i8, 0_i8, 0_i8, &
-    0_i8]
+  integer(i8), parameter :: no_terms(accumulator_size) = [int(lowest, i8), 0_i8, 0_i8, 0_i8, &
+    0_i8, 0_i8, 0_i8]
 
 contains
 
-  !> Add terms to the bins.
-  pure subroutine add_terms(p, bins)
+  !> Add terms to an accumulator.
+  pure subroutine add_terms(p, accumulator)
     real(wp), intent(in), contiguous :: p(:)   !! at most `chunk_size` terms
-    integer(i8), intent(inout) :: bins(bin_size)
-    integer(i8) :: part(bin_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
+    integer(i8) :: part(accumulator_size)
     real(wp) :: total(3)
     integer :: top, b
 
@@ -54,7 +55,7 @@ contains
       end if
     end if
     part(1) = int(top, i8)
-    call merge_bins(part, bins)
+    call merge_accumulators(part, accumulator)
   end subroutine add_terms
 
   !> Largest magnitude of the terms; four at a time, for a maximum waits for the one before.
@@ -127,26 +128,26 @@ contains
     total = [sum_1, sum_2, sum_3]
   end subroutine split_terms
 
-  !> Add the bins of one sum to those of another.
-  pure subroutine merge_bins(part, bins)
-    integer(i8), intent(in) :: part(bin_size)
-    integer(i8), intent(inout) :: bins(bin_size)
+  !> Add the accumulator of one sum to those of another.
+  pure subroutine merge_accumulators(part, accumulator)
+    integer(i8), intent(in) :: part(accumulator_size)
+    integer(i8), intent(inout) :: accumulator(accumulator_size)
     integer(i8) :: carry(3)
     integer :: down
 
-    if (part(1) > bins(1)) then
-      down = int(min(part(1) - bins(1), 3_i8))
-      call move_down(down, bins(2:4))
-      call move_down(down, bins(5:7))
-      bins(1) = part(1)
+    if (part(1) > accumulator(1)) then
+      down = int(min(part(1) - accumulator(1), 3_i8))
+      call move_down(down, accumulator(2:4))
+      call move_down(down, accumulator(5:7))
+      accumulator(1) = part(1)
     end if
-    down = int(min(bins(1) - part(1), 3_i8))
-    bins(2 + down:4) = bins(2 + down:4) + part(2:4 - down)
-    bins(5 + down:7) = bins(5 + down:7) + part(5:7 - down)
-    carry = shifta(bins(2:4), low_digits)
-    bins(2:4) = bins(2:4) - shiftl(carry, low_digits)
-    bins(5:7) = bins(5:7) + carry
-  end subroutine merge_bins
+    down = int(min(accumulator(1) - part(1), 3_i8))
+    accumulator(2 + down:4) = accumulator(2 + down:4) + part(2:4 - down)
+    accumulator(5 + down:7) = accumulator(5 + down:7) + part(5:7 - down)
+    carry = shifta(accumulator(2:4), low_digits)
+    accumulator(2:4) = accumulator(2:4) - shiftl(carry, low_digits)
+    accumulator(5:7) = accumulator(5:7) + carry
+  end subroutine merge_accumulators
 
   !> Words of three counts become those of lower bins; the lowest are dropped.
   pure subroutine move_down(down, word)
@@ -158,8 +159,8 @@ contains
   end subroutine move_down
 
   !> Value of a sum; NaN when a term was not a number or above 1e292.
-  pure function bins_value(bins) result(value)
-    integer(i8), intent(in) :: bins(bin_size)
+  pure function accumulator_value(accumulator) result(value)
+    integer(i8), intent(in) :: accumulator(accumulator_size)
     real(wp) :: value
     integer, parameter :: between = bin_digits - low_digits   ! digits of the upper word in a bin
     integer(i8), parameter :: radix = 2_i8**bin_digits
@@ -167,22 +168,22 @@ contains
     real(wp) :: unit
     integer :: b
 
-    if (bins(1) == not_a_number) then
+    if (accumulator(1) == not_a_number) then
       value = ieee_value(value, ieee_quiet_nan)
       return
     end if
-    low = bins(2:4)
-    high = bins(5:7)
+    low = accumulator(2:4)
+    high = accumulator(5:7)
     do b = 3, 2, -1   ! leave at most half a unit of the next bin, so that nothing cancels below
       low(b) = low(b) + shiftl(iand(high(b), 2_i8**between - 1_i8), low_digits)
       carry = shifta(low(b) + radix/2, bin_digits)
       low(b) = low(b) - carry*radix
       low(b - 1) = low(b - 1) + carry + shifta(high(b), between)
     end do
-    unit = scale(1.0_wp, bin_digits*(int(bins(1)) - 2))
+    unit = scale(1.0_wp, bin_digits*(int(accumulator(1)) - 2))
     value = real(low(2), wp)*scale(unit, bin_digits) + real(low(3), wp)*unit
     value = (scale(real(high(1), wp), low_digits) + real(low(1), wp))*scale(unit, 2*bin_digits) &
             + value
-  end function bins_value
+  end function accumulator_value
 
-end module exact_bins_m
+end module exact_accumulator_m
