@@ -23,7 +23,7 @@ module monolithic_m
   use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
                              predict_face_velocity
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
-  use face_memory_m, only: store_deviation
+  use old_time_correction_m, only: store_correction
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
                          add_second_half, add_whole
   use buoyancy_m, only: displaced_force, mass_defect
@@ -59,8 +59,8 @@ module monolithic_m
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
-    real(wp), allocatable :: deviation(:, :, :, :)
-      !! of the faces at the start (`face_memory_m`), from `begin` to `predict_faces`
+    real(wp), allocatable :: correction(:, :, :, :)
+      !! of the faces at the start (`old_time_correction_m`), from `begin` to `predict_faces`
   contains
     procedure :: force_at_release
     procedure :: begin
@@ -120,9 +120,9 @@ contains
       call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, self)
       call give(scratch, self%tension%force)
     else
-      call take(scratch, self%deviation)
+      call take(scratch, self%correction)
       call take(scratch, self%half_kick%given)
-      call store_deviation(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%deviation)
+      call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
       call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, &
                           self%extrapolated, dt, flow, self%acceleration, self%half_kick)
     end if
@@ -351,8 +351,8 @@ contains
       if (self%implicit_momentum) then
         call predict_face_velocity(grid, dt, self%rho, a, flow)
       else
-        call predict_face_velocity(grid, dt, self%rho, a, flow, self%deviation, given, in_liquid)
-        call give(scratch, self%deviation)
+        call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction, given, in_liquid)
+        call give(scratch, self%correction)
         call shorten_at_walls(grid, dt, self%bodies, merged%cell(:, :merged%n), merged%body, &
                               merged%number, in_liquid, self%rho, a, flow)
       end if

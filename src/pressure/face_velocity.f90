@@ -218,13 +218,13 @@ contains
   !! The compact face acceleration takes the place of the interpolated one; dt' instead of dt keeps
   !! the steady drag right when viscosity is strong (measured: error 9 % down to 1 %).
   !!
-  !! `deviation` is what a face at the surface differed from its cells before (`face_memory_m`). It
-  !! fades with viscosity like the rest that the cells do not see.
+  !! `correction` is what a face at the surface differed from its cells before
+  !! (`old_time_correction_m`). It fades with viscosity like the rest that the cells do not see.
   !!
   !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
   !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
   !! that `a_face` does not hold, so half of it goes to the cell, too.
-  subroutine predict_face_velocity(grid, dt, rho, a, flow, deviation, given, in_liquid)
+  subroutine predict_face_velocity(grid, dt, rho, a, flow, correction, given, in_liquid)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -232,7 +232,7 @@ contains
     type(acceleration_t), intent(in) :: a   !! already in `flow%u`, halo of cells filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
     real(wp), intent(in), contiguous, optional :: &
-      deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     logical, intent(in), contiguous, optional, &
       dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: given, in_liquid
@@ -245,8 +245,8 @@ contains
                        a%cell(:, :, :, d), flow%uf(:, :, :, d))
       if (present(given)) call interpolate_beside_gas(grid, dt, d, flow%u(:, :, :, d), a, given, &
                                                       in_liquid, flow%uf(:, :, :, d))
-      if (present(deviation)) call add_deviation(grid, dt, e, rho, flow%mu, &
-                                                 deviation(:, :, :, d), flow%uf(:, :, :, d))
+      if (present(correction)) call add_correction(grid, dt, e, rho, flow%mu, &
+                                                 correction(:, :, :, d), flow%uf(:, :, :, d))
       call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
@@ -367,12 +367,12 @@ contains
   end subroutine interpolate_beside_gas
 
   !> Add what the faces in one direction differed from their cells.
-  subroutine add_deviation(grid, dt, e, rho, mu, deviation, uf)
+  subroutine add_correction(grid, dt, e, rho, mu, correction, uf)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
     integer, intent(in) :: e(3)
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: rho, mu, deviation
+      contiguous :: rho, mu, correction
     real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
     real(wp) :: nu, reach, most
@@ -384,18 +384,18 @@ contains
         most = 0.0_wp
         !$omp simd reduction(max: most)
         do i = grid%lo(1), grid%hi(1) + e(1)
-          most = max(most, abs(deviation(i, j, k)))
+          most = max(most, abs(correction(i, j, k)))
         end do
         if (most <= 0.0_wp) cycle
         !$omp simd private(nu)
         do i = grid%lo(1), grid%hi(1) + e(1)
           nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
                /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
-          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, reach)/dt*deviation(i, j, k)
+          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, reach)/dt*correction(i, j, k)
         end do
       end do
     end do
-  end subroutine add_deviation
+  end subroutine add_correction
 
   !> Longest time for which the compact acceleration of a face counts [s].
   !!

@@ -76,15 +76,15 @@ contains
 
   !> Nothing has been given before the transport, and the faces are as their cells.
   subroutine begin_without_past()
-    call take(scratch, coupling%deviation)
+    call take(scratch, coupling%correction)
     call take(scratch, coupling%half_kick%given)
-    coupling%deviation = 0.0_wp
+    coupling%correction = 0.0_wp
     coupling%half_kick%given = 0.0_wp
   end subroutine begin_without_past
 
   !> The stages of a step after the transport, of which `begin` may have gone before.
   subroutine advance()
-    if (.not. allocated(coupling%deviation)) call begin_without_past()
+    if (.not. allocated(coupling%correction)) call begin_without_past()
     call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
     call stages()
     call motion_after_fluid(block%case%fluid%gravity, dt, block%blocks, coupling)

@@ -9,19 +9,19 @@
 !! cells tell it their change only:
 !! $$ u_f := \overline{u} + \dots + \theta\, (u_f - \overline{u})^n, \qquad
 !! \theta = |\rho_2 - \rho_1|/(\rho_2 + \rho_1) $$
-module face_memory_m
+module old_time_correction_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
   use mixture_m, only: face_mean
   implicit none
   private
-  public :: store_deviation
+  public :: store_correction
 
 contains
 
   !> theta (u_f - mean of u) at the lower faces lo..hi+1 at the start of a step [m/s]; zero in one
   !! fluid, at the sides and beside bodies.
-  subroutine store_deviation(grid, alpha, rho, u, uf, deviation)
+  subroutine store_correction(grid, alpha, rho, u, uf, correction)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
       alpha, rho
@@ -30,7 +30,7 @@ contains
       contiguous :: u, uf
       !! velocity of cells, halo filled, and of faces [m/s]
     real(wp), intent(inout), contiguous :: &
-      deviation(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
     real(wp) :: keep, jump
 
@@ -45,20 +45,20 @@ contains
             jump = max(jump, abs(rho(i, j, k) - rho(i - e(1), j - e(2), k - e(3))))
           end do
           if (jump <= 0.0_wp) then
-            deviation(grid%lo(1):grid%hi(1) + e(1), j, k, d) = 0.0_wp
+            correction(grid%lo(1):grid%hi(1) + e(1), j, k, d) = 0.0_wp
             cycle
           end if
           do i = grid%lo(1), grid%hi(1) + e(1)
             associate (il => i - e(1), jl => j - e(2), kl => k - e(3))
               keep = abs(rho(i, j, k) - rho(il, jl, kl))/(rho(i, j, k) + rho(il, jl, kl))
               if (alpha(i, j, k) > 0.0_wp .or. alpha(il, jl, kl) > 0.0_wp) keep = 0.0_wp
-              deviation(i, j, k, d) = keep*(uf(i, j, k, d) - face_mean(u(il, jl, kl, d), &
+              correction(i, j, k, d) = keep*(uf(i, j, k, d) - face_mean(u(il, jl, kl, d), &
                                                                       u(i, j, k, d)))
             end associate
           end do
         end do
       end do
     end do
-  end subroutine store_deviation
+  end subroutine store_correction
 
-end module face_memory_m
+end module old_time_correction_m
