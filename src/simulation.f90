@@ -151,7 +151,7 @@ contains
     call fill_velocity_halo(sim%grid, sim%flow%u)
     call fill_scalar_halo(sim%grid, sim%flow%p)
     call fill_scalar_halo(sim%grid, sim%flow%liquid)
-    call fill_scalar_halo(sim%grid, sim%flow%room)
+    call fill_scalar_halo(sim%grid, sim%flow%fluid_volume)
     call fill_scalar_halo(sim%grid, sim%flow%c)
     call mix_fluid(sim%case%fluid, sim%flow)
     call resume_outflow(sim%grid, sim%case%fluid, sim%clock%dt, sim%flow%c, sim%flow%uf, &

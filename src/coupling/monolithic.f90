@@ -204,7 +204,7 @@ contains
     real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
     type(flow_t), intent(in) :: flow
     real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), parameter :: min_room = 1.0e-3_wp   !! of a cell with a density of its own
+    real(wp), parameter :: min_volume = 1.0e-3_wp   !! of a cell with a density of its own
     integer :: k, m
 
     !$omp parallel do schedule(static)
@@ -213,8 +213,8 @@ contains
     end do
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        associate (room => flow%room(c(1), c(2), c(3)))
-          if (room > min_room*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/room
+        associate (fluid_volume => flow%fluid_volume(c(1), c(2), c(3)))
+          if (fluid_volume > min_volume*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/fluid_volume
         end associate
       end associate
     end do

@@ -66,7 +66,7 @@ contains
     !$omp parallel do schedule(static)
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        self%mass(m) = mass_through(fluid, flow%room(c(1), c(2), c(3)), &
+        self%mass(m) = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
                                     flow%liquid(c(1), c(2), c(3)))
       end associate
     end do
@@ -224,7 +224,8 @@ contains
 
       f = -half_kick%given(c(1), c(2), c(3), :)
       if (half_kick%takes_part(c(1), c(2), c(3))) then
-        mass = mass_through(fluid, flow%room(c(1), c(2), c(3)), flow%liquid(c(1), c(2), c(3)))
+        mass = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
+                            flow%liquid(c(1), c(2), c(3)))
         f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
       end if
       owed = wrench(f/dt, arm_to_cell(grid, c, bodies%x(:, b)))

@@ -15,7 +15,7 @@ module fields_m
     real(wp), allocatable :: solid_flux(:, :, :, :)
       !! volume rate of the solids through the lower face [m3/s]
     real(wp), allocatable :: liquid(:, :, :)    !! volume of liquid W in the cell [m3]
-    real(wp), allocatable :: room(:, :, :)      !! carried open volume Vt of the cell [m3]
+    real(wp), allocatable :: fluid_volume(:, :, :)      !! carried open volume Vt of the cell [m3]
     real(wp), allocatable :: c(:, :, :)
       !! C^: liquid share of the full cell below its plane, extended
                                                 !! through bodies; gives density, gravity, normals
@@ -42,7 +42,7 @@ contains
     allocate (flow%solid_flux, source=flow%u)
     allocate (flow%p(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
     allocate (flow%liquid, source=flow%p)
-    allocate (flow%room, source=flow%p)
+    allocate (flow%fluid_volume, source=flow%p)
     allocate (flow%c, source=flow%p)
     allocate (flow%rho, source=flow%p)
     allocate (flow%mu, source=flow%p)

@@ -66,15 +66,15 @@ contains
   end subroutine extended_fraction_init
 
   !> Liquid share of the open part of a cell.
-  elemental function liquid_share(liquid, room) result(c)
-    real(wp), intent(in) :: liquid, room   !! W and Vt [m3]
+  elemental function liquid_share(liquid, fluid_volume) result(c)
+    real(wp), intent(in) :: liquid, fluid_volume   !! W and Vt [m3]
     real(wp) :: c
 
     c = 0.0_wp
-    if (room > 0.0_wp) c = min(max(liquid/room, 0.0_wp), 1.0_wp)
+    if (fluid_volume > 0.0_wp) c = min(max(liquid/fluid_volume, 0.0_wp), 1.0_wp)
   end function liquid_share
 
-  !> C^ of all cells from the liquid and the room, halo filled.
+  !> C^ of all cells from the liquid and the fluid volume, halo filled.
   subroutine extend_fraction(grid, solid, self, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid   !! of the same time as the liquid
@@ -82,24 +82,24 @@ contains
     type(flow_t), intent(inout) :: flow
     integer :: pass
 
-    call cells_without_solid(grid, solid, flow%liquid, flow%room, flow%c)
+    call cells_without_solid(grid, solid, flow%liquid, flow%fluid_volume, flow%c)
     call list_solid_cells(grid, solid, self)
-    call spread_sideways(grid, solid, flow%liquid, flow%room, self, flow%c)
+    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
     self%has_plane(1:self%n) = .true.
     do pass = 1, plane_passes
-      call planes_of_cut_cells(grid, solid, flow%liquid, flow%room, pass == 1, self, flow%c)
+      call planes_of_cut_cells(grid, solid, flow%liquid, flow%fluid_volume, pass == 1, self, flow%c)
     end do
     call forget_solid_cells(solid, self, flow%c)
-    call spread_sideways(grid, solid, flow%liquid, flow%room, self, flow%c)
+    call spread_sideways(grid, solid, flow%liquid, flow%fluid_volume, self, flow%c)
     call fill_scalar_halo(grid, flow%c)
   end subroutine extend_fraction
 
   !> C^ = W/Vt where there is no solid, unknown elsewhere.
-  subroutine cells_without_solid(grid, solid, liquid, room, c)
+  subroutine cells_without_solid(grid, solid, liquid, fluid_volume, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, room
+      liquid, fluid_volume
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
 
@@ -109,7 +109,7 @@ contains
         do i = grid%lo(1), grid%hi(1)
           c(i, j, k) = unknown
           if (solid%alpha(i, j, k) <= 0.0_wp) then
-            c(i, j, k) = liquid_share(liquid(i, j, k), room(i, j, k))
+            c(i, j, k) = liquid_share(liquid(i, j, k), fluid_volume(i, j, k))
           end if
         end do
       end do
@@ -142,11 +142,11 @@ contains
 
   !> Give cells without a value the mean of their neighbours in the row, ring by ring; where a whole
   !! row has none, one step up and down, and on along the row.
-  subroutine spread_sideways(grid, solid, liquid, room, self, c)
+  subroutine spread_sideways(grid, solid, liquid, fluid_volume, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, room
+      liquid, fluid_volume
     type(extended_fraction_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: left, l
@@ -181,7 +181,7 @@ contains
     do l = 1, left   ! sealed in: what the cell itself holds
       associate (at => self%cell(:, self%open_list(l)))
         c(at(1), at(2), at(3)) = liquid_share(liquid(at(1), at(2), at(3)), &
-                                              room(at(1), at(2), at(3)))
+                                              fluid_volume(at(1), at(2), at(3)))
       end associate
     end do
     call halo_exchange(c, n_halo, layers=1)
@@ -246,11 +246,11 @@ contains
 
   !> Cut cells: accept the row's value, which stands in c, or put the share below the own plane
   !! there.
-  subroutine planes_of_cut_cells(grid, solid, liquid, room, may_accept, self, c)
+  subroutine planes_of_cut_cells(grid, solid, liquid, fluid_volume, may_accept, self, c)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, room
+      liquid, fluid_volume
     logical, intent(in) :: may_accept   !! first pass; later only cells with an own plane take part
     type(extended_fraction_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -263,7 +263,7 @@ contains
       if (nearly_solid(solid, at)) self%has_plane(l) = .false.
       if (.not. self%has_plane(l)) cycle
       cell%at = at
-      cell%share = liquid_share(liquid(at(1), at(2), at(3)), room(at(1), at(2), at(3)))
+      cell%share = liquid_share(liquid(at(1), at(2), at(3)), fluid_volume(at(1), at(2), at(3)))
       cell%row = c(at(1), at(2), at(3))
       call share_of_cut_cell(grid, solid, self%vertical, may_accept, c, &
                              self%cut(omp_get_thread_num()), cell)

@@ -41,7 +41,7 @@ contains
   end function liquid_volume
 
   !> Fill the open space below the water level and in boxes; overlaps count once, cut cells get the
-  !! exact share. Sets liquid and room, halo filled, and the initial volume; C^ follows from
+  !! exact share. Sets liquid and fluid volume, halo filled, and the initial volume; C^ follows from
   !! `extend_fraction`.
   subroutine fill_liquid(grid, fluid, water, solid, flow)
     type(grid_t), intent(in) :: grid
@@ -58,15 +58,15 @@ contains
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          flow%room(i, j, k) = grid%volume*(1.0_wp - solid%alpha(i, j, k))
-          flow%liquid(i, j, k) = flow%room(i, j, k)
-          if (fluid%single_phase .or. flow%room(i, j, k) <= 0.0_wp) cycle
-          flow%liquid(i, j, k) = flow%room(i, j, k)*share_in_boxes([i, j, k])
+          flow%fluid_volume(i, j, k) = grid%volume*(1.0_wp - solid%alpha(i, j, k))
+          flow%liquid(i, j, k) = flow%fluid_volume(i, j, k)
+          if (fluid%single_phase .or. flow%fluid_volume(i, j, k) <= 0.0_wp) cycle
+          flow%liquid(i, j, k) = flow%fluid_volume(i, j, k)*share_in_boxes([i, j, k])
         end do
       end do
     end do
     call fill_scalar_halo(grid, flow%liquid)
-    call fill_scalar_halo(grid, flow%room)
+    call fill_scalar_halo(grid, flow%fluid_volume)
     flow%liquid_initial = liquid_volume(grid, flow%liquid)
     flow%liquid_inflow = 0.0_wp
   contains
@@ -207,7 +207,7 @@ contains
     if (displaced > 0.0_wp) call add_layer(grid, after, extension%vertical, displaced, flow, left)
     flow%liquid_inflow = flow%liquid_inflow - left
     call fill_scalar_halo(grid, flow%liquid)
-    call fill_scalar_halo(grid, flow%room)
+    call fill_scalar_halo(grid, flow%fluid_volume)
     call extend_fraction(grid, after, extension, flow)
     if (present(rest)) rest = left
   end subroutine raise_surface
@@ -221,7 +221,7 @@ contains
     real(wp), intent(out) :: displaced   !! [m3]
     type(cut_cell_t) :: cut
     integer(i8) :: accumulator(accumulator_size, 1)
-    real(wp) :: share, m(3), below, room, kept, total(1)
+    real(wp) :: share, m(3), below, fluid_volume, kept, total(1)
     integer :: i, j, k
 
     call cut_cell_init(cut)
@@ -230,19 +230,20 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           if (.not. abs(after%alpha(i, j, k) - before%alpha(i, j, k)) > 0.0_wp) cycle
-          room = grid%volume*(1.0_wp - after%alpha(i, j, k))
-          share = liquid_share(flow%liquid(i, j, k), flow%room(i, j, k))
-          kept = share*room
-          if (share > nearly_pure .and. share < 1.0_wp - nearly_pure .and. room > 0.0_wp) then
+          fluid_volume = grid%volume*(1.0_wp - after%alpha(i, j, k))
+          share = liquid_share(flow%liquid(i, j, k), flow%fluid_volume(i, j, k))
+          kept = share*fluid_volume
+          if (share > nearly_pure .and. share < 1.0_wp - nearly_pure &
+              .and. fluid_volume > 0.0_wp) then
             m = surface_normal(grid, before, vertical, flow%c, i, j, k)
             call load_cut_cell(after, after%cut(i, j, k), grid%face([i, j, k], [1, 2, 3]), &
                                grid%h, cut)
             call open_below(cut, m, unit_constant(m, flow%c(i, j, k)), below)
-            kept = room*min(max(below/max(cut%open, tiny(below)), 0.0_wp), 1.0_wp)
+            kept = fluid_volume*min(max(below/max(cut%open, tiny(below)), 0.0_wp), 1.0_wp)
           end if
           call exact_add([flow%liquid(i, j, k), -kept], accumulator(:, 1))
           flow%liquid(i, j, k) = kept
-          flow%room(i, j, k) = room
+          flow%fluid_volume(i, j, k) = fluid_volume
         end do
       end do
     end do
@@ -311,7 +312,8 @@ contains
         call layer_in_cell(grid, solid, vertical, cell(:, n), &
                            surface_at(cell(:, n)) + [0.0_wp, height], cut, gain(n))
         associate (at => cell(:, n))
-          gain(n) = min(gain(n), flow%room(at(1), at(2), at(3)) - flow%liquid(at(1), at(2), at(3)))
+          gain(n) = min(gain(n), flow%fluid_volume(at(1), at(2), at(3)) &
+                        - flow%liquid(at(1), at(2), at(3)))
         end associate
       end do
       total = exact_sum(gain)
@@ -421,7 +423,7 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            if (flow%room(i, j, k) <= flow%liquid(i, j, k)) cycle
+            if (flow%fluid_volume(i, j, k) <= flow%liquid(i, j, k)) cycle
             other = pack([i, j, k], [1, 2, 3] /= axis)
             if (surface(other(1), other(2)) <= no_surface) cycle
             top = height_of_top([i, j, k])

@@ -71,14 +71,14 @@ contains
     real(wp), intent(in) :: dt
     type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances
     type(liquid_transport_t), intent(inout) :: self
-    type(flow_t), intent(in) :: flow   !! liquid, room, c (halo filled) and uf of the begin
+    type(flow_t), intent(in) :: flow   !! liquid, fluid volume, c (halo filled) and uf of the begin
     integer :: k
 
     call find_open_flux(grid, old, new, dt, flow, solver, self%flux, self%volumes%q)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       self%volumes%w(:, :, k) = flow%liquid(:, :, k)
-      self%volumes%v(:, :, k) = flow%room(:, :, k)
+      self%volumes%v(:, :, k) = flow%fluid_volume(:, :, k)
       self%volumes%c(:, :, k) = flow%c(:, :, k)
       if (self%parts > 1) self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :) &
                                                        /real(self%parts, wp)
@@ -150,7 +150,7 @@ contains
     inflow = exact_sum(self%side(1:n))
   end function inflow_of_sides
 
-  !> New liquid, room and C^; liquid through the sides; statistics.
+  !> New liquid, fluid volume and C^; liquid through the sides; statistics.
   subroutine finish_transport(grid, new, self, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: new   !! bodies at the end of the step
@@ -161,11 +161,11 @@ contains
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       flow%liquid(:, :, k) = self%volumes%w(:, :, k)
-      flow%room(:, :, k) = self%volumes%v(:, :, k)
+      flow%fluid_volume(:, :, k) = self%volumes%v(:, :, k)
       flow%c(:, :, k) = self%volumes%c(:, :, k)
     end do
     call fill_scalar_halo(grid, flow%liquid)
-    call fill_scalar_halo(grid, flow%room)
+    call fill_scalar_halo(grid, flow%fluid_volume)
     call extend_fraction(grid, new, self%extension, flow)
     flow%liquid_inflow = flow%liquid_inflow + self%inflow
   end subroutine finish_transport

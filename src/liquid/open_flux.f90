@@ -61,7 +61,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies before and after the step
     real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(in) :: flow   !! carried open volume `room`, velocity `uf` of the open part
+    type(flow_t), intent(in) :: flow   !! carried `fluid_volume`, velocity `uf` of the open part
     type(elliptic_solver_t), intent(inout) :: solver   !! of the potential for the rests r [V]
     type(open_flux_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -74,11 +74,11 @@ contains
     call flux_of_velocity(grid, old, new%open, flow%uf, dt, q)
     call find_band(grid, old, new, self%band)
     if (self%band%parts == 0) return
-    call find_balances(grid, new, flow%room, q, self%band)
+    call find_balances(grid, new, flow%fluid_volume, q, self%band)
     call sum_by_part(grid, self%band)
-    if (excess_stays(grid, flow%room, self%band)) then
+    if (excess_stays(grid, flow%fluid_volume, self%band)) then
       call widen_to_domain(grid, old, new, self%band)
-      call find_balances(grid, new, flow%room, q, self%band)
+      call find_balances(grid, new, flow%fluid_volume, q, self%band)
       call sum_by_part(grid, self%band)
     end if
     call balance_parts(self, balanced)
@@ -269,24 +269,24 @@ contains
   end subroutine list_band
 
   !> Volume balance r of the cells of the band.
-  subroutine find_balances(grid, new, room, q, band)
+  subroutine find_balances(grid, new, fluid_volume, q, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: new
-    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: fluid_volume(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flux_band_t), intent(inout) :: band
     integer :: i, j, k, l
-    real(wp) :: outflow, room_left
+    real(wp) :: outflow, volume_left
 
-    !$omp parallel do private(i, j, k, outflow, room_left) schedule(static)
+    !$omp parallel do private(i, j, k, outflow, volume_left) schedule(static)
     do l = 1, band%n
       i = band%cell(1, l)
       j = band%cell(2, l)
       k = band%cell(3, l)
       outflow = (q(i + 1, j, k, 1) - q(i, j, k, 1)) + (q(i, j + 1, k, 2) - q(i, j, k, 2)) &
                 + (q(i, j, k + 1, 3) - q(i, j, k, 3))
-      room_left = room(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
-      band%r(l) = (room_left - outflow)/grid%volume
+      volume_left = fluid_volume(i, j, k) - grid%volume*(1.0_wp - new%alpha(i, j, k))
+      band%r(l) = (volume_left - outflow)/grid%volume
       band%open(l) = 1.0_wp - new%alpha(i, j, k)
     end do
   end subroutine find_balances
@@ -304,9 +304,9 @@ contains
 
   !> Would a part of the band keep more or less fluid than the cells beside it have? All processes
   !! get the same.
-  function excess_stays(grid, room, band) result(yes)
+  function excess_stays(grid, fluid_volume, band) result(yes)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: room(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: fluid_volume(grid%first(1):, grid%first(2):, grid%first(3):)
     type(flux_band_t), intent(in) :: band
     logical :: yes
     real(wp) :: share, most(1)
@@ -323,7 +323,7 @@ contains
             nb = band%cell(:, l) + s*unit_step(:, d)
             if (grid%beyond(nb(d), d)) cycle
             if (band%marked(nb(1), nb(2), nb(3)) /= 0) cycle
-            most = max(most, abs(share - (room(nb(1), nb(2), nb(3))/grid%volume - 1.0_wp)))
+            most = max(most, abs(share - (fluid_volume(nb(1), nb(2), nb(3))/grid%volume - 1.0_wp)))
           end do
         end do
       end do

@@ -95,7 +95,7 @@ contains
             self%given(i, j, k, :) = 0.0_wp
             cycle
           end if
-          mass = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))
+          mass = mass_through(fluid, flow%fluid_volume(i, j, k), flow%liquid(i, j, k))
           flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a%cell(i, j, k, :)
           self%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do

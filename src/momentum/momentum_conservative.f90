@@ -68,11 +68,11 @@ contains
   end function mass_through
 
   !> Momentum of every cell, and the cells where the first-order value is taken.
-  subroutine momentum_begin(grid, fluid, liquid, room, c, u, self)
+  subroutine momentum_begin(grid, fluid, liquid, fluid_volume, c, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: liquid, room, c   !! W and Vt [m3], liquid share [-]
+      contiguous :: liquid, fluid_volume, c   !! W and Vt [m3], liquid share [-]
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
     type(momentum_t), intent(inout) :: self
@@ -84,7 +84,8 @@ contains
       do m = 1, 3
         do j = grid%lo(2), grid%hi(2)
           associate (a => grid%lo(1), b => grid%hi(1))
-            self%momentum(a:b, j, k, m) = mass_through(fluid, room(a:b, j, k), liquid(a:b, j, k)) &
+            self%momentum(a:b, j, k, m) = &
+              mass_through(fluid, fluid_volume(a:b, j, k), liquid(a:b, j, k)) &
                                           *u(a:b, j, k, m)
           end associate
         end do
@@ -104,7 +105,7 @@ contains
     end do
   end subroutine momentum_begin
 
-  !> One sweep in direction d of liquid, room and momentum together.
+  !> One sweep in direction d of liquid, fluid volume and momentum together.
   subroutine momentum_sweep(grid, fluid, old, d, transport, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
@@ -213,16 +214,17 @@ contains
       !! work: through the face [kg]; share of the value on it that lies beyond the donor's
     real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)
       !! value on the face [m/s], on return momentum through it [kg m/s]
-    real(wp) :: room, donor
+    real(wp) :: volume, donor
     integer :: i, m
     logical :: forward, mixed
 
-    !$omp simd private(room, forward, mixed)
+    !$omp simd private(volume, forward, mixed)
     do i = grid%lo(1), grid%hi(1) + e(1)
       forward = q(i, j, k) > 0.0_wp
-      room = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
+      volume = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
       mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
-      keep(i) = merge(0.0_wp, max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(room, tiny(room))), mixed)
+      keep(i) = merge(0.0_wp, max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(volume, tiny(volume))), &
+                      mixed)
       mass(i) = mass_through(fluid, q(i, j, k), g(i, j, k))
     end do
     do m = 1, 3
@@ -274,11 +276,11 @@ contains
   end subroutine momentum_late
 
   !> Velocity of every own cell that holds mass; the others keep theirs. Halo filled.
-  subroutine velocity_of_momentum(grid, fluid, liquid, room, momentum, u)
+  subroutine velocity_of_momentum(grid, fluid, liquid, fluid_volume, momentum, u)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: liquid, room   !! [m3]
+      contiguous :: liquid, fluid_volume   !! [m3]
     real(wp), intent(in), contiguous :: momentum(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [kg m/s]
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
@@ -292,7 +294,7 @@ contains
         do j = grid%lo(2), grid%hi(2)
           !$omp simd private(mass)
           do i = grid%lo(1), grid%hi(1)
-            mass = mass_through(fluid, room(i, j, k), liquid(i, j, k))
+            mass = mass_through(fluid, fluid_volume(i, j, k), liquid(i, j, k))
             u(i, j, k, m) = merge(momentum(i, j, k, m)/merge(mass, 1.0_wp, mass > 0.0_wp), &
                                   u(i, j, k, m), mass > 0.0_wp)
           end do

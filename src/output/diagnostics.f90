@@ -57,7 +57,7 @@ module diagnostics_m
     real(wp) :: liquid_volume = 0.0_wp        !! [m3]
     real(wp) :: liquid_volume_drift = 0.0_wp  !! (volume - initial - inflow)/initial
     real(wp) :: volume_excess_max = 0.0_wp
-      !! largest |Vt - V (1 - alpha)|/V of a cell: fluid it holds beyond its room, or lacks
+      !! largest |Vt - V (1 - alpha)|/V of a cell: fluid it holds beyond its volume, or lacks
     real(wp) :: kinetic_energy_fluid = 0.0_wp, kinetic_energy_bodies = 0.0_wp      !! [J]
     real(wp) :: potential_energy_fluid = 0.0_wp      !! zero at the lower corner of the tank [J]
     real(wp) :: potential_energy_bodies = 0.0_wp, contact_energy = 0.0_wp          !! [J]
@@ -174,7 +174,7 @@ contains
       do m = 1, n
         call exact_add(terms(:, m), mine(:, m))
       end do
-      excess = max(excess, excess_of_plane(grid, k, flow%room, solid%alpha))
+      excess = max(excess, excess_of_plane(grid, k, flow%fluid_volume, solid%alpha))
     end do
     !$omp end do nowait
     !$omp critical (merge_fluid_sums)
@@ -268,18 +268,18 @@ contains
   end function below
 
   !> Largest difference of the fluid that a cell of plane k holds from its open volume [V].
-  pure function excess_of_plane(grid, k, room, alpha) result(excess)
+  pure function excess_of_plane(grid, k, fluid_volume, alpha) result(excess)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: k
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      room, alpha
+      fluid_volume, alpha
     real(wp) :: excess
     integer :: i, j
 
     excess = 0.0_wp
     do j = grid%lo(2), grid%hi(2)
       do i = grid%lo(1), grid%hi(1)
-        excess = max(excess, abs(room(i, j, k)/grid%volume - (1.0_wp - alpha(i, j, k))))
+        excess = max(excess, abs(fluid_volume(i, j, k)/grid%volume - (1.0_wp - alpha(i, j, k))))
       end do
     end do
   end function excess_of_plane

@@ -9,7 +9,7 @@
 !!     /            @format = 'mics-restart' @format_version @checksum @version @git_revision
 !!                  @namelist @parameters
 !!     /clock       t dt step n_rows n_frames rest_began
-!!     /flow        u (3,nz,ny,nx)  p liquid room c alpha (1,nz,ny,nx)
+!!     /flow        u (3,nz,ny,nx)  p liquid fluid_volume c alpha (1,nz,ny,nx)
 !!                  uf open (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
 !!     /blocks      position quaternion velocity angular_momentum ... (N,..)
 !!     /contacts    the tangential springs

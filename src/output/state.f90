@@ -118,7 +118,7 @@ contains
     call visitor%cells('/flow/uf', 'm/s', grid, .true., 3, flow%uf)
     call visitor%cells('/flow/solid_flux', 'm3/s', grid, .true., 3, flow%solid_flux)
     call visitor%cells('/flow/liquid', 'm3', grid, .false., 1, flow%liquid)
-    call visitor%cells('/flow/room', 'm3', grid, .false., 1, flow%room)
+    call visitor%cells('/flow/fluid_volume', 'm3', grid, .false., 1, flow%fluid_volume)
     call visitor%cells('/flow/c', '1', grid, .false., 1, flow%c)
     call visitor%cells('/flow/alpha', '1', grid, .false., 1, solid%alpha)
     call visitor%cells('/flow/open', '1', grid, .true., 3, solid%open)

@@ -203,7 +203,7 @@ contains
     n = product(grid%hi - grid%lo + 1)
     associate (file => self%file, first => grid%lo, extent => grid%hi - grid%lo + 1, &
       values => self%values)
-      call liquid_share(grid, flow%liquid, flow%room, flow%c, values)
+      call liquid_share(grid, flow%liquid, flow%fluid_volume, flow%c, values)
       call file%append_block(self%scalar(1), first, extent, values(:n))
       call single(grid, solid%alpha, values)
       call file%append_block(self%scalar(2), first, extent, values(:n))
@@ -236,14 +236,14 @@ contains
   end function room_for_field_frame
 
   !> Share of liquid in the fluid of each cell; in cells without fluid the extended share.
-  pure subroutine liquid_share(grid, liquid, room, c, values)
+  pure subroutine liquid_share(grid, liquid, fluid_volume, c, values)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      liquid, room
+      liquid, fluid_volume
       !! [m3]
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     real(sp), intent(out) :: values(:)
-    real(wp), parameter :: no_room = 1.0e-9_wp   !! of the cell volume
+    real(wp), parameter :: no_volume = 1.0e-9_wp   !! of the cell volume
     integer :: i, j, k, m
 
     m = 0
@@ -251,8 +251,8 @@ contains
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
           m = m + 1
-          if (room(i, j, k) > no_room*grid%volume) then
-            values(m) = real(min(1.0_wp, max(0.0_wp, liquid(i, j, k)/room(i, j, k))), sp)
+          if (fluid_volume(i, j, k) > no_volume*grid%volume) then
+            values(m) = real(min(1.0_wp, max(0.0_wp, liquid(i, j, k)/fluid_volume(i, j, k))), sp)
           else
             values(m) = real(c(i, j, k), sp)
           end if

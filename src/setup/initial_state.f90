@@ -129,7 +129,7 @@ contains
   end function is_named
 
   !> Liquid of the open part of every own cell, halo filled, and the initial volume, if the file
-  !! gives it; the room of the cells must be set.
+  !! gives it; the fluid volume of the cells must be set.
   subroutine read_initial_liquid(fluid, grid, flow)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
@@ -145,7 +145,8 @@ contains
       allocate (part(product(extent)), source=0.0_wp)
       call file%read_block(liquid_name, grid%lo, extent, part)
       associate (a => grid%lo, b => grid%hi)
-        flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) = flow%room(a(1):b(1), a(2):b(2), a(3):b(3)) &
+        flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) = &
+          flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3)) &
           *reshape(part, extent)
       end associate
       call fill_scalar_halo(grid, flow%liquid)

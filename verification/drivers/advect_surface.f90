@@ -68,7 +68,7 @@ contains
       flow%uf = uf
       if (name /= 'zalesak') flow%uf = uf*cos(pi*(real(step, wp) - 0.5_wp)/real(steps, wp))
       call transport_liquid(grid, none, none, dt, step, transport, flow)
-      past = max(past, -minval(flow%liquid), maxval(flow%liquid - flow%room))
+      past = max(past, -minval(flow%liquid), maxval(flow%liquid - flow%fluid_volume))
     end do
     associate (a => grid%lo, b => grid%hi)
       error = sum(abs(flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) &
@@ -135,13 +135,13 @@ contains
               end do
             end do
           end do
-          flow%room(i, j, k) = grid%volume
+          flow%fluid_volume(i, j, k) = grid%volume
           flow%liquid(i, j, k) = grid%volume*real(found, wp)/real(fine*fine*layers, wp)
         end do
       end do
     end do
     call fill_scalar_halo(grid, flow%liquid)
-    call fill_scalar_halo(grid, flow%room)
+    call fill_scalar_halo(grid, flow%fluid_volume)
   end subroutine fill
 
   !> Velocity of the lower faces at its largest.

@@ -37,8 +37,8 @@ def faces(state: State, name: str, grid: Grid, periodic: tuple[bool, ...]) -> li
 
 def excess(run: Run, state: State) -> Array:
     """Fluid that each cell holds beyond its open volume, of the cell volume (nz, ny, nx)."""
-    room = np.asarray(state["flow/room"]).squeeze() / run.grid.spacing.prod()
-    return np.asarray(room - (1.0 - np.asarray(state["flow/alpha"]).squeeze()))
+    volume = np.asarray(state["flow/fluid_volume"]).squeeze() / run.grid.spacing.prod()
+    return np.asarray(volume - (1.0 - np.asarray(state["flow/alpha"]).squeeze()))
 
 
 def divergence(run: Run, state: State) -> Array:

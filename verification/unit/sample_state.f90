@@ -55,7 +55,7 @@ contains
     call fill_cells(start + 0.3_wp, s%grid, 3, s%flow%uf)
     call fill_cells(start + 0.4_wp, s%grid, 3, s%flow%solid_flux)
     call fill_cells(start + 0.5_wp, s%grid, 1, s%flow%liquid)
-    call fill_cells(start + 0.6_wp, s%grid, 1, s%flow%room)
+    call fill_cells(start + 0.6_wp, s%grid, 1, s%flow%fluid_volume)
     call fill_cells(start + 0.7_wp, s%grid, 1, s%flow%c)
     call fill_cells(start + 0.8_wp, s%grid, 1, s%solid%alpha)
     call fill_cells(start + 0.9_wp, s%grid, 3, s%solid%open)

@@ -63,8 +63,8 @@ contains
     logical :: converged
 
     call place(block)
-    block%flow%room = (1.0_wp - block%solid%alpha)*block%grid%volume
-    block%flow%liquid = block%flow%room
+    block%flow%fluid_volume = (1.0_wp - block%solid%alpha)*block%grid%volume
+    block%flow%liquid = block%flow%fluid_volume
     call scratch_init(block%grid, scratch)
     call monolithic_init(block%grid, 1, block%case, coupling)
     call copy_motion(block%blocks, coupling%bodies)
@@ -373,7 +373,8 @@ contains
 
     associate (n => block%case%grid%cells)
       do d = 1, 3
-        p(d) = sum(block%flow%room(1:n(1), 1:n(2), 1:n(3))*block%flow%u(1:n(1), 1:n(2), 1:n(3), d))
+        p(d) = sum(block%flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) &
+                   *block%flow%u(1:n(1), 1:n(2), 1:n(3), d))
       end do
     end associate
     p = block%case%fluid%liquid_density*p + block%blocks%mass(1)*block%blocks%v(:, 1)

@@ -30,7 +30,7 @@ program test_diagnostics
   state%flow%liquid = 0.0_wp   ! as far as the surface around tells
   state%flow%rho = case%fluid%liquid_density
   state%flow%liquid(1:4, 1:4, 1:2) = volume
-  state%flow%room = volume
+  state%flow%fluid_volume = volume
   call look()
   call check('liquid', row%liquid_volume, 32*volume, 1.0e-15_wp)
   call check('no excess', row%volume_excess_max, 0.0_wp, 1.0e-15_wp)
@@ -53,13 +53,13 @@ program test_diagnostics
   mass = (case%fluid%gas_density*0.05_wp + case%fluid%liquid_density*0.2_wp)*volume
   call check('both in a cut cell', row%kinetic_energy_fluid, 0.5_wp*mass*6400, 1.0e-9_wp*mass)
 
-  state%flow%room(3, 2, 3) = 0.25_wp*volume              ! just its open volume
-  state%flow%room(1, 4, 4) = (1.0_wp + 2.0e-6_wp)*volume
-  state%flow%room(4, 1, 1) = (1.0_wp - 3.0e-6_wp)*volume
-  state%flow%room(0, 1, 1) = 2.0_wp*volume               ! of the halo
+  state%flow%fluid_volume(3, 2, 3) = 0.25_wp*volume              ! just its open volume
+  state%flow%fluid_volume(1, 4, 4) = (1.0_wp + 2.0e-6_wp)*volume
+  state%flow%fluid_volume(4, 1, 1) = (1.0_wp - 3.0e-6_wp)*volume
+  state%flow%fluid_volume(0, 1, 1) = 2.0_wp*volume               ! of the halo
   call look()
   call check('the largest excess, of either sign', row%volume_excess_max, 3.0e-6_wp, 1.0e-15_wp)
-  state%flow%room(3, 2, 3) = 0.4_wp*volume
+  state%flow%fluid_volume(3, 2, 3) = 0.4_wp*volume
   call look()
   call check('excess of a cut cell', row%volume_excess_max, 0.15_wp, 1.0e-15_wp)
   call potential()

@@ -61,18 +61,18 @@ contains
     real(wp) :: before(3)
 
     before = flow%c([2, 4, 5], 4, 5)
-    flow%liquid(3, 4, 5) = 0.8_wp*flow%room(3, 4, 5)
+    flow%liquid(3, 4, 5) = 0.8_wp*flow%fluid_volume(3, 4, 5)
     call extend_fraction(grid, solid, extension, flow)
     call check('own share', flow%c(at(1), at(2), at(3)) > 0.7_wp)
     call check('neighbour in the water', flow%c(2, 4, 5), before(1), 0.0_wp)
-    flow%liquid(3, 4, 5) = 0.37_wp*flow%room(3, 4, 5)
+    flow%liquid(3, 4, 5) = 0.37_wp*flow%fluid_volume(3, 4, 5)
   end subroutine own_plane
 
   !> A nearly full cell in the body, closed all round: nobody can tell it a value.
   subroutine sealed_cell()
     solid%alpha(5, 4, 5) = 0.99_wp
-    flow%room(5, 4, 5) = 0.01_wp*grid%volume
-    flow%liquid(5, 4, 5) = 0.6_wp*flow%room(5, 4, 5)
+    flow%fluid_volume(5, 4, 5) = 0.01_wp*grid%volume
+    flow%liquid(5, 4, 5) = 0.6_wp*flow%fluid_volume(5, 4, 5)
     call extend_fraction(grid, solid, extension, flow)
     call check('sealed cell', flow%c(5, 4, 5), 0.6_wp, 1.0e-14_wp)
     call check('the full cell beside it has the row', flow%c(4, 4, 5), flow%c(1, 1, 5), 1.0e-14_wp)

@@ -42,8 +42,8 @@ program test_half_kick
         end do
       end do
     end do
-    flow%room = grid%volume*(1.0_wp - box%solid%alpha)
-    flow%liquid = flow%room*flow%c
+    flow%fluid_volume = grid%volume*(1.0_wp - box%solid%alpha)
+    flow%liquid = flow%fluid_volume*flow%c
     before = flow%u
     half = 0.5_wp*dt*(fluid%gravity - rise/fluid%liquid_density)
     call half_kick_init(grid, half_kick)
@@ -65,7 +65,8 @@ program test_half_kick
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          given = mass_through(fluid, flow%room(i, j, k), flow%liquid(i, j, k))*change(i, j, k)
+          given = change(i, j, k) &
+            *mass_through(fluid, flow%fluid_volume(i, j, k), flow%liquid(i, j, k))
           call check('the momentum is told', half_kick%given(i, j, k, :), given, 1.0e-12_wp)
         end do
       end do

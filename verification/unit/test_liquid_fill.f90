@@ -107,7 +107,7 @@ contains
                - product([0.0333_wp, 0.0111_wp, 0.0222_wp]) &
                - product([0.0222_wp, 0.0078_wp, 0.0444_wp]) &
                + product([0.0111_wp, 0.0078_wp, 0.0222_wp]), 1.0e-17_wp)
-    call check('room is the open volume', sum(flow%room(1:16, 1:12, 1:20)), product(tank) &
+    call check('room is the open volume', sum(flow%fluid_volume(1:16, 1:12, 1:20)), product(tank) &
                - product(high - low), 1.0e-16_wp)
   end subroutine boxes_around_a_solid
 
@@ -208,7 +208,8 @@ contains
     call set_boxes(grid, low, high, after)
     call raise_surface(grid, before, after, extension, flow, rest)
     call check('single phase: displaced', rest, product(high - low), 1.0e-17_wp)
-    call check('single phase: all liquid', maxval(abs(flow%liquid - flow%room)), 0.0_wp, 0.0_wp)
+    call check('single phase: all liquid', maxval(abs(flow%liquid - flow%fluid_volume)), 0.0_wp, &
+               0.0_wp)
     call check('single phase: balance', liquid_volume(grid, flow%liquid) - flow%liquid_initial &
                - flow%liquid_inflow, 0.0_wp, 1.0e-17_wp)
   end subroutine no_surface

@@ -84,7 +84,7 @@ contains
     associate (a => grid%lo, b => grid%hi)
       worst = max(maxval(-flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3))), &
                   maxval(flow%liquid(a(1):b(1), a(2):b(2), a(3):b(3)) &
-                         - flow%room(a(1):b(1), a(2):b(2), a(3):b(3))))/grid%volume
+                         - flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))))/grid%volume
     end associate
   end function out_of_bounds
 
@@ -96,7 +96,7 @@ contains
     real(wp) :: worst
 
     associate (a => grid%lo, b => grid%hi)
-      worst = maxval(abs(flow%room(a(1):b(1), a(2):b(2), a(3):b(3))/grid%volume &
+      worst = maxval(abs(flow%fluid_volume(a(1):b(1), a(2):b(2), a(3):b(3))/grid%volume &
                          - (1.0_wp - solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)))))
     end associate
   end function room_error
@@ -246,7 +246,8 @@ contains
       call set_boxes(grid, low, high, new)
       call transport_liquid(grid, old, new, 0.01_wp, step, transport, flow)
       worst = max(worst, room_error(grid, new, flow))
-      impure = max(impure, maxval(abs(flow%liquid(1:16, 1:12, 1:16) - flow%room(1:16, 1:12, 1:16))))
+      impure = max(impure, maxval(abs(flow%liquid(1:16, 1:12, 1:16) &
+                                      - flow%fluid_volume(1:16, 1:12, 1:16))))
       small = max(small, transport%small%n_late)
     end do
     call check('box under water: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, &

@@ -109,8 +109,8 @@ contains
   end function psi
 
   !> Largest change of a velocity that was uniform, in cells that hold more than the given share.
-  function deviation(min_room) result(worst)
-    real(wp), intent(in) :: min_room   !! [V]
+  function deviation(min_volume) result(worst)
+    real(wp), intent(in) :: min_volume   !! [V]
     real(wp) :: worst
     integer :: d
 
@@ -118,7 +118,8 @@ contains
     associate (n => grid%n)
       do d = 1, 3
         worst = max(worst, maxval(abs(flow%u(1:n(1), 1:n(2), 1:n(3), d) - stream(d)), &
-                                  mask=flow%room(1:n(1), 1:n(2), 1:n(3)) > min_room*grid%volume))
+                                  mask=flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) &
+                                       > min_volume*grid%volume))
       end do
     end associate
   end function deviation
@@ -179,7 +180,7 @@ contains
 
     associate (n => grid%n)
       do d = 1, 3
-        p(d) = sum(mass_through(fluid, flow%room(1:n(1), 1:n(2), 1:n(3)), &
+        p(d) = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
                                 flow%liquid(1:n(1), 1:n(2), 1:n(3))) &
                    *flow%u(1:n(1), 1:n(2), 1:n(3), d))
       end do
@@ -190,7 +191,7 @@ contains
     real(wp) :: m
 
     associate (n => grid%n)
-      m = sum(mass_through(fluid, flow%room(1:n(1), 1:n(2), 1:n(3)), &
+      m = sum(mass_through(fluid, flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)), &
                            flow%liquid(1:n(1), 1:n(2), 1:n(3))))
     end associate
   end function total_mass

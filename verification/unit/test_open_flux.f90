@@ -53,7 +53,7 @@ program test_open_flux
   call stand_on_floor()
   grid%side = side_slip
   new = old
-  flow%room = (1.0_wp + 1.0e-4_wp)*flow%room
+  flow%fluid_volume = (1.0_wp + 1.0e-4_wp)*flow%fluid_volume
   call find_open_flux(grid, old, new, dt, flow, solver, flux, q)
   call check('no way out: told', flux%unmatched, 1.0e-4_wp, 1.0e-12_wp)
   call check('no way out: what all cells share is left alone', &
@@ -78,7 +78,7 @@ contains
                    reshape([0.6_wp, 0.7_wp, 0.46_wp], [3, 1]), old)
     call set_boxes(grid, reshape([0.1_wp, 0.2_wp, -1.0_wp], [3, 1]), &
                    reshape([0.6_wp, 0.7_wp, 0.45_wp], [3, 1]), new)
-    flow%room = grid%volume*(1.0_wp - old%alpha)
+    flow%fluid_volume = grid%volume*(1.0_wp - old%alpha)
     flow%uf = 0.0_wp
   end subroutine stand_on_floor
 
@@ -103,7 +103,7 @@ contains
     end if
     call open_flux_init(grid, flux)
     call elliptic_solver_init(grid, solver)
-    flow%room = grid%volume*(1.0_wp - old%alpha)
+    flow%fluid_volume = grid%volume*(1.0_wp - old%alpha)
     do d = 1, 3
       do k = 1, 11
         do j = 1, 10
@@ -133,7 +133,8 @@ contains
           outflow = q(i + 1, j, k, 1) - q(i, j, k, 1) + q(i, j + 1, k, 2) - q(i, j, k, 2) &
                     + q(i, j, k + 1, 3) - q(i, j, k, 3)
           associate (open => 1.0_wp - new%alpha(i, j, k))
-            worst = max(worst, abs((flow%room(i, j, k) - outflow)/grid%volume - open - share*open))
+            worst = max(worst, abs((flow%fluid_volume(i, j, k) - outflow)/grid%volume - open &
+                                   - share*open))
           end associate
         end do
       end do

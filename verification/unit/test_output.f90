@@ -46,7 +46,7 @@ contains
     call fill_cells(s%clock%t, s%grid, 3, s%flow%u)
     call fill_cells(2*s%clock%t, s%grid, 1, s%flow%p)
     s%flow%liquid = 0.5_wp*s%grid%volume
-    s%flow%room = s%grid%volume
+    s%flow%fluid_volume = s%grid%volume
     s%solid%alpha = 0.25_wp
     s%flow%liquid_initial = 0.5_wp*s%grid%volume*product(s%grid%n)
     s%flow%liquid_inflow = 0.0_wp

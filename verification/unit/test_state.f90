@@ -86,7 +86,7 @@ contains
     case (9); name = '/flow/uf'; call touch(s%flow%uf(at(1) + 1, at(2), at(3), 3))
     case (10); name = '/flow/solid_flux'; call touch(s%flow%solid_flux(at(1), at(2), at(3), 1))
     case (11); name = '/flow/liquid '; call touch(s%flow%liquid(at(1), at(2), at(3)))
-    case (12); name = '/flow/room'; call touch(s%flow%room(at(1), at(2), at(3)))
+    case (12); name = '/flow/fluid_volume'; call touch(s%flow%fluid_volume(at(1), at(2), at(3)))
     case (13); name = '/flow/c '; call touch(s%flow%c(at(1), at(2), at(3)))
     case (14); name = '/flow/alpha'; call touch(s%solid%alpha(at(1), at(2), at(3)))
     case (15); name = '/flow/open'; call touch(s%solid%open(at(1), at(2), at(3), 2))

@@ -37,8 +37,8 @@ program test_wall_balance
 
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
   call place(box)
-  box%flow%room = box%grid%volume*(1.0_wp - box%solid%alpha)
-  box%flow%liquid = box%flow%room
+  box%flow%fluid_volume = box%grid%volume*(1.0_wp - box%solid%alpha)
+  box%flow%liquid = box%flow%fluid_volume
   call merged_cells_init(box%grid, merged)
   call find_merged_cells(box%grid, box%solid, merged)
   call acceleration_init(box%grid, a)
@@ -216,7 +216,7 @@ contains
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          mass = box%case%fluid%liquid_density*box%flow%room(i, j, k)
+          mass = box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k)
           half_kick%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
@@ -235,7 +235,7 @@ contains
           if (max(before%number(i, j, k), merged%number(i, j, k)) == 0) cycle
           sums = sums - half_kick%given(i, j, k, :)
           if (.not. half_kick%takes_part(i, j, k)) cycle
-          sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%room(i, j, k) &
+          sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k) &
                         *a%cell(i, j, k, :)
         end do
       end do
