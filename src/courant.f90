@@ -45,7 +45,7 @@ contains
     real(wp) :: fluid(4)
     integer :: b
 
-    fluid = fluid_rates(grid, flow%uf, solid%open, flow%c)
+    fluid = fluid_rates(grid, flow%uf, solid%aperture, flow%c)
     call global_max(fluid)
     rate%followed = fluid(1)
     rate%carried = fluid(2)

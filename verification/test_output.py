@@ -339,7 +339,7 @@ def test_divergence_from_the_restart_file(wet: Path) -> None:
         h = np.array([0.15 / 24, 0.1 / 16, 0.2 / 32])
         out = np.zeros((32, 16, 24))
         for d in range(3):
-            flux = h5["flow/open"][d] * (h.prod() / h[d]) * h5["flow/uf"][d]
+            flux = h5["flow/aperture"][d] * (h.prod() / h[d]) * h5["flow/uf"][d]
             flux += h5["flow/solid_flux"][d]
             flux = np.moveaxis(flux, 2 - d, 0)
             out += np.moveaxis(flux[1:] - flux[:-1], 0, 2 - d)[:32, :16, :24]

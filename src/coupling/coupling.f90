@@ -204,10 +204,10 @@ contains
 
   !> For C-ISMAC: note the acceleration of the cells at the start of the step, before density and
   !! solids change; `self%tension` is that of the start.
-  subroutine keep_acceleration(grid, gravity, open, rho, flow, self)
+  subroutine keep_acceleration(grid, gravity, aperture, rho, flow, self)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(flow_t), intent(in) :: flow
@@ -216,7 +216,7 @@ contains
     associate (a => self%acceleration)
       call face_acceleration(grid, gravity, flow%rho, rho, flow%p, a%face, flow%sides)
       call add_tension(grid, rho, self%tension, a%face)
-      call cell_mean_of_faces(grid, open, a%face, self%c_ismac%a_old)
+      call cell_mean_of_faces(grid, aperture, a%face, self%c_ismac%a_old)
     end associate
   end subroutine keep_acceleration
 

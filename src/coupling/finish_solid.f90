@@ -23,9 +23,9 @@ contains
 
     do m = solid%body_face(b), solid%body_face(b + 1) - 1
       associate (f => solid%face(:, m))
-        excess = min(max(-solid%open(f(1), f(2), f(3), f(4)), 0.0_wp), solid%face_beta(m))
+        excess = min(max(-solid%aperture(f(1), f(2), f(3), f(4)), 0.0_wp), solid%face_beta(m))
         solid%face_beta(m) = solid%face_beta(m) - excess
-        solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) + excess
+        solid%aperture(f(1), f(2), f(3), f(4)) = solid%aperture(f(1), f(2), f(3), f(4)) + excess
       end associate
     end do
   end subroutine make_way
@@ -39,14 +39,14 @@ contains
     n = solid%body_face(size(solid%body_face)) - 1
     do m = 1, n
       associate (f => solid%face(:, m))
-        total = 1.0_wp - solid%open(f(1), f(2), f(3), f(4))
+        total = 1.0_wp - solid%aperture(f(1), f(2), f(3), f(4))
       end associate
       if (total > 1.0_wp - full_face) solid%face_beta(m) = solid%face_beta(m)/total
     end do
     do m = 1, n
       associate (f => solid%face(:, m))
-        total = 1.0_wp - solid%open(f(1), f(2), f(3), f(4))
-        if (total > 1.0_wp - full_face) solid%open(f(1), f(2), f(3), f(4)) = 0.0_wp
+        total = 1.0_wp - solid%aperture(f(1), f(2), f(3), f(4))
+        if (total > 1.0_wp - full_face) solid%aperture(f(1), f(2), f(3), f(4)) = 0.0_wp
       end associate
     end do
   end subroutine finish_faces

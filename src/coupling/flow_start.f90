@@ -38,7 +38,7 @@ contains
     associate (p => self%pressure, system => self%pressure%system, a => self%acceleration, &
                dt => case%run%dt)
       call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, held, system%active, system%operator%flux)
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       converged = p%report%converged

@@ -15,7 +15,7 @@ module held_fluid_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, unit_step
-  use solid_geometry_m, only: solid_geometry_t, openings
+  use solid_geometry_m, only: solid_geometry_t, apertures
   use rigid_flux_m, only: closed_side
   use wall_edges_m, only: min_normal, round_edge
   implicit none
@@ -42,14 +42,14 @@ contains
     !$omp parallel
     !$omp do schedule(static)
     do k = grid%first(3), grid%last(3)
-      solid%free(:, :, k, :) = solid%open(:, :, k, :)
+      solid%effective(:, :, k, :) = solid%aperture(:, :, k, :)
     end do
     !$omp end do nowait
     !$omp do schedule(dynamic, 64)
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m))
         more(:, m) = 0.0_wp
-        if (all(c < grid%last)) more(:, m) = more_inertia(openings(grid, solid%open, c), &
+        if (all(c < grid%last)) more(:, m) = more_inertia(apertures(grid, solid%aperture, c), &
           solid%behind_plane(:, m), solid%alpha(c(1), c(2), c(3)))
         if (maxval(more(:, m)) < least) cycle
         if (others_around(grid, solid, owner, owner(m), c)) more(:, m) = 0.0_wp
@@ -59,8 +59,8 @@ contains
     call narrow_faces(grid, n_blocks, more, solid)
     do m = 1, solid%first_held(size(solid%first_held)) - 1
       associate (f => solid%held_face(:, m))
-        solid%held_share(m) = solid%open(f(1), f(2), f(3), f(4)) &
-                              - solid%free(f(1), f(2), f(3), f(4))
+        solid%held_share(m) = solid%aperture(f(1), f(2), f(3), f(4)) &
+                              - solid%effective(f(1), f(2), f(3), f(4))
       end associate
     end do
   end subroutine hold_fluid
@@ -121,16 +121,16 @@ contains
       integer, intent(in) :: f(4)
       real(wp), intent(in) :: part
 
-      associate (open => solid%open(f(1), f(2), f(3), f(4)), &
-                 free => solid%free(f(1), f(2), f(3), f(4)))
-        if (open < least .or. closed_side(grid, f(f(4)), f(4))) return
-        if (free >= open) then
+      associate (aperture => solid%aperture(f(1), f(2), f(3), f(4)), &
+                 effective => solid%effective(f(1), f(2), f(3), f(4)))
+        if (aperture < least .or. closed_side(grid, f(f(4)), f(4))) return
+        if (effective >= aperture) then
           call ensure_room(next, solid%held_face)
           call ensure_room(next, solid%held_share)
           solid%held_face(:, next) = f
           next = next + 1
         end if
-        free = open/(open/free + part)
+        effective = aperture/(aperture/effective + part)
       end associate
     end subroutine narrow
   end subroutine narrow_faces

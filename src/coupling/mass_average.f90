@@ -107,7 +107,7 @@ contains
     if (.not. self%implicit_momentum) return
     call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
     call density_of_mixture(grid, solid, self%bodies, flow%rho, self%rho)
-    call keep_acceleration(grid, case%fluid%gravity, self%whole%open, self%rho, flow, self)
+    call keep_acceleration(grid, case%fluid%gravity, self%whole%aperture, self%rho, flow, self)
     call give(scratch, self%tension%force)
   end subroutine begin
 
@@ -131,7 +131,7 @@ contains
       self%total = self%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, self%rho)
       call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, self%whole%open, self%rho, system, flow%sides)
+      call set_pressure_system(grid, self%whole%aperture, self%rho, system, flow%sides)
       call build_rigid_flux(grid, self%whole, bodies, system%active, system%operator%flux)
       call average_cells(grid, solid, bodies, flow, self%rho)
     end associate
@@ -156,7 +156,7 @@ contains
       call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
       call add_tension(grid, self%rho, self%tension, a%face)
       call give(scratch, self%tension%force)
-      call cell_mean_of_faces(grid, self%whole%open, a%face, a%cell)
+      call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
     end associate
     if (self%implicit_momentum) call flux_of_faces(grid, dt, flow%uf, self%c_ismac%q)
     call surface_stress(grid, solid%alpha, self%rho, flow%mu, flow%u, by_stress)
@@ -324,7 +324,7 @@ contains
       call solve_pressure(grid, self%whole, self%rho, dt, flow, none, p)
       call face_acceleration(grid, weightless, flow%rho, self%rho, p%phi_total, a%face, &
                              flow%sides)
-      call cell_mean_of_faces(grid, self%whole%open, a%face, a%cell)
+      call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
       call add_product(grid, dt, a%cell, flow%u)
     end associate
     call fill_velocity_halo(grid, flow%u)
@@ -393,11 +393,11 @@ contains
       end do
     end do
     do d = 1, 3
-      flow%solid_flux(:, :, :, d) = (1.0_wp - solid%open(:, :, :, d))*grid%area(d)*flow%uf(:, :, &
-          :, d)
+      flow%solid_flux(:, :, :, d) = (1.0_wp - solid%aperture(:, :, :, d))*grid%area(d) &
+                                    *flow%uf(:, :, :, d)
     end do
     associate (system => self%pressure%system)
-      call divergence(grid, solid%open, flow, system%active, system%solver%rhs, &
+      call divergence(grid, solid%aperture, flow, system%active, system%solver%rhs, &
                       report%pressure%divergence)
     end associate
   end subroutine overlay_bodies

@@ -117,7 +117,7 @@ contains
     if (self%implicit_momentum) then
       call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
       call find_liquid(grid, flow, self%half_kick%takes_part)
-      call keep_acceleration(grid, case%fluid%gravity, solid%open, flow%rho, flow, self)
+      call keep_acceleration(grid, case%fluid%gravity, solid%aperture, flow%rho, flow, self)
       call give(scratch, self%tension%force)
     else
       call take(scratch, self%correction)
@@ -190,7 +190,7 @@ contains
     call find_wall_speeds(grid, solid, self%at_start, flow%u, self%wall_speed)
     associate (system => self%pressure%system)
       call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, solid%free, self%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%effective, self%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, self%bodies, system%active, system%operator%flux)
     end associate
   end subroutine merge_cells
@@ -266,11 +266,11 @@ contains
     class(monolithic_t), intent(inout) :: self
 
     associate (a => self%acceleration, balance => self%balance)
-      call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+      call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
       call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
       call store_change(grid, self%merged, dt, a%cell, balance%pushed)
       call halo_exchange(a%cell, n_halo)
-      call share_acceleration(grid, solid%open, self%rho, self%merged, a%cell)
+      call share_acceleration(grid, solid%aperture, self%rho, self%merged, a%cell)
       call store_change(grid, self%merged, dt, a%cell, balance%gained)
     end associate
   end subroutine accelerations_of_groups
@@ -529,7 +529,7 @@ contains
       end do
       self%at_start = bodies
       call take_faces(scratch, system%operator%cf)
-      call set_pressure_system(grid, solid%free, flow%rho, system, flow%sides)
+      call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
       self%defect = mass_defect(grid, case%fluid, solid, bodies, system%operator%flux, flow)
       call count_fluid(weightless, dt, self)

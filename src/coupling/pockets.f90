@@ -165,7 +165,7 @@ contains
     n = i + (2*s - 3)*unit_step(:, d)
     if (any(n < self%low) .or. any(n > self%high)) return
     f = merge(i, n, s == 1)
-    if (solid%open(f(1), f(2), f(3), d) > 0.0_wp) number = solid%cut(n(1), n(2), n(3))
+    if (solid%aperture(f(1), f(2), f(3), d) > 0.0_wp) number = solid%cut(n(1), n(2), n(3))
   end function cut_neighbour
 
   !> Does a cell share an open face with a cell without solid, or with an open side of the domain?
@@ -182,7 +182,7 @@ contains
         n = i + (2*s - 3)*unit_step(:, d)
         f = merge(i, n, s == 1)
         if (f(d) > grid%last(d)) cycle
-        if (solid%open(f(1), f(2), f(3), d) <= 0.0_wp) cycle
+        if (solid%aperture(f(1), f(2), f(3), d) <= 0.0_wp) cycle
         if (n(d) < self%low(d) .or. n(d) > self%high(d)) then
           if (leads_out(grid, d, s, n(d))) return
         else if (solid%alpha(n(1), n(2), n(3)) <= 0.0_wp) then

@@ -239,7 +239,8 @@ contains
           solid%face_beta(n) = body(b)%beta(m)
           solid%face_centroid(:, n) = grid%origin + &
                                       (real(f(1:3) - 1, wp) + body(b)%face_centroid(:, m))*grid%h
-          solid%open(f(1), f(2), f(3), f(4)) = solid%open(f(1), f(2), f(3), f(4)) - body(b)%beta(m)
+          solid%aperture(f(1), f(2), f(3), f(4)) = solid%aperture(f(1), f(2), f(3), f(4)) &
+                                                   - body(b)%beta(m)
         end do
       end do
     end do

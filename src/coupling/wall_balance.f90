@@ -19,7 +19,7 @@ module wall_balance_m
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use merged_cells_m, only: merged_cells_t, open_shares
+  use merged_cells_m, only: merged_cells_t, mean_apertures
   use half_kick_m, only: half_kick_t
   use viscous_system_m, only: wrench
   use momentum_conservative_m, only: mass_through
@@ -156,7 +156,7 @@ contains
       associate (c => merged%cell(:, m))
         arm = arm_to_cell(grid, c, bodies%x(:, b))
         wall = wall_velocity(faster(:, b), arm)
-        moved = rho(c(1), c(2), c(3))*grid%volume*open_shares(grid, solid%open, c)
+        moved = rho(c(1), c(2), c(3))*grid%volume*mean_apertures(grid, solid%aperture, c)
         owed = wrench((moved*(self%pushed(:, m) - wall) &
                        - self%mass(m)*(self%gained(:, m) - wall) + self%to_wall(:, m))/dt, arm)
       end associate

@@ -7,7 +7,7 @@ module wall_edges_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t
-  use solid_geometry_m, only: solid_geometry_t, openings
+  use solid_geometry_m, only: solid_geometry_t, apertures
   use plic_m, only: unit_constant, unit_volume
   implicit none
   private
@@ -36,7 +36,7 @@ contains
         solid%edge(m) = 0.0_wp
         plane = 2.0_wp
         if (any(c >= grid%last)) cycle
-        w = openings(grid, solid%open, c)
+        w = apertures(grid, solid%aperture, c)
         if (maxval(abs(w(:, 2) - w(:, 1))) < min_normal) cycle
         plane = openings_of_plane(w(:, 2) - w(:, 1), solid%alpha(c(1), c(2), c(3)))
         if (solid%inside(c(1), c(2), c(3)) == 0) cycle

@@ -286,8 +286,9 @@ contains
       do m = self%held_from(b), self%first_face(b + 1) - 1
         associate (i => self%face(1, m), j => self%face(2, m), k => self%face(3, m), &
                    d => self%face(4, m))
-          uf(i, j, k, d) = (solid%free(i, j, k, d)*uf(i, j, k, d) &
-            + dot_product(self%s(:, m), bodies%motion(:, b))/grid%area(d))/solid%open(i, j, k, d)
+          uf(i, j, k, d) = (solid%effective(i, j, k, d)*uf(i, j, k, d) &
+            + dot_product(self%s(:, m), bodies%motion(:, b))/grid%area(d)) &
+            /solid%aperture(i, j, k, d)
         end associate
       end do
     end do

@@ -7,7 +7,7 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces, openings, wall_area, edge_in
+  public :: solid_geometry_t, solid_geometry_init, set_faces, apertures, wall_area, edge_in
   public :: link_to_wall, bounded_link
   public :: clear_cells, clear_faces, clear_links, hand_over_faces
 
@@ -26,8 +26,8 @@ module solid_geometry_m
   type :: solid_geometry_t
     integer :: poses = 0   !! number of the poses of all bodies that it was filled for, 0: of none
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
-    real(wp), allocatable :: open(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
-    !> Share of the lower face through which pressure moves fluid; what it lacks of `open` moves
+    real(wp), allocatable :: aperture(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
+    !> Effective aperture, through which pressure moves fluid; what it lacks of `aperture` moves
     !! with a body (`held_fluid_m`).
     real(wp), allocatable :: free(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
@@ -85,8 +85,8 @@ contains
     a = grid%first
     b = grid%last
     allocate (solid%alpha(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
-    allocate (solid%open(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
-    allocate (solid%free, source=solid%open)
+    allocate (solid%aperture(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=1.0_wp)
+    allocate (solid%effective, source=solid%aperture)
     allocate (solid%inside(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (solid%link_number(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0)
     allocate (solid%link(4, 0), solid%link_length(2, 0), solid%link_body(2, 0))
@@ -105,19 +105,19 @@ contains
   end subroutine solid_geometry_init
 
   !> Open shares of the lower (:, 1) and upper (:, 2) faces of cell c.
-  pure function openings(grid, open, c) result(w)
+  pure function apertures(grid, aperture, c) result(w)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer, intent(in) :: c(3)
     real(wp) :: w(3, 2)
     integer :: d, f(3)
 
     do d = 1, 3
       f = c + unit_step(:, d)
-      w(d, 1) = open(c(1), c(2), c(3), d)
-      w(d, 2) = open(f(1), f(2), f(3), d)
+      w(d, 1) = aperture(c(1), c(2), c(3), d)
+      w(d, 2) = aperture(f(1), f(2), f(3), d)
     end do
-  end function openings
+  end function apertures
 
   !> Area of the wall in cell c as a vector into the fluid: what its open faces lack to close [m2].
   pure function wall_area(grid, solid, c) result(area)
@@ -127,7 +127,7 @@ contains
     real(wp) :: area(3)
     real(wp) :: w(3, 2)
 
-    w = openings(grid, solid%open, c)
+    w = apertures(grid, solid%aperture, c)
     area = grid%area*(w(:, 2) - w(:, 1))
   end function wall_area
 
@@ -187,7 +187,7 @@ contains
 
     do m = 1, solid%body_face(size(solid%body_face)) - 1
       associate (i => solid%face(:, m))
-        solid%open(i(1), i(2), i(3), i(4)) = 1.0_wp
+        solid%aperture(i(1), i(2), i(3), i(4)) = 1.0_wp
       end associate
     end do
     do m = 1, solid%n_closed
@@ -213,7 +213,7 @@ contains
   subroutine hand_over_faces(from, to)
     type(solid_geometry_t), intent(inout) :: from, to
 
-    call move_alloc(from%free, to%free)
+    call move_alloc(from%effective, to%effective)
     call move_alloc(from%link_number, to%link_number)
     call move_alloc(from%link, to%link)
     call move_alloc(from%link_length, to%link_length)
@@ -223,17 +223,17 @@ contains
   end subroutine hand_over_faces
 
   !> Give the six faces of a cell an open share, as far as they are in the arrays.
-  pure subroutine set_faces(grid, cell, open, solid)
+  pure subroutine set_faces(grid, cell, aperture, solid)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: cell(3)
-    real(wp), intent(in) :: open
+    real(wp), intent(in) :: aperture
     type(solid_geometry_t), intent(inout) :: solid
     integer :: d, i(3)
 
     do d = 1, 3
-      solid%open(cell(1), cell(2), cell(3), d) = open
+      solid%aperture(cell(1), cell(2), cell(3), d) = aperture
       i = cell + unit_step(:, d)
-      if (i(d) <= grid%last(d)) solid%open(i(1), i(2), i(3), d) = open
+      if (i(d) <= grid%last(d)) solid%aperture(i(1), i(2), i(3), d) = aperture
     end do
   end subroutine set_faces
 

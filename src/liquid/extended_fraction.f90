@@ -233,7 +233,7 @@ contains
           value = c(nb(1), nb(2), nb(3))
           if (value < 0.0_wp) cycle
           if (solid%alpha(at(1), at(2), at(3)) < 1.0_wp .and. .not. &
-              passable(solid%open(f(1), f(2), f(3), d))) cycle
+              passable(solid%aperture(f(1), f(2), f(3), d))) cycle
           if (n == 0) first = value
           n = n + 1
           sum = sum + (value - first)

@@ -71,7 +71,7 @@ contains
     self%iterations = 0
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
-    call flux_of_velocity(grid, old, new%open, flow%uf, dt, q)
+    call flux_of_velocity(grid, old, new%aperture, flow%uf, dt, q)
     call find_band(grid, old, new, self%band)
     if (self%band%parts == 0) return
     call find_balances(grid, new, flow%fluid_volume, q, self%band)
@@ -97,7 +97,7 @@ contains
     logical :: solids
 
     if (all([old%poses, new%poses] > 0) .and. all(band%poses == [old%poses, new%poses])) then
-      if (band%parts > 0) call find_conductances(grid, old%open, new%open, band)
+      if (band%parts > 0) call find_conductances(grid, old%aperture, new%aperture, band)
       return
     end if
     band%poses = [old%poses, new%poses]
@@ -105,7 +105,7 @@ contains
     call mark_solids(grid, old, new, band%marked, solids)
     if (.not. solids) return
     call mark_band(band)
-    call find_conductances(grid, old%open, new%open, band)
+    call find_conductances(grid, old%aperture, new%aperture, band)
     call list_band(grid, band)
     cells = real(band%n, wp)
     call global_max(cells)
@@ -191,8 +191,8 @@ contains
       do k = a(3), b(3)
         do j = a(2), b(2)
           do i = a(1), b(1)
-            q(i, j, k, d) = merge(open_area*old%open(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
-              0.5_wp*(old%open(i, j, k, d) + new_open(i, j, k, d)) >= min_open)
+            q(i, j, k, d) = merge(open_area*old%aperture(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
+              0.5_wp*(old%aperture(i, j, k, d) + new_open(i, j, k, d)) >= min_open)
           end do
         end do
       end do
@@ -342,7 +342,7 @@ contains
     band%marked = 0
     band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
     call halo_exchange(band%marked, 1)
-    call find_conductances(grid, old%open, new%open, band)
+    call find_conductances(grid, old%aperture, new%aperture, band)
     call make_room_for_all(grid, band)
     call list_band(grid, band)
     call find_parts(grid, band)

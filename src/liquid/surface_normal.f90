@@ -37,11 +37,11 @@ contains
   end function vertical_of
 
   !> Can one look through a face of this open share?
-  elemental function passable(open) result(yes)
-    real(wp), intent(in) :: open
+  elemental function passable(aperture) result(yes)
+    real(wp), intent(in) :: aperture
     logical :: yes
 
-    yes = open > min_open
+    yes = aperture > min_open
   end function passable
 
   !> Normal from liquid to gas on the unit cube of a cell (see `plic_m`); up where nothing shows
@@ -94,7 +94,7 @@ contains
         f = at + before
         f(d) = f(d) + max(o(d), 0)
         if (.not. seen(before(1), before(2), before(3))) cycle
-        if (passable(solid%open(f(1), f(2), f(3), d))) seen(o(1), o(2), o(3)) = .true.
+        if (passable(solid%aperture(f(1), f(2), f(3), d))) seen(o(1), o(2), o(3)) = .true.
       end do
       if (.not. seen(o(1), o(2), o(3))) then
         before = 0

@@ -72,7 +72,7 @@ contains
           if (grid%outside(next)) cycle
           if (solid%inside(next(1), next(2), next(3)) /= 0) cycle
           f = max(c, next)
-          weight = abs(n(d))*solid%open(f(1), f(2), f(3), d)
+          weight = abs(n(d))*solid%aperture(f(1), f(2), f(3), d)
           if (weight <= 0.0_wp) cycle
           slip = slip + weight*slip_by_two(u(c(1), c(2), c(3), :) - wall, &
                                            u(next(1), next(2), next(3), :) - wall, n, middle, &

@@ -15,8 +15,8 @@ module group_momentum_m
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t
-  use merged_cells_m, only: merged_cells_t, targets_at_most, is_alone, along_share, open_shares, &
-                            velocity_at_wall
+  use merged_cells_m, only: merged_cells_t, targets_at_most, is_alone, along_share, &
+                            mean_apertures, velocity_at_wall
   use wall_profile_m, only: slip_at
   implicit none
   private
@@ -161,9 +161,9 @@ contains
 
   !> Acceleration of each group: the mean over its cells by the mass that the faces move, component
   !! by component. Halo filled on entry.
-  subroutine share_acceleration(grid, open, rho, self, a)
+  subroutine share_acceleration(grid, aperture, rho, self, a)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [kg/m3]
     type(merged_cells_t), intent(in) :: self
@@ -183,13 +183,13 @@ contains
     !$omp parallel do private(weight, total, w, m) schedule(static)
     do g = 1, self%n_groups
       associate (c => self%cell(:, self%leader(g)))
-        weight = rho(c(1), c(2), c(3))*open_shares(grid, open, c)
+        weight = rho(c(1), c(2), c(3))*mean_apertures(grid, aperture, c)
       end associate
       total = 0.0_wp
       do m = self%first(g), self%first(g + 1) - 1
         associate (f => self%cell(:, self%part(1, m)))
           w = self%share(self%part(2, m), self%part(1, m))*rho(f(1), f(2), f(3)) &
-              *open_shares(grid, open, f)
+              *mean_apertures(grid, aperture, f)
           weight = weight + w
           total = total + w*excess(:, self%part(1, m))
         end associate

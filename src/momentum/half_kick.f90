@@ -82,11 +82,11 @@ contains
     call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, bodies, &
                         self%takes_part, dt, a, flow%p)
     call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
-    call cell_mean_of_faces(grid, solid%open, a%face, a%cell)
+    call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
     call hold_in_cells(grid, solid, bodies, extrapolated/dt, a%face, a%cell)
     call change_where(grid, self%takes_part, .false., a%cell)
     call halo_exchange(a%cell, n_halo)
-    call share_acceleration(grid, solid%open, flow%rho, merged, a%cell)
+    call share_acceleration(grid, solid%aperture, flow%rho, merged, a%cell)
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)

@@ -9,7 +9,7 @@ module merged_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo, unit_step
-  use solid_geometry_m, only: solid_geometry_t, openings, edge_in
+  use solid_geometry_m, only: solid_geometry_t, apertures, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
   use wall_distance_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
@@ -17,7 +17,7 @@ module merged_cells_m
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: targets_at_most, is_alone, along_share, match_densities, open_shares
+  public :: targets_at_most, is_alone, along_share, match_densities, mean_apertures
   public :: velocity_at_wall
 
   integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
@@ -113,10 +113,10 @@ contains
 
     yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, reach)
     if (.not. yes) return
-    yes = any(solid%open(c(1), c(2), c(3), :) > 0.0_wp)
+    yes = any(solid%aperture(c(1), c(2), c(3), :) > 0.0_wp)
     do d = 1, 3
       e = c + unit_step(:, d)
-      yes = yes .or. solid%open(e(1), e(2), e(3), d) > 0.0_wp
+      yes = yes .or. solid%aperture(e(1), e(2), e(3), d) > 0.0_wp
     end do
   end function is_small
 
@@ -320,7 +320,7 @@ contains
       steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
       f = c + max(steps(:, d), 0)
       share(d) = 0.0_wp
-      if (is_fluid(steps(:, d))) share(d) = solid%open(f(1), f(2), f(3), d) &
+      if (is_fluid(steps(:, d))) share(d) = solid%aperture(f(1), f(2), f(3), d) &
         *(grid%area(d)/grid%area(1))*abs(normal(d))
     end do
     if (any(share > 0.0_wp)) then
@@ -482,13 +482,13 @@ contains
   end function velocity_at_wall
 
   !> Share of the cell's mass that moves with each velocity component: mean of its two open faces.
-  pure function open_shares(grid, open, c) result(w)
+  pure function mean_apertures(grid, aperture, c) result(w)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer, intent(in) :: c(3)
     real(wp) :: w(3)
 
-    w = 0.5_wp*sum(openings(grid, open, c), 2)
-  end function open_shares
+    w = 0.5_wp*sum(apertures(grid, aperture, c), 2)
+  end function mean_apertures
 
 end module merged_cells_m

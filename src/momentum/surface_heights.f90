@@ -193,7 +193,7 @@ contains
       integer :: f(3)
 
       f = cell + max(side, 0)*unit_step(:, axis(direction))
-      through = passable(solid%open(f(1), f(2), f(3), axis(direction)))
+      through = passable(solid%aperture(f(1), f(2), f(3), axis(direction)))
     end function through
   end subroutine look_around
 

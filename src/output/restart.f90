@@ -125,7 +125,7 @@ contains
     allocate (state%solid)
     if (allocated(state%flow%u)) then   ! the shares that the file holds
       allocate (state%solid%alpha, source=solid%alpha)
-      allocate (state%solid%open, source=solid%open)
+      allocate (state%solid%aperture, source=solid%aperture)
     end if
     call read_state(path, parameters, state, info, message)
     call move_alloc(solid, state%solid)

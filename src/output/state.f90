@@ -121,7 +121,7 @@ contains
     call visitor%cells('/flow/fluid_volume', 'm3', grid, .false., 1, flow%fluid_volume)
     call visitor%cells('/flow/c', '1', grid, .false., 1, flow%c)
     call visitor%cells('/flow/alpha', '1', grid, .false., 1, solid%alpha)
-    call visitor%cells('/flow/open', '1', grid, .true., 3, solid%open)
+    call visitor%cells('/flow/aperture', '1', grid, .true., 3, solid%aperture)
     call visitor%real_number('/flow/liquid_initial', 'm3', flow%liquid_initial)
     call visitor%real_number('/flow/liquid_inflow', 'm3', flow%liquid_inflow)
     call visit_outflows(visitor, flow)

@@ -6,7 +6,7 @@ module face_velocity_m
   use boundary_kinds_m, only: gives_pressure
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
-  use solid_geometry_m, only: solid_geometry_t, openings
+  use solid_geometry_m, only: solid_geometry_t, apertures
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: nearest_arm, middle_of_face
   use mixture_m, only: face_mean
@@ -156,9 +156,9 @@ contains
   end subroutine push_faces
 
   !> Cell vector from a face vector: mean of the two faces of each direction by their open shares.
-  subroutine cell_mean_of_faces(grid, open, a_face, a_cell)
+  subroutine cell_mean_of_faces(grid, aperture, a_face, a_cell)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, d, e(3)
@@ -170,8 +170,8 @@ contains
       do k = grid%lo(3), grid%hi(3)
         do j = grid%lo(2), grid%hi(2)
           do i = grid%lo(1), grid%hi(1)
-            w_low = open(i, j, k, d)
-            w_high = open(i + e(1), j + e(2), k + e(3), d)
+            w_low = aperture(i, j, k, d)
+            w_high = aperture(i + e(1), j + e(2), k + e(3), d)
             a_cell(i, j, k, d) = (w_low*a_face(i, j, k, d) &
                                   + w_high*a_face(i + e(1), j + e(2), k + e(3), d)) &
                                  /max(w_low + w_high, tiny(1.0_wp))
@@ -203,7 +203,7 @@ contains
           do s = 0, 1
             c = f - s*unit_step(:, d)
             if (.not. grid%owns(c)) cycle
-            w = openings(grid, solid%open, c)
+            w = apertures(grid, solid%aperture, c)
             a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing/sum(w(d, :))
           end do
         end associate

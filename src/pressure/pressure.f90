@@ -90,7 +90,7 @@ contains
                work => self%system%solver%work)
       do
         call solid_face_flux(grid, bodies, system%operator%flux, flow%solid_flux, held=.true.)
-        call divergence(grid, solid%free, flow, system%active, rhs, report%divergence)
+        call divergence(grid, solid%effective, flow, system%active, rhs, report%divergence)
         if (work%singular) report%divergence = uneven(grid, rhs, work)
         report%converged = report%divergence < allowed
         if (report%converged .or. report%passes == self%max_passes) exit
@@ -177,9 +177,9 @@ contains
 
   !> Net volume outflow of fluid and solid from each own cell [m3/s], and its largest value per cell
   !! volume among the cells that hold moving fluid [1/s].
-  subroutine divergence(grid, open, flow, active, outflow, largest)
+  subroutine divergence(grid, aperture, flow, active, outflow, largest)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
     type(flow_t), intent(in) :: flow
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
@@ -187,16 +187,16 @@ contains
     real(wp), intent(out) :: largest
     real(wp) :: worst(1)
 
-    call net_outflow(grid, open, flow%uf, flow%solid_flux, active, outflow, worst(1))
+    call net_outflow(grid, aperture, flow%uf, flow%solid_flux, active, outflow, worst(1))
     call global_max(worst)
     largest = worst(1)/grid%volume
   end subroutine divergence
 
   !> The same on this process; `worst` is the largest outflow [m3/s].
-  subroutine net_outflow(grid, open, uf, solid_flux, active, outflow, worst)
+  subroutine net_outflow(grid, aperture, uf, solid_flux, active, outflow, worst)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: open, uf, solid_flux
+      contiguous :: aperture, uf, solid_flux
     logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(inout), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, &
                                                    grid%lo(3) - 1:)
@@ -212,12 +212,12 @@ contains
         !$omp simd
         do i = grid%lo(1), grid%hi(1)
           outflow(i, j, k) = merge( &
-            (open(i + 1, j, k, 1)*a(1)*uf(i + 1, j, k, 1) + solid_flux(i + 1, j, k, 1)) &
-            - (open(i, j, k, 1)*a(1)*uf(i, j, k, 1) + solid_flux(i, j, k, 1)) &
-            + (open(i, j + 1, k, 2)*a(2)*uf(i, j + 1, k, 2) + solid_flux(i, j + 1, k, 2)) &
-            - (open(i, j, k, 2)*a(2)*uf(i, j, k, 2) + solid_flux(i, j, k, 2)) &
-            + (open(i, j, k + 1, 3)*a(3)*uf(i, j, k + 1, 3) + solid_flux(i, j, k + 1, 3)) &
-            - (open(i, j, k, 3)*a(3)*uf(i, j, k, 3) + solid_flux(i, j, k, 3)), 0.0_wp, &
+            (aperture(i + 1, j, k, 1)*a(1)*uf(i + 1, j, k, 1) + solid_flux(i + 1, j, k, 1)) &
+            - (aperture(i, j, k, 1)*a(1)*uf(i, j, k, 1) + solid_flux(i, j, k, 1)) &
+            + (aperture(i, j + 1, k, 2)*a(2)*uf(i, j + 1, k, 2) + solid_flux(i, j + 1, k, 2)) &
+            - (aperture(i, j, k, 2)*a(2)*uf(i, j, k, 2) + solid_flux(i, j, k, 2)) &
+            + (aperture(i, j, k + 1, 3)*a(3)*uf(i, j, k + 1, 3) + solid_flux(i, j, k + 1, 3)) &
+            - (aperture(i, j, k, 3)*a(3)*uf(i, j, k, 3) + solid_flux(i, j, k, 3)), 0.0_wp, &
             active(i, j, k))
         end do
         worst = max(worst, maxval(abs(outflow(grid%lo(1):grid%hi(1), j, k))))

@@ -102,9 +102,9 @@ contains
   !! preconditioner.
   !!
   !! `sides` tells what lies outside the outflows; without it the pressure there is zero.
-  subroutine set_pressure_system(grid, open, rho, self, sides)
+  subroutine set_pressure_system(grid, aperture, rho, self, sides)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: open(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [-]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! [kg/m3]
@@ -120,7 +120,7 @@ contains
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
-            self%operator%cf(i, j, k, d) = open(i, j, k, d)*area_over_h &
+            self%operator%cf(i, j, k, d) = aperture(i, j, k, d)*area_over_h &
               /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           end do
         end do
@@ -150,7 +150,7 @@ contains
           do j = a(2), b(2)
             do i = a(1), b(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
-              self%operator%cf(i, j, k, d) = open(i, j, k, d)*grid%area(d) &
+              self%operator%cf(i, j, k, d) = aperture(i, j, k, d)*grid%area(d) &
                 /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
             end do
           end do

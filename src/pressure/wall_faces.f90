@@ -125,7 +125,7 @@ contains
       sides = 0
       total = 0.0_wp
       associate (i => f(1), j => f(2), k => f(3))
-        if (solid%open(i, j, k, d) <= 0.0_wp) return
+        if (solid%aperture(i, j, k, d) <= 0.0_wp) return
         if (solid%inside(low(1), low(2), low(3)) == 0) then
           sides = sides + 1
           total = total + seen_from(low, 1, solid%link_length(1, m), solid%link_body(1, m), f, d)
@@ -146,7 +146,7 @@ contains
       real(wp) :: share
 
       share = 1.0_wp
-      if (solid%open(f(1), f(2), f(3), d) >= 1.0_wp) then
+      if (solid%aperture(f(1), f(2), f(3), d) >= 1.0_wp) then
         share = 1.0_wp - max(edge_in(solid, low), edge_in(solid, f))
       end if
     end function behind_plane
@@ -173,7 +173,7 @@ contains
         gain = dt*a%face(f(1), f(2), f(3), d)
         if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
-      near = near_wall(theta, n, d, solid%open(f(1), f(2), f(3), d))
+      near = near_wall(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
       along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
       velocity = u(d) + near*(along*(wall(d) - u(d)) &
                               + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
@@ -203,17 +203,17 @@ contains
 
     !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
     !! centre of the cell is.
-    pure function near_wall(theta, n, d, open) result(b)
-      real(wp), intent(in) :: theta, n(3), open   !! link [cells], normal, open share
+    pure function near_wall(theta, n, d, aperture) result(b)
+      real(wp), intent(in) :: theta, n(3), aperture   !! link [cells], normal, open share
       integer, intent(in) :: d                    !! direction of the link
       real(wp) :: b
       real(wp) :: cell, face   !! distances from the wall [spacings along the link]
 
       cell = theta*abs(n(d))
-      if (open >= 1.0_wp) then
+      if (aperture >= 1.0_wp) then
         face = (theta - 0.5_wp)*abs(n(d))
       else
-        face = 0.5_wp*open*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
+        face = 0.5_wp*aperture*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
       end if
       b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
     end function near_wall

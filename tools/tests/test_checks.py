@@ -71,7 +71,7 @@ def linear_flow(run: FakeRun, gradient: tuple[float, float, float]) -> dict[str,
         shape = [1, 1, 1]
         shape[2 - d] = len(f)
         uf[d] += rate * f.reshape(shape)
-    return {"flow/uf": uf, "flow/open": np.ones_like(uf), "flow/solid_flux": np.zeros_like(uf)}
+    return {"flow/uf": uf, "flow/aperture": np.ones_like(uf), "flow/solid_flux": np.zeros_like(uf)}
 
 
 def test_divergence_of_a_linear_flow() -> None:
@@ -80,10 +80,10 @@ def test_divergence_of_a_linear_flow() -> None:
     found = balance.divergence(run, state)
     assert found.shape == (2, 3, 4)
     assert found == pytest.approx(np.full((2, 3, 4), 0.5), rel=1e-12)
-    state["flow/open"][1] = 0.0
+    state["flow/aperture"][1] = 0.0
     state["flow/solid_flux"][1] = 2.0 * run.grid.y[:, None] * 0.1 * 0.05
     assert balance.divergence(run, state) == pytest.approx(np.full((2, 3, 4), 0.5), rel=1e-12)
-    state["flow/open"][:] = 0.0
+    state["flow/aperture"][:] = 0.0
     assert np.abs(balance.divergence(run, state)).max() == 0.0
 
 

@@ -67,7 +67,7 @@ def _divergence(run: Run, state: State) -> tuple[Array, NDArray[np.bool_]]:
     }
     data = [
         faces(state, f"flow/{name}", run.grid, run.periodic)
-        for name in ("open", "uf", "solid_flux")
+        for name in ("aperture", "uf", "solid_flux")
     ]
     outflow = np.zeros([len(f) - 1 for f in reversed(run.grid.faces)])
     openness = np.zeros_like(outflow)

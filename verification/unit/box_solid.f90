@@ -68,8 +68,8 @@ contains
               end associate
               cover = cover + product(part)
             end do
-            solid%open(i, j, k, d) = max(1.0_wp - cover, 0.0_wp)
-            if (solid%open(i, j, k, d) < 1.0e-9_wp) solid%open(i, j, k, d) = 0.0_wp
+            solid%aperture(i, j, k, d) = max(1.0_wp - cover, 0.0_wp)
+            if (solid%aperture(i, j, k, d) < 1.0e-9_wp) solid%aperture(i, j, k, d) = 0.0_wp
           end do
           cover = solid%alpha(i, j, k)
           if (cover > 0.0_wp .and. cover < 1.0_wp) call add_cut_cell([i, j, k])

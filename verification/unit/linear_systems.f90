@@ -18,7 +18,7 @@ module linear_systems_m
   type, extends(linear_operator_t) :: face_operator_t
     integer :: lo(3) = 1, hi(3) = 0
     real(wp), allocatable :: cf(:, :, :, :)     !! of the lower faces
-    real(wp), allocatable :: open(:, :, :, :)   !! open share of the lower faces [-]
+    real(wp), allocatable :: aperture(:, :, :, :)   !! open share of the lower faces [-]
   contains
     procedure :: apply => apply_faces
   end type face_operator_t
@@ -74,7 +74,7 @@ contains
             if (w > 0.0_wp .and. w < 1.0_wp .and. uniform(2, 1, number) < 0.1_wp) then
               w = 10.0_wp**(-9*uniform(2, 2, number))
             end if
-            op%open(i, j, k, d) = w
+            op%aperture(i, j, k, d) = w
             op%cf(i, j, k, d) = w*grid%area(d)/(grid%h(d)*0.5_wp*(density(grid, [i, j, k]) &
               + density(grid, [i, j, k] - e)))
           end do
@@ -155,8 +155,8 @@ contains
         do j = grid%lo(2), grid%hi(2) + e(2)
           do i = grid%lo(1), grid%hi(1) + e(1)
             number = number_of(grid, [i, j, k], d)
-            op%open(i, j, k, d) = merge(0.0_wp, 1.0_wp, uniform(seed, 1, number) < 0.25_wp)
-            op%cf(i, j, k, d) = op%open(i, j, k, d)*grid%area(d)/grid%h(d) &
+            op%aperture(i, j, k, d) = merge(0.0_wp, 1.0_wp, uniform(seed, 1, number) < 0.25_wp)
+            op%cf(i, j, k, d) = op%aperture(i, j, k, d)*grid%area(d)/grid%h(d) &
               *10.0_wp**(3*uniform(seed, 2, number))
           end do
         end do
@@ -175,7 +175,7 @@ contains
     op%lo = grid%lo
     op%hi = grid%hi
     allocate (op%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    allocate (op%open, source=op%cf)
+    allocate (op%aperture, source=op%cf)
   end subroutine allocate_operator
 
   !> Number of a face: the same for a face at both ends of a periodic direction.
@@ -215,9 +215,9 @@ contains
         b(d) = a(d)
         factor = merge(2.0_wp, 0.0_wp, grid%side(s, d) == side_open)
         associate (cf => op%cf(a(1):b(1), a(2):b(2), a(3):b(3), d), &
-                   open => op%open(a(1):b(1), a(2):b(2), a(3):b(3), d))
+                   aperture => op%aperture(a(1):b(1), a(2):b(2), a(3):b(3), d))
           cf = factor*cf
-          open = min(factor, 1.0_wp)*open
+          aperture = min(factor, 1.0_wp)*aperture
         end associate
       end do
     end do
@@ -253,7 +253,7 @@ contains
       x = pi*grid%centre(i, [1, 2, 3])/grid%length
       flux = sum(cos(x*[2, 1, 3]))*cos(2*x(1) + x(2) - x(3)) - 0.5_wp
       flux = flux + uniform(3, d, number_of(grid, i, d))
-      flux = flux*op%open(c(1), c(2), c(3), d)*grid%area(d)
+      flux = flux*op%aperture(c(1), c(2), c(3), d)*grid%area(d)
     end function flux
   end subroutine set_right_side
 

@@ -58,7 +58,7 @@ contains
     call fill_cells(start + 0.6_wp, s%grid, 1, s%flow%fluid_volume)
     call fill_cells(start + 0.7_wp, s%grid, 1, s%flow%c)
     call fill_cells(start + 0.8_wp, s%grid, 1, s%solid%alpha)
-    call fill_cells(start + 0.9_wp, s%grid, 3, s%solid%open)
+    call fill_cells(start + 0.9_wp, s%grid, 3, s%solid%aperture)
     s%flow%liquid_initial = start + 1.0_wp
     s%flow%liquid_inflow = start + 2.0_wp
     do b = 1, s%blocks%n

@@ -236,10 +236,10 @@ contains
         height = dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])
         worst(1) = max(worst(1), abs(sum(solid%alpha(i, j, 1:grid%n(3)))*grid%h(3) - height))
         height = dot_product(slope, [grid%face(i, 1), grid%centre(j, 2), 1.0_wp])
-        worst(2) = max(worst(2), abs(sum(1.0_wp - solid%open(i, j, 1:grid%n(3), 1))*grid%h(3) &
+        worst(2) = max(worst(2), abs(sum(1.0_wp - solid%aperture(i, j, 1:grid%n(3), 1))*grid%h(3) &
                                      - height))
         height = dot_product(slope, [grid%centre(i, 1), grid%face(j, 2), 1.0_wp])
-        worst(3) = max(worst(3), abs(sum(1.0_wp - solid%open(i, j, 1:grid%n(3), 2))*grid%h(3) &
+        worst(3) = max(worst(3), abs(sum(1.0_wp - solid%aperture(i, j, 1:grid%n(3), 2))*grid%h(3) &
                                      - height))
         height = dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])
         if (any((solid%inside(i, j, 1:grid%n(3)) == 1) .neqv. &
@@ -273,7 +273,8 @@ contains
               if (dot_product(slope, [x(1), x(2), 1.0_wp]) > grid%face(k, 3)) below = below + 1
             end do
           end do
-          worst = max(worst, abs(1.0_wp - solid%open(i, j, k, 3) - real(below, wp)/real(n**2, wp)))
+          worst = max(worst, abs(1.0_wp - solid%aperture(i, j, k, 3) &
+                                 - real(below, wp)/real(n**2, wp)))
         end do
       end do
     end do
@@ -310,7 +311,7 @@ contains
       form = form_of(shapes(1), blocks%x(:, 1), blocks%q(:, 1))
       call fill(case, form, grid, of_bed)
       worst(1) = max(worst(1), maxval(abs(solid%alpha - of_bed%alpha)))
-      worst(2) = max(worst(2), maxval(abs(solid%open - of_bed%open)))
+      worst(2) = max(worst(2), maxval(abs(solid%aperture - of_bed%aperture)))
       links = links_on_grid(solid)
       links_of_bed = links_on_grid(of_bed)
       worst(3) = max(worst(3), maxval(abs(links%low - links_of_bed%low)))
@@ -404,9 +405,9 @@ contains
     n = grid%n
     call check('cells beyond a periodic side', maxval(abs(solid%alpha(-2:0, :, :) &
       - solid%alpha(n(1) - 2:n(1), :, :))), 0.0_wp, 1.0e-13_wp)
-    call check('faces beyond a periodic side', maxval(abs(solid%open(1 - n_halo:2, :, 1:9, :) &
-      - solid%open(n(1) + 1 - n_halo:n(1) + 2, :, 1:9, :))), 0.0_wp, 1.0e-13_wp)
-    call check('slices of one cell', maxval(abs(solid%open(1:8, 1, 1:9, 2) &
+    call check('faces beyond a periodic side', maxval(abs(solid%aperture(1 - n_halo:2, :, 1:9, :) &
+      - solid%aperture(n(1) + 1 - n_halo:n(1) + 2, :, 1:9, :))), 0.0_wp, 1.0e-13_wp)
+    call check('slices of one cell', maxval(abs(solid%aperture(1:8, 1, 1:9, 2) &
       - 1.0_wp + solid%alpha(1:8, 1, 1:9))), 0.0_wp, 1.0e-13_wp)
     call check('height of a column', sum(solid%alpha(3, 1, 1:9))*grid%h(3), &
       0.5_wp*(height(3, 1) + height(4, 1)), 1.0e-15_wp)

@@ -45,7 +45,7 @@ program test_courant
   rate = courant_rate(grid, flow, solid, blocks)
   call check('upper face of a cell with liquid', rate%followed, 500.0_wp, 1.0e-10_wp)
   call check('what the gas above it gives is carried', rate%carried, 1040.0_wp, 1.0e-10_wp)
-  solid%open(3, 4, 3, 2) = 0.4_wp
+  solid%aperture(3, 4, 3, 2) = 0.4_wp
   rate = courant_rate(grid, flow, solid, blocks)
   call check('a face that is mostly closed is not looked at', rate%followed, 130.0_wp, 1.0e-10_wp)
   call finish_checks()
@@ -61,7 +61,7 @@ contains
     call grid_init(case%grid, case%boundary, grid)
     call flow_init(grid, flow)
     call solid_geometry_init(grid, solid, 0)
-    solid%open = 1.0_wp
+    solid%aperture = 1.0_wp
     flow%c = 0.0_wp
   end subroutine stage
 

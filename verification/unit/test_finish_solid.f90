@@ -35,13 +35,14 @@ program test_finish_solid
   call shared_cell(0.6_wp, 0.6_wp)
   call finish_cells(grid, solid)
   call check('full', solid%alpha(c(1), c(2), c(3)), 1.0_wp, 0.0_wp)
-  call check('closed all round', sum(solid%open(c(1), c(2), c(3), :)) &
-             + solid%open(c(1) + 1, c(2), c(3), 1) + solid%open(c(1), c(2) + 1, c(3), 2) &
-             + solid%open(c(1), c(2), c(3) + 1, 3), 0.0_wp, 0.0_wp)
+  call check('closed all round', sum(solid%aperture(c(1), c(2), c(3), :)) &
+             + solid%aperture(c(1) + 1, c(2), c(3), 1) + solid%aperture(c(1), c(2) + 1, c(3), 2) &
+             + solid%aperture(c(1), c(2), c(3) + 1, 3), 0.0_wp, 0.0_wp)
   call check('not cut', solid%n_cut, 0)
   call clear_cells(solid)
   call clear_faces(grid, solid)
-  call check('nothing is left of it', all(solid%open >= 1.0_wp) .and. all(solid%alpha <= 0.0_wp))
+  call check('nothing is left of it', all(solid%aperture >= 1.0_wp) &
+             .and. all(solid%alpha <= 0.0_wp))
   call shared_cell(0.6_wp, 0.2_wp)
   call finish_cells(grid, solid)
   call check('cut, counted once', solid%n_cut == 1 .and. solid%cut(c(1), c(2), c(3)) == 1)
@@ -66,7 +67,7 @@ contains
     solid%body_face = [1, 2, 3]
     solid%face = reshape([c, 1, c, 1], [4, 2])
     solid%face_beta = [first, second]
-    solid%open(c(1), c(2), c(3), 1) = 1.0_wp - first - second
+    solid%aperture(c(1), c(2), c(3), 1) = 1.0_wp - first - second
   end subroutine shared_face
 
   !> A cell that two bodies fill by so much, its centre inside the first.
@@ -85,7 +86,7 @@ contains
   end subroutine shared_cell
 
   real(wp) function open_share()
-    open_share = solid%open(c(1), c(2), c(3), 1)
+    open_share = solid%aperture(c(1), c(2), c(3), 1)
   end function open_share
 
 end program test_finish_solid

@@ -156,7 +156,7 @@ contains
     box%flow%rho(4, 5, top + 1) = 1.0_wp
     call fill(u)
     before = u
-    call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, u)
+    call share_acceleration(box%grid, box%solid%aperture, box%flow%rho, merged, u)
     w = 3.0_wp*0.5_wp   ! its lower face is closed
     call check('up: the small counts half', u(4, 5, top, 3), &
                (w*before(4, 5, top, 3) + before(4, 5, top + 1, 3))/(w + 1.0_wp), 1.0e-13_wp)
@@ -210,7 +210,7 @@ contains
   !> The share of a target goes with the open part of the face to it.
   subroutine closing_face()
     associate (small => merged%number(4, 6, top))
-      box%solid%open(4, 7, top, 2) = 0.5_wp
+      box%solid%aperture(4, 7, top, 2) = 0.5_wp
       box%solid%poses = 0   ! another geometry
       call find_merged_cells(box%grid, box%solid, merged)
       call check('shares close with the face', merged%share(:, small), &

@@ -124,7 +124,7 @@ contains
     call run(options, 5.75_wp, 9.0_wp, 0)
     if (.not. is_root()) return
 
-    call whole%open(here//'/whole/run.h5', .false., .false.)
+    call whole%aperture(here//'/whole/run.h5', .false., .false.)
     call whole%read('/series/time', time)
     call whole%read('/series/liquid_volume_drift', drift)
     call whole%read('/series/kinetic_energy_fluid', energy)
@@ -211,7 +211,7 @@ contains
 
     allocate (open_share(17*7*21*3))
     call file%open(here//'/whole/restart-b.h5', .false., .false.)
-    call file%read('/flow/open', open_share)
+    call file%read('/flow/aperture', open_share)
     call file%close()
     call check('open shares are in the restart file', file%info, 0)
   end subroutine check_restart

@@ -18,23 +18,23 @@ program test_pockets
   call two_cells([3, 3, 2])
   call close_pockets(grid, pockets, solid)
   call check('both are sealed', solid%n_sealed, 2)
-  call check('the face between them is closed', solid%open(4, 3, 2, 1), 0.0_wp, 0.0_wp)
+  call check('the face between them is closed', solid%aperture(4, 3, 2, 1), 0.0_wp, 0.0_wp)
   call check('they are listed', solid%n_closed, 2)
-  call check('others stay open', solid%open(2, 3, 2, 1), 1.0_wp, 0.0_wp)
+  call check('others stay open', solid%aperture(2, 3, 2, 1), 1.0_wp, 0.0_wp)
 
   call two_cells([3, 3, 2])
-  solid%open(5, 3, 2, 1) = 1.0e-6_wp
+  solid%aperture(5, 3, 2, 1) = 1.0e-6_wp
   call close_pockets(grid, pockets, solid)
   call check('a gap from the second frees both', solid%n_sealed, 0)
-  call check('the face between them stays', solid%open(4, 3, 2, 1), 0.3_wp, 0.0_wp)
+  call check('the face between them stays', solid%aperture(4, 3, 2, 1), 0.3_wp, 0.0_wp)
 
   call two_cells([1, 3, 2])
-  solid%open(1, 3, 2, 1) = 1.0_wp
+  solid%aperture(1, 3, 2, 1) = 1.0_wp
   call close_pockets(grid, pockets, solid)
   call check('a wall is no way out', solid%n_sealed, 2)
 
   call two_cells([3, 3, 4])
-  solid%open(3, 3, 5, 3) = 1.0_wp
+  solid%aperture(3, 3, 5, 3) = 1.0_wp
   grid%side(2, 3) = side_open
   call close_pockets(grid, pockets, solid)
   call check('an open side is', solid%n_sealed, 0)
@@ -60,11 +60,11 @@ contains
       do d = 1, 3
         above = c
         above(d) = c(d) + 1
-        solid%open(c(1), c(2), c(3), d) = 0.0_wp
-        solid%open(above(1), above(2), above(3), d) = 0.0_wp
+        solid%aperture(c(1), c(2), c(3), d) = 0.0_wp
+        solid%aperture(above(1), above(2), above(3), d) = 0.0_wp
       end do
     end do
-    solid%open(place(1) + 1, place(2), place(3), 1) = 0.3_wp
+    solid%aperture(place(1) + 1, place(2), place(3), 1) = 0.3_wp
   end subroutine two_cells
 
 end program test_pockets

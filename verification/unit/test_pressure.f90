@@ -98,7 +98,7 @@ contains
     call pressure_init(box%grid, 1, box%case%numerics, pressure)
     if (present(rough)) pressure%rough = rough
     associate (system => pressure%system)
-      call set_pressure_system(box%grid, box%solid%free, box%flow%rho, system)
+      call set_pressure_system(box%grid, box%solid%effective, box%flow%rho, system)
       call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
     end associate
     call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
@@ -119,8 +119,8 @@ contains
             do s = 0, 1
               f = [i, j, k] + s*unit_step(:, d)
               net = net + real(2*s - 1, wp)*(box%flow%solid_flux(f(1), f(2), f(3), d) &
-                + box%solid%free(f(1), f(2), f(3), d)*box%grid%area(d)*box%flow%uf(f(1), f(2), &
-                                                                                  f(3), d))
+                + box%solid%effective(f(1), f(2), f(3), d)*box%grid%area(d) &
+                *box%flow%uf(f(1), f(2), f(3), d))
             end do
           end do
           if (box%solid%alpha(i, j, k) < 1.0_wp) worst = max(worst, abs(net)/box%grid%volume)
@@ -215,7 +215,7 @@ contains
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          fluid_gain = fluid_gain + box%grid%volume*box%solid%free(i, j, k, 1) &
+          fluid_gain = fluid_gain + box%grid%volume*box%solid%effective(i, j, k, 1) &
             *face_mean(box%flow%rho(i, j, k), box%flow%rho(merge(cells(1), i - 1, i == 1), j, k)) &
             *(box%flow%uf(i, j, k, 1) - before(i, j, k, 1))
         end do
@@ -246,7 +246,7 @@ contains
       swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
     end associate
-    call divergence(box%grid, box%solid%free, box%flow, pressure%system%active, &
+    call divergence(box%grid, box%solid%effective, box%flow, pressure%system%active, &
                     pressure%system%solver%rhs, force(1, 1))
     associate (net => pressure%system%solver%rhs(1:12, 1:8, 1:12)/box%grid%volume)
       call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
@@ -273,8 +273,8 @@ contains
     box%flow%uf = dt*a%face
     call solve()
     call check('still water: converged', pressure%report%converged)
-    worst = maxval(abs(box%flow%uf(1:12, 1:8, 1:13, :)), mask=box%solid%open(1:12, 1:8, 1:13, :) &
-                   > 0.0_wp)
+    worst = maxval(abs(box%flow%uf(1:12, 1:8, 1:13, :)), &
+                   mask=box%solid%aperture(1:12, 1:8, 1:13, :) > 0.0_wp)
     call check('still water stays', worst, 0.0_wp, 1.0e-10_wp)
     expected = 0.0_wp
     do k = cells(3), 1, -1
@@ -303,11 +303,11 @@ contains
                0.0_wp)
     call check('acceleration: open top', a%face(4, 3, 13, 3), &
                -9.81_wp + box%flow%p(4, 3, 12)/(0.005_wp*rho), 1.0e-12_wp)
-    call cell_mean_of_faces(box%grid, box%solid%open, a%face, a%cell)
-    i = findloc(box%solid%open(1:12, 4, 6, 1) > 0.0_wp .and. box%solid%open(1:12, 4, 6, 1) &
+    call cell_mean_of_faces(box%grid, box%solid%aperture, a%face, a%cell)
+    i = findloc(box%solid%aperture(1:12, 4, 6, 1) > 0.0_wp .and. box%solid%aperture(1:12, 4, 6, 1) &
                 < 1.0_wp, .true., 1)
     call check('a face is partly open', i > 1)
-    associate (w => box%solid%open(i:i + 1, 4, 6, 1))
+    associate (w => box%solid%aperture(i:i + 1, 4, 6, 1))
       call check('mean of faces by open shares', a%cell(i, 4, 6, 1)*sum(w), &
                  dot_product(w, a%face(i:i + 1, 4, 6, 1)), 1.0e-13_wp)
     end associate
@@ -324,7 +324,7 @@ contains
     call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
     box%flow%solid_flux = 0.0_wp
     associate (rhs => pressure%system%solver%rhs)
-      call divergence(box%grid, 0.0_wp*box%solid%free + 1.0_wp, box%flow, &
+      call divergence(box%grid, 0.0_wp*box%solid%effective + 1.0_wp, box%flow, &
                       pressure%system%active, rhs, largest)
       call check('divergence: largest', largest, maxval(abs(rhs(1:12, 1:8, 1:12))) &
                  /box%grid%volume, 1.0e-12_wp)

@@ -233,7 +233,7 @@ contains
             worst(1) = max(worst(1), abs(solid%alpha(i, j, k) - cell(1, i, j, k)))
             do e = 1, 3
               worst(3) = max(worst(3), &
-                             abs(1 - solid%open(i, j, k, e) - maxval(face(1, i, j, k, e, :))))
+                             abs(1 - solid%aperture(i, j, k, e) - maxval(face(1, i, j, k, e, :))))
             end do
           end do
         end do
@@ -309,7 +309,7 @@ contains
               n = [i, j, k] - unit_step(:, e)
               want = 1.0_wp
               if (max(solid%alpha(i, j, k), solid%alpha(n(1), n(2), n(3))) > 0.5_wp) want = 0.0_wp
-              fits = fits .and. abs(solid%open(i, j, k, e) - want) <= 0.0_wp
+              fits = fits .and. abs(solid%aperture(i, j, k, e) - want) <= 0.0_wp
             end do
           end do
         end do
@@ -346,8 +346,8 @@ contains
         do i = 1, 20
           inside = inside .and. all(solid%inside(i, 1:20, 1:20) &
                                     == solid%inside(21 - i, 1:20, 1:20))
-          open = open .and. all(abs(solid%open(i, 1:20, 1:20, 1) &
-                                    - solid%open(22 - i, 1:20, 1:20, 1)) <= 0.0_wp)
+          open = open .and. all(abs(solid%aperture(i, 1:20, 1:20, 1) &
+                                    - solid%aperture(22 - i, 1:20, 1:20, 1)) <= 0.0_wp)
           links = links .and. all((solid%link_number(i, 1:20, 1:20, 1) > 0) &
                                 .eqv. (solid%link_number(22 - i, 1:20, 1:20, 1) > 0))
         end do
@@ -414,7 +414,7 @@ contains
     real(wp), allocatable :: rest(:, :, :, :)
     integer :: m
 
-    allocate (rest, source=solid%open)
+    allocate (rest, source=solid%aperture)
     do m = 1, solid%body_face(size(solid%body_face)) - 1
       associate (f => solid%face(:, m))
         rest(f(1), f(2), f(3), f(4)) = rest(f(1), f(2), f(3), f(4)) + solid%face_beta(m)
@@ -433,9 +433,10 @@ contains
       do j = 1, grid%n(2)
         do i = 1, grid%n(1)
           if (solid%alpha(i, j, k) < 1) cycle
-          full_cells_closed = full_cells_closed .and. all(solid%open(i, j, k, :) <= 0) .and. &
-                              solid%open(i + 1, j, k, 1) <= 0 .and. &
-                              solid%open(i, j + 1, k, 2) <= 0 .and. solid%open(i, j, k + 1, 3) <= 0
+          full_cells_closed = full_cells_closed .and. all(solid%aperture(i, j, k, :) <= 0) .and. &
+                              solid%aperture(i + 1, j, k, 1) <= 0 .and. &
+                              solid%aperture(i, j + 1, k, 2) <= 0 .and. &
+                              solid%aperture(i, j, k + 1, 3) <= 0
         end do
       end do
     end do
@@ -475,7 +476,7 @@ contains
     call fill(grid, blocks, solid)
     call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
                1e-7_wp*d**3)
-    call check('three links: the floor is open', minval(solid%open(1:60, 1:20, 1, 3)), 1.0_wp, &
+    call check('three links: the floor is open', minval(solid%aperture(1:60, 1:20, 1, 3)), 1.0_wp, &
                1e-6_wp)
     call check('three links: no pockets', solid%n_sealed, 0)
   end subroutine three_links_on_the_floor
@@ -611,7 +612,7 @@ contains
     call check('half outside: half the volume', sum(solid%alpha)*grid%volume, 1e-6_wp, 1e-18_wp)
     call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp, 0.0_wp)
     call check('half outside: solid share of the side', &
-               sum(1 - solid%open(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
+               sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
     call check('half outside: lists end at the side', &
                maxval(solid%face(3, 1:solid%body_face(2) - 1)) == 11 .and. &
                maxval(solid%cell(3, 1:solid%body_cell(2) - 1)) == 10)
@@ -644,13 +645,13 @@ contains
       if (all(solid%face(:, m) == [9, 5, 5, 2])) beta = beta + solid%face_beta(m)
     end do
     call check('overlap: shares of a closed face are scaled to one', beta, 1.0_wp, 1e-15_wp)
-    call check('overlap: nothing is open below zero', minval(solid%open), 0.0_wp, 0.0_wp)
+    call check('overlap: nothing is open below zero', minval(solid%aperture), 0.0_wp, 0.0_wp)
     x(1, :) = [0.0375_wp, 0.0575_wp]             ! side by side at x = 47.5 mm, within cell 10
     call make_bodies('cube', [0.02_wp, 0.0_wp, 0.0_wp], x, q, blocks)
     call fill(grid, blocks, solid)
     call check('side by side: the shared cell is full', solid%alpha(10, 5, 5), 1.0_wp, 0.0_wp)
     call check('side by side: and is no cut cell', solid%cut(10, 5, 5), 0)
-    call check('side by side: its faces are closed', solid%open(10, 5, 5, 2), 0.0_wp, 0.0_wp)
+    call check('side by side: its faces are closed', solid%aperture(10, 5, 5, 2), 0.0_wp, 0.0_wp)
     call check('side by side: the centre belongs to one of them', solid%inside(10, 5, 5) > 0)
   end subroutine touching_bodies
 
@@ -672,8 +673,9 @@ contains
     call make_bodies('cube', [0.04_wp, 0.0_wp, 0.0_wp], x, q, blocks)
     call fill(grid, blocks, solid)
     call check('pocket: four cells are sealed', solid%n_sealed, 4)
-    call check('pocket: their faces are closed', maxval(solid%open(7:8, 7:8, 1, :)), 0.0_wp, 0.0_wp)
-    call check('pocket: other cells are open', solid%open(2, 2, 1, 1), 1.0_wp, 0.0_wp)
+    call check('pocket: their faces are closed', maxval(solid%aperture(7:8, 7:8, 1, :)), 0.0_wp, &
+               0.0_wp)
+    call check('pocket: other cells are open', solid%aperture(2, 2, 1, 1), 1.0_wp, 0.0_wp)
     grid%side(1, 3) = side_open
     call fill(grid, blocks, solid)
     call check('pocket: open through the floor', solid%n_sealed, 0)
@@ -714,7 +716,7 @@ contains
     worst = 0.0_wp
     do i = 1, n_halo
       worst = max(worst, maxval(abs(solid%alpha(i, :, :) - solid%alpha(24 + i, :, :))), &
-                  maxval(abs(solid%open(:, :, i, :) - solid%open(:, :, 24 + i, :))), &
+                  maxval(abs(solid%aperture(:, :, i, :) - solid%aperture(:, :, 24 + i, :))), &
                   maxval(abs(links%low(1 - i, :, 4:20, :) - links%low(25 - i, :, 4:20, :))))
     end do
     call check('periods: halos are images, bit by bit', worst, 0.0_wp, 0.0_wp)
@@ -755,7 +757,8 @@ contains
 
     of_a = links_on_grid(a)
     of_b = links_on_grid(b)
-    same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. maxval(abs(a%open - b%open)) <= 0 .and. &
+    same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. &
+           maxval(abs(a%aperture - b%aperture)) <= 0 .and. &
            maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) <= 0 &
            .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) .and. &
            all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
@@ -793,8 +796,8 @@ contains
         same = same .and. all(abs(piece%alpha(low(1):high(1), low(2):high(2), low(3):high(3)) - &
                                   whole%alpha(low(1):high(1), low(2):high(2), low(3):high(3))) <= 0)
         same = same .and. all(abs( &
-          piece%open(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
-          whole%open(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
+          piece%aperture(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
+          whole%aperture(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
         same = same .and. all(abs( &
           of_piece%high(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
           of_whole%high(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)

@@ -89,7 +89,7 @@ contains
     case (12); name = '/flow/fluid_volume'; call touch(s%flow%fluid_volume(at(1), at(2), at(3)))
     case (13); name = '/flow/c '; call touch(s%flow%c(at(1), at(2), at(3)))
     case (14); name = '/flow/alpha'; call touch(s%solid%alpha(at(1), at(2), at(3)))
-    case (15); name = '/flow/open'; call touch(s%solid%open(at(1), at(2), at(3), 2))
+    case (15); name = '/flow/aperture'; call touch(s%solid%aperture(at(1), at(2), at(3), 2))
     case (16); name = '/flow/liquid_initial'; call touch(s%flow%liquid_initial)
     case (17); name = '/flow/liquid_inflow'; call touch(s%flow%liquid_inflow)
     case (18); name = '/blocks/present'; s%blocks%present(3) = .not. s%blocks%present(3)

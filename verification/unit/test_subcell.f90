@@ -35,7 +35,7 @@ program test_subcell
   call recount(3)
   call check('box on the grid: shares', maxval(abs(solid%alpha - block%solid%alpha)), 0.0_wp, &
              1.0e-15_wp)
-  call check('box on the grid: faces', maxval(abs(solid%open - block%solid%open)), 0.0_wp, &
+  call check('box on the grid: faces', maxval(abs(solid%aperture - block%solid%aperture)), 0.0_wp, &
              1.0e-15_wp)
   call check('box on the grid: there it is', count(solid%alpha > 0.5_wp), 4*3*3)
   call finish_checks()
@@ -72,7 +72,7 @@ contains
             if (solid%alpha(i, j, k) >= 1.0_wp) share = 1.0_wp
             if (solid%alpha(i - unit_step(1, d), j - unit_step(2, d), k - unit_step(3, d)) &
                 >= 1.0_wp) share = 1.0_wp
-            worst(2) = max(worst(2), abs(1.0_wp - solid%open(i, j, k, d) - share))
+            worst(2) = max(worst(2), abs(1.0_wp - solid%aperture(i, j, k, d) - share))
           end do
         end do
       end do

@@ -69,11 +69,11 @@ contains
 
     call still_water(grid, solid, c)
     c(5:, :, :) = 1.0_wp
-    solid%open(5, :, :, 1) = 0.0_wp
+    solid%aperture(5, :, :, 1) = 0.0_wp
     solid%alpha(5, 3, level) = 0.5_wp
     call check('behind a wall', surface_normal(grid, solid, vertical_of(-up), c, 4, 3, level), up, &
                0.0_wp)
-    solid%open(5, 3, level, 1) = 1.0_wp
+    solid%aperture(5, 3, level, 1) = 1.0_wp
     normal = surface_normal(grid, solid, vertical_of(-up), c, 4, 3, level)
     call check('through a hole in it', normal(1) < 0.0_wp)
   end subroutine hidden_water

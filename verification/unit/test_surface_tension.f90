@@ -157,8 +157,8 @@ contains
     type(surface_tension_t), intent(out) :: tension
 
     call surface_tension_init(grid, liquid, tension)
-    allocate (tension%force, source=solid%open)
-    allocate (tension%surface%place, source=solid%open)
+    allocate (tension%force, source=solid%aperture)
+    allocate (tension%surface%place, source=solid%aperture)
     allocate (tension%surface%curvature, source=c)
   end subroutine ready
 
@@ -236,7 +236,7 @@ contains
     call fill_bowed(3, 1)
     call ready(fluid, tension)
     call find_tension(grid, fluid, solid, c, tension)
-    allocate (a, source=solid%open)
+    allocate (a, source=solid%aperture)
     allocate (rho, source=c)
     a = 0.0_wp
     rho = 1.2_wp + 998.0_wp*c
@@ -301,7 +301,7 @@ contains
       heavy%gravity = [0.0_wp, 0.0_wp, merge(-9.81_wp, 9.81_wp, way == 1)]
       call ready(heavy, tension)
       call find_tension(grid, heavy, solid, c, tension)
-      allocate (a, source=solid%open)
+      allocate (a, source=solid%aperture)
       allocate (one, source=c)
       a = 0.0_wp
       one = 1.0_wp
@@ -368,7 +368,7 @@ contains
         end do
       end do
       call fill_scalar_halo(g, p)
-      allocate (tension%force, source=block%solid%open)
+      allocate (tension%force, source=block%solid%aperture)
       tension%acts = .true.
       tension%force = 0.0_wp
       do d = 1, 3

@@ -267,8 +267,8 @@ contains
       low = grid%face(k, 3)
       share = min(max((z0 - low)/grid%h(3), 0.0_wp), 1.0_wp)
       solid%alpha(:, :, k) = share
-      solid%open(:, :, k, 1:2) = 1.0_wp - share
-      if (low < z0) solid%open(:, :, k, 3) = 0.0_wp
+      solid%aperture(:, :, k, 1:2) = 1.0_wp - share
+      if (low < z0) solid%aperture(:, :, k, 3) = 0.0_wp
       if (grid%centre(k, 3) < z0) solid%inside(:, :, k) = 1
       if (k == 1) cycle
       if (grid%centre(k - 1, 3) < z0 .and. grid%centre(k, 3) > z0) then
@@ -316,9 +316,9 @@ contains
     do k = 1, 8
       gap = max(min(grid%face(k + 1, 3), high) - max(grid%face(k, 3), low), 0.0_wp)/grid%h(3)
       solid%alpha(:, :, k) = 1.0_wp - gap
-      solid%open(:, :, k, 1:2) = gap
-      solid%open(:, :, k, 3) = 0.0_wp
-      if (low <= 0.0_wp .and. k == 1) solid%open(:, :, k, 3) = 1.0_wp
+      solid%aperture(:, :, k, 1:2) = gap
+      solid%aperture(:, :, k, 3) = 0.0_wp
+      if (low <= 0.0_wp .and. k == 1) solid%aperture(:, :, k, 3) = 1.0_wp
       solid%inside(:, :, k) = merge(1, bodies, grid%centre(k, 3) < low)
     end do
     if (low > 0.0_wp) call list_slab(1, 0.0_wp, low)
@@ -378,8 +378,8 @@ contains
 
     p = 0.0_wp
     do k = 1, 8
-      p = p + rho*grid%volume*sum(0.5_wp*(solid%open(1:4, 1:4, k, 1) + solid%open(2:5, 1:4, k, &
-          1))*flow%u(1:4, 1:4, k, 1))
+      p = p + rho*grid%volume*sum(0.5_wp*(solid%aperture(1:4, 1:4, k, 1) &
+                                          + solid%aperture(2:5, 1:4, k, 1))*flow%u(1:4, 1:4, k, 1))
     end do
   end function fluid_momentum
 end program test_viscous

@@ -11,7 +11,7 @@ program test_wall_balance
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body, &
-    open_shares
+    mean_apertures
   use group_momentum_m, only: share_acceleration
   use half_kick_m, only: half_kick_t, half_kick_init
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
@@ -78,12 +78,12 @@ contains
       end do
       call fill_scalar_halo(grid, box%flow%p)
       call face_acceleration(grid, fluid%gravity, box%flow%rho, box%flow%rho, box%flow%p, a%face)
-      call cell_mean_of_faces(grid, box%solid%open, a%face, a%cell)
+      call cell_mean_of_faces(grid, box%solid%aperture, a%face, a%cell)
       call begin()
       call check('mass of the fluid that is there', balance%mass(merged%number(4, 4, 7)), &
                  0.85_wp*fluid%liquid_density*grid%volume, 1.0e-9_wp)
       call store_change(grid, merged, dt, a%cell, balance%pushed)
-      call share_acceleration(grid, box%solid%open, box%flow%rho, merged, a%cell)
+      call share_acceleration(grid, box%solid%aperture, box%flow%rho, merged, a%cell)
       call store_change(grid, merged, dt, a%cell, balance%gained)
       call find(spread(0.0_wp, 1, 6))
       call check('still water: no force', norm2(force), 0.0_wp, &
@@ -98,7 +98,7 @@ contains
     call begin()
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        w = open_shares(box%grid, box%solid%open, c)
+        w = mean_apertures(box%grid, box%solid%aperture, c)
         balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*w(3)
         balance%pushed(3, m) = 0.1_wp*sum(c)
         balance%gained(3, m) = 0.1_wp*sum(c)
@@ -127,7 +127,7 @@ contains
     real(wp) :: f(3)
 
     call begin()
-    call check('its open shares', open_shares(box%grid, box%solid%open, c), &
+    call check('its open shares', mean_apertures(box%grid, box%solid%aperture, c), &
                [0.5_wp, 0.3_wp, 0.3_wp], 1.0e-12_wp)
     m = merged%number(c(1), c(2), c(3))
     balance%pushed(:, m) = pushed
@@ -182,12 +182,12 @@ contains
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
         from_faces = from_faces + box%case%fluid%liquid_density*box%grid%volume*dt &
-          *open_shares(box%grid, box%solid%open, c)*a%cell(c(1), c(2), c(3), :)
+          *mean_apertures(box%grid, box%solid%aperture, c)*a%cell(c(1), c(2), c(3), :)
         if (modulo(sum(c), 3) == 0) merged%body(m) = 2
       end associate
     end do
     call order_by_body(2, merged)
-    call share_acceleration(box%grid, box%solid%open, box%flow%rho, merged, a%cell)
+    call share_acceleration(box%grid, box%solid%aperture, box%flow%rho, merged, a%cell)
     call store_change(box%grid, merged, dt, a%cell, balance%gained)
     of_fluid = matmul(balance%gained(:, :merged%n), balance%mass(:merged%n))
     call rigid_motion_init(2, two)

@@ -50,10 +50,12 @@ contains
     integer :: m, n
 
     associate (solid => body%solid)
-      call check('held beside an edge', solid%free(3, 3, 4, 1), 1.0_wp/inertia, 1.0e-12_wp)
-      call check('and in it', solid%free(4, 3, 4, 1), 0.4_wp/inertia, 1.0e-12_wp)
-      call check('none along the edge', solid%free(3, 3, 5, 3), solid%open(3, 3, 5, 3), 0.0_wp)
-      call check('none at a flat side', solid%free(4, 6, 4, 2), solid%open(4, 6, 4, 2), 0.0_wp)
+      call check('held beside an edge', solid%effective(3, 3, 4, 1), 1.0_wp/inertia, 1.0e-12_wp)
+      call check('and in it', solid%effective(4, 3, 4, 1), 0.4_wp/inertia, 1.0e-12_wp)
+      call check('none along the edge', solid%effective(3, 3, 5, 3), &
+                 solid%aperture(3, 3, 5, 3), 0.0_wp)
+      call check('none at a flat side', solid%effective(4, 6, 4, 2), &
+                 solid%aperture(4, 6, 4, 2), 0.0_wp)
       n = 0
       do m = solid%first_held(1), solid%first_held(2) - 1
         if (all(solid%held_face(:, m) == [3, 3, 4, 1])) n = m
@@ -89,14 +91,16 @@ contains
     call build('box', [width, width, 0.4_wp], [0.5_wp, 0.5_wp, 0.5_wp], turned=.true.)
     call check('plane walls', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 1.0e-9_wp)
     call check('there are some', body%solid%n_cut > 10)
-    call check('no held fluid', maxval(abs(body%solid%open - body%solid%free)), 0.0_wp, 1.0e-9_wp)
+    call check('no held fluid', maxval(abs(body%solid%aperture - body%solid%effective)), 0.0_wp, &
+               1.0e-9_wp)
   end subroutine turned_box
 
   !> Eight cells wide.
   subroutine sphere()
     call build('sphere', [0.8_wp, 0.0_wp, 0.0_wp], [0.513_wp, 0.487_wp, 0.505_wp])
     call check('sphere: none', maxval(body%solid%edge(:body%solid%n_cut)), 0.0_wp, 0.0_wp)
-    call check('sphere: little held fluid', maxval(body%solid%open - body%solid%free) < 0.1_wp)
+    call check('sphere: little held fluid', &
+               maxval(body%solid%aperture - body%solid%effective) < 0.1_wp)
   end subroutine sphere
 
   subroutine build(kind, size, position, turned)

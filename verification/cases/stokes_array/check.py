@@ -20,7 +20,7 @@ def drag_factor(share: float) -> float:
 def mean_velocity(run: Run) -> np.ndarray:
     """Volume flux through every layer of faces across x over the area of the layer [m/s]."""
     state, periodic = run.restart(), (True, True, True)
-    opened = faces(state, "flow/open", run.grid, periodic)[0]
+    opened = faces(state, "flow/aperture", run.grid, periodic)[0]
     velocity = faces(state, "flow/uf", run.grid, periodic)[0]
     return np.asarray((opened * velocity).mean(axis=(0, 1)))
 
