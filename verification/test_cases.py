@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from run_cases import Machine, changed, names, planned, verify
-from verify import LEVELS
+from verify import LEVELS, prepared_key
 
 pytestmark = pytest.mark.cost(10)
 
@@ -20,6 +20,11 @@ def test_case(name: str, tmp_path: Path) -> None:
         pytest.skip("all its runs are long, or known to miss")
     holds, report = verify(name, tmp_path, Machine(), COST, misses=False)
     assert holds, report
+
+
+def test_runs_kept_go_with_what_prepared_them() -> None:
+    """The keys by which `make verify` keeps runs find the sources of prepared states."""
+    assert prepared_key("sloshing") != prepared_key("cavity") == ""
 
 
 def test_levels_fit_into_their_time(tmp_path: Path) -> None:

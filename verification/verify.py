@@ -17,7 +17,9 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
+from micstools.cases import initial_state
 from report import Case, Finished, note_options, write
 from run_cases import CASES, MPI_SETTINGS, ROOT, Machine, Planned, Run, checker, names, planned
 
@@ -68,7 +70,7 @@ def program_key() -> str:
 
 def prepared_key(case: str) -> str:
     """Changes with what prepares the initial states of a case."""
-    sources = [CASES / case / "prepare.py", ROOT / "tools" / "micstools" / "initial_state.py"]
+    sources = [CASES / case / "prepare.py", Path(initial_state.__file__)]
     return "".join(path.read_text() for path in sources) if sources[0].is_file() else ""
 
 

@@ -9,7 +9,7 @@ module file_words_m
   implicit none
   private
   public :: words_t, read_whole, next_word, skip_line, get_integer, get_real, get_count
-  public :: expected, complain, place_of
+  public :: expected, report, place_of
 
   integer, parameter :: longest_text = 500000000   !! bytes
 
@@ -56,12 +56,12 @@ contains
   end subroutine read_whole
 
   !> Note a problem; only the first counts.
-  subroutine complain(words, text)
+  subroutine report(words, text)
     type(words_t), intent(inout) :: words
     character(*), intent(in) :: text
 
     if (len(words%problem) == 0) words%problem = text
-  end subroutine complain
+  end subroutine report
 
   !> The next word; empty at the end of the text or after a problem.
   function next_word(words) result(word)
@@ -121,7 +121,7 @@ contains
     if (len(words%problem) > 0) return
     call parse_integer(word, n, info)
     if (info == value_too_large) then
-      call complain(words, quoted_text(printable(word))//' is too large for a whole number')
+      call report(words, quoted_text(printable(word))//' is too large for a whole number')
     else if (info /= value_ok) then
       call expected(words, 'a whole number', word)
     end if
@@ -141,7 +141,7 @@ contains
       if (index(word, '-', back=.true.) > scan(word, 'eEdD')) info = value_ok   ! as good as zero
     end if
     if (info == value_too_large) then
-      call complain(words, quoted_text(printable(word))//' is too large a number')
+      call report(words, quoted_text(printable(word))//' is too large a number')
     else if (info /= value_ok) then
       call expected(words, 'a number', word)
     end if
@@ -152,9 +152,9 @@ contains
     character(*), intent(in) :: what, word
 
     if (len(word) == 0) then
-      call complain(words, 'the file ends where '//what//' should stand')
+      call report(words, 'the file ends where '//what//' should stand')
     else
-      call complain(words, quoted_text(printable(word))//' stands where '//what//' should')
+      call report(words, quoted_text(printable(word))//' stands where '//what//' should')
     end if
   end subroutine expected
 
@@ -168,7 +168,7 @@ contains
 
     call get_integer(words, n)
     most = (len(words%text) - words%at + 1)/words_each   ! a word has a character at least
-    if (n < 0 .or. n > most) call complain(words, 'the file does not hold '//to_text(n)//' '//what)
+    if (n < 0 .or. n > most) call report(words, 'the file does not hold '//to_text(n)//' '//what)
     if (len(words%problem) > 0) n = 0
   end subroutine get_count
 

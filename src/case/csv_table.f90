@@ -25,7 +25,7 @@ module csv_table_m
     character(:), allocatable, private :: text       !! the file; rows by their ends in it
     integer, allocatable, private :: first(:, :), last(:, :)   !! (columns, rows)
   contains
-    procedure :: cell, column, number, complain => table_complain
+    procedure :: cell, column, number, report => table_report
     procedure :: check_names
   end type csv_table_t
 
@@ -257,7 +257,7 @@ contains
   end function column
 
   !> Tell what is wrong with a cell.
-  subroutine table_complain(self, row, column, what, problems)
+  subroutine table_report(self, row, column, what, problems)
     class(csv_table_t), intent(in) :: self
     integer, intent(in) :: row, column
     character(*), intent(in) :: what
@@ -266,7 +266,7 @@ contains
     call problems%add_message('line '//to_text(self%line(row))//', column '//to_text(column) &
       //' ('//printable(trim(self%name(column)))//') = ' &
       //quoted_text(printable(self%cell(row, column)))//': '//what)
-  end subroutine table_complain
+  end subroutine table_report
 
   !> Read a cell as a number. An empty one, or one whose column is not there, leaves `x` as it is;
   !! it is a problem if the number is required.
@@ -297,7 +297,7 @@ contains
     end if
     if (len(what) == 0) return
     ok = .false.
-    call self%complain(row, column, what, problems)
+    call self%report(row, column, what, problems)
   end subroutine number
 
   !> Columns that are not known, and required ones that are missing.

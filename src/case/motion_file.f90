@@ -106,17 +106,17 @@ contains
       x(:, r) = row(2:4)
       q(:, r) = row(5:8)
       if (.not. norm2(q(:, r)) > 0.0_wp) then
-        call table%complain(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', problems)
+        call table%report(r, table%column('qw'), 'qw, qx, qy, qz must not all be 0', problems)
         good(r) = .false.
         cycle
       end if
       q(:, r) = normalised(q(:, r))
       if (last > 0) then
-        if (.not. time(r) > time(last)) call table%complain(r, table%column('time'), &
+        if (.not. time(r) > time(last)) call table%report(r, table%column('time'), &
           'must be later than '//to_text(time(last))//' on line '//to_text(table%line(last)), &
           problems)
         angle = 2.0_wp*acos(min(1.0_wp, abs(dot_product(q(:, r), q(:, last)))))*180.0_wp/pi
-        if (angle > largest_turn) call table%complain(r, table%column('qw'), 'turns by ' &
+        if (angle > largest_turn) call table%report(r, table%column('qw'), 'turns by ' &
           //brief(angle, 3)//' degrees since line '//to_text(table%line(last)) &
           //', which leaves open which way; at most '//to_text(largest_turn), problems)
       end if

@@ -100,16 +100,16 @@ contains
         ok = .true.
         call table%number(r, column(c_v + d - 1), .false., row%v(d), ok, problems)
         if (ok .and. drop%handling%lowering_speed > 0.0_wp .and. abs(row%v(d)) > 0.0_wp) then
-          call table%complain(r, column(c_v + d - 1), 'has no meaning with lowering_speed > 0', &
+          call table%report(r, column(c_v + d - 1), 'has no meaning with lowering_speed > 0', &
                               problems)
         end if
       end do
       ok = .true.
       call table%number(r, column(c_time), .true., row%time, ok, problems)
-      if (ok .and. row%time < 0.0_wp) call table%complain(r, column(c_time), &
+      if (ok .and. row%time < 0.0_wp) call table%report(r, column(c_time), &
         'must not be negative', problems)
       call read_words(table, r, column, shapes, row, problems)
-      if (row%fixed .and. drop%handling%lowering_speed > 0.0_wp) call table%complain(r, &
+      if (row%fixed .and. drop%handling%lowering_speed > 0.0_wp) call table%report(r, &
         column(c_fixed), 'a fixed block is not lowered', problems)
       call read_attitude(table, r, column, row%q, problems)
     end associate
@@ -128,17 +128,17 @@ contains
     if (column(c_shape) > 0) then
       text = table%cell(r, column(c_shape))
       if (size(shapes) == 0) then
-        call table%complain(r, column(c_shape), 'the case has no &shape group', problems)
+        call table%report(r, column(c_shape), 'the case has no &shape group', problems)
       else if (any(shapes == text) .and. len(text) > 0) then
         row%shape = text
       else
-        call table%complain(r, column(c_shape), 'no &shape has this name, nearest known: ' &
+        call table%report(r, column(c_shape), 'no &shape has this name, nearest known: ' &
           //quoted_text(nearest_name(text, shapes)), problems)
       end if
     end if
     text = table%cell(r, column(c_name))
     if (len(text) > name_length .or. sanitise(text) /= text) then
-      call table%complain(r, column(c_name), 'must have at most '//to_text(name_length) &
+      call table%report(r, column(c_name), 'must have at most '//to_text(name_length) &
         //' bytes and no control characters', problems)
     else
       row%name = text
@@ -148,7 +148,7 @@ contains
     row%fixed = any(text == [character(3) :: '1', 'yes'])
     if (row%fixed) return
     call parse_logical(text, row%fixed, info)
-    if (info /= value_ok) call table%complain(r, column(c_fixed), &
+    if (info /= value_ok) call table%report(r, column(c_fixed), &
       'must be true or false, yes or no, 1 or 0', problems)
   end subroutine read_words
 
@@ -171,7 +171,7 @@ contains
       end do
       if (.not. ok) return
       if (all(abs(part) <= 0.0_wp)) then
-        call table%complain(r, column(c_q), 'a quaternion must not be zero', problems)
+        call table%report(r, column(c_q), 'a quaternion must not be zero', problems)
       else
         q = normalised(part)
       end if

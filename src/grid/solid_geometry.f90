@@ -29,7 +29,7 @@ module solid_geometry_m
     real(wp), allocatable :: aperture(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
     !> Effective aperture, through which pressure moves fluid; what it lacks of `aperture` moves
     !! with a body (`held_fluid_m`).
-    real(wp), allocatable :: free(:, :, :, :)
+    real(wp), allocatable :: effective(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
     !> Links between the centres of the two cells of a lower face d: `link_number(i,j,k,d)` is the
     !! number of one that meets a surface in the lists, 0 where it is free.

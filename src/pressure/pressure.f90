@@ -124,7 +124,7 @@ contains
   end subroutine start_from_none
 
   !> Largest divergence in a closed box less its mean over the open cells [1/s], which is what the
-  !! walls swallow (`pressure_system_m`). The transport shares it out, too (`open_flux_m`).
+  !! walls take (`pressure_system_m`). The transport shares it out, too (`open_flux_m`).
   function uneven(grid, outflow, work) result(largest)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: outflow(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)

@@ -38,8 +38,8 @@ module pressure_system_m
     real(wp), allocatable :: push(:, :)
       !! (6, bodies) force of a trial pressure, then its motion
     real(wp), allocatable :: is_open(:, :, :)    !! of a closed box: 1 in cells with an open face
-    real(wp), allocatable :: swallowed(:, :)
-      !! (6, bodies) what the walls of a closed box swallow of J, per open cell [m2, m3]
+    real(wp), allocatable :: wall_share(:, :)
+      !! (6, bodies) what the walls of a closed box take of J, per open cell [m2, m3]
     logical :: pressed = .false.                 !! a free body covers whole cells at such a wall
   contains
     procedure :: apply => apply_pressure
@@ -74,7 +74,7 @@ contains
       allocate (self%operator%cf(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     end if
     allocate (self%operator%push(6, n_bodies), source=0.0_wp)
-    allocate (self%operator%swallowed, source=self%operator%push)
+    allocate (self%operator%wall_share, source=self%operator%push)
     a = grid%first
     b = grid%last
     allocate (self%active(a(1):b(1), a(2):b(2), a(3):b(3)), source=.true.)
@@ -181,7 +181,7 @@ contains
   !!
   !! In a closed box take the mean over the open cells off J, where a free body covers whole cells
   !! at a wall. These take no part, so that J would not sum up to zero: an even pressure would push
-  !! the body, and no pressure balance what it displaces. So all cells share what the wall swallows.
+  !! the body, and no pressure balance what it displaces. So all cells share what the wall takes.
   subroutine set_bodies(grid, bodies, self)
     type(grid_t), intent(in) :: grid
     type(rigid_motion_t), intent(in) :: bodies
@@ -192,10 +192,10 @@ contains
       op%bodies = bodies
       op%pressed = .false.
       if (.not. (work%singular .and. any(op%bodies%free))) return
-      call force_from_cells(op%bodies, op%flux, work%is_open, op%lo - 1, op%swallowed)
-      op%pressed = any(abs(op%swallowed(1:3, :)) > rounding*minval(grid%area))
+      call force_from_cells(op%bodies, op%flux, work%is_open, op%lo - 1, op%wall_share)
+      op%pressed = any(abs(op%wall_share(1:3, :)) > rounding*minval(grid%area))
       if (.not. op%pressed) return
-      op%swallowed = op%swallowed/work%n_open
+      op%wall_share = op%wall_share/work%n_open
       op%is_open = work%is_open
     end associate
   end subroutine set_bodies
@@ -210,10 +210,10 @@ contains
     call seven_points(self%lo, self%hi, self%cf, x, y)
     if (.not. any(self%bodies%free)) return
     call force_from_cells(self%bodies, self%flux, x, self%lo - 1, self%push)
-    if (self%pressed) self%push = self%push - self%swallowed*exact_dot(x, self%is_open, 1)
+    if (self%pressed) self%push = self%push - self%wall_share*exact_dot(x, self%is_open, 1)
     call motion_of_force(self%bodies, self%push)
     call add_cell_flux(self%bodies, self%flux, self%push, self%lo - 1, y)
-    if (self%pressed) y = y - sum(self%swallowed*self%push)*self%is_open
+    if (self%pressed) y = y - sum(self%wall_share*self%push)*self%is_open
   end subroutine apply_pressure
 
   !> The part of the operator on the grid.

@@ -19,7 +19,7 @@ module bed_file_m
   use value_text_m, only: quoted_text, lower_case
   use vectors_m, only: cross
   use file_words_m, only: words_t, read_whole, next_word, skip_line, get_integer, get_real, &
-    expected, complain, place_of
+    expected, report, place_of
   implicit none
   private
   public :: bed_form_t, read_bed_file
@@ -52,7 +52,7 @@ contains
     call read_whole(file, words)
     if (len(words%problem) == 0 .and. len(words%text) == 0) then
       words%line = 0
-      call complain(words, 'the file is empty')
+      call report(words, 'the file is empty')
     end if
     if (len(words%problem) == 0) then
       call checksum%add_text(words%text)
@@ -83,7 +83,7 @@ contains
 
     if (index(words%text, achar(0)) > 0 .or. starts_as_stl(words%text)) then
       words%line = 0
-      call complain(words, 'looks like an STL or another binary file, not a map of heights; ' &
+      call report(words, 'looks like an STL or another binary file, not a map of heights; ' &
         //'an STL file is read with kind = ''stl''')
     end if
     do k = 1, 2
@@ -95,12 +95,12 @@ contains
     do k = 1, 2
       call get_real(words, spacing(k))
     end do
-    if (any(n < 2)) call complain(words, 'a map of heights needs two points at least in x and y')
-    if (.not. all(spacing > 0.0_wp)) call complain(words, 'the spacing must be positive')
+    if (any(n < 2)) call report(words, 'a map of heights needs two points at least in x and y')
+    if (.not. all(spacing > 0.0_wp)) call report(words, 'the spacing must be positive')
     if (real(n(1), wp)*real(n(2), wp) > real(max_points, wp)) then
-      call complain(words, 'more than '//to_text(max_points)//' points')
+      call report(words, 'more than '//to_text(max_points)//' points')
     else if (n(1)*n(2) > len(words%text) - words%at + 1) then   ! a character each at least
-      call complain(words, 'the file does not hold '//to_text(n(1)*n(2))//' heights')
+      call report(words, 'the file does not hold '//to_text(n(1)*n(2))//' heights')
     end if
     if (len(words%problem) > 0) return
     deallocate (form%point, form%triangle)
@@ -140,7 +140,7 @@ contains
       -32767.0_wp, 9999.0_wp, 32767.0_wp]
 
     call get_real(words, z)
-    if (any(abs(z - mark) <= 0.0_wp)) call complain(words, 'is the height '//to_text(z) &
+    if (any(abs(z - mark) <= 0.0_wp)) call report(words, 'is the height '//to_text(z) &
       //' a mark of a missing one (NODATA)? Every point needs a height, fill the gaps first')
   end subroutine get_height
 
@@ -168,28 +168,28 @@ contains
       case ('')
         exit
       case ('solid', 'endsolid')
-        if (open_facet) call complain(words, quoted_text(word)//' stands inside a facet')
+        if (open_facet) call report(words, quoted_text(word)//' stands inside a facet')
         call skip_line(words)   ! the name
       case ('facet')
-        if (open_facet) call complain(words, 'a facet begins before the last one ends')
+        if (open_facet) call report(words, 'a facet begins before the last one ends')
         open_facet = .true.
         in_facet = 0
       case ('vertex')
-        if (.not. open_facet) call complain(words, 'a vertex stands outside of a facet')
+        if (.not. open_facet) call report(words, 'a vertex stands outside of a facet')
         in_facet = in_facet + 1
         n = n + 1
         call read_corner(words, n, form)
       case ('endfacet')
         if (.not. open_facet .or. in_facet /= 3) then
-          call complain(words, 'a facet of the file does not have three corners')
+          call report(words, 'a facet of the file does not have three corners')
         end if
         open_facet = .false.
       case default   ! the loop and the normal
         if (.not. open_facet) call expected(words, '''facet'' or ''endsolid''', word)
       end select
     end do
-    if (open_facet) call complain(words, 'the file ends inside a facet')
-    if (n == 0) call complain(words, 'the file holds no facets')
+    if (open_facet) call report(words, 'the file ends inside a facet')
+    if (n == 0) call report(words, 'the file holds no facets')
     if (len(words%problem) > 0) return
     form%point = form%point(:, :n)
     form%triangle = reshape([(k, k=1, n)], [3, n/3])
@@ -243,7 +243,7 @@ contains
 
     n = (len(words%text) - stl_head)/stl_facet
     words%line = 0
-    if (n == 0) call complain(words, 'the file holds no facets')
+    if (n == 0) call report(words, 'the file holds no facets')
     deallocate (form%point)
     allocate (form%point(3, 3*n))
     do f = 1, n
@@ -252,7 +252,7 @@ contains
         x = transfer(words%text(at + 1:at + 12), x)
         if (.not. all(ieee_is_finite(x))) x = huge(x)   ! no comparison with NaN
         if (any(abs(x) > farthest)) then
-          call complain(words, 'facet '//to_text(f)//': a coordinate is no number up to 1e20')
+          call report(words, 'facet '//to_text(f)//': a coordinate is no number up to 1e20')
           return
         end if
         form%point(:, 3*(f - 1) + c) = real(x, wp)
@@ -276,7 +276,7 @@ contains
       if (.not. has_flat_facet(form)) return
     end if
     words%line = 0
-    call complain(words, 'lies too far from zero: coordinates of ' &
+    call report(words, 'lies too far from zero: coordinates of ' &
       //to_text(maxval(abs(form%point)))//' m are rounded to '//to_text(step) &
       //' m in single precision, and the form is ' &
       //to_text(length)//' m long; move it near zero where it was made, and write it anew')

@@ -14,7 +14,7 @@ module shape_file_m
   use kinds_m, only: wp
   use errors_m, only: to_text
   use file_words_m, only: words_t, read_whole, next_word, get_integer, get_real, get_count, &
-    expected, complain, place_of
+    expected, report, place_of
   implicit none
   private
   public :: read_shape_file
@@ -54,7 +54,7 @@ contains
     case ('mics-shape'); call read_own(words, point, tet)
     case ('$MeshFormat'); call read_gmsh(words, point, tet)
     case default
-      call complain(words, 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file; ' &
+      call report(words, 'is neither a Gmsh .msh file ($MeshFormat) nor a mics-shape file; ' &
         //'tools/make_shape.py makes one of .stl, .obj and .step')
       words%line = 0
     end select
@@ -74,16 +74,16 @@ contains
     integer :: n
 
     call get_integer(words, n)
-    if (n /= 1) call complain(words, 'mics-shape '//to_text(n)//' is unknown, this program reads 1')
+    if (n /= 1) call report(words, 'mics-shape '//to_text(n)//' is unknown, this program reads 1')
     do
       word = next_word(words)
       select case (word)
       case ('points')
-        if (allocated(point)) call complain(words, '''points'' stands a second time')
+        if (allocated(point)) call report(words, '''points'' stands a second time')
         call read_points(words, point)
       case ('tets')
-        if (.not. allocated(point)) call complain(words, '''tets'' stands before any ''points''')
-        if (allocated(tet)) call complain(words, '''tets'' stands a second time')
+        if (.not. allocated(point)) call report(words, '''tets'' stands before any ''points''')
+        if (allocated(tet)) call report(words, '''tets'' stands a second time')
         call read_tets(words, point, tet)
       case ('')
         return
@@ -124,7 +124,7 @@ contains
       do k = 1, 4
         call get_integer(words, tet(k, i))
         if (tet(k, i) < 1 .or. tet(k, i) > size(point, 2)) then
-          call complain(words, 'there is no point '//to_text(tet(k, i)))
+          call report(words, 'there is no point '//to_text(tet(k, i)))
         end if
         if (len(words%problem) > 0) return
       end do
@@ -144,9 +144,9 @@ contains
     call get_real(words, version)
     call get_integer(words, form)
     if (.not. (is_version(version, 2.2_wp) .or. is_version(version, 4.1_wp))) then
-      call complain(words, 'this version of the .msh form is not read, 2.2 and 4.1 are')
+      call report(words, 'this version of the .msh form is not read, 2.2 and 4.1 are')
     else if (form /= 0) then
-      call complain(words, 'binary .msh files are not read, save it as ASCII')
+      call report(words, 'binary .msh files are not read, save it as ASCII')
     end if
     do
       word = next_word(words)
@@ -158,13 +158,13 @@ contains
       end select
     end do
     if (mesh%n_high > 0) then
-      call complain(words, 'holds '//to_text(mesh%n_high) &
+      call report(words, 'holds '//to_text(mesh%n_high) &
                     //' solid elements of higher order, mesh with order 1')
     else if (mesh%n_other > 0) then
-      call complain(words, 'holds '//to_text(mesh%n_other) &
+      call report(words, 'holds '//to_text(mesh%n_other) &
                     //' solid elements that are not tetrahedra')
     else if (.not. allocated(mesh%tag)) then
-      call complain(words, 'the file ends without points, the section $Nodes')
+      call report(words, 'the file ends without points, the section $Nodes')
     end if
     if (len(words%problem) == 0) call number_from_one(words, mesh, point, tet)
   end subroutine read_gmsh
@@ -189,7 +189,7 @@ contains
     do i = 1, size(mesh%tag)
       if (place(mesh%tag(i)) /= 0) then
         words%line = mesh%point_line(i)
-        call complain(words, 'there are two points '//to_text(mesh%tag(i)))
+        call report(words, 'there are two points '//to_text(mesh%tag(i)))
         return
       end if
       place(mesh%tag(i)) = i
@@ -203,7 +203,7 @@ contains
         if (tag >= 1 .and. tag <= size(place)) tet(k, i) = place(tag)
         if (tet(k, i) > 0) cycle
         words%line = mesh%tet_line(i)
-        call complain(words, 'a tetrahedron has the corner '//to_text(tag) &
+        call report(words, 'a tetrahedron has the corner '//to_text(tag) &
                       //', which is no point of the file')
         return
       end do
@@ -217,7 +217,7 @@ contains
     type(gmsh_t), intent(inout) :: mesh
     integer :: n_block, n, b, in_block, found, parameters
 
-    if (allocated(mesh%tag)) call complain(words, '$Nodes stands a second time')
+    if (allocated(mesh%tag)) call report(words, '$Nodes stands a second time')
     n_block = 1
     if (blocks) call get_count(words, 'blocks', 4, n_block)
     call get_count(words, 'points', 4, n)
@@ -230,14 +230,14 @@ contains
     do b = 1, n_block
       if (blocks) call begin_block(words, parameters)
       if (blocks) call get_count(words, 'points', 4, in_block)
-      if (in_block > n - found) call complain(words, 'more points than announced')
+      if (in_block > n - found) call report(words, 'more points than announced')
       if (len(words%problem) > 0) return
       call read_node_block(words, blocks, parameters, mesh%tag(found + 1:found + in_block), &
         mesh%x(:, found + 1:found + in_block), mesh%point_line(found + 1:found + in_block))
       if (len(words%problem) > 0) return
       found = found + in_block
     end do
-    if (found < n) call complain(words, 'fewer points than announced')
+    if (found < n) call report(words, 'fewer points than announced')
     call end_section(words, '$EndNodes')
   end subroutine read_nodes
 
@@ -249,7 +249,7 @@ contains
 
     call get_integer(words, dimension)
     if (dimension < 0 .or. dimension > 3) then
-      call complain(words, to_text(dimension)//' stands where a dimension, 0 to 3, should')
+      call report(words, to_text(dimension)//' stands where a dimension, 0 to 3, should')
     end if
     call skip_integers(words, 1)
     call get_integer(words, parametric)
@@ -291,7 +291,7 @@ contains
 
     call get_integer(words, tag)
     if (tag >= 1 .and. tag <= highest_tag) return
-    call complain(words, 'a point has the number '//to_text(tag)//', allowed are 1 to ' &
+    call report(words, 'a point has the number '//to_text(tag)//', allowed are 1 to ' &
                   //to_text(highest_tag))
   end subroutine get_tag
 
@@ -302,7 +302,7 @@ contains
     type(gmsh_t), intent(inout) :: mesh
     integer :: n_block, n, b, i, in_block, found, kind
 
-    if (allocated(mesh%tet)) call complain(words, '$Elements stands a second time')
+    if (allocated(mesh%tet)) call report(words, '$Elements stands a second time')
     n_block = 1
     if (blocks) call get_count(words, 'blocks', 4, n_block)
     call get_count(words, 'elements', 2, n)
@@ -316,7 +316,7 @@ contains
       if (blocks) call skip_integers(words, 2)
       if (blocks) call get_integer(words, kind)
       if (blocks) call get_count(words, 'elements', 2, in_block)
-      if (in_block > n - found) call complain(words, 'more elements than announced')
+      if (in_block > n - found) call report(words, 'more elements than announced')
       do i = 1, in_block
         call skip_integers(words, 1)
         if (.not. blocks) call get_kind_and_skip_tags(words, kind)
@@ -325,7 +325,7 @@ contains
       end do
       found = found + in_block
     end do
-    if (found < n) call complain(words, 'fewer elements than announced')
+    if (found < n) call report(words, 'fewer elements than announced')
     call end_section(words, '$EndElements')
   end subroutine read_elements
 
@@ -348,7 +348,7 @@ contains
     integer :: k
 
     if (kind < 1 .or. kind > size(nodes_of)) then
-      call complain(words, 'element type '//to_text(kind)//' is unknown')
+      call report(words, 'element type '//to_text(kind)//' is unknown')
     end if
     if (len(words%problem) > 0) return
     if (kind == tet_type) then

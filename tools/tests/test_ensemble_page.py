@@ -39,7 +39,7 @@ def test_the_sentence_has_shares_and_heights(report: Path) -> None:
     said = ensemble_page.sentence(found)
     assert "17\u00a0%" in said  # numbers and units stay on one line
     said = said.replace("\u00a0", " ")
-    assert said.startswith("12 blocks lie around x = 223, y = 50 mm, with a standard deviation")
+    assert said.startswith("12 blocks lie around x = 223.3, y = 50 mm, with a standard deviation")
     assert "% of them (" in said and "lie outside the area of the drops, x = 120 to 180" in said
     assert "In 2 of 12 (17 %, 5 to 45) runs every dropped block ends off the floor" in said
     assert "in 6 of 12 (50 %, 25 to 75) at least one more" in said

@@ -2,7 +2,7 @@
 program test_file_words
   use kinds_m, only: wp
   use file_words_m, only: words_t, read_whole, next_word, get_integer, get_real, get_count, &
-    complain, place_of
+    report, place_of
   use check_m, only: check, finish_checks
   implicit none
   character, parameter :: lf = achar(10), tab = achar(9), cr = achar(13)
@@ -93,7 +93,7 @@ contains
 
     words = text_of('x 5 6')
     call get_integer(words, n)
-    call complain(words, 'another')
+    call report(words, 'another')
     call check('the first problem stays', index(words%problem, 'x') > 0)
     call check('nothing is read after it', next_word(words) == '')
   end subroutine first_problem
