@@ -71,8 +71,8 @@ contains
 
     word = ''
     if (len(words%problem) > 0) return
-    if (words%at == 1 .and. index(words%text, byte_order_mark) == 1) then
-      words%at = len(byte_order_mark) + 1
+    if (words%at == 1) then   ! not joined by .and.: `index` may pass over the whole text each time
+      if (index(words%text, byte_order_mark) == 1) words%at = len(byte_order_mark) + 1
     end if
     do while (words%at <= len(words%text))
       select case (words%text(words%at:words%at))
