@@ -1,11 +1,13 @@
 !> Checks for the unit tests: count, name what failed, end with an exit code.
 module check_m
-  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use, intrinsic :: iso_fortran_env, only: compiler_options, error_unit, output_unit
   use kinds_m, only: wp
   implicit none
   private
-  public :: check, finish_checks
+  public :: check, checked, finish_checks
 
+  !> With run-time checks, some eight times as slow: fewer random poses and damaged places do.
+  logical, parameter :: checked = index(compiler_options(), '-fcheck=all') > 0
   integer :: n_passed = 0, n_failed = 0
 
   !> One check: of a condition, of equal integers, or of reals within an absolute tolerance.
