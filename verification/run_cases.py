@@ -20,6 +20,7 @@ import sys
 import time
 import tomllib
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -40,7 +41,7 @@ MPI_SETTINGS = {
     "OMPI_MCA_mpi_yield_when_idle": "1",
 }
 COST = 10.0
-"""Seconds on one core that a run takes which does not say so."""
+"""Seconds on one core that a run takes which does not say so; the longest run of `make test`."""
 
 
 @dataclass(frozen=True)
@@ -104,9 +105,9 @@ def prepare(name: str, work: Path) -> list[Path]:
     return sorted([*(CASES / name).glob("*.nml"), *work.glob("*.nml")])
 
 
-def planned(case: str, work: Path, cost: float = float("inf")) -> list[Planned]:
-    """The runs of a case that cost no more than `cost`: every *.nml, and for every table in
-    variants.toml the file `from` (case.nml) with some values changed."""
+def planned(case: str, work: Path) -> list[Planned]:
+    """The runs of a case: every *.nml, and for every table in variants.toml the file `from`
+    (case.nml) with some values changed."""
     folder, found = CASES / case, []
     for path in prepare(case, work):
         text = path.read_text()
@@ -122,7 +123,15 @@ def planned(case: str, work: Path, cost: float = float("inf")) -> list[Planned]:
             misses = bool(table.pop("misses", ""))
             text = changed(base.read_text(), table)
             found.append(Planned(case, name, text, own_cost, fine, misses))
-    return [run for run in found if run.cost <= cost]
+    return found
+
+
+def quick(plans: list[Planned]) -> list[Planned]:
+    """Those of the runs of a case that `make test` takes: short ones that are not known to miss,
+    of these the ones that fit a pattern of `QUICK` in check.py, if it has some."""
+    patterns = getattr(checker(plans[0].case), "QUICK", ("*",)) if plans else ()
+    short = [plan for plan in plans if plan.cost <= COST and not plan.misses]
+    return [plan for plan in short if any(fnmatch(plan.name, pattern) for pattern in patterns)]
 
 
 def changed(text: str, groups: dict[str, Any]) -> str:
@@ -175,15 +184,10 @@ def checker(case: str) -> ModuleType:
     return module
 
 
-def verify(
-    name: str, out: Path, machine: Machine, cost: float = float("inf"), *, misses: bool = True
-) -> tuple[bool, str]:
-    """Run all of a case that costs no more than `cost`, with the runs that are known to miss or
-    without, and its check; whether it holds, and the report."""
+def verify(name: str, out: Path, machine: Machine, plans: list[Planned]) -> tuple[bool, str]:
+    """Run these of a case, and its check; whether it holds, and the report."""
     folders, lines = [], []
-    for plan in planned(name, out / name, cost):
-        if plan.misses and not misses:
-            continue
+    for plan in plans:
         folder, case = out / name / plan.name, plan.write(out / name)
         seconds = run(case, folder, machine)
         lines.append(f"{name}/{plan.name}: {seconds:.1f} s")
@@ -206,7 +210,9 @@ def main() -> None:
     failed = 0
     for name in given.case:
         try:
-            holds, report = verify(name, given.out, machine, given.cost)
+            plans = planned(name, given.out / name)
+            chosen = [plan for plan in plans if plan.cost <= given.cost]
+            holds, report = verify(name, given.out, machine, chosen)
         except RuntimeError as problem:
             holds, report = False, str(problem)
         print(report, flush=True)

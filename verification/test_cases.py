@@ -1,24 +1,27 @@
 """The verification cases as tests, as far as their runs are short; `make verify` runs all."""
 
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
 
-from run_cases import Machine, changed, names, planned, verify
+from run_cases import Machine, Planned, changed, checker, names, planned, quick, verify
 from verify import LEVELS, prepared_key
 
 pytestmark = pytest.mark.cost(10)
 
-COST = 10.0
-"""Longest run [s] that is part of `make test`."""
+TOGETHER = 15.0
+"""Most that the quick runs of a case take together [s on one core]."""
 
 
 @pytest.mark.parametrize("name", names())
 def test_case(name: str, tmp_path: Path) -> None:
-    """Run the short runs of the case and ask its check."""
-    if all(plan.misses for plan in planned(name, tmp_path / name, COST)):
+    """Run the quick runs of the case and ask its check."""
+    plans = planned(name, tmp_path / name)
+    chosen = quick(plans)
+    if not chosen:
         pytest.skip("all its runs are long, or known to miss")
-    holds, report = verify(name, tmp_path, Machine(), COST, misses=False)
+    holds, report = verify(name, tmp_path, Machine(), chosen)
     assert holds, report
 
 
@@ -27,9 +30,27 @@ def test_runs_kept_go_with_what_prepared_them() -> None:
     assert prepared_key("sloshing") != prepared_key("cavity") == ""
 
 
-def test_levels_fit_into_their_time(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def plans(tmp_path_factory: pytest.TempPathFactory) -> list[Planned]:
+    """All runs of all cases."""
+    work = tmp_path_factory.mktemp("plans")
+    return [plan for name in names() for plan in planned(name, work / name)]
+
+
+@pytest.mark.xdist_group("plans")
+def test_quick_runs_are_few(plans: list[Planned]) -> None:
+    """By their stated costs; and each pattern that chooses them fits one."""
+    for name in names():
+        chosen = quick([plan for plan in plans if plan.case == name])
+        together = sum(plan.cost for plan in chosen)
+        assert together <= TOGETHER, f"{name}: {together} s"
+        for pattern in getattr(checker(name), "QUICK", ()):
+            assert any(fnmatch(plan.name, pattern) for plan in chosen), f"{name}: {pattern}"
+
+
+@pytest.mark.xdist_group("plans")
+def test_levels_fit_into_their_time(plans: list[Planned]) -> None:
     """By the costs that the runs state, each level of `make verify` ends before its limit."""
-    plans = [plan for name in names() for plan in planned(name, tmp_path / name)]
     for level in LEVELS.values():
         needs = level.needs(plans)
         assert needs < 0.95 * level.limit, f"{level.name}: {needs / 60:.1f} min"

@@ -7,6 +7,7 @@ from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
 VARIES = ("numerics coupling",)
+QUICK = ("tight_12", "wide_24", "wide_12_m*", "cylinder_tight_12", "cylinder_wide_24")
 
 
 def along(run: Run) -> int:

@@ -3,6 +3,7 @@
 from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
+QUICK = ("cells_08", "hexapod_*")
 TOUCHING = 0.803  # of the displaced mass: a sphere, Lamb, Hydrodynamics, art. 98
 """As `src/coupling/added_mass.f90` takes it for every shape."""
 

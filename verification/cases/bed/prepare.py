@@ -66,7 +66,7 @@ def octahedra(name: str, centres: np.ndarray, radius: float) -> None:
 def slope_case(name: str, mu: float, end: float, model: str, sphere: bool) -> None:
     """A flat box, and a sphere, put on the slope."""
     normal = np.array([np.sin(np.radians(ANGLE)), 0.0, np.cos(np.radians(ANGLE))])
-    text = DRY.format(title=f"slope of 20 degrees, friction {mu:g}", cost="5 s", end=end)
+    text = DRY.format(title=f"slope of 20 degrees, friction {mu:g}", cost="0.5 s", end=end)
     text += "&grid  cells = 55, 15, 30  length = 1.1, 0.3, 0.6 /\n&bed file = 'slope.txt' /\n"
     text += f"&contact model = '{model}'  wall_friction = {mu:g}  sleep = F /\n"
     stand = 0.01 if model == "surface" else 0.0111  # contact spheres reach beyond the box
@@ -98,7 +98,7 @@ slope_case("slope_stand_spheres", 0.4, 2.0, "spheres", sphere=False)
 slope_case("slope_slide", 0.2, 0.6, "surface", sphere=True)
 
 Path("groove.nml").write_text(
-    DRY.format(title="a cube in a groove", cost="2 s", end=1.5)
+    DRY.format(title="a cube in a groove", cost="0.2 s", end=1.5)
     + """&grid  cells = 10, 10, 10  length = 0.1, 0.1, 0.1 /
 &bed file = 'groove.txt' /
 &shape name = 'cube'  kind = 'cube'  size = 0.02 /
@@ -124,24 +124,24 @@ FLOORS = {
 }
 for floor in ("bed", "wall"):
     for model in ("surface", "spheres"):
-        text = DRY.format(title=f"blocks on a flat {floor}", cost="1 s", end=0.5) + FLOORS[floor]
+        text = DRY.format(title=f"blocks on a flat {floor}", cost="0.1 s", end=0.5) + FLOORS[floor]
         text += BLOCKS.format(model=model, cube=FLAT + 0.02, ball=FLAT + 0.025)
         Path(f"flat_{floor}_{model}.nml").write_text(text)
 for floor in ("bed", "box"):
-    text = WET.format(title=f"a wave over a flat {floor}", cost="5 s", end=0.2)
+    text = WET.format(title=f"a wave over a flat {floor}", cost="0.2 s", end=0.2)
     Path(f"flat_{floor}_wave.nml").write_text(text + FLOORS[floor] + WAVE)
 for name, file, kind, level in (
     ("rough", "rough.txt", "heightmap", 0.053),
     ("stones", "stones.stl", "stl", 0.0871),
 ):
     Path(f"{name}.nml").write_text(
-        WET.format(title=f"still water over a bed: {name}", cost="10 s", end=1.0)
+        WET.format(title=f"still water over a bed: {name}", cost="1 s", end=1.0)
         + "&grid  cells = 12, 11, 10  length = 0.1, 0.1, 0.1 /\n"
         + f"&bed file = '{file}'  kind = '{kind}' /\n&fluid water_level = {level} /\n"
     )
 
 Path("drop.nml").write_text(
-    WET.format(title="blocks dropped in water on a rough bed", cost="10 s", end=1.0)
+    WET.format(title="blocks dropped in water on a rough bed", cost="2 s", end=1.0)
     + """&grid  cells = 14, 14, 14  length = 0.1, 0.1, 0.1 /
 &bed file = 'rough.txt' /
 &fluid water_level = 0.0712 /

@@ -7,7 +7,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 HEAD = """! {what}
-! cost: 1 s
+! cost: 0.2 s
 &run
   title = '{what}'
   physics = 'dry'

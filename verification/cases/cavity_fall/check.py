@@ -10,6 +10,13 @@ from micstools.shapes.geometry import Array
 VARIES = ("contact contact_time",)
 """It goes with the size of the block."""
 
+QUICK = (
+    "cube_prototype_05_100_4",
+    "dolos_model_tension_*",
+    "hexapod_prototype_05_100_6",
+    "tetrapod_prototype_05_*_4",
+)
+
 WINDOW_LIMIT = 0.6  # mean acceleration of a window [g]
 STEP_LIMIT = 3.0  # acceleration of a step [g] above which its change of velocity is looked at
 CHANGE_LIMIT = 0.02  # of such a step [sqrt(g D)]

@@ -13,6 +13,7 @@ TILT = 0.5  # [degrees]
 CREEP = 1e-6  # [m/s]
 PARTS = {"aligned cubes": slice(0, 10), "cubes with offsets": slice(10, 20), "hook": slice(21, 22)}
 VARIES = ("contact sleep", "contact solver")
+QUICK = ("impulses",)
 
 
 def check(runs: list[Run]) -> Checks:

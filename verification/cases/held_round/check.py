@@ -8,6 +8,7 @@ from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
+QUICK = ("sphere_06", "moved_06")
 DRAG = {"sphere": 0.40, "finite cylinder": 0.68, "cylinder": 1.15}  # in a wide stream
 DRAG_AT_1E3 = 0.45  # of the sphere
 BAND = 0.15

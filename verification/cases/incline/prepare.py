@@ -7,7 +7,7 @@ import numpy as np
 
 ROWS = np.loadtxt(Path(__file__).with_name("D5.csv"), delimiter=",", skiprows=2)
 TEXT = """! Flat box and sphere on an incline of {theta:g} degrees, friction {mu:g}.
-! cost: 1 s
+! cost: 0.1 s
 &run
   title = 'incline'
   physics = 'dry'

@@ -5,6 +5,7 @@ import numpy as np
 from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
+QUICK = ("straight_08_*_50", "oblique_08_*_100", "cylinder_10_*_50")
 BAND = {"sphere": 0.04, "cylinder": 0.06}
 """A tenth of the drag of a sphere at Reynolds numbers of 1e3 to 1e5; a cylinder drags more."""
 APART = 0.03  # moved less held, which in truth are one and the same flow

@@ -11,7 +11,7 @@ from micstools.cases.initial_state import below_surface, write_initial_state  # 
 from micstools.shapes.geometry import Array  # noqa: E402
 
 DEPTHS = {"long": (0.0513, 0.2), "medium": (0.1013, 0.1), "short": (0.1513, 0.06)}
-COSTS = {"long": 8, "medi": 21, "shor": 21}  # [s]
+COSTS = {"long": 5, "medi": 21, "shor": 21}  # [s]
 LENGTH, SPACING, HEIGHT = 1.0, 0.01, 0.002  # of the tank, the cells, the hump [m]
 
 CASE = """! cost: {cost} s

@@ -13,6 +13,7 @@ from micstools.reading.reader import Run
 from micstools.shapes.geometry import Array
 
 BAND, BAND_CELLS = 0.01, 20  # of the largest velocity of the profile
+QUICK = ("case", "duct_*")
 THIN = 3.0  # cells: a thinner layer at the wall is shown for information
 TIMES = {"t0p02": 0.02, "t0p05": 0.05, "t0p1": 0.1, "steady": 1.0}
 

@@ -10,6 +10,7 @@ from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
 VARIES = ("contact restitution", "contact contact_time", "contact lubrication")
+QUICK = ("approach_06",)
 BAND, FILM_BAND, MEAN_BAND = 0.25, 0.05, 0.03
 IMPACT = {"St27": 0.518, "St152": 0.585}  # speed of impact [m/s], in the heads of the files
 

@@ -5,6 +5,7 @@ import numpy as np
 from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
+QUICK = ("Re30_04",)
 BAND = 0.1
 CUBE = (np.pi / 6) ** (1 / 3)  # sphericity
 HEXAPOD = 0.589877

@@ -5,6 +5,7 @@ import numpy as np
 from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
+QUICK = ("dolos_lab_06",)
 BANDS = {12.0: 0.15, 24.0: 0.10}  # of the speed with half the cells, by the finer grid
 MASKELL = 2.5  # rise of the dynamic pressure over C_d S/C
 EXPECTED = {  # drag coefficient on the sphere of the same volume, see README.md

@@ -16,6 +16,7 @@ VARIES = (  # every way to compute keeps still water still
     "numerics solid_fraction",
     "numerics pressure_solver",
 )
+QUICK = ("default", "paper", "split_cells")
 SPEED_BAND = {1e-6: 1e-6, 1e-10: 1e-9}  # divergence tolerance [1/s]: largest speed [m/s]
 
 

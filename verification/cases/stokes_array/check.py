@@ -9,6 +9,9 @@ from micstools.reading.reader import Run
 DRAG_BAND, SCATTER_BAND, BALANCE_BAND = 0.015, 0.01, 1e-3
 
 
+QUICK = ("cells_12_mid_cell", "cells_12_offset_1")
+
+
 def drag_factor(share: float) -> float:
     """Drag over 6 pi mu a U of a sphere in a simple cubic array that fills a share of space, U
     the mean velocity over all space: series of Sangani and Acrivos (1982)."""

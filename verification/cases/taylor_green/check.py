@@ -12,6 +12,7 @@ from micstools.reading.profiles import table
 from micstools.reading.reader import Run
 
 VARIES = ("numerics momentum",)
+QUICK = ("cells_16", "cells_32", "ismac_16", "ismac_32", "long_*")
 AMPLITUDE_BAND, BAND_CELLS = 0.01, 32
 LEAST_ORDER = {"cells": 1.9, "courant": 1.9, "ismac": 1.9, "long": 0.9}
 LABEL = {

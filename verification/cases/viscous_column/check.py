@@ -11,6 +11,14 @@ from micstools.shapes.geometry import Array
 VARIES = ("numerics momentum", "numerics coupling")
 """In rows that do not count."""
 
+QUICK = (
+    "honey_no_slip_tenth",
+    "honey_*slip*_whole",
+    "equal_thin_whole",
+    "oil_thick_gas_whole",
+    "cube_honey_whole",
+)
+
 GRAVITY = 9.81
 FREE_FALL = 1.01  # of what a body has lost: steps of its free fall and rounding
 STEP_BAND = 0.15  # of the largest energy with a tenth of the step

@@ -11,6 +11,7 @@ from measures.checks import Checks, main, sound
 from measures.waves import standing_amplitude
 from micstools.reading.reader import Run
 
+QUICK = ("cells_32",)
 RMS_BAND = 0.02  # of the initial amplitude
 COUNTS_FROM = 32  # cells per wavelength
 AMPLITUDE = 0.01  # [m]

@@ -6,6 +6,7 @@ from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
 VARIES = ("contact restitution", "contact solver")
+QUICK = ("case", "step_1", "cells_12", "impulses_coarse")
 BAND = 0.05
 LATER = 3.0e-3  # s after the contact
 DIAMETER, COARSE = 0.02, 8  # m; cells along it, of the runs with different steps
