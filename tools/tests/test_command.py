@@ -52,14 +52,23 @@ def test_every_input_file_leads_to_its_folder(case: Path, tmp_path: Path, monkey
         command.results_of(case)
 
 
-@pytest.mark.parametrize("script", OF_RUNS)
-def test_a_wrong_folder_or_file_is_one_line(script: str, tmp_path: Path) -> None:
+def test_a_wrong_folder_or_file_is_named(tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("Dear reader,\nthis is no case.\n")
     (tmp_path / "bytes").write_bytes(bytes(range(256)))
     (tmp_path / "empty").mkdir()
-    assert "there is no such folder or file" in one_line(call(script, tmp_path / "missing"))
-    assert "holds no run.h5" in one_line(call(script, tmp_path / "empty"))
-    assert "neither a folder of results nor a case" in one_line(call(script, tmp_path / "bytes"))
+    for name, problem in {
+        "missing": "there is no such folder or file",
+        "empty": "holds no run.h5",
+        "bytes": "neither a folder of results nor a case",
+        "letter.txt": "neither a folder of results nor a case",
+    }.items():
+        with pytest.raises((BadRun, OSError), match=f"^{tmp_path}/{name}:? .*{problem}"):
+            _ = command.open_run(tmp_path / name).bodies
+
+
+@pytest.mark.parametrize("script", OF_RUNS)
+def test_a_script_refuses_in_one_line(script: str, tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").write_text("Dear reader,\nthis is no case.\n")
     said = one_line(call(script, tmp_path / "letter.txt"))
     assert said.startswith(f"{script}: {tmp_path}/letter.txt: neither")
 
