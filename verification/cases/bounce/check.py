@@ -30,6 +30,9 @@ VARIES = (
     "contact k_n",
     "contact gamma_n",
     "contact eta_n",
+    "contact k_t",
+    "contact gamma_t",
+    "contact eta_t",
 )
 
 

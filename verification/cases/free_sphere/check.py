@@ -8,7 +8,12 @@ import numpy as np
 from measures.checks import Checks, main, sound
 from micstools.reading.reader import Run
 
-VARIES = ("numerics momentum", "numerics solid_fraction", "numerics pressure_solver")  # of one run
+VARIES = (  # of one run
+    "numerics momentum",
+    "numerics solid_fraction",
+    "numerics subcells",
+    "numerics pressure_solver",
+)
 THEORY_BAND, STEP_BAND = 0.02, 0.01
 START_BAND = 0.03  # of way and speed at the ends of the first steps, at the default step
 SPIN_BAND = 1.0  # speed of the surface by spin over that of the sphere

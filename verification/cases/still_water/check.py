@@ -14,6 +14,7 @@ VARIES = (  # every way to compute keeps still water still
     "numerics coupling",
     "numerics momentum",
     "numerics solid_fraction",
+    "numerics subcells",
     "numerics pressure_solver",
 )
 QUICK = ("default", "paper", "split_cells")

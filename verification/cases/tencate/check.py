@@ -9,6 +9,7 @@ from measures.checks import Checks, sound
 from micstools.reading.reader import Run
 
 HERE = Path(__file__).resolve().parent
+VARIES = ("contact lubrication",)
 CURVE_BAND = 0.05  # of the measured largest speed
 START_BAND = 0.02  # of the measured largest speed
 START = 0.05  # diameters of fall in which the start is judged

@@ -8,6 +8,7 @@ import numpy as np
 from measures.checks import Checks, main, sound
 from micstools.reading.reader import Run
 
+VARIES = ("contact contact_time",)  # of one run
 SPIN = 1e-3  # rad/s
 SIDEWAYS = 1e-4  # of the speed
 
