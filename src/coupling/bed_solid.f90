@@ -9,7 +9,8 @@ module bed_solid_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo
-  use bed_m, only: bed_t, facet_within, clip_polygon, most_corners
+  use polygon_m, only: clip_polygon
+  use bed_m, only: bed_t, facet_within, most_corners
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t
   implicit none

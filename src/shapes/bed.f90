@@ -7,11 +7,12 @@
 module bed_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
-  use errors_m, only: problems_t, to_text
+  use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t
   use named_files_m, only: found_file
   use value_text_m, only: quoted_text
   use vectors_m, only: cross, norm
+  use polygon_m, only: clip_polygon
   use tet_mesh_m, only: shape_t
   use neighbours_m, only: bins_t, bins_build
   use surface_features_m, only: surface_init, pair_edges
@@ -21,7 +22,7 @@ module bed_m
   implicit none
   private
   public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
-  public :: facet_within, clip_polygon, most_corners, way_of, height_of
+  public :: facet_within, most_corners, way_of, height_of
 
   integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
   integer, parameter :: most_corners = 12  !! of a facet cut at five planes, and more
@@ -561,45 +562,12 @@ contains
     end do
   end subroutine facet_within
 
-  !> Keep the part of a convex polygon where side*(x(d) - plane) >= 0; it has one corner more at
-  !! most.
-  pure subroutine clip_polygon(d, plane, side, n, p)
-    integer, intent(in) :: d
-    real(wp), intent(in) :: plane, side
-    integer, intent(inout) :: n
-    real(wp), intent(inout) :: p(:, :)   !! (3, at least n + 1)
-    real(wp) :: old(3, n), here, before
-    integer :: v, w
-
-    if (n == 0) return
-    old = p(:, :n)
-    w = n
-    n = 0
-    before = side*(old(d, w) - plane)
-    do v = 1, size(old, 2)
-      here = side*(old(d, v) - plane)
-      if (here*before < 0.0_wp) then
-        n = n + 1
-        p(:, n) = old(:, w) + before/(before - here)*(old(:, v) - old(:, w))
-        p(d, n) = plane
-      end if
-      if (here >= 0.0_wp) then
-        n = n + 1
-        p(:, n) = old(:, v)
-      end if
-      w = v
-      before = here
-    end do
-  end subroutine clip_polygon
-
   !> Three coordinates.
   pure function place_text(x) result(text)
     real(wp), intent(in) :: x(3)   !! [m]
     character(:), allocatable :: text
-    character(48) :: buffer
 
-    write (buffer, '(g0.4, ", ", g0.4, ", ", g0.4)') x
-    text = 'x, y, z = '//trim(buffer)//' m'
+    text = 'x, y, z = '//brief(x(1), 9)//', '//brief(x(2), 9)//', '//brief(x(3), 9)//' m'
   end function place_text
 
 end module bed_m

@@ -1,8 +1,8 @@
 !> How high the bed is at a place, and how much of the tank below a height is bed.
 module bed_measure_m
   use kinds_m, only: wp
-  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, &
-    clip_polygon, most_corners
+  use polygon_m, only: clip_polygon
+  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, most_corners
   implicit none
   private
   public :: bed_volume, bed_height

@@ -647,6 +647,9 @@ contains
     call refused(case, 'solid lies in solid', 'two pyramids in one another')
     call write_stl([0.53_wp, 0.03_wp, 0.02_wp], 0.03_wp, 1)
     call refused(case, 'outside the tank in x', 'a pyramid elsewhere')
+    case%grid%origin(1) = 354200.0_wp
+    call write_stl([354200.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, -1)
+    call refused(case, 'x, y, z = 354200.0', 'a pyramid inside out in a survey')
   end subroutine refusals
 
   subroutine refused(case, expected, name)
