@@ -252,6 +252,28 @@ def test_a_blocked_block_waits_is_raised_or_left_out(tmp_path: Path) -> None:
     assert found.release_time[1] == np.inf and list(found.present(-1)) == [True, False]
 
 
+def test_the_plan_is_without_the_random_shift(tmp_path: Path) -> None:
+    """Of a table, a track and a body; `spread` moves the first two."""
+    spread = "spread = 0.01, 0.01, 0 /\n"
+    groups = (
+        LYING
+        + "&drop file = 'plan.csv' "
+        + spread
+        + (
+            "&drop shape = 'cube'  position = 0.03, 0.03, 0.2  to = 0.09, 0.03, 0.2  count = 3 "
+            + spread
+        )
+    )
+    case = crane(tmp_path, groups)
+    (tmp_path / "plan.csv").write_text("shape,x,y,z,time\ncube,0.03,0.09,0.2,0\n")
+    bodies, _ = run(tmp_path, case)
+    plan = [(0.06, 0.06), (0.03, 0.09), (0.03, 0.03), (0.06, 0.03), (0.09, 0.03)]
+    assert bodies["planned"] == pytest.approx(np.array(plan), abs=1e-15)
+    away = np.abs(bodies["position"][0, :, :2] - bodies["planned"]).max(axis=1)
+    assert away[0] == 0 and (away[1:] > 1e-4).all() and (away < 0.01).all()
+    assert bodies["status"].dtype.kind == "i"
+
+
 def test_raised_out_of_the_water(tmp_path: Path) -> None:
     """A pile that reaches to the top does not stop a crane; below a lid it has to wait."""
     drop = "&drop shape = 'cube'  position = 0.06, 0.06, 0.02  count = 6  interval = 0.02 "

@@ -40,6 +40,7 @@ contains
     end if
     place%seed = drop%seed
     place%index = index
+    place%planned = place%x(:2)
     do d = 1, 3
       if (is_given(place%x(d))) place%x(d) = place%x(d) + drop%spread(d) &
         *(2*uniform(drop%seed, index, k_shift + d - 1) - 1.0_wp)
@@ -82,6 +83,7 @@ contains
     place%shape = body%shape
     place%x = body%position
     place%q = normalised(body%quaternion)
+    place%planned = body%position(:2)
     place%v = body%velocity
     place%time = body%release_time
     place%fixed = body%fixed

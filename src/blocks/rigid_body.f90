@@ -55,6 +55,7 @@ module rigid_body_m
     real(wp), allocatable :: release_time(:)     !! (n) due, then true time of release [s]
     real(wp), allocatable :: entry_time(:)       !! (n) likewise of coming into the tank [s]
     real(wp), allocatable :: raised(:)           !! (n) above its place when that was taken [m]
+    real(wp), allocatable :: planned(:, :)       !! (2, n) x, y without the random shift [m]
     character(name_length), allocatable :: name(:)   !! (n) of the unit in a plan; '': none
     type(handling_t), allocatable :: handling(:)     !! (n) by the crane
     logical, allocatable :: on_ground(:)         !! (n) its height is found at the release
@@ -128,6 +129,7 @@ contains
     blocks%entry_time(b) = place%time
     blocks%given%v(:, b) = place%v
     blocks%x(:, b) = place%x
+    blocks%planned(:, b) = place%planned
     blocks%q(:, b) = place%q
     if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
     associate (shape => blocks%shapes(blocks%shape(b)), handling => blocks%handling(b))
@@ -175,6 +177,7 @@ contains
         b = begun%block(i)
         if (begun%drop(i) > 0) b = b + size(case%body) + sum(case%drop(:begun%drop(i) - 1)%count)
         blocks%x(:, b) = begun%x(:, i)
+        blocks%planned(:, b) = begun%x(:2, i)
         blocks%q(:, b) = begun%q(:, i)
         if (blocks%q(1, b) < 0.0_wp) blocks%q(:, b) = -blocks%q(:, b)
         blocks%given%v(:, b) = begun%v(:, i)
@@ -219,6 +222,7 @@ contains
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
       blocks%raised(n), blocks%goal(n), source=0.0_wp)
     allocate (blocks%name(n), blocks%handling(n))
+    allocate (blocks%planned(2, n), source=0.0_wp)
     allocate (blocks%on_ground(n), source=.false.)
     allocate (blocks%status(n), source=to_come)
     allocate (blocks%x(3, n), blocks%q(4, n), blocks%v(3, n), blocks%l(3, n), blocks%omega(3, n), &

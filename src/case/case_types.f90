@@ -140,6 +140,7 @@ module case_types_m
     character(name_length) :: shape = ''
     character(name_length) :: name = ''             !! of the unit in a plan; '': none
     real(wp) :: x(3) = absent                       !! z absent: on what lies there [m]
+    real(wp) :: planned(2) = absent                 !! x, y without the random shift [m]
     real(wp) :: q(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     real(wp) :: v(3) = 0.0_wp                       !! [m/s]
     real(wp) :: time = 0.0_wp                       !! [s]

@@ -25,8 +25,8 @@ module hdf5_datasets_m
     generic :: store => store_reals, store_matrix, store_integers, store_table, store_texts
     procedure :: store_shaped_reals, store_shaped_integers
     procedure :: store_wide_integers
-    procedure, private :: rewrite_reals
-    generic :: rewrite => rewrite_reals
+    procedure, private :: rewrite_reals, rewrite_integers
+    generic :: rewrite => rewrite_reals, rewrite_integers
     procedure, private :: read_reals, read_integers, read_texts
     generic :: read => read_reals, read_integers, read_texts
     procedure :: new_blocks, write_block, read_block
@@ -177,6 +177,21 @@ contains
     call self%check(status, 'open '//name)
     call write_whole(self, name, id, memory_type(file_real64), size(a), c_loc(copy))
   end subroutine rewrite_reals
+
+  subroutine rewrite_integers(self, name, a)
+    class(h5_datasets_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer, intent(in) :: a(:)
+    integer, target :: copy(max(1, size(a)))
+    integer(hid_t) :: id
+    integer :: status
+
+    if (self%info /= 0) return
+    copy(:size(a)) = a
+    call h5dopen_f(self%id, name, id, status)
+    call self%check(status, 'open '//name)
+    call write_whole(self, name, id, memory_type(file_integer32), size(a), c_loc(copy))
+  end subroutine rewrite_integers
 
   !> All elements of a dataset, in a row; their number must be right.
   subroutine read_reals(self, name, a)

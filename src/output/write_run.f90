@@ -27,8 +27,8 @@ module write_run_m
   character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', &
     'N m', 'N', 'N m']
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
-    'raised', 'status']                      !! datasets with a number per block
-  character(*), parameter :: once_units(*) = ['s', 's', 'm', '1']
+    'raised']                                !! datasets with a number per block
+  character(*), parameter :: once_units(*) = ['s', 's', 'm']
   integer, parameter :: chunk_bytes = 16384  !! room that a column takes at a time
   integer, parameter :: running = &
     -1         !! exit status while the run goes on, or if it was killed
@@ -42,6 +42,7 @@ module write_run_m
     type(h5_column_t), private :: time, vector(n_vectors), quaternion, contacts, on_floor
     real(wp), allocatable, private :: q(:, :)          !! as in the last row
     real(wp), allocatable, private :: once(:, :)       !! (blocks, `once_name`) as in the file
+    integer, allocatable, private :: status(:)         !! of the blocks, as in the file
   end type run_file_t
 
 contains
@@ -88,6 +89,7 @@ contains
     end associate
     self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
                         [blocks%n, size(once_name)])
+    self%status = blocks%status
     self%q = first_sign(blocks%q)
   end subroutine create_run_file
 
@@ -204,6 +206,8 @@ contains
     do c = 1, size(once_name)
       call file%store('/bodies/'//trim(once_name(c)), trim(once_units(c)), once_values(blocks, c))
     end do
+    call file%store('/bodies/planned', 'm', blocks%planned)
+    call file%store('/bodies/status', '1', blocks%status)
     call file%attribute('/bodies/status', 'meaning', '0 not there yet, 1 being lowered, ' &
       //'2 released, 3 left out')
   end subroutine write_bodies
@@ -217,8 +221,7 @@ contains
     select case (c)
     case (1); values = blocks%release_time
     case (2); values = blocks%entry_time
-    case (3); values = blocks%raised
-    case default; values = real(blocks%status, wp)
+    case default; values = blocks%raised
     end select
   end function once_values
 
@@ -235,6 +238,9 @@ contains
       self%once(:, c) = values
       call self%file%rewrite('/bodies/'//trim(once_name(c)), values)
     end do
+    if (all(blocks%status == self%status)) return
+    self%status = blocks%status
+    call self%file%rewrite('/bodies/status', self%status)
   end subroutine rewrite_once
 
   !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
@@ -268,6 +274,7 @@ contains
       self%wall_time = wall_time(1)
       self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
                           [blocks%n, size(once_name)])
+      self%status = blocks%status
     end associate
   end subroutine reopen_run_file
 
@@ -284,6 +291,7 @@ contains
       do c = 1, size(once_name)
         call file%rewrite('/bodies/'//trim(once_name(c)), self%once(:, c))
       end do
+      call file%rewrite('/bodies/status', self%status)
       call file%attribute('/provenance', 'namelist', text)
       call file%attribute('/provenance', 'parameters', parameters)
       call file%attribute('/provenance', 'finished', '')

@@ -4,7 +4,7 @@ runs of an ensemble the ellipse in which a unit lands, and the share within a to
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -81,8 +81,7 @@ MEANING = {
     "shape": "name of its shape",
     "fixed": "1: it is held",
     "time": "of its release [s]",
-    "plan_x": "easting of its place in the plan, without the random shift by spread (that of a "
-    "table stays) [m]",
+    "plan_x": "easting of its place in the plan, without the random shift by spread [m]",
     "plan_y": "northing [m]",
     "plan_z": "level at its release [m]",
     "touching": "numbers of the units that it touches",
@@ -103,8 +102,8 @@ def heading_and_tilt(quaternion: Array, north: float = 0.0) -> tuple[float, floa
 
 def planned(run: Run) -> Array:
     """Place (N, 3) of each body in the plan [m]: where it is let go, without the random shift that
-    `spread` gives it, which stays in a place of a table. The last row before its release shows
-    where; nan of one not released."""
+    `spread` gives it. The last row before its release shows the level, and all of it in results of
+    older programs; nan of one not released."""
     b = run.bodies
     rows = np.searchsorted(b.time, b.release_time + 1e-12, side="right") - 1
     released = b.present(-1)
@@ -112,31 +111,8 @@ def planned(run: Run) -> Array:
     found = b.position[(rows + 1).clip(0, len(b.time) - 1), np.arange(b.n), 2]
     waits = start[:, 2] > run.grid.high[2]  # over the tank, until its level is found
     start[waits, 2] = found[waits]
-    for k, shift in _nominal(run):
-        start[k, :2] = shift
+    start[:, :2] = np.where(np.isfinite(b.planned), b.planned, start[:, :2])
     return np.where(released[:, None], start, np.nan)
-
-
-def _nominal(run: Run) -> Iterable[tuple[int, Array]]:
-    """Number and plan (2) [m] of each body of a `&drop` with `spread`, along its track."""
-    drops = run.parameters.get("drop", [])
-    first = len(run.parameters.get("body", []))
-    tables = [bool(str(d.get("file") or "").strip()) for d in drops]
-    counts = [0 if t else int(d.get("count") or 1) for t, d in zip(tables, drops, strict=True)]
-    rows = run.bodies.n - first - sum(counts)  # of tables, which say how many they are
-    if sum(tables) > 1 or (rows > 0) != any(tables):
-        return
-    for drop, table, count in zip(drops, tables, counts, strict=True):
-        if table:
-            first += rows
-            continue
-        start = np.array(drop["position"], float)
-        end = start if drop.get("to") is None else np.array(drop["to"], float)
-        if np.any(np.array(drop.get("spread") or 0.0, float)):
-            for k in range(count):
-                share = k / (count - 1) if count > 1 else 0.0
-                yield first + k, (start + share * (end - start))[:2]
-        first += count
 
 
 def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (it is frozen)

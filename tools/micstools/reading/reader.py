@@ -90,6 +90,7 @@ class Bodies:
     release_time: Array  # (N) true time of release, infinite for blocks not released yet [s]
     entry_time: Array  # (N) likewise of coming into the tank, earlier if a crane lowers it [s]
     raised: Array  # (N) height above the place, where that was taken [m]
+    planned: Array  # (N, 2) x and y without the random shift, nan in results of older programs [m]
     status: IntArray  # (N) 0 not there yet, 1 being lowered, 2 released, 3 left out
     time: Array  # (T) [s]
     position: Array  # (T, N, 3) [m]
@@ -466,7 +467,7 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
     """The bodies at `most` of the rows; the first `placed` of them are those of `&body`, the others
     drops."""
     group = h5["bodies"]
-    per_body = ("shape", "name", "mass", "fixed", *_HANDLED)
+    per_body = ("shape", "name", "mass", "fixed", "planned", *_HANDLED)
     rows = [f.name for f in fields(Bodies) if f.name not in per_body]
     complete = min(len(group[name]) for name in rows)
     step = -(-complete // most) if most else 1
@@ -476,6 +477,9 @@ def _read_bodies(h5: h5py.File, placed: int, most: int | None) -> Bodies:
         name=[_text(name) for name in group.get("name", [""] * len(group["mass"]))],
         mass=group["mass"][:],
         fixed=group["fixed"][:].astype(bool),
+        planned=group["planned"][:]
+        if "planned" in group
+        else np.full((len(group["mass"]), 2), np.nan),
         **_handled(group, values, placed),
         **values,
     )
