@@ -83,6 +83,7 @@ def test_runs_what_is_missing_and_writes_the_table(
     few = tuple(c for c in CHOICES if c.name in ("as_it_is", "tilt_15"))
     monkeypatch.setattr(paper, "CHOICES", few)
     words = ["x", "--case", str(case), "--out", str(out), "--runs", "2", "--moves", "1"]
+    words += ["--set", "drop.if_blocked=raise"]
     monkeypatch.setattr("sys.argv", words)
     for left in ("2 of them to do", "0 of them to do"):
         with pytest.raises(SystemExit) as end:
@@ -93,6 +94,9 @@ def test_runs_what_is_missing_and_writes_the_table(
         rows = list(csv.DictReader(file))
     assert [row["runs"] for row in rows] == ["2", "1", "1"]
     assert [row["what"] for row in rows] == [
-        "blocks.nml, as it is", "coarse: as it is", "coarse: tilts up to 15 degrees"]  # fmt: skip
+        "blocks.nml, drop.if_blocked=raise", "coarse: as it is",
+        "coarse: tilts up to 15 degrees"]  # fmt: skip
     assert "tilt_deg = 15" in (out / "tilt_15/0001/case.nml").read_text()
+    for name in ("drops", "as_it_is"):
+        assert "if_blocked = 'raise'" in (out / name / "0001/case.nml").read_text()
     assert (out / "drops/report.html").is_file() and (out / "shares.md").is_file()

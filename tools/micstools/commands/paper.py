@@ -22,6 +22,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """How many runs, and where they go."""
     add = parser.add_argument
     add("--case", type=Path, default=CASE, help="default input/blocks.nml")
+    add("--set", action="append", default=[], metavar="GROUP.VARIABLE=VALUE", help="in the case; "
+        "drop.if_blocked=raise lets drops go on above a pile that fills their place")  # fmt: skip
     add("--runs", type=int, default=50, help="drops of six blocks, default 50")
     add("--moves", type=int, default=0, help="runs of each choice that may move the shares, on "
         f"coarse cells ({COARSE}); default 0")  # fmt: skip
@@ -33,15 +35,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def work(given: argparse.Namespace) -> int:
     """Run what is missing, tell the shares and write `shares.csv` and `shares.md`."""
     folder: Path = given.out
-    case = program.case_text(given.case, [])
+    case = program.case_text(given.case, given.set)
     code = _ensemble(given, CHOICES[0], case, folder / "drops", given.runs)
     if code:
         return code
     _call(PILE, str(folder / "drops"))
     _call(REPORT, str(folder / "drops"))
-    rows = [paper_ensemble.row_of(f"{given.case.name}, as it is", folder / "drops")]
+    first = f"{given.case.name}, {', '.join(given.set) or 'as it is'}"
+    rows = [paper_ensemble.row_of(first, folder / "drops")]
     _write(folder, rows)
-    quick = program.case_text(given.case, [COARSE])
+    quick = program.case_text(given.case, [*given.set, COARSE])
     for choice in CHOICES if given.moves else ():
         code = _ensemble(given, choice, quick, folder / choice.name, given.moves)
         if code:
