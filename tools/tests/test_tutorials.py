@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,15 @@ SAID = {
         r"impact_speed +0\.34\d+, 0\.32\d+, 0\.32\d* m/s  order 2\.1\d*, limit 0\.31\d+ m/s",
         r"impact at 0\.32 to 0\.35 m/s: \n",
     ],
+    "crane": [
+        r"27 free units, 11 of them at rest",
+        r"layer coefficient of 1 layer \d\.\d+ by the ball",
+        r"down the slope: \d\.\d+ m on average",
+    ],
+    "hopper": [
+        r"current 0\.6 m/s: middle of the load at x = \d+\.\d m",
+        r"current 1\.2 m/s: middle of the load at x = \d+\.\d m",
+    ],
     "own_block": [
         r"3 parts were united: -22\.22%",
         r"cross is 3 cells long",
@@ -30,8 +40,16 @@ SAID = {
         r"block 3: let go at x = 0\.\d+ m, lies at x = 0\.\d+ m",
         r"x = 0\.5 m: 0\.",
     ],
+    "reef_list": [
+        r"35 rows, 35 on what lies there",
+        r"\d+ of 12 \(\d+ %, \d+ to \d+\) of the free units lie within 0\.3 m",
+        r"A3 354207\.\d+ 562110\.\d+ 0\.\d+ 0\.\d+",
+    ],
 }
 MADE = {
+    "crane": ["input/check.html", "mics-lines/places.geojson"],
+    "hopper": ["mics-slow/run.h5", "mics-fast/run.h5"],
+    "reef_list": ["mics-reefs/places.geojson"],
     "convergence": ["mics-fall/3/result/run.h5"],
     "own_block": ["cross.txt", "mics-crosses/report.html"],
     "reef_in_current": ["slope.txt", "mics-reef/run.h5", "reef.vtm"],
@@ -39,8 +57,9 @@ MADE = {
 
 
 def install(folder: Path) -> None:
-    """What a reader finds in the folder of mics: the program, Python and the tools of here."""
+    """What a reader finds in the folder of mics: the program, its cases, Python and the tools."""
     (folder / "mics").symlink_to(ROOT / "mics")
+    shutil.copytree(ROOT / "input", folder / "input")
     (folder / ".venv" / "bin").mkdir(parents=True)
     for name, words in (("python", ""), ("mics-tools", "-m micstools.cli ")):
         path = folder / ".venv" / "bin" / name
