@@ -124,7 +124,7 @@ contains
     call run(options, 5.75_wp, 9.0_wp, 0)
     if (.not. is_root()) return
 
-    call whole%aperture(here//'/whole/run.h5', .false., .false.)
+    call whole%open(here//'/whole/run.h5', .false., .false.)
     call whole%read('/series/time', time)
     call whole%read('/series/liquid_volume_drift', drift)
     call whole%read('/series/kinetic_energy_fluid', energy)
