@@ -14,7 +14,7 @@ from micstools import cli
 from micstools.pictures import labels, plots, scene
 from micstools.reading.reader import Run
 from micstools.shapes.shape import hexapod
-from synthetic import UPRIGHT, Motion
+from synthetic import UPRIGHT, Motion, write_run
 
 can_draw = pytest.mark.skipif(bool(scene.missing_libraries()), reason=scene.missing_libraries())
 TOOLS = Path(__file__).parents[1]
@@ -33,6 +33,21 @@ def test_a_picture_shows_blocks_and_water(loose_pile: Run, tmp_path: Path, view:
     bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
     assert reddish.mean() > 0.01
     assert (bluish.mean() < 0.1) if view == "top" else (bluish.mean() > 0.2)  # water veils the pile
+
+
+@can_draw
+def test_the_water_of_a_light_run_is_drawn_at_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write_run(tmp_path / "run")
+    (folder / "fields.vtkhdf").unlink()
+    monkeypatch.setattr(Run, "physics", property(lambda run: "light"))
+    for view, wet in (("front", True), ("top", False)):
+        for water in (True, False):
+            style = scene.Style(width=300, water=water)
+            rgb = colours(scene.picture(Run(folder), 8.0, view, tmp_path / "a.png", style))
+            bluish = (rgb[:, 2] > rgb[:, 0] + 10) & (rgb[:, 2] > 150)
+            assert (bluish.mean() > 0.2) == (wet and water)
 
 
 @can_draw

@@ -19,7 +19,7 @@ class Reel:
 
     def __init__(self, run: Run, width: int, aspect: float, water: bool) -> None:
         """Build everything for pictures `width` [pixels] wide and `aspect` times as high; `water`:
-        show that of the written fields."""
+        show that of the written fields, or of a light run."""
         self.run = run
         self._wet = water and run.field_times.size > 0
         self._field_time = np.nan
@@ -29,6 +29,8 @@ class Reel:
         plotter.suppress_rendering = True
         scene.add_tank(plotter, run.grid.low, run.grid.high)
         scene.add_bed(plotter, run)
+        if water:
+            scene.add_still_water(plotter, run)
         colours = scene.block_colours(run)
         shapes = [run.shapes[name] for name in run.bodies.shape]
         self._blocks = [

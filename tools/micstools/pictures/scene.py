@@ -16,6 +16,7 @@ from PIL import Image
 from micstools import extras
 from micstools.pictures import labels
 from micstools.pictures.vtk_data import shares_at_points, triangles_of, water_surface
+from micstools.piles import pile
 from micstools.reading import units
 from micstools.reading.overlap import present_bodies
 from micstools.reading.reader import Fields, Run
@@ -100,7 +101,8 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     """Draw the run at time `t` [s] seen from the `front` (along +y), the `side` (along -x) or the
     `top`, from where the water would only veil the blocks: without it and its arrows.
 
-    With fluid the picture is that of the written field nearest to `t`.
+    With fluid the picture is that of the written field nearest to `t`; the water of a light run is
+    drawn at rest.
     """
     style = style or Style()
     fields = run.fields_at(t) if run.field_times.size else None
@@ -109,7 +111,9 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
         fields = None
     camera = camera_for(run.grid.low, run.grid.high, view)
     width = style.width if view != "side" else int(0.55 * style.width)
-    plotter = _stage(run, row, fields if style.water else None, width, camera)
+    shown = fields if style.water else None
+    still_water = style.water and view != "top"
+    plotter = _stage(run, row, shown, still_water, width, camera)
     arrows = Arrows(np.empty((0, 3)), np.empty((0, 3)))
     if fields is not None and style.arrows:
         arrows = arrows_of(run, fields, view)
@@ -127,14 +131,18 @@ def picture(run: Run, t: float, view: str, path: Path, style: Style | None = Non
     return path
 
 
-def _stage(run: Run, row: int, fields: Fields | None, width: int, camera: Camera) -> Plotter:
-    """Tank, bed, blocks at a row and the water of some fields."""
+def _stage(
+    run: Run, row: int, fields: Fields | None, still_water: bool, width: int, camera: Camera
+) -> Plotter:
+    """Tank, bed, blocks at a row and the water of some fields, or that of a light run."""
     plotter = new_plotter(width, int(width * camera.aspect))
     _add_blocks(plotter, run, row)
     add_tank(plotter, run.grid.low, run.grid.high)
     add_bed(plotter, run)
     if fields is not None:
         add_water(plotter, run, fields)
+    if still_water:
+        add_still_water(plotter, run)
     return plotter
 
 
@@ -317,6 +325,26 @@ def add_water(plotter: Plotter, run: Run, fields: Fields) -> None:
     )
     look = {"color": WATER, "opacity": 0.12, "lighting": False}
     plotter.add_mesh(water, name=WATER_PARTS[1], **look)
+
+
+def add_still_water(plotter: Plotter, run: Run) -> None:
+    """Add the water of a light run, which has no fields, at its level at rest."""
+    import pyvista as pv
+
+    level = pile.still_level(run) if run.physics == "light" else None
+    if level is None:
+        return
+    low, high = run.grid.low.copy(), run.grid.high.copy()
+    high[2] = min(level, high[2])
+    outside = 1e-3 * (run.grid.high - run.grid.low)  # not in the sides of a bed
+    body = np.stack([low - outside, np.append(high[:2] + outside[:2], high[2])], axis=1).ravel()
+    look = {"color": WATER, "opacity": 0.12, "lighting": False}
+    plotter.add_mesh(pv.Box(bounds=body), name=WATER_PARTS[1], **look)
+    middle, size = 0.5 * (low + high), high - low
+    surface = pv.Plane(
+        center=[*middle[:2], high[2]], direction=[0, 0, 1], i_size=size[0], j_size=size[1]
+    )
+    plotter.add_mesh(surface, name=WATER_PARTS[0], color=WATER, opacity=0.4, lighting=False)
 
 
 @dataclass(frozen=True)
