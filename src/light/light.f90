@@ -48,6 +48,8 @@ module light_m
     real(wp) :: level = 0.0_wp                    !! [m]
     real(wp), allocatable :: wet(:), wet_before(:)   !! (n) V_w now and in the step before [m3]
     real(wp), allocatable :: moment(:, :)         !! (3, n) K_w about the centre [m4]
+    real(wp), allocatable :: cut_at(:)            !! (n) level at which a block at rest was cut [m]
+    real(wp), allocatable :: inverse(:, :, :)     !! (3, 3, shapes) inverse inertia [1/(kg m2)]
     real(wp), allocatable :: force(:, :)          !! (6, n) buoyancy and drag [N, N m]
     real(wp), allocatable :: start(:, :)
       !! (6, n) velocity and own angular momentum at the start of a step [m/s, kg m2/s]
@@ -72,15 +74,18 @@ contains
     light%bottom = case%grid%origin(3)
     light%area = free_area(case, bed)
     light%drag = case%shape%drag_coefficient
-    allocate (light%facets(size(blocks%shapes)), light%added(size(blocks%shapes)))
+    allocate (light%facets(size(blocks%shapes)), light%added(size(blocks%shapes)), &
+      light%inverse(3, 3, size(blocks%shapes)))
     do s = 1, size(blocks%shapes)
       associate (shape => blocks%shapes(s))
         light%facets(s) = split_panels(surface_panels(shape), &
                                        facet_max*shape%volume**(1.0_wp/3.0_wp))
         light%added(s) = added_inertia_of(shape)
+        light%inverse(:, :, s) = inverse3(shape%inertia)
       end associate
     end do
     allocate (light%wet(blocks%n), light%wet_before(blocks%n), source=0.0_wp)
+    allocate (light%cut_at(blocks%n), source=-huge(1.0_wp))
     allocate (light%moment(3, blocks%n), light%force(6, blocks%n), light%start(6, blocks%n), &
       source=0.0_wp)
     do b = 1, blocks%n
@@ -242,8 +247,10 @@ contains
       integer :: b
 
       do b = 1, blocks%n
-        if (blocks%present(b)) call submerge(blocks, b, light%level, light%wet(b), &
-                                             light%moment(:, b))
+        if (.not. blocks%present(b)) cycle
+        if (blocks%asleep(b) .and. abs(light%level - light%cut_at(b)) <= 0.0_wp) cycle
+        call submerge(blocks, b, light%level, light%wet(b), light%moment(:, b))
+        light%cut_at(b) = merge(light%level, -huge(1.0_wp), blocks%asleep(b))
       end do
       lack_of_level = 0.0_wp
       if (light%area > 0.0_wp) lack_of_level = light%level_start - light%level &
@@ -306,7 +313,7 @@ contains
 
     associate (s => blocks%shape(b))
       blocks%mass(b) = loaded_mass(light, blocks, b, light%wet(b))
-      blocks%inverse_inertia(:, :, b) = inverse3(blocks%shapes(s)%inertia) &
+      blocks%inverse_inertia(:, :, b) = light%inverse(:, :, s) &
         /growth(light, blocks, b, light%wet(b))
     end associate
   end subroutine load_block
