@@ -9,6 +9,8 @@
 !! Pairs of bodies keep a list of the features that may touch until they have moved against one
 !! another by a skin (`near_features_m`), and a short one of those that may touch soon
 !! (`short_list_m`). What comes out, and its order, do not depend on when the lists were made.
+!!
+!! With a margin (impulses) only what comes near by its own motion counts as a touch to come.
 module contact_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_room
@@ -21,7 +23,7 @@ module contact_surface_m
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
-  use meeting_m, only: poses_t, view_t, meeting_t, update_views, way_between
+  use meeting_m, only: poses_t, view_t, meeting_t, update_views, way_between, closes
   use near_features_m, only: near_features_t, search_t, list_features, list_bed, edge_in_view
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
@@ -123,7 +125,7 @@ contains
       if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
         speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
         gap = ahead*speed + self%search%margin
-        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, speed, gap, self, touches)
+        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, speed, ahead, self, touches)
         do w = 1, walls%n
           call touch_wall(walls, blocks, a, w, gap, self, touches)
         end do
@@ -299,12 +301,12 @@ contains
 
   !> Touches of body a and the bed: corners of the bed, corners of the body, crossing edges. The
   !! points inside the faces of a body do not touch it: as on a wall, some corner always does.
-  subroutine touch_bed(bed, blocks, a, speed, gap, self, touches)
+  subroutine touch_bed(bed, blocks, a, speed, ahead, self, touches)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     real(wp), intent(in) :: speed   !! of its points, at most [m/s]
-    real(wp), intent(in) :: gap     !! still taken as a touch [m]
+    real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
     type(touches_t), intent(inout) :: touches
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
@@ -316,8 +318,12 @@ contains
     now%turn_a = self%turn(:, :, a)
     now%turn_b = no_turn
     now%to_b = -now%poses%x_a
+    now%v = blocks%v(:, a)
+    now%omega_a = blocks%omega(:, a)
     now%speed = speed
-    now%gap = gap
+    now%gap = ahead*speed + self%search%margin
+    now%ahead = ahead
+    now%margin = self%search%margin
     call touch_features(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
       self%with_bed(a), touches, bed)
   end subroutine touch_bed
@@ -338,9 +344,14 @@ contains
     now%turn_a = self%turn(:, :, a)
     now%turn_b = self%turn(:, :, b)
     now%to_b = now%poses%x_b + self%pairs(slot)%shift - now%poses%x_a
-    now%speed = distance(blocks%v(:, a), blocks%v(:, b)) &
-      + norm(blocks%omega(:, a))*self%reach(a) + norm(blocks%omega(:, b))*self%reach(b)
+    now%v = blocks%v(:, a) - blocks%v(:, b)
+    now%omega_a = blocks%omega(:, a)
+    now%omega_b = blocks%omega(:, b)
+    now%speed = norm(now%v) + norm(now%omega_a)*self%reach(a) + norm(now%omega_b)*self%reach(b)
     now%gap = ahead*now%speed + self%search%margin
+    now%ahead = ahead
+    now%margin = self%search%margin
+    if (norm(now%to_b) > self%reach(a) + self%reach(b) + now%gap) return
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
@@ -457,6 +468,7 @@ contains
         touch%arm_b = arm - now%to_b
         touch%normal = outward
       end if
+      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
       call add_touch(touch, touches)
     end do
   end subroutine touch_probes
@@ -489,6 +501,7 @@ contains
       touch%normal = matmul(now%turn_b, crossing%normal)
       touch%depth = crossing%depth
       touch%weight = crossing%weight
+      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
       if (crossing%weight < 1.0_wp .and. crossing%depth > 0.0_wp) then
         call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
         touch%weight_shift = matmul(now%turn_b, with_shift)

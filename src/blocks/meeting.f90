@@ -1,11 +1,11 @@
 !> How two bodies that may touch stand to one another, and each seen from the other.
 module meeting_m
   use kinds_m, only: wp
-  use vectors_m, only: norm
+  use vectors_m, only: cross, norm
   implicit none
   private
   public :: poses_t, view_t, meeting_t
-  public :: update_views, inverse_view, seen_from, box_in_view, way_between
+  public :: update_views, inverse_view, seen_from, box_in_view, way_between, closes
 
   !> Poses of a pair of bodies.
   type :: poses_t
@@ -25,6 +25,10 @@ module meeting_m
     real(wp) :: to_b(3) = 0.0_wp       !! from the centre of a to that of b, space [m]
     real(wp) :: speed = 0.0_wp         !! of any two points against one another, at most [m/s]
     real(wp) :: gap = 0.0_wp           !! still taken as a touch [m]
+    real(wp) :: margin = 0.0_wp        !! part of it whatever the speed [m]
+    real(wp) :: ahead = 0.0_wp         !! time in which touches may come [s]
+    real(wp) :: v(3) = 0.0_wp          !! of a past b, space [m/s]
+    real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp       !! spins, space [rad/s]
     type(view_t) :: a_in_b, b_in_a     !! see `update_views`
   end type meeting_t
 
@@ -82,5 +86,21 @@ contains
     way = norm((now%x_a - before%x_a) - (now%x_b - before%x_b)) &
       + 2*reach_a*norm(now%q_a - before%q_a) + 2*reach_b*norm(now%q_b - before%q_b)
   end function way_between
+
+  !> Whether two places touch, or come as near as the margin in the time ahead. Where there is one,
+  !! others are left out: touches to come that the bodies pass by would hold them.
+  pure function closes(now, arm_a, arm_b, normal, depth) result(yes)
+    type(meeting_t), intent(in) :: now
+    real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres, space [m]
+    real(wp), intent(in) :: normal(3)            !! from a to b, space [-]
+    real(wp), intent(in) :: depth                !! now [m]
+    logical :: yes
+    real(wp) :: closing(3)
+
+    yes = depth > 0.0_wp .or. now%margin <= 0.0_wp
+    if (yes) return
+    closing = now%v + cross(now%omega_a, arm_a) - cross(now%omega_b, arm_b)
+    yes = depth + now%margin + now%ahead*dot_product(normal, closing) > 0.0_wp
+  end function closes
 
 end module meeting_m

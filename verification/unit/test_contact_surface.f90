@@ -31,6 +31,7 @@ program test_contact_surface
   call check_corner_in_face()
   call check_crossing_edges()
   call check_faces_on_one_another()
+  call check_touches_to_come()
   call check_balls()
   call check_energy()
   call check_lists()
@@ -180,6 +181,33 @@ contains
                                       1.0e-9_wp*d*force)
     end do
   end subroutine check_faces_on_one_another
+
+  !> A cube a gap above another: with a margin, as for impulses, it may touch soon if it comes down,
+  !! by its fall or its spin, not if it goes sideways. Without one all within reach may.
+  subroutine check_touches_to_come()
+    real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
+    type(world_t) :: world
+    real(wp) :: v(3, 4), spin(4)
+    integer :: m
+
+    v = reshape([0.0_wp, 0.0_wp, -speed, speed, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, speed, &
+                 0.0_wp, 0.0_wp, 0.0_wp], [3, 4])
+    spin = [0.0_wp, 0.0_wp, 0.0_wp, 2*speed/d]
+    do m = 1, 4
+      call new_world(world, ['cube', 'cube'])
+      world%blocks%x(3, 2) = 0.5_wp + d + gap
+      world%blocks%v(:, 2) = v(:, m)
+      world%blocks%omega(2, 2) = spin(m)
+      world%surface%search%margin = 1.0e-4_wp
+      call find_surface_touches(world%walls, world%blocks, ahead, world%surface, world%touches)
+      call check('comes', (world%touches%n > 0) .eqv. (m == 1 .or. m == 4))
+      if (m == 4) call check('on the side that comes down', &
+        minval(world%touches%item(:world%touches%n)%arm_a(1)) > 0.0_wp)
+      world%surface%search%margin = 0.0_wp
+      call find_surface_touches(world%walls, world%blocks, ahead, world%surface, world%touches)
+      call check('within reach', world%touches%n > 0)
+    end do
+  end subroutine check_touches_to_come
 
   !> A ball touches a ball, a face, an edge, a corner and a wall at one point each.
   subroutine check_balls()
