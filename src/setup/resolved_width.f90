@@ -21,7 +21,6 @@ contains
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`; a faulty one has no volume
     type(problems_t), intent(inout) :: problems
-    character(:), allocatable :: cure
     real(wp) :: edge, width(size(shapes))    ! largest of a cell, of the shapes [m]
     integer :: s
 
@@ -38,18 +37,27 @@ contains
         if (s /= minloc(width, 1, shapes%family == shapes(s)%family)) cycle
       end if
       if (.not. is_free(case, shapes(s))) cycle
-      cure = 'finer &grid cells, physics = ''light'''
-      if (shapes(s)%family == '') then
-        cure = cure//', or a block at least '//brief(min_cells_wide*edge, 3)//' m wide'
-      else
-        cure = cure//', or a mass_min of '//brief(shapes(s)%density*shapes(s)%volume &
-          *(min_cells_wide*edge/width(s))**3, 3)//' kg'
-      end if
       call problems%add_message('&shape '//trim(shapes(s)%name)//' is '//brief(width(s), 3) &
         //' m wide, '//brief(width(s)/edge, 2)//' of a cell of '//brief(edge, 3) &
-        //' m; resolved water needs one cell across a free block: '//cure, case%shape(s)%line)
+        //' m; resolved water needs one cell across a free block: '//cure(shapes(s), width(s), &
+        edge), case%shape(s)%line)
     end do
   end subroutine check_widths
+
+  !> What to do about a shape that is too narrow.
+  function cure(shape, width, edge) result(text)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: width, edge   !! of the shape, of a cell [m]
+    character(:), allocatable :: text
+
+    if (shape%family == '') then
+      text = 'a block at least '//brief(min_cells_wide*edge, 3)//' m wide'
+    else
+      text = 'a mass_min of '//brief(shape%density*shape%volume*(min_cells_wide*edge/width)**3, 3) &
+        //' kg'
+    end if
+    text = 'finer &grid cells, physics = ''light'', or '//text
+  end function cure
 
   !> Width of a shape: the middle one of the three edges of the box around it [m]. Plates thinner
   !! than a cell fall safely, rods do not.
