@@ -19,7 +19,7 @@ OLD_PREDICTOR = {"momentum": "c_ismac"}
 OLD_COUPLING = {"coupling": "mics"}
 LAYOUTS = [
     ("coupled", (24, 16, 32), (1, 1, 2), {}),
-    ("coupled", (30, 14, 8), (3, 1, 1), {}),
+    ("coupled", (30, 14, 10), (3, 1, 1), {}),
     ("coupled", (16, 12, 30), (1, 1, 4), {}),
     ("coupled", (16, 12, 30), (1, 1, 3), OLD_PREDICTOR),
     ("coupled", (24, 12, 12), (2, 1, 2), OLD_COUPLING),

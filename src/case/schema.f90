@@ -85,12 +85,16 @@ contains
       end associate
     end do
     call lines%add_line('      },')
-    if (trim(group%name) == 'drop') then
+    select case (group%name)
+    case ('body')
+      call lines%add_line('      "anyOf": ['//needs('shape position')//', ' &
+        //needs('shape motion')//'],')
+    case ('drop')
       call lines%add_line('      "anyOf": ['//needs('shape position')//', ' &
         //needs('shapes position')//', '//needs('file')//'],')
-    else if (len(needed) > 0) then
-      call lines%add_line('      "required": ['//needed(3:)//'],')
-    end if
+    case default
+      if (len(needed) > 0) call lines%add_line('      "required": ['//needed(3:)//'],')
+    end select
     call lines%add_line('      "additionalProperties": false')
   end subroutine add_group
 

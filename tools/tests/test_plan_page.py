@@ -16,6 +16,7 @@ from micstools.pages import plan_page, set_up
 from micstools.pages.set_up import SetUp
 from micstools.reading import units
 from micstools.reading.reader import Grid, Run
+from synthetic import write_run
 from test_page import scene_of
 
 ROOT = Path(__file__).parents[2]
@@ -125,10 +126,11 @@ def test_the_scene_does_not_depend_on_the_origin(found: SetUp) -> None:
     assert "354206, 5621083, -7" in row
 
 
-def test_faces_of_many_cells_are_thinned(loose_pile: Run) -> None:
+def test_faces_of_many_cells_are_thinned(tmp_path: Path) -> None:
     many, one = np.linspace(3, 4, 1001), np.array([0.0, 1.0])
-    loose_pile.__dict__["grid"] = Grid(many, one, one)
-    x, *others = plan_page._cells(loose_pile)
+    run = Run(write_run(tmp_path / "run"))
+    run.__dict__["grid"] = Grid(many, one, one)
+    x, *others = plan_page._cells(run)
     assert len(x) < 160 and x[0] == 0.007 and others == [[], []]
 
 

@@ -63,7 +63,7 @@ class Kind:
         return (
             "&run t_end = 0.002 dt = 0.001 field_interval = 0 " + self.more + " /\n"
             "&grid cells = 6, 4, 5  length = 1, 1, 1 /\n"
-            "&shape name = 'cube'  kind = 'cube'  size = 0.1 /\n"
+            "&shape name = 'cube'  kind = 'cube'  size = 0.26 /\n"
             "&body shape = 'cube'  position = 0.2, 0.2, 0.85 /\n" + self.group + "\n"
         )
 
@@ -226,7 +226,7 @@ def small_case(rng: random.Random) -> bytes:
     rows = [
         f"&run title = 'a case'  physics = '{physics}'  t_end = 0.004  dt = 0.002  cfl_max = 0.5",
         "  output = 'out'  field_interval = 0.002  restart_interval = 0.002 /",
-        "&grid cells = 8, 6, 7  length = 1, 1, 1  origin = 0, 0, 0 /",
+        "&grid cells = 16, 12, 14  length = 1, 1, 1  origin = 0, 0, 0 /",
         f"&boundary x_min = '{side}'  x_max = '{side if side == 'periodic' else 'slip'}'",
         f"  z_max = 'open'{'  x_min_velocity = 0.1, 0, 0' if side == 'inflow' else ''} /",
         "&fluid liquid_density = 998.2  gas_viscosity = 1.82e-5  gravity = 0, 0, -9.81",
