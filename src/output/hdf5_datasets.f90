@@ -168,14 +168,9 @@ contains
     character(*), intent(in) :: name
     real(wp), intent(in) :: a(:)
     real(wp), target :: copy(max(1, size(a)))
-    integer(hid_t) :: id
-    integer :: status
 
-    if (self%info /= 0) return
     copy(:size(a)) = a
-    call h5dopen_f(self%id, name, id, status)
-    call self%check(status, 'open '//name)
-    call write_whole(self, name, id, memory_type(file_real64), size(a), c_loc(copy))
+    call rewrite_whole(self, name, memory_type(file_real64), size(a), c_loc(copy))
   end subroutine rewrite_reals
 
   subroutine rewrite_integers(self, name, a)
@@ -183,15 +178,25 @@ contains
     character(*), intent(in) :: name
     integer, intent(in) :: a(:)
     integer, target :: copy(max(1, size(a)))
+
+    copy(:size(a)) = a
+    call rewrite_whole(self, name, memory_type(file_integer32), size(a), c_loc(copy))
+  end subroutine rewrite_integers
+
+  subroutine rewrite_whole(self, name, mem_type, n, data)
+    class(h5_datasets_t), intent(inout) :: self
+    character(*), intent(in) :: name
+    integer(hid_t), intent(in) :: mem_type
+    integer, intent(in) :: n            !! elements
+    type(c_ptr), intent(in) :: data
     integer(hid_t) :: id
     integer :: status
 
     if (self%info /= 0) return
-    copy(:size(a)) = a
     call h5dopen_f(self%id, name, id, status)
     call self%check(status, 'open '//name)
-    call write_whole(self, name, id, memory_type(file_integer32), size(a), c_loc(copy))
-  end subroutine rewrite_integers
+    call write_whole(self, name, id, mem_type, n, data)
+  end subroutine rewrite_whole
 
   !> All elements of a dataset, in a row; their number must be right.
   subroutine read_reals(self, name, a)

@@ -155,7 +155,7 @@ contains
         spacing = norm(cross(p(:, 2) - p(:, 1), p(:, 3) - p(:, 1)))
         if (.not. spacing > (same_place*maxval(high(:, m) - low(:, m)))*maxval(high(:, m) &
                             - low(:, m))) then
-          message = 'the facet at '//place_text(p(:, 1))//' has no area'
+          message = 'the facet at '//point_text(p(:, 1))//' has no area'
           return
         end if
         area = area + 0.5_wp*spacing
@@ -328,7 +328,7 @@ contains
       if (from >= to) cycle
       n = n + 1
       if (n > 1) cycle
-      message = place_text(p(:, 1) + 0.5_wp*(from + to)*(p(:, 2) - p(:, 1)))
+      message = point_text(p(:, 1) + 0.5_wp*(from + to)*(p(:, 2) - p(:, 1)))
     end do
     if (n == 0) return
     message = 'the surface has '//to_text(n)//' open edges inside the tank, one at '//message &
@@ -361,10 +361,10 @@ contains
         if (depth == 0 .or. depth == 1) cycle
         at(3) = layers%height(k)
         if (depth < 0) then
-          message = 'the facet at '//place_text(at)//' looks down with no solid above it: its ' &
+          message = 'the facet at '//point_text(at)//' looks down with no solid above it: its ' &
             //'corners must run counter-clockwise seen from outside'
         else
-          message = 'at '//place_text(at)//' solid lies in solid: parts of the bed must not ' &
+          message = 'at '//point_text(at)//' solid lies in solid: parts of the bed must not ' &
             //'overlap, and facets must run counter-clockwise seen from outside'
         end if
         return
@@ -563,11 +563,11 @@ contains
   end subroutine facet_within
 
   !> Three coordinates.
-  pure function place_text(x) result(text)
+  pure function point_text(x) result(text)
     real(wp), intent(in) :: x(3)   !! [m]
     character(:), allocatable :: text
 
     text = 'x, y, z = '//brief(x(1), 9)//', '//brief(x(2), 9)//', '//brief(x(3), 9)//' m'
-  end function place_text
+  end function point_text
 
 end module bed_m

@@ -1,6 +1,7 @@
 'use strict';
 // Draws blocks, bed, tank and water of a scene at a moment: plain WebGL, nothing loaded. A scene is
-// what motion.py packs: places count from the lower corner of the tank, `origin`. Bed and walls are see-through where they stand before a block.
+// what motion.py packs: places count from the lower corner of the tank, `origin`. Bed and walls are
+// see-through where they stand before a block.
 
 const BLOCK_VERTEX = `
 attribute vec3 place, normal;

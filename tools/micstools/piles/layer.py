@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from micstools.piles import pile_form
 from micstools.piles.maps import ground_map, height_map
-from micstools.reading.overlap import Placed, images, machines, present_bodies
+from micstools.reading.overlap import Placed, images, present_bodies, without_machines
 from micstools.reading.reader import Run
 from micstools.reading.units import Units, figure
 from micstools.shapes.geometry import Array, volume_in_box
@@ -107,7 +107,7 @@ def parted(run: Run, row: int = -1) -> tuple[dict[int, Placed], dict[int, Placed
     """The units of a layer by their number, and fixed bodies of shapes that no free one has: these
     belong to the ground. Machines are neither."""
     bodies, b = present_bodies(run, row), run.bodies
-    bodies = {k: body for k, body in bodies.items() if k not in machines(run)}
+    bodies = without_machines(run, bodies)
     free = {b.shape[k] for k in range(b.n) if not b.fixed[k]} or set(b.shape)
     units = {k: body for k, body in bodies.items() if b.shape[k] in free}
     return units, {k: body for k, body in bodies.items() if k not in units}

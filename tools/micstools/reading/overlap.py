@@ -80,11 +80,12 @@ def present_bodies(run: Run, row: int) -> dict[int, Placed]:
     }
 
 
-def machines(run: Run) -> set[int]:
-    """Numbers of the bodies that a table moves: doors, pushers, paddles. They are no part of a
-    pile, nor of the ground."""
-    bodies = run.parameters.get("body", [])
-    return {k for k, body in enumerate(bodies) if str(body.get("motion") or "").strip()}
+def without_machines(run: Run, bodies: dict[int, Placed]) -> dict[int, Placed]:
+    """Bodies without those that a table moves: doors, pushers, paddles. They are no part of a pile,
+    nor of the ground."""
+    groups = run.parameters.get("body", [])
+    moved = {k for k, group in enumerate(groups) if str(group.get("motion") or "").strip()}
+    return {k: body for k, body in bodies.items() if k not in moved}
 
 
 def images(run: Run, bodies: Iterable[Placed]) -> list[Placed]:
