@@ -26,6 +26,18 @@ has_ffmpeg = pytest.mark.skipif(not movie.encoder(), reason=movie.NO_ENCODER)
 has_ffprobe = pytest.mark.skipif(not movie.shutil.which("ffprobe"), reason="no ffprobe here")
 
 
+@pytest.mark.parametrize(
+    ("slow", "caption"),
+    [
+        (1, "t = 2.50 s"),
+        (4, "t = 2.50 s, 4 times slower"),
+        (0.04, "t = 2.50 s, 25 times faster"),
+    ],
+)
+def test_caption(slow: float, caption: str) -> None:
+    assert Film(slow=slow).caption(2.5) == caption
+
+
 def test_slow_motion_has_more_pictures(loose_pile: Run) -> None:
     assert len(Film().times(loose_pile)) == 8 * 25 + 1
     slow = Film(begin=1.0, end=2.0, slow=4, rate=10).times(loose_pile)

@@ -15,7 +15,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run", type=Path, help=command.RUN_HELP)
     add("--view", choices=movie.VIEWS, default="front")
-    add("--slow", type=float, default=1.0, help="times slower than in truth, default 1")
+    add(
+        "--slow",
+        type=float,
+        default=1.0,
+        help="times slower than in truth, below 1 faster, default 1",
+    )
     add("--from", type=float, default=0.0, dest="begin", help="[s], default 0")
     add("--until", type=float, default=float("inf"), help="[s], default the end")
     add("--rate", type=int, default=25, help="pictures a second, default 25")

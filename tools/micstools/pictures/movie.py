@@ -38,7 +38,7 @@ class Film:
     view: str = "front"  # one of VIEWS
     begin: float = 0.0  # [s]
     end: float = np.inf  # [s]
-    slow: float = 1.0  # 2: half as fast as in truth
+    slow: float = 1.0  # 2: half as fast as in truth; 0.04: 25 times as fast
     rate: int = 25  # pictures a second
     width: int = 800  # [pixels]
 
@@ -50,6 +50,14 @@ class Film:
             raise BadRun(f"the film from {self.begin:g} to {self.end:g} s holds nothing of the "
                          f"run, which goes from {time[0]:g} to {time[-1]:g} s")  # fmt: skip
         return np.arange(first, last + 1e-9, 1 / (self.rate * self.slow))
+
+    def caption(self, time: float) -> str:
+        """What stands above the picture of that time [s]."""
+        if self.slow == 1.0:
+            return f"t = {time:.2f} s"
+        if self.slow > 1.0:
+            return f"t = {time:.2f} s, {self.slow:.3g} times slower"
+        return f"t = {time:.2f} s, {1.0 / self.slow:.3g} times faster"
 
 
 def encoder() -> str | None:
@@ -84,8 +92,7 @@ def pictures(run: Run, film: Film) -> Iterator[Image.Image]:
         for k, t in enumerate(times):
             if orbit:
                 camera = scene.camera_around(low, high, -30 + 360 * k / len(times))
-            said = f"t = {t:.2f} s" + (f", {film.slow:g} times slower" if film.slow != 1 else "")
-            yield labels.with_header(reel.draw(float(t), camera), said, [])
+            yield labels.with_header(reel.draw(float(t), camera), film.caption(float(t)), [])
     finally:
         reel.close()
 

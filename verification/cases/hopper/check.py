@@ -1,0 +1,55 @@
+"""Rock from a split hopper in a current: the books of momentum and volume, and where it lies.
+
+usage: python check.py RUN [RUN ...]
+"""
+
+import numpy as np
+
+from measures.checks import Checks, main, sound
+from micstools.reading.health import EXCESS_LIMIT
+from micstools.reading.reader import Run
+
+VARIES = ("contact contact_time", "contact wall_friction")
+BOOK_BAND = 1e-10  # of the largest force, weight included
+LAYERS = 2.0  # height of two rocks on one another [m]
+
+
+def momentum(run: Run, checks: Checks) -> None:
+    """M dU/dt = fluid force + contact force + weight, for each rock in each step."""
+    b, free = run.bodies, ~run.bodies.fixed
+    mass = b.mass[free][None, :, None]
+    step = np.diff(b.time)[:, None, None]
+    force = b.fluid_force[1:, free] + b.contact_force[1:, free]
+    weight = mass * np.array([0.0, 0.0, -9.81])
+    error = mass * np.diff(b.velocity[:, free], axis=0) / step - force - weight
+    scale = float(np.abs(force).max())
+    worst = float(np.abs(error).max()) / scale
+    checks.below("M dU/dt less its forces / largest force", worst, BOOK_BAND)
+
+
+def load(run: Run, checks: Checks) -> None:
+    """The load leaves the hopper, goes downstream and comes to rest on the ground."""
+    b, free = run.bodies, ~run.bodies.fixed
+    start, end = b.position[0, free], b.position[-1, free]
+    checks.true("settled before the end", b.time[-1] < float(run.value("run", "t_end", 0.0)))
+    checks.below("highest rock at the end [m]", float(end[:, 2].max()), LAYERS)
+    inside = ((end > run.grid.low) & (end < run.grid.high)).all()
+    checks.true("all within the tank", inside)
+    drift = float((end - start)[:, 0].mean())
+    checks.true("downstream, on average", drift > 0.0, f"{drift:.2f} m")
+
+
+def check(runs: list[Run]) -> Checks:
+    """One run."""
+    checks = Checks("hopper")
+    for run in runs:
+        momentum(run, checks)
+        load(run, checks)
+        excess = run.series.volume_excess_max.max()
+        checks.below("largest excess of a cell [V]", excess, EXCESS_LIMIT)
+        sound(run, checks)
+    return checks
+
+
+if __name__ == "__main__":
+    main(check)
