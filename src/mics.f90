@@ -24,7 +24,7 @@ program mics
   use case_check_m, only: make_shapes, check_case
   use resolved_width_m, only: check_widths
   use case_plan_m, only: print_plan
-  use case_oddities_m, only: find_oddities
+  use case_warnings_m, only: find_case_warnings
   use set_up_file_m, only: write_set_up
   use memory_plan_m, only: require_memory, require_memory_to_start
   use tet_mesh_m, only: shape_t
@@ -229,7 +229,7 @@ contains
       return
     end if
     if (is_root()) call print_plan(output_unit, case, shapes, bed)
-    call find_oddities(case, shapes, bed, warnings)
+    call find_case_warnings(case, shapes, bed, warnings)
     if (is_root() .and. warnings%n > 0) write (output_unit, '(a)') 'Warnings'
     call warnings%report(output_unit, '  warning: ')
     message = ''

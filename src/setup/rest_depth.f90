@@ -17,10 +17,10 @@ contains
 
   !> Blocks that give way at rest by more than a share of their size, under their own weight or,
   !! as supports, under the heaviest block; and a restitution below the least one.
-  subroutine look_at_rest(case, shapes, oddities)
+  subroutine look_at_rest(case, shapes, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     class(contact_law_t), allocatable :: law
     type(load_t) :: heaviest
     real(wp) :: depth, give
@@ -28,7 +28,7 @@ contains
 
     if (size(case%body) + size(case%drop) == 0) return
     if (case%contact%law == 'restitution' .and. case%contact%restitution < min_restitution) then
-      call oddities%add('&contact restitution', case%contact%restitution, 'acts as ' &
+      call warnings%add('&contact restitution', case%contact%restitution, 'acts as ' &
         //brief(min_restitution)//': blocks leave their supports with that share of the speed ' &
         //'of an impact at least')
     end if
@@ -40,10 +40,10 @@ contains
       give = give_share*shapes(s)%smallest_edge
       if (.not. depth > 1.000001_wp*give) cycle   ! the law itself may aim at it
       if (case%contact%law == 'restitution') then
-        call oddities%add('&contact contact_time', case%contact%contact_time, sinks(s) &
+        call warnings%add('&contact contact_time', case%contact%contact_time, sinks(s) &
           //'; a shorter one makes blocks stiffer')
       else
-        call oddities%add('&contact k_n', case%contact%k_n, sinks(s)//'; should be larger')
+        call warnings%add('&contact k_n', case%contact%k_n, sinks(s)//'; should be larger')
       end if
     end do
   contains

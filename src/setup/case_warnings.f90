@@ -1,5 +1,5 @@
 !> What is allowed in a case but is hardly what its author meant: warnings of `--check`.
-module case_oddities_m
+module case_warnings_m
   use kinds_m, only: wp, i8
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t, shape_input_t, drop_input_t, place_t, is_given, &
@@ -19,7 +19,7 @@ module case_oddities_m
   use light_m, only: added_inertia_of
   implicit none
   private
-  public :: find_oddities
+  public :: find_case_warnings
 
   real(wp), parameter :: min_density = 10.0_wp     !! of a block [kg/m3]
   real(wp), parameter :: largest_block = 10.0_wp     !! [m]
@@ -34,41 +34,41 @@ module case_oddities_m
 contains
 
   !> Collect everything odd about a checked case; nothing of it forbids a run.
-  subroutine find_oddities(case, shapes, bed, oddities)
+  subroutine find_case_warnings(case, shapes, bed, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     integer :: s
 
-    if (case%fluid%gravity(3) > 0.0_wp) call oddities%add('&fluid gravity', &
+    if (case%fluid%gravity(3) > 0.0_wp) call warnings%add('&fluid gravity', &
       case%fluid%gravity(3), 'in z points up; 0, 0, -9.81 is usual', case%fluid%line)
-    if (case%run%physics /= 'dry') call look_at_water(case, oddities)
+    if (case%run%physics /= 'dry') call look_at_water(case, warnings)
     if (has_flow(case%run)) then
-      call look_at_inflows(case, oddities)
-      call look_at_open_sides(case, oddities)
+      call look_at_inflows(case, warnings)
+      call look_at_open_sides(case, warnings)
     end if
-    call look_at_memory(case, shapes, oddities)
-    call look_at_contact(case, oddities)
-    call look_at_seeds(case, oddities)
-    call look_at_rest(case, shapes, oddities)
-    call look_at_times(case, oddities)
-    call look_at_heights(case, shapes, bed, oddities)
+    call look_at_memory(case, shapes, warnings)
+    call look_at_contact(case, warnings)
+    call look_at_seeds(case, warnings)
+    call look_at_rest(case, shapes, warnings)
+    call look_at_times(case, warnings)
+    call look_at_heights(case, shapes, bed, warnings)
     do s = 1, size(shapes)
-      if (extreme_of_family(shapes, s)) call look_at_shape(case, case%shape(s), shapes(s), oddities)
+      if (extreme_of_family(shapes, s)) call look_at_shape(case, case%shape(s), shapes(s), warnings)
     end do
-  end subroutine find_oddities
+  end subroutine find_case_warnings
 
   !> A level outside the tank, or no water at all.
-  subroutine look_at_water(case, oddities)
+  subroutine look_at_water(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     real(wp) :: low, high, longest
     logical :: below
 
     longest = gravity_step(case%fluid, smallest_spacing(case%grid))
     if (.not. has_flow(case%run)) longest = huge(longest)
-    if (case%run%dt > longest .and. case%run%cfl_max <= 0.0_wp) call oddities%add('&run dt', &
+    if (case%run%dt > longest .and. case%run%cfl_max <= 0.0_wp) call warnings%add('&run dt', &
       case%run%dt, 'lets the shortest waves of the grid grow, should be at most ' &
       //brief(longest, 3)//' s; or cfl_max > 0 lets the step shrink', case%run%line)
     if (case%fluid%single_phase .or. len(case%fluid%initial_state) > 0) return
@@ -77,35 +77,35 @@ contains
     below = .true.
     if (is_given(case%fluid%water_level)) then
       below = case%fluid%water_level <= low
-      if (case%fluid%water_level > high) call oddities%add('&fluid water_level', &
+      if (case%fluid%water_level > high) call warnings%add('&fluid water_level', &
         case%fluid%water_level, 'lies above the tank, which ends at '//to_text(high) &
         //' m: there is no surface', case%fluid%line)
-      if (below) call oddities%add('&fluid water_level', case%fluid%water_level, &
+      if (below) call warnings%add('&fluid water_level', case%fluid%water_level, &
         'lies below the tank, which begins at '//to_text(low)//' m', case%fluid%line)
     end if
-    if (below .and. size(case%water) == 0) call oddities%add('&run physics', &
+    if (below .and. size(case%water) == 0) call warnings%add('&run physics', &
       trim(case%run%physics), 'without any water; give &fluid water_level or &water', case%run%line)
   end subroutine look_at_water
 
   !> Inflows without a level, through which gas alone comes in.
-  subroutine look_at_inflows(case, oddities)
+  subroutine look_at_inflows(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     integer :: s, d
 
     if (case%fluid%single_phase .or. is_given(case%fluid%water_level)) return
     do d = 1, 3
       do s = 1, 2
-        if (case%boundary%kind(s, d) == 'inflow') call oddities%add_message('&boundary ' &
+        if (case%boundary%kind(s, d) == 'inflow') call warnings%add_message('&boundary ' &
           //side_name(s, d)//' = ''inflow'': only gas comes in without &fluid water_level')
       end do
     end do
   end subroutine look_at_inflows
 
   !> Without a surface an open side has pressure 0 from top to bottom, which still water has not.
-  subroutine look_at_open_sides(case, oddities)
+  subroutine look_at_open_sides(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     real(wp) :: along(3)
     integer :: s, d
 
@@ -115,7 +115,7 @@ contains
       along(d) = 0.0_wp
       if (.not. any(abs(along) > 0.0_wp)) cycle
       do s = 1, 2
-        if (case%boundary%kind(s, d) == 'open') call oddities%add_message('&boundary ' &
+        if (case%boundary%kind(s, d) == 'open') call warnings%add_message('&boundary ' &
           //side_name(s, d)//' = ''open'': gravity acts along it and the pressure on it is 0 ' &
           //'from top to bottom, so with single_phase the liquid flows from rest; it ' &
           //'stays at rest beside an ''outflow''')
@@ -124,41 +124,41 @@ contains
   end subroutine look_at_open_sides
 
   !> Parts of the contact that this case does not have.
-  subroutine look_at_contact(case, oddities)
+  subroutine look_at_contact(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     integer :: s
 
     if (case%run%physics == 'coupled' .and. case%contact%lubrication &
-        .and. .not. any(case%shape%kind == 'sphere')) call oddities%add('&contact lubrication', &
+        .and. .not. any(case%shape%kind == 'sphere')) call warnings%add('&contact lubrication', &
       case%contact%lubrication, 'has no effect: only blocks of kind ''sphere'' have such films')
     if (case%contact%model /= 'surface') return
     do s = 1, size(case%shape)
       if (case%shape(s)%member > 1) cycle   ! one of a family is enough
-      if (case%shape(s)%spheres /= 'centroid') call oddities%add('&shape spheres', &
+      if (case%shape(s)%spheres /= 'centroid') call warnings%add('&shape spheres', &
         trim(case%shape(s)%spheres), 'of '//trim(case%shape(s)%name)//': no sphere touches with ' &
         //'&contact model = ''surface'', they only come into run.h5', case%shape(s)%line)
     end do
   end subroutine look_at_contact
 
   !> More memory than there is.
-  subroutine look_at_memory(case, shapes, oddities)
+  subroutine look_at_memory(case, shapes, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     integer(i8) :: planned, available
 
     planned = planned_memory(case, shapes)
     available = available_memory()
-    if (available > 0 .and. planned > available) call oddities%add_message('&grid cells = ' &
+    if (available > 0 .and. planned > available) call warnings%add_message('&grid cells = ' &
       //to_text(case%grid%cells)//': the run takes about '//size_text(real(planned, wp)) &
       //' of memory, more than the '//size_text(real(available, wp))//' that this machine has left')
   end subroutine look_at_memory
 
   !> Blocks that are due only after the end of the run.
-  subroutine look_at_times(case, oddities)
+  subroutine look_at_times(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     character(:), allocatable :: late
     type(place_t) :: place
     integer :: i, k, n
@@ -171,22 +171,22 @@ contains
           place = place_of_block(drop, k)
           if (place%time > case%run%t_end) n = n + 1
         end do
-        if (n > 0) call oddities%add('&drop count', drop%count, to_text(n)//trim(merge(' is ', &
+        if (n > 0) call warnings%add('&drop count', drop%count, to_text(n)//trim(merge(' is ', &
           ' are', n == 1))//late, drop%line)
       end associate
     end do
     do i = 1, size(case%body)
-      if (case%body(i)%release_time > case%run%t_end) call oddities%add('&body release_time', &
+      if (case%body(i)%release_time > case%run%t_end) call warnings%add('&body release_time', &
         case%body(i)%release_time, 'is'//late, case%body(i)%line)
     end do
   end subroutine look_at_times
 
   !> Blocks that begin far above the tank.
-  subroutine look_at_heights(case, shapes, bed, oddities)
+  subroutine look_at_heights(case, shapes, bed, warnings)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
     type(bed_t), intent(in) :: bed
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     integer :: i, n
 
     do i = 1, size(case%drop)
@@ -215,16 +215,16 @@ contains
       above = fall%bottom - case%grid%origin(3) - case%grid%length(3)
       if (above <= far_above*case%grid%length(3)) return
       n = n + 1
-      call oddities%add_message(group//' position = '//to_text(place%x)//': begins ' &
+      call warnings%add_message(group//' position = '//to_text(place%x)//': begins ' &
         //brief(above, 3)//' m above the tank, which is '//brief(case%grid%length(3), 3) &
         //' m high; is that meant?', line)
     end subroutine look_at
   end subroutine look_at_heights
 
   !> Random drops of the same seed: their blocks have the same shifts and turns.
-  subroutine look_at_seeds(case, oddities)
+  subroutine look_at_seeds(case, warnings)
     type(case_t), intent(in) :: case
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     logical :: random(size(case%drop))
     integer :: i
 
@@ -235,7 +235,7 @@ contains
       associate (drop => case%drop(i))
         if (.not. random(i)) cycle
         if (.not. any(case%drop(:i - 1)%seed == drop%seed .and. random(:i - 1))) cycle
-        call oddities%add('&drop seed', drop%seed, 'is that of another &drop too: their blocks ' &
+        call warnings%add('&drop seed', drop%seed, 'is that of another &drop too: their blocks ' &
           //'have the same shifts, turns and stones', drop%line)
       end associate
     end do
@@ -251,72 +251,72 @@ contains
   end function is_random
 
   !> A block too light, too large, too coarse in the grid or in its own tetrahedra.
-  subroutine look_at_shape(case, input, shape, oddities)
+  subroutine look_at_shape(case, input, shape, warnings)
     type(case_t), intent(in) :: case
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(in) :: shape
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     character(:), allocatable :: name
     real(wp) :: extent, cells, min_turning   ! [m], [cells], [kg/m3]
     real(wp) :: lowest, highest                ! contact spheres over the surface [m]
 
     name = trim(shape%name)
     extent = maxval(maxval(shape%point, 2) - minval(shape%point, 2))
-    if (input%density < min_density) call oddities%add('&shape density', input%density, &
+    if (input%density < min_density) call warnings%add('&shape density', input%density, &
       'of '//name//' is in kg/m3; concrete has about 2300', input%line)
     min_turning = turning_share*case%fluid%liquid_density
     if (case%run%physics == 'coupled' .and. input%density < min_turning) then
-      call oddities%add('&shape density', input%density, 'of '//name//': it turns with the ' &
+      call warnings%add('&shape density', input%density, 'of '//name//': it turns with the ' &
         //'inertia of '//brief(min_turning, 3)//' kg/m3, for the liquid that it drags along', &
         input%line)
     end if
     if (extent > largest_block) then
       if (input%kind == 'file') then
-        call oddities%add('&shape scale', input%scale, name//' is '//brief(extent, 3) &
+        call warnings%add('&shape scale', input%scale, name//' is '//brief(extent, 3) &
           //' m long; scale = 0.001 makes m of mm', input%line)
       else
-        call oddities%add('&shape size', input%size(1), name//' is '//brief(extent, 3) &
+        call warnings%add('&shape size', input%size(1), name//' is '//brief(extent, 3) &
           //' m long; lengths are in m, not in mm', input%line)
       end if
     end if
     if (case%run%physics == 'coupled') then
       cells = extent/maxval(case%grid%length/real(case%grid%cells, wp), case%grid%cells > 1)
-      if (cells < min_cells) call oddities%add_message('&shape '//name//' is ' &
+      if (cells < min_cells) call warnings%add_message('&shape '//name//' is ' &
         //brief(cells, 3)//' cells long; below '//to_text(nint(min_cells)) &
         //' the water around it is coarse: more &grid cells', input%line)
     end if
-    if (case%run%physics == 'light') call look_at_light(case, input, shape, extent, oddities)
+    if (case%run%physics == 'light') call look_at_light(case, input, shape, extent, warnings)
     if (case%contact%model == 'spheres') then
       call height_errors(shape, lowest, highest)
-      if (max(-lowest, highest) > 0.0_wp) call oddities%add_message('&shape '//name//': its ' &
+      if (max(-lowest, highest) > 0.0_wp) call warnings%add_message('&shape '//name//': its ' &
         //'contact spheres reach up to '//brief(-lowest, 3)//' m short of its surface and ' &
         //brief(highest, 3)//' m beyond it', input%line)
     end if
-    if (size(shape%tet, 2) > many_tets) call oddities%add_message('&shape '//name//' has ' &
+    if (size(shape%tet, 2) > many_tets) call warnings%add_message('&shape '//name//' has ' &
       //to_text(size(shape%tet, 2))//' tetrahedra; more than '//to_text(many_tets) &
       //' make every step slow: simplify the drawing', input%line)
     if (any(input%kind == [character(8) :: 'sphere', 'cylinder']) .and. &
-        size(shape%tet, 2) < few_tets) call oddities%add('&shape refinement', input%refinement, &
+        size(shape%tet, 2) < few_tets) call warnings%add('&shape refinement', input%refinement, &
       'cuts '//name//' into '//to_text(size(shape%tet, 2)) &
       //' tetrahedra, more of a prism than round; a larger value cuts it more finely', input%line)
   end subroutine look_at_shape
 
   !> What a water without flow tells badly: slabs, and shallow water.
-  subroutine look_at_light(case, input, shape, extent, oddities)
+  subroutine look_at_light(case, input, shape, extent, warnings)
     type(case_t), intent(in) :: case
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: extent   !! of the shape [m]
-    type(problems_t), intent(inout) :: oddities
+    type(problems_t), intent(inout) :: warnings
     type(added_inertia_t) :: added
 
     added = added_inertia_of(shape)
-    if (added%spread > compact) call oddities%add_message('&shape '//trim(input%name)//': its ' &
+    if (added%spread > compact) call warnings%add_message('&shape '//trim(input%name)//': its ' &
       //'added mass differs by '//brief(100.0_wp*added%spread, 2)//' % between directions; ' &
       //'''light'' takes the mean, and a tilted one glides as it should not', input%line)
-    if (case%fluid%water_level - case%grid%origin(3) < shallow*extent) call oddities%add_message( &
+    if (case%fluid%water_level - case%grid%origin(3) < shallow*extent) call warnings%add_message( &
       '&shape '//trim(input%name)//': the water is less than two blocks deep; entry, which ' &
       //'''light'' tells roughly, is all there is', input%line)
   end subroutine look_at_light
 
-end module case_oddities_m
+end module case_warnings_m
