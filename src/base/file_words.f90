@@ -3,7 +3,7 @@
 module file_words_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text
-  use plain_file_m, only: is_pipe
+  use posix_file_m, only: is_pipe
   use value_text_m, only: byte_order_mark, parse_real, parse_integer, value_ok, value_too_large, &
     quoted_text, printable
   implicit none

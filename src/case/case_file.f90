@@ -6,7 +6,7 @@ module case_file_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
     c_associated, c_loc
   use errors_m, only: problems_t
-  use plain_file_m, only: is_pipe
+  use posix_file_m, only: is_pipe
   implicit none
   private
   public :: read_text, is_utf8, utf8_of_latin1

@@ -7,7 +7,7 @@
 !! room. HDF5 cuts off most of what it did not need when it flushes.
 module file_room_m
   use kinds_m, only: i8
-  use plain_file_m, only: plain_file_t, cut_file
+  use posix_file_m, only: posix_file_t, cut_file
   implicit none
   private
   public :: lengthen_file, shorten_file, room_for_chunks
@@ -23,7 +23,7 @@ contains
     integer(i8), intent(in) :: length                   !! [bytes]
     character(:), allocatable, intent(out) :: message   !! of trouble, else empty
     integer, parameter :: piece = 2**20
-    type(plain_file_t) :: file
+    type(posix_file_t) :: file
     character(:), allocatable :: zeros
     integer(i8) :: before, there
 

@@ -11,7 +11,7 @@ module folder_lock_m
   use kinds_m, only: wp
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_pause
-  use plain_file_m, only: plain_file_t, delete_file, lock_taken, lock_refused, lock_unknown
+  use posix_file_m, only: posix_file_t, delete_file, lock_taken, lock_refused, lock_unknown
   implicit none
   private
   public :: folder_lock_t, lock_name, look_at_folder
@@ -21,7 +21,7 @@ module folder_lock_m
   type :: folder_lock_t
     logical :: held = .false.
     character(:), allocatable :: folder
-    type(plain_file_t), private :: file
+    type(posix_file_t), private :: file
   contains
     procedure :: take => take_lock
     procedure :: release => release_lock
@@ -96,7 +96,7 @@ contains
     character(*), intent(in) :: folder
     integer, intent(out) :: code                       !! exit_ok or exit_input
     character(:), allocatable, intent(out) :: message
-    type(plain_file_t) :: file
+    type(posix_file_t) :: file
     integer :: outcome
 
     code = exit_ok
@@ -130,7 +130,7 @@ contains
   function text_of(folder) result(text)
     character(*), intent(in) :: folder
     character(:), allocatable :: text
-    type(plain_file_t) :: file
+    type(posix_file_t) :: file
     character(:), allocatable :: bytes
     integer :: n
 

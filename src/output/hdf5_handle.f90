@@ -24,7 +24,7 @@ module hdf5_handle_m
   use parallel_m, only: is_root, my_rank, nproc, set_file_access, set_collective, global_max
   use parallel_m, only: global_min, broadcast, share_trouble
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
-  use plain_file_m, only: cut_file, delete_file, is_pipe
+  use posix_file_m, only: cut_file, delete_file, is_pipe
   use file_room_m, only: lengthen_file, shorten_file
   implicit none
   private

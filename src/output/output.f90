@@ -14,7 +14,7 @@ module output_m
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
-  use plain_file_m, only: delete_file
+  use posix_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, row_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
     write_row, close_run_file

@@ -8,7 +8,7 @@ module output_folder_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
-  use plain_file_m, only: plain_file_t, delete_file
+  use posix_file_m, only: posix_file_t, delete_file
   use folder_lock_m, only: folder_lock_t, lock_name, look_at_folder
   implicit none
   private
@@ -342,7 +342,7 @@ contains
     character(:), allocatable, intent(inout) :: message
     integer, parameter :: piece = 2**20
     character(:), allocatable :: bytes
-    type(plain_file_t) :: source, target
+    type(posix_file_t) :: source, target
     integer :: n
 
     allocate (character(piece) :: bytes)

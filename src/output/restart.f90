@@ -25,7 +25,7 @@ module restart_m
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: rename_file
-  use plain_file_m, only: delete_file, store_file
+  use posix_file_m, only: delete_file, store_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
   use state_visitors_m, only: checksum_visitor_t, size_visitor_t
   use file_room_m, only: room_for_change

@@ -5,7 +5,7 @@ module stop_requests_m
   use parallel_m, only: is_root, global_max
   use signals_m, only: signal_caught, signal_terminate
   use timers_m, only: wall_clock
-  use plain_file_m, only: delete_file
+  use posix_file_m, only: delete_file
   implicit none
   private
   public :: stop_requests_t, watch_for_stop, stop_asked

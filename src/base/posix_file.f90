@@ -2,19 +2,19 @@
 !!
 !! The first trouble sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.
-module plain_file_m
+module posix_file_m
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_long, &
     c_null_char, c_null_ptr, c_ptr, c_size_t, c_associated
   use kinds_m, only: i8
   implicit none
   private
-  public :: plain_file_t, cut_file, delete_file, is_pipe, store_file
+  public :: posix_file_t, cut_file, delete_file, is_pipe, store_file
   public :: lock_taken, lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
   integer, parameter :: lock_unknown = 2   !! the file system keeps no locks
 
-  type :: plain_file_t
+  type :: posix_file_t
     character(:), allocatable :: path
     integer :: info = 0                    !! 0: no trouble so far
     character(:), allocatable :: message   !! file and reason of the first trouble
@@ -27,7 +27,7 @@ module plain_file_m
     procedure :: read => file_read
     procedure :: lock => file_lock
     procedure, private :: check
-  end type plain_file_t
+  end type posix_file_t
 
   interface
     type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
@@ -151,7 +151,7 @@ contains
 
   !> Note trouble with `what`, if there is any, in the words of the system.
   subroutine check(self, well, what)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     logical, intent(in) :: well
     character(*), intent(in) :: what   !! like 'write'
     integer(c_int) :: number
@@ -181,7 +181,7 @@ contains
 
   !> Open a file; `mode` as in C: 'r' to read, 'w' to write anew, 'a' to write at the end.
   subroutine file_open(self, path, mode)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     character(*), intent(in) :: path, mode
 
     self%path = path
@@ -198,7 +198,7 @@ contains
 
   !> Close the file; done even after trouble. A lock ends with it.
   subroutine file_close(self)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
 
     if (.not. c_associated(self%stream)) return
     call self%check(c_fclose(self%stream) == 0, 'close the file')
@@ -207,7 +207,7 @@ contains
 
   !> Write bytes and hand them to the system at once.
   subroutine file_write(self, bytes)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     character(*), intent(in) :: bytes
     integer(c_size_t) :: n
 
@@ -219,7 +219,7 @@ contains
 
   !> Replace all that the file holds.
   subroutine file_rewrite(self, bytes)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     character(*), intent(in) :: bytes
 
     if (self%info /= 0) return
@@ -229,7 +229,7 @@ contains
 
   !> Read the next bytes, at most as many as `bytes` holds.
   subroutine file_read(self, bytes, n)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     character(:), allocatable, target, intent(inout) :: bytes
     integer, intent(out) :: n   !! how many there were; 0 at the end of the file
 
@@ -241,7 +241,7 @@ contains
 
   !> Try to take a lock on the open file; it ends when the file is closed or the program ends.
   subroutine file_lock(self, alone, outcome)
-    class(plain_file_t), intent(inout) :: self
+    class(posix_file_t), intent(inout) :: self
     logical, intent(in) :: alone      !! nobody else may have a lock; otherwise many may
     integer, intent(out) :: outcome   !! lock_taken, lock_refused or lock_unknown
     integer(c_int), parameter :: shared = 1, exclusive = 2, at_once = 4
@@ -278,7 +278,7 @@ contains
     character(*), intent(in) :: path
     integer, intent(out) :: info   !! 0: done
     character(:), allocatable, intent(inout) :: message
-    type(plain_file_t) :: file
+    type(posix_file_t) :: file
 
     call file%open(path, 'a')
     if (file%info == 0) call file%check(c_fsync(c_fileno(file%stream)) == 0, 'store')
@@ -302,4 +302,4 @@ contains
     if (c_unlink(path//c_null_char) /= 0) return   ! it was not there, or nothing can be done
   end subroutine delete_file
 
-end module plain_file_m
+end module posix_file_m
