@@ -12,7 +12,7 @@
 module group_visitor_m
   use kinds_m, only: wp, name_length
   use errors_m, only: problems_t, to_text
-  use long_text_m, only: long_text_t
+  use string_builder_m, only: string_builder_t
   use allowed_values_m, only: allowed_t
   use description_m, only: variable_t, group_description_t, described, choices, &
     word_text, words_text, next_word
@@ -30,7 +30,7 @@ module group_visitor_m
 
   type :: group_visitor_t
     logical :: reading = .false., writing = .false., describing = .false.   !! one of them
-    type(long_text_t) :: written           !! what a writing visitor has written
+    type(string_builder_t) :: written           !! what a writing visitor has written
     type(group_description_t) :: told      !! what a describing visitor was told
     type(problems_t) :: problems           !! what a reading visitor has found
     type(problems_t) :: passed_over        !! and what it passes over, for warnings

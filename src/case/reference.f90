@@ -1,7 +1,7 @@
 !> The reference of the case file: each variable of each group as the reading procedures tell it.
 module reference_m
   use description_m, only: group_description_t, variable_t, choices
-  use long_text_m, only: long_text_t
+  use string_builder_m, only: string_builder_t
   use case_input_m, only: describe_groups
   use errors_m, only: problems_t, to_text
   use schema_m, only: schema_text
@@ -45,7 +45,7 @@ contains
   pure function list_text(groups) result(text)
     type(group_description_t), intent(in) :: groups(:)
     character(:), allocatable :: text
-    type(long_text_t) :: lines
+    type(string_builder_t) :: lines
     character(:), allocatable :: name
     integer :: g
 
@@ -62,7 +62,7 @@ contains
   pure function group_text(group) result(text)
     type(group_description_t), intent(in) :: group
     character(:), allocatable :: text
-    type(long_text_t) :: lines
+    type(string_builder_t) :: lines
     integer :: i, indent
 
     call lines%add_line('&'//trim(group%name)//': '//group%meaning)
@@ -105,7 +105,7 @@ contains
   pure function page_text(groups) result(text)
     type(group_description_t), intent(in) :: groups(:)
     character(:), allocatable :: text
-    type(long_text_t) :: lines
+    type(string_builder_t) :: lines
     integer :: g, i
 
     call lines%add_line('# The case file: every group and variable')

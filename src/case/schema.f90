@@ -6,7 +6,7 @@
 module schema_m
   use kinds_m, only: name_length
   use errors_m, only: to_text
-  use long_text_m, only: long_text_t
+  use string_builder_m, only: string_builder_t
   use description_m, only: group_description_t, variable_t
   implicit none
   private
@@ -18,7 +18,7 @@ contains
   pure function schema_text(groups) result(text)
     type(group_description_t), intent(in) :: groups(:)
     character(:), allocatable :: text
-    type(long_text_t) :: lines
+    type(string_builder_t) :: lines
     character(:), allocatable :: needed
     integer :: g
 
@@ -66,7 +66,7 @@ contains
   !> The definition of a group, but for its closing brace.
   pure subroutine add_group(group, lines)
     type(group_description_t), intent(in) :: group
-    type(long_text_t), intent(inout) :: lines
+    type(string_builder_t), intent(inout) :: lines
     character(:), allocatable :: needed
     integer :: i
 

@@ -4,7 +4,7 @@ program test_allowed_values
   use kinds_m, only: wp
   use allowed_values_m, only: allowed_t, any_number, positive, not_negative, share, any_whole, &
     at_least, between
-  use long_text_m, only: long_text_t
+  use string_builder_m, only: string_builder_t
   implicit none
 
   call bounds('any number', any_number('m'), -1.0e20_wp, 1.0e20_wp, '')
@@ -56,7 +56,7 @@ contains
 
   !> Pieces of any length add up.
   subroutine test_long_text()
-    type(long_text_t) :: long
+    type(string_builder_t) :: long
     integer :: i
 
     call check('nothing yet', long%text() == '' .and. len(long%text()) == 0)

@@ -1,23 +1,23 @@
 !> A text that grows piece by piece, in a time that grows with its length.
-module long_text_m
+module string_builder_m
   implicit none
   private
-  public :: long_text_t
+  public :: string_builder_t
 
-  type :: long_text_t
+  type :: string_builder_t
     private
     integer :: n = 0                         ! characters in use
     character(:), allocatable :: space
   contains
     procedure :: add, add_line
     procedure :: text => whole_text
-  end type long_text_t
+  end type string_builder_t
 
 contains
 
   !> Append a piece.
   pure subroutine add(self, piece)
-    class(long_text_t), intent(inout) :: self
+    class(string_builder_t), intent(inout) :: self
     character(*), intent(in) :: piece
     character(:), allocatable :: longer
 
@@ -33,7 +33,7 @@ contains
 
   !> Append a line.
   pure subroutine add_line(self, line)
-    class(long_text_t), intent(inout) :: self
+    class(string_builder_t), intent(inout) :: self
     character(*), intent(in) :: line
 
     call self%add(line)
@@ -42,11 +42,11 @@ contains
 
   !> All that was added.
   pure function whole_text(self) result(text)
-    class(long_text_t), intent(in) :: self
+    class(string_builder_t), intent(in) :: self
     character(:), allocatable :: text
 
     text = ''
     if (self%n > 0) text = self%space(:self%n)
   end function whole_text
 
-end module long_text_m
+end module string_builder_m
