@@ -35,7 +35,7 @@ module step_m
   use solid_fraction_m, only: update_solid
   use liquid_fill_m, only: raise_surface
   use fluid_transport_m, only: fit_fluxes, carry_fluid, finish_carrying, fluxes_of_step, &
-                               span_t
+                               time_step_t
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
   use rigid_body_m, only: fastest_point, follow_motions, look_ahead
@@ -67,7 +67,7 @@ contains
     type(step_report_t), intent(out) :: report
     type(contact_report_t) :: contact
     type(coupling_report_t) :: coupling_report
-    type(span_t) :: span
+    type(time_step_t) :: time_step
     real(wp) :: dt_before   !! of the last step [s]
 
     dt_before = sim%clock%dt
@@ -92,11 +92,11 @@ contains
         call toc(sim%timer_solid)
         ! 6 fluxes
         call tic(sim%timer_transport)
-        span = span_t(dt, report%cfl_carried, sim%clock%step)
-        call fit_fluxes(grid, sim%before, sim%solid, span, flow, scratch, &
+        time_step = time_step_t(dt, report%cfl_carried, sim%clock%step)
+        call fit_fluxes(grid, sim%before, sim%solid, time_step, flow, scratch, &
                         coupling%pressure%system%solver, sim%transport)
         ! 7 advection
-        call carry_fluid(case%fluid, grid, sim%before, span, flow, sim%transport)
+        call carry_fluid(case%fluid, grid, sim%before, time_step, flow, sim%transport)
         if (coupling%implicit_momentum) call fluxes_of_step(grid, sim%transport, coupling%c_ismac%q)
         call finish_carrying(grid, sim%solid, flow, scratch, sim%transport)
         ! 8 mixture

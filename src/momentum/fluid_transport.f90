@@ -13,7 +13,7 @@ module fluid_transport_m
   use elliptic_solver_m, only: elliptic_solver_t
   implicit none
   private
-  public :: fluid_transport_t, fluid_transport_init, span_t, fit_fluxes, carry_fluid, &
+  public :: fluid_transport_t, fluid_transport_init, time_step_t, fit_fluxes, carry_fluid, &
             finish_carrying, fluxes_of_step
 
   real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: a cell gives less than it has
@@ -26,11 +26,11 @@ module fluid_transport_m
   end type fluid_transport_t
 
   !> The step at hand.
-  type :: span_t
+  type :: time_step_t
     real(wp) :: dt = 0.0_wp        !! [s]
     real(wp) :: courant = 0.0_wp   !! largest share of itself that a cell gives [-]
     integer :: number = 0          !! of the step, which decides the order of the sweeps
-  end type span_t
+  end type time_step_t
 
 contains
 
@@ -88,34 +88,34 @@ contains
   end subroutine give_arrays
 
   !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
-  subroutine fit_fluxes(grid, before, after, span, flow, scratch, solver, self)
+  subroutine fit_fluxes(grid, before, after, time_step, flow, scratch, solver, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
-    type(span_t), intent(in) :: span
+    type(time_step_t), intent(in) :: time_step
     type(flow_t), intent(in) :: flow   !! halos filled
     type(scratch_t), intent(inout) :: scratch
     type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
     type(fluid_transport_t), intent(inout) :: self
 
-    self%liquid%parts = parts_of_step(span%courant)
+    self%liquid%parts = parts_of_step(time_step%courant)
     call take_arrays(scratch, self)
-    call begin_transport(grid, before, after, span%dt, solver, self%liquid, flow)
+    call begin_transport(grid, before, after, time_step%dt, solver, self%liquid, flow)
   end subroutine fit_fluxes
 
   !> Stage 7: liquid and momentum pass the faces, direction by direction, small cells last. With
   !! C-ISMAC momentum waits for the predictor, which uses the volumes of the same parts.
-  subroutine carry_fluid(fluid, grid, before, span, flow, self)
+  subroutine carry_fluid(fluid, grid, before, time_step, flow, self)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before   !! bodies at the start of the step
-    type(span_t), intent(in) :: span
+    type(time_step_t), intent(in) :: time_step
     type(flow_t), intent(inout) :: flow            !! its velocity
     type(fluid_transport_t), intent(inout) :: self
     integer :: n, part
 
     associate (liquid => self%liquid, volumes => self%liquid%volumes, momentum => self%momentum)
       do part = 1, liquid%parts
-        call begin_part(grid, before, part, span%number, liquid)
+        call begin_part(grid, before, part, time_step%number, liquid)
         if (self%carries_momentum) then
           call momentum_begin(grid, fluid, volumes%w, volumes%v, volumes%c, flow%u, momentum)
           do n = 1, 3
