@@ -81,7 +81,7 @@ contains
       if (sim%wet) call begin(sim, dt_before, report%inertia_clips)
       ! 4 bodies
       call tic(sim%timer_blocks)
-      if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%felt, sim%light)
+      if (sim%light%on) call enter_water(case%fluid%gravity, dt, blocks, sim%initialised, sim%light)
       call move_blocks(sim%walls, case%fluid%gravity, dt, sim%contacts, blocks, contact)
       if (sim%light%on) call store_water_force(case%fluid%gravity, dt, blocks, sim%light)
       call toc(sim%timer_blocks)
@@ -220,7 +220,7 @@ contains
     logical :: begins(sim%blocks%n)
     integer :: b
 
-    begins = sim%blocks%present .and. .not. sim%felt
+    begins = sim%blocks%present .and. .not. sim%initialised
     if (.not. any(begins)) return
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call sim%coupling%force_at_release(sim%case, sim%grid, sim%solid, begins, sim%flow, &
@@ -229,7 +229,7 @@ contains
       if (.not. begins(b)) cycle
       sim%blocks%fluid_force(:, b) = force(1:3, b)
       sim%blocks%fluid_torque(:, b) = force(4:6, b)
-      sim%felt(b) = .true.
+      sim%initialised(b) = .true.
     end do
   end subroutine first_force
 

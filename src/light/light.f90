@@ -167,11 +167,11 @@ contains
   !> What the water does to the blocks in the step that begins: the level, what each carries along,
   !! the loss of entry, and the forces, at the poses of the middle of the step, so that a float
   !! gains no energy. Blocks that have just appeared enter without a loss.
-  subroutine enter_water(gravity, dt, blocks, felt, light)
+  subroutine enter_water(gravity, dt, blocks, initialised, light)
     real(wp), intent(in) :: gravity(3)   !! straight down [m/s2]
     real(wp), intent(in) :: dt           !! the step [s]
     type(blocks_t), intent(inout) :: blocks
-    logical, intent(inout) :: felt(:)    !! (n) blocks that have been here before
+    logical, intent(inout) :: initialised(:)    !! (n) blocks that were here before
     type(light_t), intent(inout) :: light
     real(wp) :: before   ! V_w [m3]
     logical :: rests
@@ -189,11 +189,11 @@ contains
       light%start(4:6, b) = blocks%l(:, b)/growth(light, blocks, b, before)
       rests = blocks%asleep(b) .or. (blocks%fixed(b) .and. all(abs(blocks%v(:, b)) <= 0.0_wp) &
                                      .and. all(abs(blocks%omega(:, b)) <= 0.0_wp))
-      if (.not. (felt(b) .and. rests .and. abs(light%wet(b) - before) <= 0.0_wp)) then
-        if (.not. blocks%fixed(b)) call carry_water(b, before, felt(b), light, blocks)
+      if (.not. (initialised(b) .and. rests .and. abs(light%wet(b) - before) <= 0.0_wp)) then
+        if (.not. blocks%fixed(b)) call carry_water(b, before, initialised(b), light, blocks)
         call find_force(gravity, b, blocks, light)
       end if
-      felt(b) = .true.
+      initialised(b) = .true.
       blocks%fluid_force(:, b) = light%force(1:3, b) &
         - (blocks%mass(b) - own_mass(blocks, b))*gravity
       blocks%fluid_torque(:, b) = light%force(4:6, b)
@@ -320,10 +320,10 @@ contains
 
   !> Let free block b carry what is below the level now. Water that comes along takes momentum from
   !! it, water left behind takes its own away.
-  subroutine carry_water(b, before, felt, light, blocks)
+  subroutine carry_water(b, before, initialised, light, blocks)
     integer, intent(in) :: b
     real(wp), intent(in) :: before   !! V_w of the step before [m3]
-    logical, intent(in) :: felt      !! else it has just appeared, and keeps its velocities
+    logical, intent(in) :: initialised      !! else it has just appeared, and keeps its velocities
     type(light_t), intent(in) :: light
     type(blocks_t), intent(inout) :: blocks
     real(wp) :: left, turned   ! of the velocity relative to the water, of the spin
@@ -331,7 +331,7 @@ contains
     call load_block(b, light, blocks)
     left = (loaded_mass(light, blocks, b, before)/blocks%mass(b))**entry_loss
     turned = growth(light, blocks, b, before)/growth(light, blocks, b, light%wet(b))
-    if (felt .and. light%wet(b) > before) then
+    if (initialised .and. light%wet(b) > before) then
       blocks%v(:, b) = light%current + left*(blocks%v(:, b) - light%current)
       blocks%omega(:, b) = turned*blocks%omega(:, b)
     else

@@ -81,13 +81,13 @@ contains
   end subroutine start
 
   !> A step without contact.
-  subroutine step(dt, blocks, felt, light)
+  subroutine step(dt, blocks, initialised, light)
     real(wp), intent(in) :: dt
     type(blocks_t), intent(inout) :: blocks
-    logical, intent(inout) :: felt(:)
+    logical, intent(inout) :: initialised(:)
     type(light_t), intent(inout) :: light
 
-    call enter_water(gravity, dt, blocks, felt, light)
+    call enter_water(gravity, dt, blocks, initialised, light)
     call begin_step(blocks)
     call drift(0.5_wp*dt, blocks)
     call kick(gravity, dt, blocks%fluid_force, blocks%fluid_torque, blocks)
@@ -141,22 +141,22 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(3)
+    logical :: initialised(3)
     real(wp) :: cut, want
 
     call describe(2300.0_wp, [0.05_wp, level, 0.06_wp], case)
     case%body%fixed = .true.
     case%body(3)%release_time = 1.0_wp
     call start(case, blocks, light)
-    felt = .false.
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
+    initialised = .false.
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
     call check('the level of the start', abs(light%level - level) < 1.0e-15_wp)
     call check('buoyancy of a whole block', &
                abs(blocks%fluid_force(3, 1)/(rho*g*edge**3) - 1.0_wp) < 1.0e-12_wp)
     call check('buoyancy of a half', &
                abs(blocks%fluid_force(3, 2)/(0.5_wp*rho*g*edge**3) - 1.0_wp) < 1.0e-12_wp)
     call release_body(1.0_wp, 3, blocks)
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
     want = level + edge**3/(area - edge**2)   ! the held half below and above takes its place
     cut = 0.5_wp*edge + want - level
     call check('the level over a block that came', abs(light%level - want) < 1.0e-15_wp)
@@ -171,13 +171,13 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp), parameter :: dt = 1.0e-6_wp, s = 2.3_wp
     real(wp) :: want
 
     call make_case(s*rho, [0.07_wp], case, blocks, light)
-    felt = .false.
-    call step(dt, blocks, felt, light)
+    initialised = .false.
+    call step(dt, blocks, initialised, light)
     want = -(s - 1.0_wp)*g/(s + light%added(1)%mass)
     call check('start of a fall', abs(blocks%v(3, 1)/dt/want - 1.0_wp) < 1.0e-5_wp)
     call check('M dU/dt is the sum of forces', abs(own_mass(blocks, 1)*(blocks%v(3, 1)/dt + g) &
@@ -191,7 +191,7 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp), parameter :: s = 2.3_wp
     real(wp) :: want
     integer :: i
@@ -199,9 +199,9 @@ contains
     call describe(s*rho, [-1.0_wp], case)
     case%body(1)%quaternion = quaternion_from_axis([1.0_wp, 2.0_wp, 0.5_wp], 0.7_wp)
     call start(case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 4000
-      call step(min(1.0e-3_wp, step_in_water(gravity, blocks, light)), blocks, felt, light)
+      call step(min(1.0e-3_wp, step_in_water(gravity, blocks, light)), blocks, initialised, light)
     end do
     want = sqrt(2.0_wp*(s - 1.0_wp)*g*edge**3/(0.55_wp*2.0_wp*edge**2))
     call check('terminal speed', abs(-blocks%v(3, 1)/want - 1.0_wp) < 1.0e-3_wp)
@@ -213,13 +213,13 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     integer :: i
 
     call make_case(0.5_wp*rho, [level], case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 1000
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
     end do
     call check('floats at half draught', abs(blocks%x(3, 1) - level) < 1.0e-12_wp)
   end subroutine check_floating
@@ -229,13 +229,13 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     integer :: i
 
     call make_case(rho, [0.07_wp], case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 1000
-      call step(1.0e-2_wp, blocks, felt, light)
+      call step(1.0e-2_wp, blocks, initialised, light)
     end do
     call check('a neutral block stays', abs(blocks%x(3, 1) - 0.07_wp) < 1.0e-13_wp)
   end subroutine check_neutral
@@ -245,7 +245,7 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp), parameter :: fall = -0.5_wp
     real(wp) :: want
     integer :: i, n
@@ -255,18 +255,18 @@ contains
       case%shape(1)%drag_coefficient = 0.0_wp
       case%body(1)%velocity = [0.0_wp, 0.0_wp, fall]
       call start(case, blocks, light)
-      felt = .false.
+      initialised = .false.
       do i = 1, n
-        call enter_water(0.0_wp*gravity, 0.0_wp, blocks, felt, light)
+        call enter_water(0.0_wp*gravity, 0.0_wp, blocks, initialised, light)
         call drift(1.2_wp*edge/real(n, wp)/0.4_wp, blocks)
       end do
-      call enter_water(0.0_wp*gravity, 0.0_wp, blocks, felt, light)
+      call enter_water(0.0_wp*gravity, 0.0_wp, blocks, initialised, light)
       want = fall*(own_mass(blocks, 1)/blocks%mass(1))**1.2_wp
       call check('entry takes momentum', abs(blocks%v(3, 1)/want - 1.0_wp) < 1.0e-12_wp)
     end do
     call check('all of it is in the water', abs(light%wet(1)/edge**3 - 1.0_wp) < 1.0e-12_wp)
     blocks%x(3, 1) = level + edge
-    call enter_water(0.0_wp*gravity, 0.0_wp, blocks, felt, light)
+    call enter_water(0.0_wp*gravity, 0.0_wp, blocks, initialised, light)
     call check('leaving the water takes none', abs(blocks%v(3, 1)/want - 1.0_wp) < 1.0e-12_wp)
     call check('nor leaves it any', abs(blocks%mass(1)/own_mass(blocks, 1) - 1.0_wp) < 1.0e-15_wp)
   end subroutine check_entry
@@ -276,7 +276,7 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp), parameter :: speed = -0.1_wp
     integer :: i
 
@@ -284,16 +284,16 @@ contains
     case%body(1)%fixed = .true.
     case%body(1)%velocity = [0.0_wp, 0.0_wp, speed]
     call start(case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 10
-      call step(1.0e-2_wp, blocks, felt, light)
+      call step(1.0e-2_wp, blocks, initialised, light)
     end do
     call check('it is half in the water', light%wet(1) > 0.3_wp*edge**3 .and. &
                light%wet(1) < 0.6_wp*edge**3)
     call check('a crane moves the block alone', &
                abs(blocks%mass(1)/own_mass(blocks, 1) - 1.0_wp) < 1.0e-15_wp)
     blocks%fixed = .false.
-    call step(1.0e-9_wp, blocks, felt, light)
+    call step(1.0e-9_wp, blocks, initialised, light)
     call check('let go it carries water', blocks%mass(1) > 1.05_wp*own_mass(blocks, 1))
     call check('and has kept its speed but for the last step', abs(blocks%v(3, 1)/speed &
       - 1.0_wp) < 0.02_wp)
@@ -304,7 +304,7 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp), parameter :: spin = 5.0_wp
     real(wp) :: grown
     integer :: i
@@ -312,24 +312,24 @@ contains
     call describe(rho, [0.07_wp], case)
     case%body(1)%angular_velocity = [0.0_wp, 0.0_wp, spin]
     call start(case, blocks, light)
-    felt = .false.
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
-    call step(1.0e-9_wp, blocks, felt, light)
+    initialised = .false.
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
+    call step(1.0e-9_wp, blocks, initialised, light)
     call check('a release in the water keeps the spin', &
                abs(blocks%omega(3, 1)/spin - 1.0_wp) < 1.0e-6_wp)
     do i = 1, 400
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
     end do
     call check('drag brakes it', blocks%omega(3, 1) < 0.9_wp*spin .and. blocks%omega(3, 1) > 0.0_wp)
     grown = 1.0_wp + light%added(1)%inertia
     blocks%omega(3, 1) = spin
     blocks%l(3, 1) = spin*grown*blocks%shapes(1)%inertia(3, 3)
     blocks%x(3, 1) = level + edge
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
-    call step(1.0e-9_wp, blocks, felt, light)
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
+    call step(1.0e-9_wp, blocks, initialised, light)
     call check('leaving the water keeps it', abs(blocks%omega(3, 1)/spin - 1.0_wp) < 1.0e-6_wp)
     blocks%x(3, 1) = 0.07_wp
-    call step(1.0e-9_wp, blocks, felt, light)
+    call step(1.0e-9_wp, blocks, initialised, light)
     call check('entry shares it', abs(blocks%omega(3, 1)*grown/spin - 1.0_wp) < 1.0e-6_wp)
   end subroutine check_spin
 
@@ -338,7 +338,7 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     real(wp) :: first, largest
     integer :: i
 
@@ -347,19 +347,19 @@ contains
     case%body(1)%velocity = [0.1_wp, 0.0_wp, 0.3_wp]
     case%body(1)%angular_velocity = [3.0_wp, 2.0_wp, 5.0_wp]
     call start(case, blocks, light)
-    felt = .false.
-    call step(1.0e-12_wp, blocks, felt, light)
+    initialised = .false.
+    call step(1.0e-12_wp, blocks, initialised, light)
     first = energy(blocks, light)
     do i = 1, 50
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
     end do
     call check('energy under water stays', &
                abs(energy(blocks, light)/first - 1.0_wp) < 1.0e-12_wp)
     call make_case(0.9_wp*rho, [level - 0.35_wp*edge], case, blocks, light)   ! at rest at -0.4
-    felt = .false.
+    initialised = .false.
     largest = 0.0_wp
     do i = 1, 1000
-      call step(1.0e-2_wp, blocks, felt, light)
+      call step(1.0e-2_wp, blocks, initialised, light)
       if (i > 500) largest = max(largest, abs(blocks%x(3, 1) - light%level + 0.4_wp*edge))
     end do
     call check('a float bobs ever less, at long steps', largest < 0.03_wp*edge)
@@ -379,15 +379,15 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(1)
+    logical :: initialised(1)
     integer :: i
 
     call describe(rho, [0.07_wp], case)
     case%fluid%velocity = [0.2_wp, 0.0_wp, 0.0_wp]
     call start(case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 20000
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
     end do
     call check('a neutral block swims with the current', &
                abs(blocks%v(1, 1)/0.2_wp - 1.0_wp) < 2.0e-2_wp)
@@ -399,17 +399,17 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(light_t) :: light
-    logical :: felt(2)
+    logical :: initialised(2)
     real(wp) :: force
 
     call make_case(2300.0_wp, [0.02_wp, level], case, blocks, light)
-    felt = .false.
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
+    initialised = .false.
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
     blocks%asleep = .true.
     light%force(3, 1) = 7.0_wp   ! a mark: it must not be found anew
     force = light%force(3, 2)
     light%displaced_start = light%displaced_start - area*1.0e-3_wp
-    call enter_water(gravity, 0.0_wp, blocks, felt, light)
+    call enter_water(gravity, 0.0_wp, blocks, initialised, light)
     call check('the force on a sleeper stays', abs(light%force(3, 1) - 7.0_wp) <= 0.0_wp)
     call check('a sleeper that sticks out feels the level', light%force(3, 2) > 1.05_wp*force)
   end subroutine check_sleepers
@@ -419,13 +419,13 @@ contains
     type(case_t) :: case
     type(blocks_t) :: blocks, again
     type(light_t) :: light, copy
-    logical :: felt(1), same(1)
+    logical :: initialised(1), same(1)
     integer :: i
 
     call make_case(2300.0_wp, [level + 0.4_wp*edge], case, blocks, light)
-    felt = .false.
+    initialised = .false.
     do i = 1, 30
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
     end do
     call start(case, again, copy)
     again%x = blocks%x
@@ -436,10 +436,10 @@ contains
     copy%level = light%level
     copy%wet = light%wet
     copy%force = light%force
-    same = felt
+    same = initialised
     call resume_light(again, copy)
     do i = 1, 30
-      call step(1.0e-3_wp, blocks, felt, light)
+      call step(1.0e-3_wp, blocks, initialised, light)
       call step(1.0e-3_wp, again, same, copy)
     end do
     call check('a restart goes on as it would have', all(abs(again%v - blocks%v) <= 0.0_wp) &
