@@ -8,7 +8,7 @@ module faults_m
   use simulation_m, only: simulation_t
   use courant_m, only: courant_rate_t, courant_rate
   use diagnostics_m, only: step_report_t
-  use release_m, only: n_waiting
+  use release_m, only: n_pending
   use deep_overlaps_m, only: overlap_fault
   implicit none
   private
@@ -155,7 +155,7 @@ contains
     character(:), allocatable :: why
     integer :: n
 
-    n = n_waiting(sim%clock%t, sim%blocks)
+    n = n_pending(sim%clock%t, sim%blocks)
     if (n == 0) return
     why = ''
     if (sim%clock%settled()) why = ', and all others are at rest'

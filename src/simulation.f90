@@ -51,7 +51,7 @@ module simulation_m
     logical :: start_converged = .true.    !! velocity and pressure at t = 0
     real(wp) :: next_let_go = huge(1.0_wp)   !! when a lowered block will be let go [s]
     logical, allocatable :: initialised(:)        !! blocks whose motion in the fluid has begun
-    logical, allocatable :: waiting(:)     !! blocks that are due, found no room and were warned of
+    logical, allocatable :: pending(:)     !! blocks that are due, found no room and were warned of
     integer :: timer_blocks = 0, timer_solid = 0, timer_transport = 0, timer_velocity = 0
   end type simulation_t
 
@@ -83,7 +83,7 @@ contains
     call contacts_init(case%contact, sim%blocks, sim%contacts)
     call overlap_init(sim%blocks%shapes, sim%blocks%n, sim%overlap)
     call deep_overlaps_init(sim%blocks, sim%deep)
-    allocate (sim%waiting(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)
+    allocate (sim%pending(sim%blocks%n), sim%initialised(sim%blocks%n), source=.false.)
     allocate (sim%solid, sim%before)
     if (case%run%physics == 'light') call light_init(case, bed, sim%blocks, sim%light)
     if (.not. sim%wet) return

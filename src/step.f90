@@ -191,7 +191,7 @@ contains
     logical :: released
 
     call follow_motions(sim%clock%t, sim%blocks)
-    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%waiting, &
+    call release_due_blocks(sim%walls, sim%clock%t, sim%overlap, sim%blocks, sim%pending, &
                             report%warnings, released)
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
                         sim%next_let_go, report%warnings)

@@ -19,7 +19,7 @@ module release_m
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
-  public :: release_due_blocks, let_go_lowered, next_release, n_waiting, none_to_come
+  public :: release_due_blocks, let_go_lowered, next_release, n_pending, none_to_come
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
   real(wp), parameter :: slack_share = 0.05_wp
@@ -31,12 +31,12 @@ contains
   !!
   !! Of blocks that are due at the same time and whose places exclude one another those go that
   !! leave room to most others, so that many go together.
-  subroutine release_due_blocks(walls, time, overlap, blocks, waiting, warnings, released)
+  subroutine release_due_blocks(walls, time, overlap, blocks, pending, warnings, released)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: time   !! [s]
     type(overlap_t), intent(in) :: overlap
     type(blocks_t), intent(inout) :: blocks
-    logical, intent(inout) :: waiting(:)     !! blocks warned of
+    logical, intent(inout) :: pending(:)     !! blocks warned of
     integer, intent(inout) :: warnings       !! counted up
     logical, intent(out) :: released         !! there was one
     integer, allocatable :: due(:)
@@ -61,15 +61,15 @@ contains
           //' m, its place is taken', blocks, warnings)
       end if
       if (free(i)) then
-        if (waiting(b)) call warn(time, b, 'found room and was released', blocks, warnings)
+        if (pending(b)) call warn(time, b, 'found room and was released', blocks, warnings)
         call release_body(time, b, blocks)
         released = .true.
       else if (blocks%handling(b)%if_blocked == 'skip') then
         call warn(time, b, 'is left out, its place is taken', blocks, warnings)
         blocks%status(b) = left_out
-      else if (.not. waiting(b)) then
+      else if (.not. pending(b)) then
         call warn(time, b, 'is due but its place is taken; it waits', blocks, warnings)
-        waiting(b) = .true.
+        pending(b) = .true.
       end if
     end do
   end subroutine release_due_blocks
@@ -243,7 +243,7 @@ contains
 
   !> Number of blocks whose time came before this moment but whose place was taken; one that is due
   !! at this very moment has not been tried.
-  pure function n_waiting(time, blocks) result(n)
+  pure function n_pending(time, blocks) result(n)
     real(wp), intent(in) :: time   !! [s]
     type(blocks_t), intent(in) :: blocks
     integer :: n
@@ -251,7 +251,7 @@ contains
     n = 0
     if (blocks%n > 0) n = count(blocks%status == to_come .and. .not. blocks%present &
                                 .and. blocks%release_time < time - same_time)
-  end function n_waiting
+  end function n_pending
 
   !> Is every block let go, left out, or tried before this moment and without room? Once all blocks
   !! rest nobody makes room any more.
@@ -260,7 +260,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     logical :: yes
 
-    yes = count(blocks%status == to_come .and. .not. blocks%present) == n_waiting(time, blocks) &
+    yes = count(blocks%status == to_come .and. .not. blocks%present) == n_pending(time, blocks) &
       .and. .not. any(blocks%status == lowering)
   end function none_to_come
 

@@ -7,7 +7,7 @@ program test_release
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use overlap_m, only: overlap_t, overlap_init
-  use release_m, only: release_due_blocks, next_release, n_waiting
+  use release_m, only: release_due_blocks, next_release, n_pending
   use check_m, only: check, finish_checks
   implicit none
   type(case_t) :: case
@@ -16,7 +16,7 @@ program test_release
   type(walls_t) :: walls
   type(overlap_t) :: overlap
   character(:), allocatable :: message
-  logical :: waiting(4), released
+  logical :: pending(4), released
   integer :: warnings
 
   ! Block 1 is there from the start, 2 comes later beside it, 3 and 4 drop onto the place of 1.
@@ -42,7 +42,7 @@ program test_release
   call walls_init(case%grid, case%boundary, walls)
   call blocks_init(case, shapes, blocks)
   call overlap_init(blocks%shapes, blocks%n, overlap)
-  waiting = .false.
+  pending = .false.
   warnings = 0
   call check('one block at the start', all(blocks%present .eqv. [.true., .false., .false., &
                                                                  .false.]))
@@ -50,8 +50,8 @@ program test_release
 
   call try(0.0_wp)
   call check('no room: not released', .not. (released .or. blocks%present(3)))
-  call check('no room: it waits', waiting(3) .and. n_waiting(0.1_wp, blocks) == 1)
-  call check('due at the very end: not waiting', n_waiting(0.0_wp, blocks), 0)
+  call check('no room: it waits', pending(3) .and. n_pending(0.1_wp, blocks) == 1)
+  call check('due at the very end: not waiting', n_pending(0.0_wp, blocks), 0)
   call check('warned', warnings, 1)
   call try(0.1_wp)
   call check('warned once', warnings, 1)
@@ -73,10 +73,10 @@ program test_release
   call check('room at last', released .and. blocks%present(3))
   call check('the true time is kept', blocks%release_time(3), 0.5_wp, 0.0_wp)
   call check('said once more', warnings, 2)
-  call check('nobody waits', n_waiting(0.5_wp, blocks), 0)
+  call check('nobody waits', n_pending(0.5_wp, blocks), 0)
 
   call try(0.75_wp)
-  call check('the next of the drop finds the one before', n_waiting(0.8_wp, blocks), 1)
+  call check('the next of the drop finds the one before', n_pending(0.8_wp, blocks), 1)
   blocks%x(3, 3) = 0.3_wp
   call try(0.8_wp)
   call check('all there', all(blocks%present))
@@ -127,7 +127,7 @@ contains
   subroutine try(time)
     real(wp), intent(in) :: time   !! [s]
 
-    call release_due_blocks(walls, time, overlap, blocks, waiting, warnings, released)
+    call release_due_blocks(walls, time, overlap, blocks, pending, warnings, released)
   end subroutine try
 
 end program test_release
