@@ -3,7 +3,8 @@
 !! A small cell would give away nearly all it holds, or it opens or closes in this step. It receives
 !! in the sweeps and gives afterwards, of the implicit donor value, which is bounded for any step:
 !! $$ C_S = (W_S + \sum_{in} Q\, C_{S'}) / (V_S + \sum_{in} Q) $$
-!! Momentum goes the same way, with its mass in place of the volume (`late_values`, `move_late`).
+!! Momentum goes the same way, with its mass in place of the volume (`implicit_values`,
+!! `move_implicit`).
 module small_cells_m
   use kinds_m, only: wp, i8
   use growing_m, only: ensure_room
@@ -16,12 +17,12 @@ module small_cells_m
   implicit none
   private
   public :: small_cells_t, small_cells_init, find_small_cells, give_small_cells
-  public :: renew_shares, late_values, move_late
+  public :: renew_shares, implicit_values, move_implicit
 
   real(wp), parameter :: max_outflow = 0.98_wp     !! share of its volume a cell may give
   real(wp), parameter :: min_volume = 1.0e-6_wp   !! of a cell that is not small [V]
-  integer, parameter :: max_late_iterations = 10000
-  real(wp), parameter :: late_tolerance = 1.0e-14_wp
+  integer, parameter :: max_implicit_iterations = 10000
+  real(wp), parameter :: implicit_tolerance = 1.0e-14_wp
     !! change of a pass, of the largest value; on closed rings rounding alone makes some 1e-15
 
   type :: small_cells_t
@@ -29,11 +30,11 @@ module small_cells_m
     integer, allocatable :: cell(:, :)        !! (3, *)
     integer, allocatable :: number(:, :, :)   !! of a small cell, 0 for others; halo filled
     !> "Late" faces, whose donor is a small cell.
-    integer :: n_late = 0
+    integer :: n_implicit = 0
     integer, allocatable :: face(:, :)        !! (4, *) cell and direction of the lower face
     integer, allocatable :: donor(:, :), receiver(:, :)   !! (3, *)
-    integer, allocatable :: late_in_row(:, :)   !! work: those of a direction in the row (:, j, k)
-    real(wp), allocatable :: q_late(:), g_late(:)
+    integer, allocatable :: implicit_in_row(:, :)   !! work: of a direction in the row (:, j, k)
+    real(wp), allocatable :: q_implicit(:), g_implicit(:)
       !! (*) volume and liquid through these faces, positive along the axis [m3]
     integer :: iterations = 0                 !! of the last donor values
     logical :: converged = .true.             !! all donor values of the step
@@ -53,7 +54,7 @@ contains
     a = grid%first
     b = grid%last
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
-    allocate (self%late_in_row(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1))
+    allocate (self%implicit_in_row(grid%lo(2):grid%hi(2) + 1, grid%lo(3):grid%hi(3) + 1))
     allocate (self%cell(3, first_size))
     allocate (self%face(4, first_size), self%donor(3, first_size), self%receiver(3, first_size))
   end subroutine small_cells_init
@@ -72,7 +73,7 @@ contains
     call ensure_room(self%n, self%mass)
     call ensure_room(self%n, self%ratio)
     call halo_exchange(self%number, n_halo, layers=1)
-    call find_late_faces(grid, volumes, self)
+    call find_implicit_faces(grid, volumes, self)
   end subroutine find_small_cells
 
   !> One for small cells, zero for others.
@@ -100,7 +101,7 @@ contains
   end subroutine mark_small_cells
 
   !> Faces with a small donor: listed, and taken out of the sweeps.
-  subroutine find_late_faces(grid, volumes, self)
+  subroutine find_implicit_faces(grid, volumes, self)
     type(grid_t), intent(in) :: grid
     type(carried_volumes_t), intent(inout) :: volumes
     type(small_cells_t), intent(inout) :: self
@@ -109,10 +110,10 @@ contains
     n = 0
     do d = 1, 3
       e = unit_step(:, d)
-      call count_late_faces(grid, d, volumes%q(:, :, :, d), self%number, self%late_in_row)
+      call count_implicit_faces(grid, d, volumes%q(:, :, :, d), self%number, self%implicit_in_row)
       do k = grid%lo(3), grid%hi(3) + e(3)
         do j = grid%lo(2), grid%hi(2) + e(2)
-          if (self%late_in_row(j, k) == 0) cycle
+          if (self%implicit_in_row(j, k) == 0) cycle
           do i = grid%lo(1), grid%hi(1) + e(1)
             if (.not. abs(volumes%q(i, j, k, d)) > 0.0_wp) cycle
             up = [i, j, k]
@@ -123,23 +124,23 @@ contains
             call ensure_room(n, self%face)
             call ensure_room(n, self%donor)
             call ensure_room(n, self%receiver)
-            call ensure_room(n, self%q_late)
+            call ensure_room(n, self%q_implicit)
             self%face(:, n) = [i, j, k, d]
             self%donor(:, n) = donor
             self%receiver(:, n) = up + low - donor
-            self%q_late(n) = volumes%q(i, j, k, d)
+            self%q_implicit(n) = volumes%q(i, j, k, d)
             volumes%q(i, j, k, d) = 0.0_wp
           end do
         end do
       end do
     end do
-    self%n_late = n
-    call ensure_room(n, self%q_late)
-    call ensure_room(n, self%g_late)
-  end subroutine find_late_faces
+    self%n_implicit = n
+    call ensure_room(n, self%q_implicit)
+    call ensure_room(n, self%g_implicit)
+  end subroutine find_implicit_faces
 
   !> How many faces of direction d have a small donor, in each row.
-  subroutine count_late_faces(grid, d, q, number, in_row)
+  subroutine count_implicit_faces(grid, d, q, number, in_row)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: d
     real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):)
@@ -161,7 +162,7 @@ contains
         in_row(j, k) = n
       end do
     end do
-  end subroutine count_late_faces
+  end subroutine count_implicit_faces
 
   !> The small cells give what they hold once all has come in: w, v, q and g are complete.
   subroutine give_small_cells(grid, volumes, self, share)
@@ -172,24 +173,24 @@ contains
       !! work: liquid share of what the small cells give
     integer :: l, n, at(3)
 
-    n = self%n_late
-    call late_values(grid, volumes%w, volumes%v, abs(self%q_late(1:n)), self, share)
+    n = self%n_implicit
+    call implicit_values(grid, volumes%w, volumes%v, abs(self%q_implicit(1:n)), self, share)
     do l = 1, n
       at = self%donor(:, l)
-      self%g_late(l) = self%q_late(l)*min(max(share(at(1), at(2), at(3)), 0.0_wp), 1.0_wp)
+      self%g_implicit(l) = self%q_implicit(l)*min(max(share(at(1), at(2), at(3)), 0.0_wp), 1.0_wp)
     end do
-    call move_late(grid, self, self%g_late, volumes%w)
-    call move_late(grid, self, self%q_late, volumes%v)
+    call move_implicit(grid, self, self%g_implicit, volumes%w)
+    call move_implicit(grid, self, self%q_implicit, volumes%v)
     call fill_scalar_halo(grid, volumes%v)
     do l = 1, n
       associate (f => self%face(:, l))
-        volumes%q(f(1), f(2), f(3), f(4)) = self%q_late(l)
-        volumes%g(f(1), f(2), f(3), f(4)) = self%g_late(l)
+        volumes%q(f(1), f(2), f(3), f(4)) = self%q_implicit(l)
+        volumes%g(f(1), f(2), f(3), f(4)) = self%g_implicit(l)
       end associate
     end do
   end subroutine give_small_cells
 
-  !> C^ of what gave and got late in the part before, for the next one; that of cells with solid
+  !> C^ of what gave and got implicitly in the part before, for the next one; that of cells with solid
   !! stays that of the begin, as in the sweeps.
   subroutine renew_shares(grid, old, self, volumes)
     type(grid_t), intent(in) :: grid
@@ -198,7 +199,7 @@ contains
     type(carried_volumes_t), intent(inout) :: volumes
     integer :: l
 
-    do l = 1, self%n_late
+    do l = 1, self%n_implicit
       call renew(self%donor(:, l))
       call renew(self%receiver(:, l))
     end do
@@ -217,13 +218,13 @@ contains
   !> What small cells hold per mass of a carried quantity once all has come in:
   !! $$ x_S = (a_S + \sum_{in} w\, x_{S'}) / (m_S + \sum_{in} w) $$
   !! Every value follows from those of the pass before, so the result does not depend on any order.
-  subroutine late_values(grid, amount, mass, weight, self, value)
+  subroutine implicit_values(grid, amount, mass, weight, self, value)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
       !! carried, after the sweeps
     real(wp), intent(in), contiguous :: mass(grid%first(1):, grid%first(2):, grid%first(3):)
       !! mass or volume then
-    real(wp), intent(in) :: weight(:)   !! of the late faces, like `mass`, positive
+    real(wp), intent(in) :: weight(:)   !! of the implicit faces, like `mass`, positive
     type(small_cells_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: value(grid%first(1):, grid%first(2):, grid%first(3):)
       !! of small cells
@@ -232,18 +233,18 @@ contains
     real(wp) :: change(2)   ! largest change and largest value of a pass
 
     self%iterations = 0
-    faces = int(self%n_late, i8)
+    faces = int(self%n_implicit, i8)
     call global_sum(faces)
     if (faces(1) == 0_i8) return
     call first_values()
-    do it = 1, max_late_iterations
+    do it = 1, max_implicit_iterations
       call halo_exchange(value, n_halo, layers=1)
       call next_values()
       call global_max(change)
       self%iterations = it
-      if (change(1) <= max(late_tolerance*change(2), tiny(1.0_wp))) exit
+      if (change(1) <= max(implicit_tolerance*change(2), tiny(1.0_wp))) exit
     end do
-    if (it > max_late_iterations) self%converged = .false.
+    if (it > max_implicit_iterations) self%converged = .false.
     call halo_exchange(value, n_halo, layers=1)
   contains
     !> What they hold after the sweeps, and their mass with all that comes in.
@@ -258,7 +259,7 @@ contains
           value(at(1), at(2), at(3)) = amount(at(1), at(2), at(3))/self%mass(s)
         end if
       end do
-      do l = 1, self%n_late
+      do l = 1, self%n_implicit
         s = number_of(self%receiver(:, l))
         if (s > 0) self%mass(s) = self%mass(s) + weight(l)
       end do
@@ -272,7 +273,7 @@ contains
         at = self%cell(:, s)
         self%amount(s) = amount(at(1), at(2), at(3))
       end do
-      do l = 1, self%n_late
+      do l = 1, self%n_implicit
         s = number_of(self%receiver(:, l))
         if (s == 0) cycle
         at = self%donor(:, l)
@@ -296,17 +297,17 @@ contains
       number_of = 0
       if (grid%owns(at)) number_of = self%number(at(1), at(2), at(3))
     end function number_of
-  end subroutine late_values
+  end subroutine implicit_values
 
-  !> Move what crosses the late faces; `flux` is positive along the axis.
-  subroutine move_late(grid, self, flux, amount)
+  !> Move what crosses the implicit faces; `flux` is positive along the axis.
+  subroutine move_implicit(grid, self, flux, amount)
     type(grid_t), intent(in) :: grid
     type(small_cells_t), intent(in) :: self
     real(wp), intent(in) :: flux(:)
     real(wp), intent(inout), contiguous :: amount(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: l, up(3), low(3)
 
-    do l = 1, self%n_late
+    do l = 1, self%n_implicit
       up = self%face(1:3, l)
       low = up - unit_step(:, self%face(4, l))
       if (grid%owns(low)) then
@@ -316,6 +317,6 @@ contains
         amount(up(1), up(2), up(3)) = amount(up(1), up(2), up(3)) + flux(l)
       end if
     end do
-  end subroutine move_late
+  end subroutine move_implicit
 
 end module small_cells_m

@@ -9,7 +9,7 @@ module fluid_transport_m
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
                                 begin_part, sweep, small_cells, finish_transport
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
-                                     momentum_late
+                                     momentum_implicit
   use elliptic_solver_m, only: elliptic_solver_t
   implicit none
   private
@@ -121,7 +121,7 @@ contains
           do n = 1, 3
             call momentum_sweep(grid, fluid, before, liquid%order(n), liquid, flow%u, momentum)
           end do
-          call momentum_late(grid, fluid, liquid, flow%u, momentum)
+          call momentum_implicit(grid, fluid, liquid, flow%u, momentum)
         else
           do n = 1, 3
             call sweep(grid, before, liquid%order(n), liquid)

@@ -21,10 +21,11 @@ module momentum_conservative_m
   use tvd_m, only: face_row, scheme_of, mp_scheme
   use carried_volumes_m, only: carried_volumes_t
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
-  use small_cells_m, only: late_values, move_late
+  use small_cells_m, only: implicit_values, move_implicit
   implicit none
   private
-  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_late, mass_through
+  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_implicit, &
+            mass_through
 
   type :: momentum_t
     integer :: scheme = mp_scheme                   !! of the carried velocity
@@ -32,7 +33,7 @@ module momentum_conservative_m
     !> Momentum through the lower faces of two planes, work of each thread [kg m/s].
     real(wp), allocatable :: carried(:, :, :, :, :)   !! (i, j, component, 0:1, thread)
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
-    real(wp), allocatable :: late(:), late_mass(:)
+    real(wp), allocatable :: implicit_flux(:), implicit_mass(:)
       !! momentum and mass through the faces of small cells
   end type momentum_t
 
@@ -54,7 +55,7 @@ contains
     end if
     allocate (self%carried(grid%lo(1):grid%hi(1) + 1, grid%lo(2):grid%hi(2) + 1, 3, 0:1, &
                            0:omp_get_max_threads() - 1), source=0.0_wp)
-    allocate (self%late(0), self%late_mass(0))
+    allocate (self%implicit_flux(0), self%implicit_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
 
@@ -238,7 +239,7 @@ contains
 
   !> Velocity after the small cells have given what they hold, with the same implicit donor value as
   !! their liquid; moves the volumes of the small cells too (`small_cells`).
-  subroutine momentum_late(grid, fluid, transport, u, self)
+  subroutine momentum_implicit(grid, fluid, transport, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(liquid_transport_t), intent(inout) :: transport
@@ -248,7 +249,7 @@ contains
     integer :: m, l, k, at(3)
 
     ! the sweeps have done with their arrays
-    associate (small => transport%small, n => transport%small%n_late, &
+    associate (small => transport%small, n => transport%small%n_implicit, &
                mass => transport%sweeps%out_high, value => transport%sweeps%out_low)
       !$omp parallel do schedule(static)
       do k = grid%lo(3), grid%hi(3)
@@ -256,24 +257,24 @@ contains
                                      transport%volumes%w(:, :, k))
       end do
       call small_cells(grid, transport)
-      if (size(self%late) < n) then
-        deallocate (self%late, self%late_mass)
-        allocate (self%late(2*n), self%late_mass(2*n))
+      if (size(self%implicit_flux) < n) then
+        deallocate (self%implicit_flux, self%implicit_mass)
+        allocate (self%implicit_flux(2*n), self%implicit_mass(2*n))
       end if
-      self%late_mass(1:n) = mass_through(fluid, small%q_late(1:n), small%g_late(1:n))
+      self%implicit_mass(1:n) = mass_through(fluid, small%q_implicit(1:n), small%g_implicit(1:n))
       do m = 1, 3
-        call late_values(grid, self%momentum(:, :, :, m), mass, abs(self%late_mass(1:n)), &
+        call implicit_values(grid, self%momentum(:, :, :, m), mass, abs(self%implicit_mass(1:n)), &
                          small, value)
         do l = 1, n
           at = small%donor(:, l)
-          self%late(l) = self%late_mass(l)*value(at(1), at(2), at(3))
+          self%implicit_flux(l) = self%implicit_mass(l)*value(at(1), at(2), at(3))
         end do
-        call move_late(grid, small, self%late(1:n), self%momentum(:, :, :, m))
+        call move_implicit(grid, small, self%implicit_flux(1:n), self%momentum(:, :, :, m))
       end do
     end associate
     call velocity_of_momentum(grid, fluid, transport%volumes%w, transport%volumes%v, &
                               self%momentum, u)
-  end subroutine momentum_late
+  end subroutine momentum_implicit
 
   !> Velocity of every own cell that holds mass; the others keep theirs. Halo filled.
   subroutine velocity_of_momentum(grid, fluid, liquid, fluid_volume, momentum, u)

@@ -138,7 +138,7 @@ contains
     call check('ball: bounds', worst, 0.0_wp, 1.0e-15_wp)
     call check('ball: room', room_error(grid, new, flow), 0.0_wp, 1.0e-13_wp)
     call check('ball: shape after one turn', shape_error < 0.05_wp)
-    call check('ball: no small cells give', transport%small%n_late, 0)
+    call check('ball: no small cells give', transport%small%n_implicit, 0)
     print '(a, es9.2)', 'ball: share of the ball in the wrong place ', shape_error
   end subroutine ball_in_uniform_stream
 
@@ -248,7 +248,7 @@ contains
       worst = max(worst, room_error(grid, new, flow))
       impure = max(impure, maxval(abs(flow%liquid(1:16, 1:12, 1:16) &
                                       - flow%fluid_volume(1:16, 1:12, 1:16))))
-      small = max(small, transport%small%n_late)
+      small = max(small, transport%small%n_implicit)
     end do
     call check('box under water: volume', liquid_volume(grid, flow%liquid)/before, 1.0_wp, &
                1.0e-14_wp)

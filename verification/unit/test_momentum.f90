@@ -13,7 +13,7 @@ program test_momentum
     begin_part, finish_transport
   use liquid_fill_m, only: fill_liquid
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
-    momentum_late, mass_through
+    momentum_implicit, mass_through
   use box_solid_m, only: set_boxes, simple_grid
   use check_m, only: check, finish_checks
   implicit none
@@ -78,7 +78,7 @@ contains
       do n = 1, 3
         call momentum_sweep(grid, fluid, old, transport%order(n), transport, flow%u, momentum)
       end do
-      call momentum_late(grid, fluid, transport, flow%u, momentum)
+      call momentum_implicit(grid, fluid, transport, flow%u, momentum)
     end do
     call finish_transport(grid, new, transport, flow)
   end subroutine carry
@@ -143,7 +143,7 @@ contains
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
     call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
                > 50)
-    call check('parts keep cells from being small', transport%small%n_late, 0)
+    call check('parts keep cells from being small', transport%small%n_implicit, 0)
   end subroutine uniform_through_an_interface
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.
@@ -226,7 +226,7 @@ contains
       do d = 1, 3   ! the velocity stage gives closed cells the velocity of the body
         where (new%alpha >= 1.0_wp) flow%u(:, :, :, d) = stream(d)
       end do
-      small = max(small, transport%small%n_late)
+      small = max(small, transport%small%n_implicit)
     end do
     call check('uniform velocity around a moving box', worst, 0.0_wp, 1.0e-9_wp)
     call check('cells opened and closed', small > 0)

@@ -47,7 +47,7 @@ contains
                small%number(4, 2, 2) > 0)
     call check('one gives nearly all', small%number(2, 3, 3) > 0)
     call check('one gives just what it may', small%number(4, 1, 1), 0)
-    call check('late faces', small%n_late, 3)
+    call check('implicit faces', small%n_implicit, 3)
     call check('they are taken out of the sweeps', volumes%q(4:5, 2, 2, 1), [0.0_wp, 0.0_wp], &
                0.0_wp)
     call check('others are not', volumes%q(3, 2, 2, 1), through, 0.0_wp)
@@ -92,7 +92,7 @@ contains
     volumes%q(4, 2, 2, 1) = -1.0_wp
     volumes%q(3, 2, 2, 2) = -1.0_wp
     call find_small_cells(grid, solid, volumes, small)
-    call check('ring: late faces', small%n_late, 4)
+    call check('ring: implicit faces', small%n_implicit, 4)
     call give_small_cells(grid, volumes, small, share)
     call check('ring: not converged', .not. small%converged)
     call check('ring: nothing is lost', total(), 1.0e-6_wp, 1.0e-15_wp)
