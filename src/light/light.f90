@@ -227,23 +227,23 @@ contains
     type(blocks_t), intent(in) :: blocks
     type(light_t), intent(inout) :: light
     integer, parameter :: max_rounds = 50
-    real(wp) :: lack, lack_before, level_before, step
+    real(wp) :: residual, residual_before, level_before, step
     integer :: round
 
-    lack = lack_of_level()
-    step = lack
+    residual = level_residual()
+    step = residual
     do round = 1, max_rounds
-      if (abs(lack) <= 4.0_wp*epsilon(lack)*abs(light%level - light%bottom)) exit
-      lack_before = lack
+      if (abs(residual) <= 4.0_wp*epsilon(residual)*abs(light%level - light%bottom)) exit
+      residual_before = residual
       level_before = light%level
       light%level = light%level + step
-      lack = lack_of_level()
-      if (abs(lack - lack_before) <= 0.0_wp) exit
-      step = -lack*(light%level - level_before)/(lack - lack_before)   ! secant
+      residual = level_residual()
+      if (abs(residual - residual_before) <= 0.0_wp) exit
+      step = -residual*(light%level - level_before)/(residual - residual_before)   ! secant
     end do
   contains
     !> How much higher the level ought to be for what it makes the blocks displace [m].
-    real(wp) function lack_of_level()
+    real(wp) function level_residual()
       integer :: b
 
       do b = 1, blocks%n
@@ -252,10 +252,10 @@ contains
         call submerge(blocks, b, light%level, light%wet(b), light%moment(:, b))
         light%cut_at(b) = merge(light%level, -huge(1.0_wp), blocks%asleep(b))
       end do
-      lack_of_level = 0.0_wp
-      if (light%area > 0.0_wp) lack_of_level = light%level_start - light%level &
+      level_residual = 0.0_wp
+      if (light%area > 0.0_wp) level_residual = light%level_start - light%level &
         + (sum(light%wet) - light%displaced_start)/light%area
-    end function lack_of_level
+    end function level_residual
   end subroutine find_level
 
   !> Volume of block b below the level, and its first moment about the centre of mass, space axes.

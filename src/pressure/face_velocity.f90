@@ -14,9 +14,9 @@ module face_velocity_m
   private
   public :: acceleration_t, acceleration_init, face_acceleration, push_faces, cell_mean_of_faces
   public :: hold_in_cells
-  public :: predict_face_velocity, compact_time, face_step
+  public :: predict_face_velocity, rhie_chow_time, face_step
 
-  real(wp), parameter :: compact_courant = 0.125_wp   !! Courant number of the longest compact_time
+  real(wp), parameter :: rhie_chow_courant = 0.125_wp   !! Courant number of the longest compact_time
 
   !> Acceleration of the fluid by weight, pressure and surface tension.
   type :: acceleration_t
@@ -402,13 +402,13 @@ contains
   !! The term is a viscosity for pressure: it takes the energy dt' sum m (a_f^2 - mean(a)^2) per
   !! time, which beside a body is a drag of the first order in the step; without it short steps
   !! break up (docs/decisions/cut_cells.md).
-  elemental function compact_time(dt, courant) result(time)
+  elemental function rhie_chow_time(dt, courant) result(time)
     real(wp), intent(in) :: dt        !! [s]
     real(wp), intent(in) :: courant   !! largest Courant number of the step [-]
     real(wp) :: time
 
-    time = dt*min(1.0_wp, compact_courant/max(courant, compact_courant))
-  end function compact_time
+    time = dt*min(1.0_wp, rhie_chow_courant/max(courant, rhie_chow_courant))
+  end function rhie_chow_time
 
   !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
   elemental function face_step(dt, nu, reach) result(step)

@@ -10,14 +10,14 @@ module wall_faces_m
   use rigid_flux_m, only: nearest_arm, arm_to_cell
   use mixture_m, only: face_mean
   use wall_profile_m, only: slip_at
-  use face_velocity_m, only: acceleration_t, compact_time, face_step
+  use face_velocity_m, only: acceleration_t, rhie_chow_time, face_step
   implicit none
   private
   public :: face_velocity_at_walls, shorten_at_walls
 
 contains
 
-  !> Faces of the cells at walls: their compact acceleration counts for `compact_time` by the
+  !> Faces of the cells at walls: their compact acceleration counts for `rhie_chow_time` by the
   !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
   !! all of its damping and has no drag worth the name.
   subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
@@ -60,7 +60,7 @@ contains
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
           - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
-        time = compact_time(dt, dt*sum(abs(past)/grid%h))
+        time = rhie_chow_time(dt, dt*sum(abs(past)/grid%h))
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
@@ -186,7 +186,7 @@ contains
       real(wp) :: time
 
       time = dt
-      if (.not. c_ismac) time = compact_time(dt, dt*rate)
+      if (.not. c_ismac) time = rhie_chow_time(dt, dt*rate)
       time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
     end function time_in_liquid
 
