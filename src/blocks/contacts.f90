@@ -18,7 +18,7 @@ module contacts_m
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
   use partners_met_m, only: store_partners, count_partners
   use contact_state_m, only: contacts_t, contacts_init
-  use resting_m, only: wake_or_sleep, rouse
+  use resting_m, only: wake_or_sleep, wake_touching
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
@@ -52,7 +52,7 @@ contains
     call update_partners(walls, gravity, blocks, contacts%touching%partners)
     if (contacts%sleep%active) then
       call update_stillness(blocks, changed)
-      if (changed) call rouse(blocks, contacts)
+      if (changed) call wake_touching(blocks, contacts)
     end if
     if (.not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
     if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
@@ -159,7 +159,7 @@ contains
       call stretch_springs(0.5_wp*dt_b, touching, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)
-    if (contacts%sleep%active .and. any(contacts%woken)) call rouse(blocks, contacts)
+    if (contacts%sleep%active .and. any(contacts%woken)) call wake_touching(blocks, contacts)
   end subroutine finish_substep
 
   !> The part of a contact force that moves a body, and what else acts on it all through the step.

@@ -19,7 +19,7 @@ module impulse_step_m
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
   use sleep_m, only: hold_or_wake
-  use resting_m, only: rouse
+  use resting_m, only: wake_touching
   use partners_met_m, only: store_partners
   implicit none
   private
@@ -63,7 +63,7 @@ contains
         call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
           contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
         if (.not. any(contacts%woken)) exit
-        call rouse(blocks, contacts)   ! what wakes takes part: once more
+        call wake_touching(blocks, contacts)   ! what wakes takes part: once more
       end do
       call finish_step(gravity, step, h, contacts, blocks, report)
       left = merge(left - step, 0.0_wp, step < left)

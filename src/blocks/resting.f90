@@ -6,7 +6,7 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use springs_m, only: move_springs
-  use sleep_m, only: update_loads, sum_memory, is_tired, balanced, put_to_sleep, hold_or_wake, &
+  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
   use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
@@ -17,7 +17,7 @@ module resting_m
   use contact_state_m, only: contacts_t
   implicit none
   private
-  public :: wake_or_sleep, rouse
+  public :: wake_or_sleep, wake_touching
 
 contains
 
@@ -40,13 +40,13 @@ contains
       call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
         contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
       changed = any(contacts%woken)
-      if (changed) call rouse(blocks, contacts)
+      if (changed) call wake_touching(blocks, contacts)
     else
       changed = .false.
       do b = 1, blocks%n
-        contacts%sleep%tired(b) = is_tired(gravity, b, blocks, contacts%sleep)
+        contacts%sleep%candidate(b) = may_sleep(gravity, b, blocks, contacts%sleep)
       end do
-      if (any(contacts%sleep%tired)) then
+      if (any(contacts%sleep%candidate)) then
         dt_b = dt
         if (.not. contacts%by_impulses) dt_b = equal_part(dt, substep_limit(walls, &
           contacts%touching, blocks, dt, contacts%limits))
@@ -86,7 +86,7 @@ contains
     changed = .false.
     associate (sleep => contacts%sleep, loads => contacts%loads)
       do b = 1, blocks%n
-        if (.not. (sleep%tired(b) .and. sleep%supported(b))) cycle
+        if (.not. (sleep%candidate(b) .and. sleep%supported(b))) cycle
         if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
                            blocks%fluid_torque(:, b), sleep%reach(b))) cycle
@@ -97,7 +97,7 @@ contains
         changed = .true.
       end do
     end associate
-    if (changed) call lay_down(dt_b, blocks, contacts)
+    if (changed) call freeze_contacts(dt_b, blocks, contacts)
   end subroutine let_sleep
 
   !> Velocities of the partners in the middle of a substep, if the tired blocks begin it at rest.
@@ -113,8 +113,8 @@ contains
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       associate (v => contacts%touching%partners%v(:, b), &
         omega => contacts%touching%partners%omega(:, b))
-        if (contacts%sleep%tired(b)) v = 0.0_wp
-        if (contacts%sleep%tired(b)) omega = 0.0_wp
+        if (contacts%sleep%candidate(b)) v = 0.0_wp
+        if (contacts%sleep%candidate(b)) omega = 0.0_wp
         v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
         omega = omega + 0.5_wp*dt_b*matmul( &
           contacts%touching%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
@@ -134,9 +134,9 @@ contains
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
-        if (is_carried(blocks, contacts%touching%partners, b)) sleep%tired(a) = .false.
+        if (is_carried(blocks, contacts%touching%partners, b)) sleep%candidate(a) = .false.
         if (b < 1) cycle
-        if (is_carried(blocks, contacts%touching%partners, a)) sleep%tired(b) = .false.
+        if (is_carried(blocks, contacts%touching%partners, a)) sleep%candidate(b) = .false.
       end do
       sleep%supported = blocks%fixed .or. blocks%asleep
       changed = .true.
@@ -172,7 +172,7 @@ contains
   end function is_carried
 
   !> Move the springs of touches between what does not move to those at rest, with their forces.
-  subroutine lay_down(dt_b, blocks, contacts)
+  subroutine freeze_contacts(dt_b, blocks, contacts)
     real(wp), intent(in) :: dt_b         !! the substep [s]
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
@@ -202,10 +202,10 @@ contains
       call move_springs(sleep%chosen, springs, sleep%rest)
       call update_loads(sleep)
     end associate
-  end subroutine lay_down
+  end subroutine freeze_contacts
 
   !> Give the springs of touches with a body that moves now back to those at work.
-  subroutine rouse(blocks, contacts)
+  subroutine wake_touching(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
     integer :: i
@@ -218,7 +218,7 @@ contains
       call move_springs(sleep%chosen, sleep%rest, contacts%springs)
       call update_loads(sleep)
     end associate
-  end subroutine rouse
+  end subroutine wake_touching
 
   !> Whether neither body a nor its partner moves.
   pure function at_rest(blocks, a, b) result(yes)

@@ -16,7 +16,7 @@ module sleep_m
   implicit none
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
-  public :: store_quiet, is_tired
+  public :: store_quiet, may_sleep
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
@@ -31,7 +31,7 @@ module sleep_m
     type(springs_t) :: rest                    !! touches at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
-    logical, allocatable :: tired(:), supported(:), chosen(:)   !! (n), (n), (springs) work
+    logical, allocatable :: candidate(:), supported(:), chosen(:)   !! (n), (n), (springs) work
   end type sleep_t
 
 contains
@@ -45,7 +45,7 @@ contains
     sleep%active = active
     sleep%reach = reach
     allocate (sleep%quiet(size(reach)), source=0.0_wp)
-    allocate (sleep%tired(size(reach)), sleep%supported(size(reach)), source=.false.)
+    allocate (sleep%candidate(size(reach)), sleep%supported(size(reach)), source=.false.)
     allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
     call reserve_springs(1, sleep%rest)
   end subroutine sleep_init
@@ -139,7 +139,7 @@ contains
   end subroutine store_quiet
 
   !> Whether a block has been slow for long: several times that of a fall by its size.
-  pure function is_tired(gravity, b, blocks, sleep) result(yes)
+  pure function may_sleep(gravity, b, blocks, sleep) result(yes)
     real(wp), intent(in) :: gravity(3)         !! [m/s2]
     integer, intent(in) :: b
     type(blocks_t), intent(in) :: blocks
@@ -148,7 +148,7 @@ contains
 
     yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
     if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= patience**2*sleep%reach(b)
-  end function is_tired
+  end function may_sleep
 
   !> Whether contact forces balance weight and fluid within a share of the tolerance.
   pure function balanced(share, force, torque, steady, steady_torque, reach) result(yes)
