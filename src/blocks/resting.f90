@@ -22,7 +22,7 @@ module resting_m
 contains
 
   !> At the start of a step: wake those that the fluid has put out of balance where nothing moves
-  !! (else they wake in the substeps), and let those sleep that are tired and in balance.
+  !! (else they wake in the substeps), and let those sleep that are candidates and in balance.
   subroutine wake_or_sleep(walls, gravity, dt, contacts, blocks)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -61,7 +61,7 @@ contains
     end associate
   end subroutine wake_or_sleep
 
-  !> Let tired blocks sleep that are held up, touch nothing that is moved at a given rate, and on
+  !> Let candidates sleep that are held up, touch nothing that is moved at a given rate, and on
   !! which the forces of a substep balance if they do not move.
   subroutine let_sleep(gravity, dt_b, contacts, blocks, changed)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -100,7 +100,7 @@ contains
     if (changed) call freeze_contacts(dt_b, blocks, contacts)
   end subroutine let_sleep
 
-  !> Velocities of the partners in the middle of a substep, if the tired blocks begin it at rest.
+  !> Velocities of the partners in the middle of a substep, if the candidates begin it at rest.
   subroutine foresee_motion(gravity, dt_b, blocks, contacts)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt_b         !! the substep [s]
@@ -123,7 +123,7 @@ contains
   end subroutine foresee_motion
 
   !> Which blocks are held up: they touch a wall, the bed, a body that is fixed or asleep, or others
-  !! that are held up. Those are not tired that touch what is moved at a given rate.
+  !! that are held up. Those are no candidates that touch what is moved at a given rate.
   subroutine update_supported(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts

@@ -19,7 +19,7 @@ module sleep_m
   public :: store_quiet, may_sleep
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
-  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a tired block over sqrt(g reach)
+  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g reach)
   real(wp), parameter :: patience = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
   real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
 

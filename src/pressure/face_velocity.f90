@@ -16,7 +16,7 @@ module face_velocity_m
   public :: hold_in_cells
   public :: predict_face_velocity, rhie_chow_time, face_step
 
-  real(wp), parameter :: rhie_chow_courant = 0.125_wp   !! Courant number of the longest compact_time
+  real(wp), parameter :: rhie_chow_courant = 0.125_wp   !! Courant number up to dt
 
   !> Acceleration of the fluid by weight, pressure and surface tension.
   type :: acceleration_t
@@ -397,7 +397,7 @@ contains
     end do
   end subroutine add_correction
 
-  !> Longest time for which the compact acceleration of a face counts [s].
+  !> Longest time for which the Rhie-Chow acceleration of a face counts [s].
   !!
   !! The term is a viscosity for pressure: it takes the energy dt' sum m (a_f^2 - mean(a)^2) per
   !! time, which beside a body is a drag of the first order in the step; without it short steps
@@ -410,7 +410,8 @@ contains
     time = dt*min(1.0_wp, rhie_chow_courant/max(courant, rhie_chow_courant))
   end function rhie_chow_time
 
-  !> Time for which the compact acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2) [s].
+  !> Time for which the Rhie-Chow acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2)
+  !! [s].
   elemental function face_step(dt, nu, reach) result(step)
     real(wp), intent(in) :: dt      !! [s]
     real(wp), intent(in) :: nu      !! kinematic viscosity [m2/s]

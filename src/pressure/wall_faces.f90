@@ -17,7 +17,7 @@ module wall_faces_m
 
 contains
 
-  !> Faces of the cells at walls: their compact acceleration counts for `rhie_chow_time` by the
+  !> Faces of the cells at walls: their Rhie-Chow acceleration counts for `rhie_chow_time` by the
   !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
   !! all of its damping and has no drag worth the name.
   subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
@@ -179,7 +179,7 @@ contains
                               + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
     end function seen_from
 
-    !> Time for which the compact acceleration at a wall counts in liquid [s].
+    !> Time for which the Rhie-Chow acceleration at a wall counts in liquid [s].
     pure function time_in_liquid(c, rate) result(time)
       integer, intent(in) :: c(3)
       real(wp), intent(in) :: rate   !! Courant number per second of the flow past the wall [1/s]

@@ -1,5 +1,5 @@
-!> Faces beside a moving box: how long their compact acceleration counts, and that what is normal to
-!! the wall goes linearly from the velocity of the cell to that of the wall.
+!> Faces beside a moving box: how long their Rhie-Chow acceleration counts, and that what is normal
+!! to the wall goes linearly from the velocity of the cell to that of the wall.
 program test_face_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo, unit_step

@@ -121,7 +121,7 @@ contains
     call check('sleeps again, for it has not moved', world%blocks%asleep(1))
   end subroutine check_balance
 
-  !> What is not tired, or touches nothing, or what is moved, stays awake.
+  !> What is no candidate, or touches nothing, or what is moved, stays awake.
   subroutine check_touch()
     type(world_t) :: world
     integer :: support
@@ -129,7 +129,7 @@ contains
     call begin(1.0_wp, 0, 0.0_wp, world)
     world%contacts%sleep%quiet = 0.0_wp
     call start_step(world)
-    call check('not tired', .not. world%blocks%asleep(1))
+    call check('no candidate', .not. world%blocks%asleep(1))
     call begin(-1.0_wp, 0, 0.0_wp, world)
     world%contacts%steady(3, 1) = load
     call start_step(world)

@@ -11,7 +11,8 @@ program test_sleep
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
   use springs_m, only: reserve_springs
-  use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, may_sleep, update_loads
+  use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, may_sleep, &
+    update_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -86,8 +87,8 @@ contains
       .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, reach)]))
   end subroutine check_balanced
 
-  !> A block is tired that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) without a break; its
-  !! turning counts, and one that is held or not there is never tired.
+  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) without a break; its
+  !! turning counts, and one that is held or not there is never one.
   subroutine check_quiet()
     type(world_t) :: world
     type(sleep_t) :: sleep
@@ -109,7 +110,7 @@ contains
       end do
       call check('not yet', .not. any([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)]))
       call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
-      call check('tired', all([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)] &
+      call check('candidates', all([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)] &
         .eqv. [.true., .true., .false., .false.]))
       call creep(world, way, [0.99_wp, 0.5_wp], 0.51_wp, sleep)
       call check('turns too fast', sleep%quiet(:2), [51*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
