@@ -57,7 +57,7 @@ module step_m
   public :: take_step, measure_overlap
 
   real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
-  real(wp), parameter :: worth_measuring = 0.5_wp   !! depth of a touch over that which is told [-]
+  real(wp), parameter :: worth_measuring = 0.5_wp   !! depth of a touch over the reported one [-]
 
 contains
 

@@ -11,7 +11,7 @@ contains
 
   !> Memory that programs may still take [B]: what the machine has free, or the limit of the control
   !! group of this process (queues and containers set it) if that is lower; 0 where the system does
-  !! not tell.
+  !! not report it.
   function available_memory() result(bytes)
     integer(i8) :: bytes
 
@@ -21,7 +21,7 @@ contains
 
   !> The most that this process can ever hold [B]: all memory of the machine, swap space included,
   !! or the limit of its address space (`ulimit -v`) if that is lower; the largest number where the
-  !! system does not tell.
+  !! system does not report it.
   function memory_limit() result(bytes)
     integer(i8) :: bytes
     integer(i8) :: memory

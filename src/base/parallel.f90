@@ -156,7 +156,7 @@ module parallel_m
     module subroutine share_trouble(patience, trouble, answered)
       real(wp), intent(in) :: patience      !! [s]
       logical, intent(inout) :: trouble     !! of this process; then of any
-      logical, intent(out) :: answered      !! all have told
+      logical, intent(out) :: answered      !! all have answered
     end subroutine share_trouble
   end interface
 

@@ -126,7 +126,7 @@ contains
   end procedure set_collective
 
   module procedure share_trouble
-    answered = patience >= 0.0_wp .or. .not. trouble   ! the only process has told
+    answered = patience >= 0.0_wp .or. .not. trouble   ! the only process has answered
   end procedure share_trouble
 
 end submodule parallel_serial_m

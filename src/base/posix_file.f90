@@ -1,4 +1,4 @@
-!> Files of bytes as the C library gives them: Fortran's own units do not tell that a disk is full.
+!> Files of bytes as the C library gives them: Fortran's own units do not report a full disk.
 !!
 !! The first trouble sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.

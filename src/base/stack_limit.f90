@@ -25,7 +25,7 @@ module stack_limit_m
 
 contains
 
-  !> Add a problem for each stack that is too small; none where the system does not tell.
+  !> Add a problem for each stack that is too small; none where the system does not report it.
   subroutine check_stack(problems)
     type(problems_t), intent(inout) :: problems
     integer(c_int), parameter :: rlimit_stack = 3_c_int   ! on Linux

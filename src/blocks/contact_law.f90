@@ -1,4 +1,4 @@
-!> What a contact law has to tell of a touch, and what all laws have in common.
+!> What a contact law provides for a touch, and what all laws have in common.
 !!
 !! Source: Yoshikawa et al. (2008), eqs. (1) and (2). The paper gives no constants; the law
 !! 'restitution' (`law_restitution_m`) finds them from what can be measured, 'constants'

@@ -236,7 +236,7 @@ contains
   !!
   !! The elastic wrench W of the pair drives the motion u = M^-1 W, whose mass is u.W and whose
   !! stiffness (W.u)^2/(2 E) follows from the elastic energy E. Touches along oblique normals, which
-  !! part sideways, and weights that change with position make W other than each normal tells.
+  !! part sideways, and weights that change with position make W other than by each normal.
   pure subroutine damp_as_one(touches, first, last, law, of, response, highest)
     type(touches_t), intent(in) :: touches
     integer, intent(in) :: first, last

@@ -1,4 +1,4 @@
-!> Which bodies reach deep into one another, into a wall or the bed, and what is told of it: where a
+!> Which bodies reach deep into one another, into a wall or the bed, and how it is reported: where a
 !! body is pressed harder than contact can hold, it goes through.
 module deep_overlaps_m
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -12,7 +12,7 @@ module deep_overlaps_m
   public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_touches
   public :: size_of_pair, warn_of_overlaps, overlap_fault, noted_share
 
-  real(wp), parameter :: noted_share = 0.05_wp   !! overlap over size from which a body is told
+  real(wp), parameter :: noted_share = 0.05_wp   !! overlap over size from which a body is reported
   real(wp), parameter :: fault_share = 0.2_wp    !! likewise, from which the run ends
 
   !> The deepest overlap of each body, (n), where it is above `noted_share`.
@@ -21,7 +21,7 @@ module deep_overlaps_m
     real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
     real(wp), allocatable :: share(:)    !! of the size of the smaller of the two [-]
     integer, allocatable :: partner(:)   !! body, or below 1: wall or bed
-    logical, allocatable :: told(:)      !! has been warned of
+    logical, allocatable :: warned(:)      !! has been warned of
   end type deep_overlaps_t
 
 contains
@@ -34,7 +34,7 @@ contains
 
     allocate (deep%depth(blocks%n), deep%share(blocks%n), source=0.0_wp)
     allocate (deep%partner(blocks%n), source=0)
-    allocate (deep%told(blocks%n), source=.false.)
+    allocate (deep%warned(blocks%n), source=.false.)
     deep%size = [(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)]
   end subroutine deep_overlaps_init
 
@@ -101,10 +101,10 @@ contains
     integer, intent(inout) :: warnings     !! counted up
     integer :: b
 
-    do b = 1, size(deep%told)
-      if (.not. deep%share(b) > 0.0_wp .or. deep%told(b)) cycle
-      deep%told(b) = .true.
-      if (deep%partner(b) > 0) deep%told(deep%partner(b)) = .true.
+    do b = 1, size(deep%warned)
+      if (.not. deep%share(b) > 0.0_wp .or. deep%warned(b)) cycle
+      deep%warned(b) = .true.
+      if (deep%partner(b) > 0) deep%warned(deep%partner(b)) = .true.
       warnings = warnings + 1
       if (.not. is_root()) cycle
       write (error_unit, '(5a)') 'mics: warning: ', overlap_text(b, deep), ', t = ', &

@@ -385,7 +385,7 @@ contains
   end subroutine list_hits
 
   !> Let all turn by what the way of the bodies added to their arms, and move the contacts of the
-  !! rows that were hit half way from a to b, as `half_way_past` tells. The sum of twists takes the
+  !! rows that were hit half way from a to b, see `half_way_past`. The sum of twists takes the
   !! old arms: what these impulses were until now is added to `turn`.
   pure subroutine move_arms(hits, rows)
     integer, intent(in) :: hits

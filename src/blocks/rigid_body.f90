@@ -17,7 +17,7 @@ module rigid_body_m
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   implicit none
   private
-  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share, told_body
+  public :: blocks_t, blocks_init, release_body, turn_with_fluid, turning_share, body_text
   public :: to_come, lowering, let_go, left_out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
@@ -256,7 +256,7 @@ contains
   end subroutine release_body
 
   !> A body for people: its number, and its name in the plan.
-  pure function told_body(b, blocks) result(text)
+  pure function body_text(b, blocks) result(text)
     integer, intent(in) :: b
     type(blocks_t), intent(in) :: blocks
     character(:), allocatable :: text
@@ -265,7 +265,7 @@ contains
     write (number, '(i0)') b
     text = 'body '//trim(number)
     if (blocks%name(b) /= '') text = text//' ('//trim(blocks%name(b))//')'
-  end function told_body
+  end function body_text
 
   !> Put body b where its path has it at `blocks%time`; before its release where that has it then.
   pure subroutine follow(b, blocks)

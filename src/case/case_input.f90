@@ -453,8 +453,8 @@ contains
   end function parameters_text
 
   !> What all groups are made of, with the defaults of a case that says nothing.
-  function describe_groups() result(told)
-    type(group_description_t) :: told(size(groups))
+  function describe_groups() result(descriptions)
+    type(group_description_t) :: descriptions(size(groups))
     type(group_visitor_t) :: v
     type(case_t) :: case
     character(name_length) :: no_names(0)
@@ -465,8 +465,8 @@ contains
     do g = 1, size(groups)
       call v%start_describing(trim(groups(g)))
       call visit_group(v, case, groups(g), 1, no_names)
-      told(g) = v%told
-      told(g)%repeated = g >= first_repeated
+      descriptions(g) = v%description
+      descriptions(g)%repeated = g >= first_repeated
     end do
   end function describe_groups
 

@@ -31,7 +31,7 @@ module csv_table_m
 
 contains
 
-  !> Read a file; what is wrong with its form is told with line and column.
+  !> Read a file; faults of its form are reported with line and column.
   subroutine read_table(file, table, problems)
     character(*), intent(in) :: file
     type(csv_table_t), intent(out) :: table

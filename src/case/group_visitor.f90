@@ -7,7 +7,7 @@
 !!
 !! A reading visitor fills the variable from the text if the user gave it and notes what is wrong
 !! with it; a writing visitor appends `dt = 0.01` to its text; a describing visitor lists what it
-!! was told, the value at hand as the default. The names asked for are the known names, so an
+!! was given, the value at hand as the default. The names asked for are the known names, so an
 !! unknown variable and its nearest neighbour need no second list.
 module group_visitor_m
   use kinds_m, only: wp, name_length
@@ -31,7 +31,7 @@ module group_visitor_m
   type :: group_visitor_t
     logical :: reading = .false., writing = .false., describing = .false.   !! one of them
     type(string_builder_t) :: written           !! what a writing visitor has written
-    type(group_description_t) :: told      !! what a describing visitor was told
+    type(group_description_t) :: description      !! what a describing visitor collects
     type(problems_t) :: problems           !! what a reading visitor has found
     type(problems_t) :: passed_over        !! and what it passes over, for warnings
     type(group_text_t) :: group            !! the group being read
@@ -46,7 +46,7 @@ module group_visitor_m
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
     procedure, private :: real_value, real_values, integer_value, integer_values
-    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, tell
+    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, put_variable
   end type group_visitor_t
 
 contains
@@ -80,8 +80,8 @@ contains
 
     self%describing = .true.
     self%unsure = ' '
-    self%told = group_description_t(name=group)
-    allocate (self%told%variable(max_variables))
+    self%description = group_description_t(name=group)
+    allocate (self%description%variable(max_variables))
   end subroutine start_describing
 
   !> What the group is about, in a line.
@@ -89,7 +89,7 @@ contains
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: meaning
 
-    if (self%describing) self%told%meaning = meaning
+    if (self%describing) self%description%meaning = meaning
   end subroutine about
 
   !> End a group: report the variables nobody asked for, or close the group written.
@@ -155,7 +155,7 @@ contains
     end if
   end subroutine needed
 
-  !> Report what is wrong with a variable unless `ok`; only the first problem of each is told.
+  !> Report what is wrong with a variable unless `ok`; only the first problem of each is reported.
   subroutine require(self, variable, ok, allowed)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: variable
@@ -255,17 +255,17 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: told
+    type(variable_t) :: entry
     character(:), allocatable :: problem
     real(wp) :: values(size(x))
     integer :: i, j, fewest
 
     if (.not. self%reading) then
-      told = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, &
+      entry = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, &
         required)
-      told%allowed = allowed
-      told%most = size(x)
-      call self%tell(told)
+      entry%allowed = allowed
+      entry%most = size(x)
+      call self%put_variable(entry)
       return
     end if
     i = self%lookup(variable, meaning//' ['//allowed%unit//']', required)
@@ -308,16 +308,16 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: told
+    type(variable_t) :: entry
     character(:), allocatable :: problem
     integer :: values(size(n))
     integer :: i, j
 
     if (.not. self%reading) then
-      told = described(variable, 'number', to_text(n), meaning, example, required)
-      told%allowed = allowed
-      told%most = size(n)
-      call self%tell(told)
+      entry = described(variable, 'number', to_text(n), meaning, example, required)
+      entry%allowed = allowed
+      entry%most = size(n)
+      call self%put_variable(entry)
       return
     end if
     i = self%lookup(variable, meaning, required)
@@ -345,7 +345,8 @@ contains
     integer :: i, info
 
     if (.not. self%reading) then
-      call self%tell(described(variable, 'logical', to_text(flag), meaning, to_text(.not. flag)))
+      call self%put_variable(described(variable, 'logical', to_text(flag), meaning, &
+                                       to_text(.not. flag)))
       return
     end if
     i = self%lookup(variable, meaning)
@@ -368,7 +369,7 @@ contains
     logical :: ok
 
     if (.not. self%reading) then
-      call self%tell(described(variable, 'text', quoted_text(text), meaning, example))
+      call self%put_variable(described(variable, 'text', quoted_text(text), meaning, example))
       return
     end if
     i = self%lookup(variable, meaning)
@@ -403,14 +404,14 @@ contains
     logical, intent(in), optional :: required
     character(*), parameter :: allowed = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
-    type(variable_t) :: told
+    type(variable_t) :: entry
     integer :: i, j
     logical :: ok
 
     if (.not. self%reading) then
-      told = described(variable, 'name', words_text(words), meaning, example, required)
-      told%most = size(words)
-      call self%tell(told)
+      entry = described(variable, 'name', words_text(words), meaning, example, required)
+      entry%most = size(words)
+      call self%put_variable(entry)
       return
     end if
     i = self%lookup(variable, meaning, required)
@@ -439,14 +440,14 @@ contains
     character(*), intent(in) :: allowed   !! the words, one blank between them
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: told
+    type(variable_t) :: entry
     integer :: i
     logical :: ok
 
     if (.not. self%reading) then
-      told = described(variable, 'choice', word_text(word), meaning, example, required)
-      told%choices = allowed
-      call self%tell(told)
+      entry = described(variable, 'choice', word_text(word), meaning, example, required)
+      entry%choices = allowed
+      call self%put_variable(entry)
       return
     end if
     i = self%lookup(variable, meaning, required)
@@ -464,8 +465,8 @@ contains
     end associate
   end subroutine option
 
-  !> Write a variable that has a value, or list what was told of it.
-  subroutine tell(self, variable)
+  !> Write a variable that has a value, or add it to the description.
+  subroutine put_variable(self, variable)
     class(group_visitor_t), intent(inout) :: self
     type(variable_t), intent(in) :: variable
 
@@ -473,10 +474,10 @@ contains
       if (len(variable%value) == 0 .or. index(self%left_out, ' '//variable%name//' ') > 0) return
       call self%written%add_line('  '//variable%name//' = '//variable%value)
     else
-      self%told%n = self%told%n + 1
-      self%told%variable(self%told%n) = variable
+      self%description%n = self%description%n + 1
+      self%description%variable(self%description%n) = variable
     end if
-  end subroutine tell
+  end subroutine put_variable
 
   !> Number of the assignment to a variable, 0 if the user gave none (a problem if it is required)
   !! or it is damaged.
@@ -497,7 +498,7 @@ contains
     if (self%group%assignment(i)%faulty) i = 0
   end function lookup
 
-  !> Note what is wrong with assignment i; only the first problem of each is told.
+  !> Note what is wrong with assignment i; only the first problem of each is reported.
   subroutine fault(self, i, what)
     class(group_visitor_t), intent(inout) :: self
     integer, intent(in) :: i

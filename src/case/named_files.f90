@@ -3,7 +3,7 @@ module named_files_m
   use case_types_m, only: case_t
   implicit none
   private
-  public :: look_beside, found_file, told_file
+  public :: look_beside, found_file, file_text
 
 contains
 
@@ -44,7 +44,7 @@ contains
   end function found_file
 
   !> The same for people: its name, and where it is if not beside the case.
-  function told_file(folder, file) result(text)
+  function file_text(folder, file) result(text)
     character(:), allocatable, intent(in) :: folder   !! with its last '/'
     character(*), intent(in) :: file
     character(:), allocatable :: text
@@ -53,7 +53,7 @@ contains
     if (has_choice(folder, file)) then
       if (.not. is_there(folder//file)) text = file//' in the working folder, not beside the case'
     end if
-  end function told_file
+  end function file_text
 
   !> Can a file of this name be in two places?
   pure function has_choice(folder, file) result(yes)

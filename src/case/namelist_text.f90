@@ -436,7 +436,7 @@ contains
     type(assignment_t), intent(in) :: new
     type(assignment_t), allocatable :: longer(:)
 
-    if (group%n == max_variables) then   ! told once; what follows is read over, in the last place
+    if (group%n == max_variables) then   ! once; what follows is read over
       group%assignment(group%n) = new
       group%assignment(group%n)%faulty = .true.
       return

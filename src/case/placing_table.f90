@@ -17,7 +17,7 @@ module placing_table_m
   public :: read_places, attitude_of_angles
 
   integer, parameter :: max_rows = 100000
-  integer, parameter :: max_told = 100   !! problems of one table
+  integer, parameter :: max_reported = 100   !! problems of one table
 
   !> Columns, the five that every table has first.
   character(name_length), parameter :: known(*) = [character(name_length) :: 'shape', 'x', 'y', &
@@ -28,7 +28,7 @@ module placing_table_m
 
 contains
 
-  !> Read the tables of all drops; every problem is told with file, line and column.
+  !> Read the tables of all drops; every problem is reported with file, line and column.
   subroutine read_places(case, problems)
     type(case_t), intent(inout) :: case
     type(problems_t), intent(inout) :: problems
@@ -43,12 +43,13 @@ contains
         call read_drop([case%shape%name, (member_name(case%shape(k), case%shape(k)%member), &
           k=1, size(case%shape))], drop, found)
         drop%faulty = drop%faulty .or. found%n > 0
-        do k = 1, min(found%n, max_told)
+        do k = 1, min(found%n, max_reported)
           call problems%add_message('&drop file = '//quoted_text(drop%file)//': ' &
             //found%message(k), drop%line)
         end do
-        if (found%n > max_told) call problems%add_message('&drop file = ' &
-          //quoted_text(drop%file)//': '//to_text(found%n - max_told)//' more problems', drop%line)
+        if (found%n > max_reported) call problems%add_message('&drop file = ' &
+          //quoted_text(drop%file)//': '//to_text(found%n - max_reported)//' more problems', &
+          drop%line)
       end associate
     end do
   end subroutine read_places

@@ -1,4 +1,4 @@
-!> The reference of the case file: each variable of each group as the reading procedures tell it.
+!> The reference of the case file: each variable of each group by the reading procedures.
 module reference_m
   use description_m, only: group_description_t, variable_t, choices
   use string_builder_m, only: string_builder_t
@@ -16,7 +16,7 @@ contains
 
   !> The help on a topic: all groups in a line each (''), the variables of one group (its name),
   !! the page of docs/reference.md ('markdown') or the schema for editors ('json'). Another topic
-  !! is a problem, told with the nearest group.
+  !! is a problem, reported with the nearest group.
   function reference_text(topic, problems) result(text)
     character(*), intent(in) :: topic
     type(problems_t), intent(inout) :: problems   !! gets an unknown topic
@@ -49,7 +49,7 @@ contains
     character(:), allocatable :: name
     integer :: g
 
-    call lines%add_line('Groups of a case (* any number); --help GROUP tells the variables:')
+    call lines%add_line('Groups of a case (* any number); --help GROUP lists the variables:')
     do g = 1, size(groups)
       name = trim(groups(g)%name)
       if (groups(g)%repeated) name = name//' *'

@@ -13,7 +13,7 @@ module release_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
-  use rigid_body_m, only: blocks_t, release_body, told_body, own_mass, to_come, lowering, left_out
+  use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, left_out
   use walls_m, only: walls_t
   use overlap_m, only: overlap_t, room_for, exclude
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
@@ -84,7 +84,7 @@ contains
 
     warnings = warnings + 1
     if (.not. is_root()) return
-    write (error_unit, '(7a)') 'mics: warning: ', told_body(b, blocks), ' ', what, ', t = ', &
+    write (error_unit, '(7a)') 'mics: warning: ', body_text(b, blocks), ' ', what, ', t = ', &
       to_text(time), ' s'
     flush (error_unit)
   end subroutine warn

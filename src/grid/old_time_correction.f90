@@ -6,7 +6,7 @@
 !! longer adjoint in the mass that moves, and a wave gains or loses energy by where its level lies
 !! in a cell, whatever the time step (measured: 15 % of its height in a second to either side, at 16
 !! cells per wavelength). So a face there keeps what it differs from the mean of its cells, and the
-!! cells tell it their change only:
+!! cells give it their change only:
 !! $$ u_f := \overline{u} + \dots + \theta\, (u_f - \overline{u})^n, \qquad
 !! \theta = |\rho_2 - \rho_1|/(\rho_2 + \rho_1) $$
 module old_time_correction_m

@@ -53,7 +53,7 @@ contains
   end subroutine rigid_motion_init
 
   !> Inertia of body b and its inverse, with a part taken off if it is given; no more of it than
-  !! leaves the rest positive, and `clipped` tells whether that cut it.
+  !! leaves the rest positive, `clipped` whether that cut it.
   pure subroutine set_inertia(b, bodies, defect)
     integer, intent(in) :: b
     type(rigid_motion_t), intent(inout) :: bodies

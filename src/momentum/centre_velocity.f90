@@ -53,7 +53,7 @@ contains
       end associate
     end do
   contains
-    !> Slip of the layer as the cells across the open faces away from the wall tell it, by what
+    !> Slip of the layer as the cells across the open faces away from the wall give it, by what
     !! of these faces lies along the wall.
     pure function slip_beside(m, n, middle) result(slip)
       integer, intent(in) :: m

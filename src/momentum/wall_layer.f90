@@ -2,7 +2,7 @@
 !!
 !! Between the wall and the cell behind its target the velocity along the wall is taken as that of
 !! a layer, \( U y/(y + \delta) \), which is linear where the layer is thick against the cells and
-!! free slip where it is thin, as without viscosity. The two cells tell its thickness: with y_m and
+!! free slip where it is thin, as without viscosity. The two cells give its thickness: with y_m and
 !! y_n their distances from the wall and a the ratio of their velocities along it,
 !! $$ \frac{\delta}{y_m} = \frac{1 - a}{a - y_m/y_n}, \qquad
 !! s = \frac{1}{1 + \delta/y_m} = \frac{a - y_m/y_n}{1 - y_m/y_n} $$
@@ -24,7 +24,7 @@ module wall_layer_m
 contains
 
   !> The slip of the layer at each small cell: the mean over its targets with fluid behind them, by
-  !! share times 1 - r (what lies as far out as its target tells little of the layer); none in gaps
+  !! share times 1 - r (what lies as far out as its target says little of the layer); none in gaps
   !! where there is no such target.
   subroutine find_slip(grid, solid, bodies, u, merged)
     type(grid_t), intent(in) :: grid
@@ -82,7 +82,7 @@ contains
     end function slip_beside
   end subroutine find_slip
 
-  !> Slip of the layer as a cell and the next one behind it tell it.
+  !> Slip of the layer as a cell and the next one behind it give it.
   pure function slip_by_two(u, u_next, normal, distance, behind) result(slip)
     real(wp), intent(in) :: u(3), u_next(3)   !! their velocities, seen from the wall [m/s]
     real(wp), intent(in) :: normal(3)         !! of the wall

@@ -23,7 +23,7 @@ module diagnostics_m
     real(wp) :: excess_max = 0.0_wp      !! of the fluid of a cell over its open volume [V]
   end type fluid_sums_t
 
-  !> What one fluid step, with its body substeps, tells about itself.
+  !> The report of one fluid step with its body substeps.
   type :: step_report_t
     real(wp) :: cfl = 0.0_wp                  !! Courant number of liquid and blocks [-]
     real(wp) :: cfl_carried = 0.0_wp          !! largest share of itself that a cell gives [-]

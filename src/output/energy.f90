@@ -1,7 +1,7 @@
 !> Energy of fluid and blocks against what was put in: no step may make any.
 !!
 !! $$ E = E_{kin} + E_{pot} + E_{contact} \le E(0) + \sum_{releases} \Delta E $$
-!! The excess is told over the energy set free, the most of what was put in that was no potential
+!! The excess is divided by the energy set free, the most of what was put in that was no potential
 !! energy at some time. Known where nothing else does work: no side moves, no stream comes in, only
 !! the top is open, no block is driven, no surface tension.
 !!

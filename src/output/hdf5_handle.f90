@@ -78,7 +78,7 @@ contains
     logical :: trouble, answered
 
     if (.not. self%shared) return
-    if (self%info /= 0 .and. .not. self%broken) return   ! all have been told why
+    if (self%info /= 0 .and. .not. self%broken) return   ! all have the reason
     trouble = self%info /= 0
     call share_trouble(patience, trouble, answered)
     if (.not. answered) then
@@ -207,7 +207,7 @@ contains
     call self%agree()
   end subroutine file_close
 
-  !> Bytes of a file that are in use. Of a shared file HDF5 does not tell; it cuts it to that length
+  !> Bytes of a file that are in use. Of a shared file HDF5 does not know; it cuts it to that length
   !! when it flushes.
   function length_of(self) result(bytes)
     class(h5_handle_t), intent(inout) :: self

@@ -257,7 +257,7 @@ contains
     frame_wanted = state%clock%frame_due() .and. output%frame_step /= state%clock%step
     line_wanted = line_due(output%progress)
     line_wanted = line_wanted .or. frame_wanted
-    if (.not. (row_wanted .or. frame_wanted)) call tell_all(output%quiet, line_wanted)
+    if (.not. (row_wanted .or. frame_wanted)) call share_outcome(output%quiet, line_wanted)
     if (row_wanted .or. line_wanted) then
       call make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report, row)
@@ -281,7 +281,7 @@ contains
   end subroutine write_due_output
 
   !> Whether a line is wanted depends on the clock of the root process.
-  subroutine tell_all(quiet, wanted)
+  subroutine share_outcome(quiet, wanted)
     logical, intent(in) :: quiet
     logical, intent(inout) :: wanted
     integer :: flag
@@ -290,7 +290,7 @@ contains
     flag = merge(1, 0, wanted)
     call broadcast(flag)
     wanted = flag == 1
-  end subroutine tell_all
+  end subroutine share_outcome
 
   !> Write the frames of this moment as the next ones; the caller counts them if they were due.
   subroutine write_frames(state, output)

@@ -2,7 +2,7 @@
 !!
 !! A folder that holds a `run.h5` is renamed to `DIR.bak-N` first; any other folder that is not
 !! empty is refused, and so is one in which another program is at work. Only the root process looks
-!! and acts; the outcome is told to all.
+!! and acts; the outcome is broadcast.
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
@@ -93,7 +93,7 @@ contains
       end if
       if (len(message) > 0) code = exit_input
     end if
-    call tell_all(code, message)
+    call share_outcome(code, message)
   end subroutine check_folder
 
   !> Make an empty folder for a new run; the results of an older run are renamed away first.
@@ -107,7 +107,7 @@ contains
     call check_folder(what, path, code, message)
     if (code /= exit_ok) return
     if (is_root()) call take_folder(trimmed(path), lock, code, message)
-    call tell_all(code, message)
+    call share_outcome(code, message)
   end subroutine prepare_folder
 
   !> Lock the folder and rename it away while it holds older results. The lock moves with it, and is
@@ -202,11 +202,11 @@ contains
       if (is_root()) call lock%take(path, code, message)
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
-      call tell_all(code, message)
+      call share_outcome(code, message)
       if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
       if (code == exit_ok .and. is_root()) call copy_results(from, path, lock, code, message)
     end if
-    call tell_all(code, message)
+    call share_outcome(code, message)
   end subroutine continue_folder
 
   !> Copy the result files of a run to a new folder, all or none.
@@ -229,14 +229,14 @@ contains
     call lock%release()
   end subroutine copy_results
 
-  !> The root process tells code and message.
-  subroutine tell_all(code, message)
+  !> The root process broadcasts code and message.
+  subroutine share_outcome(code, message)
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
 
     call broadcast(code)
     call broadcast(message)
-  end subroutine tell_all
+  end subroutine share_outcome
 
   !> The folder that holds a file.
   pure function folder_of(file) result(path)

@@ -70,7 +70,7 @@ contains
     call visit_state(checksum, state)
     associate (file => writer%file)
       call file%create(path//unfinished, .true.)
-      if (nproc() > 1) then   ! one in trouble alone could not tell the others
+      if (nproc() > 1) then   ! one that failed alone could not stop the others
         call visit_state(needed, state)
         call file%make_room(needed%bytes + len(text) + len(parameters) + room_for_change)
       end if
@@ -90,7 +90,7 @@ contains
     call finish_file(path//unfinished, path, writer%file, info, message)
   end subroutine write_restart
 
-  !> Give a complete file its name, on the root process, and tell all of the outcome.
+  !> Give a complete file its name, on the root process, and broadcast the outcome.
   subroutine finish_file(unfinished, path, file, info, message)
     character(*), intent(in) :: unfinished, path
     type(h5_file_t), intent(in) :: file

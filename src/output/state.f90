@@ -206,7 +206,7 @@ contains
     type(springs_t), intent(inout) :: s
 
     call visitor%whole_number(name//'n', s%n)
-    if (s%n < 0 .or. s%n > max_springs) s%n = 0   ! a damaged file: its checksum will tell
+    if (s%n < 0 .or. s%n > max_springs) s%n = 0   ! a damaged file: its checksum shows it
     call reserve_springs(max(1, s%n), s)
     call visitor%integers(name//'a', [s%n], s%a)
     call visitor%integers(name//'b', [s%n], s%b)

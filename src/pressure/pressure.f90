@@ -64,7 +64,7 @@ contains
   !!
   !! On entry `flow%uf` and `bodies%motion` are predictions and the system is set. On return both
   !! are final, `flow%p` has changed by `self%phi_total`, `flow%solid_flux` is that of the final
-  !! motion; `self%report` tells how it went.
+  !! motion; `self%report` holds how it went.
   subroutine solve_pressure(grid, solid, rho, dt, flow, bodies, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid

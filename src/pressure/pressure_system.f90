@@ -101,7 +101,7 @@ contains
   !> Coefficients of the system for the open shares and densities at hand, and of its
   !! preconditioner.
   !!
-  !! `sides` tells what lies outside the outflows; without it the pressure there is zero.
+  !! `sides` says what lies outside the outflows; without it the pressure there is zero.
   subroutine set_pressure_system(grid, aperture, rho, self, sides)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)

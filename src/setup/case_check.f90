@@ -58,10 +58,10 @@ contains
     type(shape_t) :: empty
     character(:), allocatable :: message
     real(wp) :: samples
-    logical :: told(size(case%shape))   ! of stones: that of the first of the family
+    logical :: reported(size(case%shape))   ! of stones: that of the first of the family
     integer :: s, first
 
-    told = .false.
+    reported = .false.
     allocate (shapes(size(case%shape)))
     do s = 1, size(case%shape)
       if (case%shape(s)%faulty) cycle
@@ -80,8 +80,8 @@ contains
       if (len(message) == 0) cycle
       shapes(s) = empty
       first = s - max(case%shape(s)%member - 1, 0)
-      if (.not. told(first)) call problems%add_message('&shape '//message, case%shape(s)%line)
-      told(first) = .true.
+      if (.not. reported(first)) call problems%add_message('&shape '//message, case%shape(s)%line)
+      reported(first) = .true.
     end do
   end subroutine make_shapes
 
@@ -308,7 +308,7 @@ contains
   end function subject
 
   !> Where body b of the scene stands in the case.
-  function told_held(case, scene, b) result(text)
+  function held_text(case, scene, b) result(text)
     type(case_t), intent(in) :: case
     type(scene_t), intent(in) :: scene
     integer, intent(in) :: b
@@ -319,7 +319,7 @@ contains
     associate (drop => case%drop(scene%origin(1, b)))
       text = 'block on line '//to_text(drop%row(scene%origin(2, b))%line)//' of '//drop%file
     end associate
-  end function told_held
+  end function held_text
 
   !> Every body lies inside the tank; through an open top it may stick out.
   subroutine check_places(case, scene, problems)
@@ -421,7 +421,7 @@ contains
         n = n + 1
         if (n > max_reported) cycle
         call problems%add_message(subject(case, scene, b)//': overlaps the ' &
-          //told_held(case, scene, a)//' by ' &
+          //held_text(case, scene, a)//' by ' &
           //brief(depth, 3)//' m; bodies must lie apart at the start', scene%line(b))
       end do
       if (n == max_counted) exit
@@ -607,7 +607,7 @@ contains
       if (scene%blocks%release_time(a) > scene%blocks%release_time(b)) cycle
       if (.not. near(scene, a, b)) cycle
       if (room_beside(scene, a, b)) cycle
-      text = 'lies inside the fixed '//told_held(case, scene, a)
+      text = 'lies inside the fixed '//held_text(case, scene, a)
       exit
     end do
   end function hindrance

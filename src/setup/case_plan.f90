@@ -6,7 +6,7 @@ module case_plan_m
     not_resolved
   use drops_m, only: place_of_block, shape_of_place
   use boundary_kinds_m, only: side_code, gives_pressure
-  use named_files_m, only: told_file
+  use named_files_m, only: file_text
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, give_share
@@ -118,7 +118,7 @@ contains
 
     low = minval(bed%point, 2)
     high = maxval(bed%point, 2)
-    call entry(unit, 'bed from', told_file(case%bed%folder, trim(case%bed%file))//', ' &
+    call entry(unit, 'bed from', file_text(case%bed%folder, trim(case%bed%file))//', ' &
                //to_text(bed%n_given)//' facets, ' &
                //'heights from '//place_text(low(3), case%grid%length)//' to ' &
                //place_text(high(3), case%grid%length)//' m')
@@ -169,7 +169,7 @@ contains
     end if
     if (len(case%fluid%initial_state) > 0) then
       call entry(unit, 'initial state', 'from ' &
-                 //told_file(case%fluid%folder, case%fluid%initial_state))
+                 //file_text(case%fluid%folder, case%fluid%initial_state))
     else if (size(case%water) == 0 .and. .not. is_given(case%fluid%water_level)) then
       call entry(unit, 'water level', 'none: no liquid at all')
     end if
@@ -261,7 +261,7 @@ contains
     type(shape_input_t), intent(in) :: input
     type(shape_t), intent(in) :: shape
 
-    call entry(unit, trim(shape%name)//' from', told_file(input%folder, input%file)//', ' &
+    call entry(unit, trim(shape%name)//' from', file_text(input%folder, input%file)//', ' &
                //triple(maxval(shape%point, 2) - minval(shape%point, 2))//' m, ' &
                //to_text(size(shape%facet) - 1)//' facets')
   end subroutine print_file_shape
@@ -294,7 +294,7 @@ contains
                  //brief(last)//' s')
     end if
     if (case%begun%n > 0) call entry(unit, 'begin elsewhere', to_text(case%begun%n)//', where ' &
-      //told_file(case%start%folder, case%start%file)//' left them at '//brief(case%begun%time) &
+      //file_text(case%start%folder, case%start%file)//' left them at '//brief(case%begun%time) &
       //' s')
     n_moved = 0
     fastest = 0.0_wp

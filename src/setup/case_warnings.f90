@@ -301,7 +301,7 @@ contains
       //' tetrahedra, more of a prism than round; a larger value cuts it more finely', input%line)
   end subroutine look_at_shape
 
-  !> What a water without flow tells badly: slabs, and shallow water.
+  !> What a water without flow describes badly: slabs, and shallow water.
   subroutine look_at_light(case, input, shape, extent, warnings)
     type(case_t), intent(in) :: case
     type(shape_input_t), intent(in) :: input

@@ -1,9 +1,9 @@
-!> The part of the plan that tells how the blocks will fall: heights, depth, speeds.
+!> The part of the plan about how the blocks will fall: heights, depth, speeds.
 module fall_plan_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use case_types_m, only: case_t, drop_input_t, place_t, is_given
-  use named_files_m, only: told_file
+  use named_files_m, only: file_text
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   use tet_mesh_m, only: shape_t
   use bed_m, only: bed_t
@@ -13,7 +13,7 @@ module fall_plan_m
   private
   public :: print_falls
 
-  integer, parameter :: max_told = 20   !! groups &drop
+  integer, parameter :: max_reported = 20   !! groups &drop
 
 contains
 
@@ -39,7 +39,7 @@ contains
     under_water = .false.
     any_falls = .false.
     if (b > 0) call print_fall('&body', place_of_body(case%body(b)), case%body(b)%line, 1)
-    do i = 1, min(size(case%drop), max_told)
+    do i = 1, min(size(case%drop), max_reported)
       if (case%drop(i)%handling%lowering_speed > 0.0_wp) then
         call entry(unit, '&drop on line '//to_text(case%drop(i)%line), to_text( &
           case%drop(i)%count)//' by crane')
@@ -49,8 +49,8 @@ contains
       end if
       call print_handling(unit, case%drop(i))
     end do
-    if (size(case%drop) > max_told) call entry(unit, '', 'and of ' &
-      //to_text(size(case%drop) - max_told)//' more groups &drop')
+    if (size(case%drop) > max_reported) call entry(unit, '', 'and of ' &
+      //to_text(size(case%drop) - max_reported)//' more groups &drop')
     if (gravity_down(case%fluid%gravity) <= 0.0_wp .or. .not. any_falls) return
     call entry(unit, 'in air', 'v^2 = v_0^2 + 2 g h, without drag')
     if (.not. under_water) return
@@ -111,7 +111,7 @@ contains
     associate (handling => drop%handling)
       if (allocated(drop%row)) then
         n = count([(.not. is_given(drop%row(n)%x(3)), n=1, drop%count)])
-        call entry(unit, '', 'places from '//told_file(drop%folder, trim(drop%file))//': ' &
+        call entry(unit, '', 'places from '//file_text(drop%folder, trim(drop%file))//': ' &
           //to_text(drop%count)//' rows, '//to_text(n)//' on what lies there, ' &
           //to_text(count(drop%row%fixed))//' fixed')
       end if

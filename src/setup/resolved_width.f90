@@ -16,7 +16,7 @@ module resolved_width_m
 
 contains
 
-  !> Every shape of a free block is at least a cell wide; of a family the least stone is told.
+  !> Every shape of a free block is at least a cell wide; of a family the smallest stone counts.
   subroutine check_widths(case, shapes, problems)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`; a faulty one has no volume

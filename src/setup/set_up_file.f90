@@ -25,8 +25,8 @@ module set_up_file_m
 
 contains
 
-  !> Write the set-up of a case; `message` tells what went wrong, empty: nothing. All processes
-  !! call, the root writes and is told.
+  !> Write the set-up of a case; `message` is what went wrong, empty: nothing. All processes
+  !! call, the root writes and reports.
   subroutine write_set_up(path, case, parameters, shapes, bed, message)
     character(*), intent(in) :: path         !! of the new file
     type(case_t), intent(in) :: case         !! checked

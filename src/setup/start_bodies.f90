@@ -32,7 +32,7 @@ module start_bodies_m
 
 contains
 
-  !> Read the file of `&start` and see which blocks begin there; `case%begun` tells it.
+  !> Read the file of `&start` and see which blocks begin there; `case%begun` holds it.
   subroutine read_start(case, shapes, problems)
     type(case_t), intent(inout) :: case
     type(shape_t), intent(in) :: shapes(:)

@@ -31,7 +31,7 @@ program test_deep_overlaps
   warnings = 3
   call warn_of_overlaps(0.5_wp, deep, warnings)
   call check('told of one with the other, and of the floor', warnings, 4)
-  call check('both are told', deep%told(1) .and. deep%told(2) .and. .not. deep%told(3))
+  call check('both are told', deep%warned(1) .and. deep%warned(2) .and. .not. deep%warned(3))
   call warn_of_overlaps(0.6_wp, deep, warnings)
   call check('told once', warnings, 4)
   call add_touch(touch_t(3, 2, 1, depth=0.0039_wp), touches)
