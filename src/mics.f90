@@ -63,7 +63,7 @@ program mics
   if (len(options%restart) > 0) call go_on()
 
   call open_output(case, parameters(), options, sim%run_state_t, bed, output)
-  call stop_on_trouble()
+  call stop_on_error()
   call measure(sim, report)
   if (len(options%restart) == 0) then   ! else what was due has been written
     call write_due_output(sim%run_state_t, report, output)
@@ -84,7 +84,7 @@ program mics
   if (code == exit_ok .and. signal /= 0) code = 128 + signal
   call measure_overlap(sim, report)   ! of the last row
   call close_output(code, sim%run_state_t, report, output)
-  call stop_on_trouble()
+  call stop_on_error()
   if (fault%code /= exit_ok) call fatal(code, fault%message)
   if (code /= exit_ok) call fatal(code, stop_requests%reason//'; the run goes on with' &
     //new_line('a')//'  '//restart_command(program_name(), nproc(), options, output%restart_file))
@@ -274,9 +274,9 @@ contains
     stop
   end subroutine finish
 
-  !> Trouble with files ends the run; what was written stays.
-  subroutine stop_on_trouble()
+  !> An error of files ends the run; what was written stays.
+  subroutine stop_on_error()
     if (output%code /= exit_ok) call fatal(output%code, output%message)
-  end subroutine stop_on_trouble
+  end subroutine stop_on_error
 
 end program mics

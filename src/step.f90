@@ -41,7 +41,7 @@ module step_m
   use rigid_body_m, only: fastest_point, follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, noted_share
+  use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, reported_share
   use release_m, only: release_due_blocks, let_go_lowered, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
@@ -125,7 +125,7 @@ contains
     call describe(sim, contact, coupling_report, report)
     report%overlap_known = .false.
     if (sim%clock%row_due() .or. sim%clock%finished() .or. (sim%contacts%touching%exact &
-      .and. contact%deepest > worth_measuring*noted_share)) call measure_overlap(sim, report)
+      .and. contact%deepest > worth_measuring*reported_share)) call measure_overlap(sim, report)
     if (.not. report%overlap_known) call forget_overlaps(sim%deep)
     associate (touching => sim%contacts%touching)
       if (.not. touching%exact) call store_touches(touching%touches, sim%deep)

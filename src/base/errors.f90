@@ -148,13 +148,13 @@ contains
   !> Say why on standard error and end every process with the exit code `code`.
   !!
   !! All processes may call this with the same message, then the root process prints it; a process
-  !! that is alone in trouble waits for the root first and prints the message itself.
+  !! that fails alone waits for the root first and prints the message itself.
   subroutine fatal(code, message)
     integer, intent(in) :: code
     character(*), intent(in) :: message
-    real(wp), parameter :: patience = 1.0_wp   !! time for the root to end the others [s]
+    real(wp), parameter :: timeout = 1.0_wp   !! time for the root to end the others [s]
 
-    if (.not. is_root()) call parallel_pause(patience)
+    if (.not. is_root()) call parallel_pause(timeout)
     if (len(message) > 0) write (error_unit, '(a)') 'mics: '//lines_of(message)
     flush (error_unit)
     call parallel_abort(code)

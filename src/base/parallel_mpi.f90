@@ -427,21 +427,21 @@ contains
     call h5pset_dxpl_mpio_f(transfer, H5FD_MPIO_COLLECTIVE_F, status)
   end procedure set_collective
 
-  module procedure share_trouble
+  module procedure share_failure
     integer, asynchronous :: worst(1)
     type(MPI_Request) :: request
     real(wp) :: began, waited
 
-    worst = merge(1, 0, trouble)
+    worst = merge(1, 0, failed)
     began = MPI_Wtime()
     call MPI_Iallreduce(MPI_IN_PLACE, worst, 1, MPI_INTEGER, MPI_MAX, MPI_COMM_WORLD, request)
     do
       call MPI_Test(request, answered, MPI_STATUS_IGNORE)
       if (answered) exit
       waited = MPI_Wtime() - began
-      if (trouble .and. waited > patience) return
+      if (failed .and. waited > timeout) return
     end do
-    trouble = worst(1) > 0
-  end procedure share_trouble
+    failed = worst(1) > 0
+  end procedure share_failure
 
 end submodule parallel_mpi_m

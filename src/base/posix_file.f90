@@ -1,6 +1,6 @@
 !> Files of bytes as the C library gives them: Fortran's own units do not report a full disk.
 !!
-!! The first trouble sets `info` and a `message` that names the file and the reason; from then on
+!! The first error sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.
 module posix_file_m
   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_long, &
@@ -16,8 +16,8 @@ module posix_file_m
 
   type :: posix_file_t
     character(:), allocatable :: path
-    integer :: info = 0                    !! 0: no trouble so far
-    character(:), allocatable :: message   !! file and reason of the first trouble
+    integer :: info = 0                    !! 0: no error so far
+    character(:), allocatable :: message   !! file and reason of the first error
     type(c_ptr), private :: stream = c_null_ptr
   contains
     procedure :: open => file_open
@@ -149,7 +149,7 @@ module posix_file_m
 
 contains
 
-  !> Note trouble with `what`, if there is any, in the words of the system.
+  !> Keep an error of `what`, if there is one, in the words of the system.
   subroutine check(self, well, what)
     class(posix_file_t), intent(inout) :: self
     logical, intent(in) :: well
@@ -196,7 +196,7 @@ contains
     call self%check(c_associated(self%stream), 'open the file')
   end subroutine file_open
 
-  !> Close the file; done even after trouble. A lock ends with it.
+  !> Close the file; done even after an error. A lock ends with it.
   subroutine file_close(self)
     class(posix_file_t), intent(inout) :: self
 

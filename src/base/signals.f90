@@ -2,7 +2,7 @@
 !!
 !! They come from the keyboard (SIGINT), from a queue (SIGTERM, SIGUSR1, SIGXCPU), from a terminal
 !! that closes (SIGHUP) or from a reader of the table that has gone (SIGPIPE).
-!! SIGXFSZ, a file beyond the user's limit, is left to the write that then fails: it is trouble with
+!! SIGXFSZ, a file beyond the user's limit, is left to the write that then fails: it is an error of
 !! files like a full disk.
 module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc

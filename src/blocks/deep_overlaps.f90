@@ -10,12 +10,12 @@ module deep_overlaps_m
   implicit none
   private
   public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_touches
-  public :: size_of_pair, warn_of_overlaps, overlap_fault, noted_share
+  public :: size_of_pair, warn_of_overlaps, overlap_fault, reported_share
 
-  real(wp), parameter :: noted_share = 0.05_wp   !! overlap over size from which a body is reported
+  real(wp), parameter :: reported_share = 0.05_wp   !! overlap over size to report a body
   real(wp), parameter :: fault_share = 0.2_wp    !! likewise, from which the run ends
 
-  !> The deepest overlap of each body, (n), where it is above `noted_share`.
+  !> The deepest overlap of each body, (n), where it is above `reported_share`.
   type :: deep_overlaps_t
     real(wp), allocatable :: size(:)     !! smallest edge [m]
     real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
@@ -64,7 +64,7 @@ contains
     real(wp) :: share
 
     share = depth/size_of_pair(a, b, deep)
-    if (.not. share > noted_share) return
+    if (.not. share > reported_share) return
     call keep_deepest(a, b, depth, share, deep)
     if (b > 0) call keep_deepest(b, a, depth, share, deep)
   end subroutine store_overlap

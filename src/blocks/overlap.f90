@@ -15,7 +15,7 @@ module overlap_m
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   use overlap_solid_m, only: solid_t, prepare, inside
   use deep_overlaps_m, only: deep_overlaps_t, forget_overlaps, store_overlap, size_of_pair, &
-    noted_share
+    reported_share
   implicit none
   private
   public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for, exclude
@@ -194,7 +194,7 @@ contains
     type(deep_overlaps_t), intent(in) :: deep
     real(wp) :: least
 
-    least = min(depth, noted_share*size_of_pair(a, b, deep))
+    least = min(depth, reported_share*size_of_pair(a, b, deep))
   end function worth_finding
 
   !> Raise `depth` to the depth of two bodies in one another, if that is larger.

@@ -20,7 +20,7 @@ module sleep_m
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g reach)
-  real(wp), parameter :: patience = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
+  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
   real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
 
   type :: sleep_t
@@ -147,7 +147,7 @@ contains
     logical :: yes
 
     yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
-    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= patience**2*sleep%reach(b)
+    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%reach(b)
   end function may_sleep
 
   !> Whether contact forces balance weight and fluid within a share of the tolerance.

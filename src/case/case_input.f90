@@ -146,10 +146,11 @@ contains
       if (groups(g) == group%name) exit
     end do
     if (g > size(groups)) then
-      call v%note(': unknown group, nearest known: &'//nearest_name(printable(group%name), groups))
+      call v%report(': unknown group, nearest known: &' &
+                    //nearest_name(printable(group%name), groups))
       return
     else if (n(g) > 0 .and. g < first_repeated) then
-      call v%note(': the group is given twice, first on line '//to_text(first_line(g)))
+      call v%report(': the group is given twice, first on line '//to_text(first_line(g)))
       return
     end if
     if (n(g) == 0) first_line(g) = group%line
@@ -374,8 +375,8 @@ contains
     associate (fluid => case%fluid)
       call v%require('single_phase', .not. fluid%single_phase, light//'needs a level of the water')
       if (.not. (fluid%single_phase .or. is_given(fluid%water_level)) &
-          .and. v%good('water_level')) call v%note(': '//light//'needs water_level, the level of ' &
-        //'the water that is given [m]')
+          .and. v%good('water_level')) call v%report(': '//light//'needs water_level, the level ' &
+        //'of the water that is given [m]')
       call v%require('gravity', .not. any(abs(fluid%gravity(1:2)) > 0.0_wp) &
         .and. fluid%gravity(3) < 0.0_wp, light//'has a level, gravity must point straight down')
       call v%require('velocity', .not. abs(fluid%velocity(3)) > 0.0_wp, &

@@ -41,7 +41,7 @@ module group_visitor_m
     character(:), allocatable, private :: unsure   !! required and missing, or misspelt, it seems
   contains
     procedure :: start_reading, start_writing, start_describing, about, finish
-    procedure :: given, good, needed, require, without_meaning, note, pass_over
+    procedure :: given, good, needed, require, without_meaning, report, pass_over
     procedure :: name, names, option, text => text_value, logical => logical_value
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
@@ -148,9 +148,9 @@ contains
     if (self%group%find(variable) > 0) return
     self%unsure = self%unsure//variable//' '
     if (self%group%line > 0) then
-      call self%note(' '//variable//': missing, required: '//meaning)
+      call self%report(' '//variable//': missing, required: '//meaning)
     else
-      call self%note(' '//variable//': missing, required: '//meaning &
+      call self%report(' '//variable//': missing, required: '//meaning &
                      //' (there is no group &'//self%group%name//')')
     end if
   end subroutine needed
@@ -168,7 +168,7 @@ contains
     if (i > 0) then
       call self%fault(i, allowed)
     else
-      call self%note(' '//variable//' (by default): '//allowed)
+      call self%report(' '//variable//' (by default): '//allowed)
     end if
   end subroutine require
 
@@ -220,7 +220,7 @@ contains
   end subroutine pass_over
 
   !> Report a problem of the group; `what` goes on right after its name.
-  subroutine note(self, what)
+  subroutine report(self, what)
     class(group_visitor_t), intent(inout) :: self
     character(*), intent(in) :: what
 
@@ -230,7 +230,7 @@ contains
     else
       call self%problems%add_message('&'//self%group%name//what)
     end if
-  end subroutine note
+  end subroutine report
 
   !> A real number.
   subroutine real_value(self, variable, x, allowed, meaning, example, required)

@@ -42,7 +42,7 @@ contains
           'physics = '''//trim(case%run%physics)//'''')
       end select
       if (list%group(i)%name == 'water' .and. case%fluid%single_phase &
-          .and. has_flow(case%run)) call v%note( &
+          .and. has_flow(case%run)) call v%report( &
         ': has no meaning with &fluid single_phase = .true.; the liquid fills the whole tank')
       list%group(i) = v%group
     end do

@@ -21,7 +21,7 @@ contains
   subroutine lengthen_file(path, length, message)
     character(*), intent(in) :: path
     integer(i8), intent(in) :: length                   !! [bytes]
-    character(:), allocatable, intent(out) :: message   !! of trouble, else empty
+    character(:), allocatable, intent(out) :: message   !! of an error, else empty
     integer, parameter :: piece = 2**20
     type(posix_file_t) :: file
     character(:), allocatable :: zeros

@@ -1,6 +1,6 @@
 !> The result file as its writers know it, and its columns, the datasets that grow by rows.
 !!
-!! `h5_file_t` has what is in `hdf5_handle_m` (the file; what happens on trouble and who calls),
+!! `h5_file_t` has what is in `hdf5_handle_m` (the file; what happens on an error and who calls),
 !! `hdf5_attributes_m` and `hdf5_datasets_m`; here come the columns.
 module hdf5_file_m
   use, intrinsic :: iso_c_binding, only: c_ptr, c_loc
@@ -183,7 +183,7 @@ contains
     integer(i8) :: layers, before, after
 
     bytes = 0
-    if (column%rank == 0) return   ! of a file in trouble
+    if (column%rank == 0) return   ! of a file that failed
     associate (r => column%rank, extent => int(column%extent, i8), chunk => int(column%chunk, i8))
       layers = product((extent(:r - 1) + chunk(:r - 1) - 1)/chunk(:r - 1))
       before = layers*((extent(r) + chunk(r) - 1)/chunk(r))

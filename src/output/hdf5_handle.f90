@@ -1,6 +1,6 @@
 !> An HDF5 file as such: opened and closed, flushed, given room, asked what it holds.
 !!
-!! Every status of HDF5 is looked at. The first trouble sets `info` and a `message` that names the
+!! Every status of HDF5 is looked at. The first error sets `info` and a `message` that names the
 !! file, the dataset and the reason; from then on every procedure of that file returns at once, so a
 !! caller may write a whole group of things and look at `info` once, before anything that waits for
 !! others.
@@ -22,7 +22,7 @@ module hdf5_handle_m
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, exit_files
   use parallel_m, only: is_root, my_rank, nproc, set_file_access, set_collective, global_max
-  use parallel_m, only: global_min, broadcast, share_trouble
+  use parallel_m, only: global_min, broadcast, share_failure
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   use posix_file_m, only: cut_file, delete_file, is_pipe
   use file_room_m, only: lengthen_file, shorten_file
@@ -34,8 +34,8 @@ module hdf5_handle_m
   type :: h5_handle_t
     character(:), allocatable :: path
     logical :: shared = .false.
-    integer :: info = 0                    !! 0: no trouble so far
-    character(:), allocatable :: message   !! file, dataset and reason of the first trouble
+    integer :: info = 0                    !! 0: no error so far
+    character(:), allocatable :: message   !! file, dataset and reason of the first error
     ! Only for the modules that extend this type:
     logical :: broken = .false.            !! HDF5 failed: what it has in memory is not to be used
     integer(hid_t) :: id = -1
@@ -56,7 +56,7 @@ module hdf5_handle_m
 
 contains
 
-  !> Note trouble: `status` is what HDF5 returned when it was asked to do `what`.
+  !> Keep an error: `status` is what HDF5 returned when it was asked to do `what`.
   subroutine check(self, status, what)
     class(h5_handle_t), intent(inout) :: self
     integer, intent(in) :: status
@@ -68,27 +68,27 @@ contains
     self%message = self%path//': cannot '//what//': '//hdf5_reason()
   end subroutine check
 
-  !> Trouble of one process of a shared file becomes that of all.
+  !> An error of one process of a shared file becomes that of all.
   !!
-  !! A process in trouble may find that the others wait for it inside MPI (seen with a full disk):
+  !! A process that failed may find that the others wait for it inside MPI (seen with a full disk):
   !! then nothing is left but to end them all, though this is a lower procedure.
   subroutine agree(self)
     class(h5_handle_t), intent(inout) :: self
-    real(wp), parameter :: patience = 3.0_wp   ! [s]
-    logical :: trouble, answered
+    real(wp), parameter :: timeout = 3.0_wp   ! [s]
+    logical :: failed, answered
 
     if (.not. self%shared) return
     if (self%info /= 0 .and. .not. self%broken) return   ! all have the reason
-    trouble = self%info /= 0
-    call share_trouble(patience, trouble, answered)
+    failed = self%info /= 0
+    call share_failure(timeout, failed, answered)
     if (.not. answered) then
       call leave(self)
       call fatal(exit_files, self%message)
     end if
-    if (trouble) call share_message(self)
+    if (failed) call share_message(self)
   end subroutine agree
 
-  !> Give all processes the message of the first one in trouble.
+  !> Give all processes the message of the first one that failed.
   subroutine share_message(self)
     class(h5_handle_t), intent(inout) :: self
     integer, parameter :: longest = 500
@@ -186,7 +186,7 @@ contains
     call self%check(status, 'set the access')
   end subroutine begin_file
 
-  !> Write everything out and close the file, its datasets with it; done even after trouble.
+  !> Write everything out and close the file, its datasets with it; done even after an error.
   subroutine file_close(self)
     class(h5_handle_t), intent(inout) :: self
     integer(i8) :: used
@@ -251,16 +251,16 @@ contains
   subroutine make_room(self, bytes)
     class(h5_handle_t), intent(inout) :: self
     integer(i8), intent(in) :: bytes
-    character(:), allocatable :: trouble
+    character(:), allocatable :: reason
 
     if (self%info /= 0) return
-    trouble = ''
+    reason = ''
     if (is_root() .or. .not. self%shared) call lengthen_file(self%path, length_of(self) + bytes, &
-      trouble)
-    if (self%shared) call broadcast(trouble)
-    if (len(trouble) == 0) return
+      reason)
+    if (self%shared) call broadcast(reason)
+    if (len(reason) == 0) return
     self%info = 1
-    self%message = trouble
+    self%message = reason
   end subroutine make_room
 
   !> Create a group; the group around it must exist.

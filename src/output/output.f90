@@ -1,6 +1,6 @@
 !> Everything a run writes: opened once, written when due, closed with the last state in place.
 !!
-!! After trouble `code` is not `exit_ok`, on all processes, and `message` says why, on the root
+!! After an error `code` is not `exit_ok`, on all processes, and `message` says why, on the root
 !! process at least; the caller then closes the output and ends with `fatal`.
 module output_m
   use kinds_m, only: wp, i8
@@ -34,8 +34,8 @@ module output_m
   character(*), parameter :: restart_name(2) = ['/restart-a.h5', '/restart-b.h5']
 
   type :: output_t
-    integer :: code = exit_ok                !! exit code of the trouble met
-    character(:), allocatable :: message     !! what the trouble was
+    integer :: code = exit_ok                !! exit code of the error met
+    character(:), allocatable :: message     !! what the error was
     character(:), allocatable :: folder
     character(:), allocatable :: restart_file   !! the newest, empty: none yet
     character(:), allocatable, private :: text, parameters   !! of the case
@@ -85,7 +85,7 @@ contains
       call prepare_folder(what, output%folder, output%lock, output%code, output%message)
       if (output%code == exit_ok) call create_files(state, bed, output)
     end if
-    call look_for_trouble(output)
+    call check_files(output)
     if (output%code /= exit_ok) then
       call close_files(output)
       call output%lock%release()
@@ -136,7 +136,7 @@ contains
                                               output%field_file)
     if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &
       output%block_file)
-    call look_for_trouble(output)
+    call check_files(output)
     if (output%code /= exit_ok) call remove_files(output)
   end subroutine create_files
 
@@ -177,7 +177,7 @@ contains
       if (state%blocks%n > 0) call reopen_block_file(output%folder//block_name, state%blocks, &
                                                      state%clock, output%block_file)
     end if
-    call look_for_trouble(output)
+    call check_files(output)
     if (output%code /= exit_ok) return
     call continue_run_file(output%text, output%parameters, output%run_file)
     if (output%fluid) call continue_fields(state, output)
@@ -219,8 +219,8 @@ contains
     end if
   end subroutine continue_surfaces
 
-  !> Keep the first trouble of any of the files; all processes call.
-  subroutine look_for_trouble(output)
+  !> Keep the first error of any of the files; all processes call.
+  subroutine check_files(output)
     type(output_t), intent(inout) :: output
 
     call look_at(output%run_file%file)
@@ -238,7 +238,7 @@ contains
       output%message = file%message
     end subroutine look_at
 
-  end subroutine look_for_trouble
+  end subroutine check_files
 
   !> After a step, and once before the first: write the row, the frames and the restart file that
   !! are due, and a line of the table. All processes call.
@@ -272,7 +272,7 @@ contains
       call state%clock%frame_done()
     end if
     if (line_wanted) call write_line(output%progress, state%clock, row, state%blocks)
-    call look_for_trouble(output)
+    call check_files(output)
     call toc(output%phase)
     if (state%clock%restart_due()) then
       call state%clock%restart_done()
@@ -326,7 +326,7 @@ contains
   end subroutine save_state
 
   !> Write what a run must end with, its last row, frames and state, say how it ended, and close all
-  !! files; after trouble with files only close them. All processes call.
+  !! files; after an error of files only close them. All processes call.
   subroutine close_output(exit_code, state, report, output)
     integer, intent(in) :: exit_code
     type(run_state_t), intent(inout) :: state
@@ -343,7 +343,7 @@ contains
       frame_wanted = output%frame_step /= state%clock%step
       if (row_wanted) call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
       if (frame_wanted) call write_frames(state, output)
-      call look_for_trouble(output)
+      call check_files(output)
     end if
     if (output%code == exit_ok) then   ! the state that is saved counts what is there
       if (row_wanted .and. state%clock%row_due()) call state%clock%row_done()
@@ -355,7 +355,7 @@ contains
     call close_run_file(output%run_file, code)
     call close_files(output)
     call output%lock%release()
-    call look_for_trouble(output)
+    call check_files(output)
     if (output%code /= exit_ok) code = output%code
     call write_summary(output%progress, state%clock, product(int(state%grid%n, i8)), code, &
                        output%folder)

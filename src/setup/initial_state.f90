@@ -42,16 +42,16 @@ contains
     liquid = file%has(liquid_name)
     velocity = file%has(velocity_name)
     if (file%info /= 0) then
-      call note(file%message)
+      call report(file%message)
       return
     end if
-    if (.not. (liquid .or. velocity)) call note( &
+    if (.not. (liquid .or. velocity)) call report( &
       'the file holds neither ''liquid'' nor ''velocity''')
     if (liquid) then
       call check_values(liquid_name, case%grid%cells, 0.0_wp, 1.0_wp, 'shares between 0 and 1')
       if ((is_given(case%fluid%water_level) .and. .not. streams(case)) .or. size(case%water) > 0 &
           .or. case%fluid%single_phase) then
-        call note('''liquid'' of the file takes the place of water_level, single_phase and '// &
+        call report('''liquid'' of the file takes the place of water_level, single_phase and '// &
                   '&water, give one only')
       end if
     end if
@@ -59,17 +59,17 @@ contains
       call check_values(velocity_name, [3, case%grid%cells], -fastest, fastest, &
                         'finite numbers up to '//to_text(fastest))
       if (any(abs(case%fluid%velocity) > 0.0_wp)) then
-        call note('''velocity'' of the file takes the place of &fluid velocity, give one only')
+        call report('''velocity'' of the file takes the place of &fluid velocity, give one only')
       end if
     end if
     call file%close()
   contains
-    subroutine note(what)
+    subroutine report(what)
       character(*), intent(in) :: what
 
       call problems%add_message('&fluid initial_state = '// &
                                 quoted_text(case%fluid%initial_state)//': '//what, case%fluid%line)
-    end subroutine note
+    end subroutine report
 
     !> Shape of a dataset and the range of its values, layer by layer.
     subroutine check_values(name, extent, least, most, meaning)
@@ -85,13 +85,13 @@ contains
       n = size(extent)
       if (file%info == 0) then
         if (size(found) /= n) then
-          call note(name//' has another number of dimensions than (nz, ny, nx'// &
+          call report(name//' has another number of dimensions than (nz, ny, nx'// &
                     trim(merge(', 3)', ')   ', n == 4)))
           return
         else if (case%grid%cells_faulty) then
           return
         else if (any(found /= extent)) then
-          call note(name//' does not have the cells of &grid')
+          call report(name//' does not have the cells of &grid')
           return
         end if
       end if
@@ -106,10 +106,10 @@ contains
         if (all(ieee_is_finite(layer))) then
           if (all(layer >= least .and. layer <= most)) cycle
         end if
-        call note(name//' must hold '//meaning)
+        call report(name//' must hold '//meaning)
         return
       end do
-      if (file%info /= 0) call note(file%message)
+      if (file%info /= 0) call report(file%message)
     end subroutine check_values
   end subroutine check_initial_state
 

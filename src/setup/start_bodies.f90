@@ -48,14 +48,14 @@ contains
   end subroutine read_start
 
   !> Report a problem with the group.
-  subroutine note(case, what, problems)
+  subroutine report(case, what, problems)
     type(case_t), intent(in) :: case
     character(*), intent(in) :: what
     type(problems_t), intent(inout) :: problems
 
     call problems%add_message('&start file = '//quoted_text(case%start%file)//': '//what, &
                               case%start%line)
-  end subroutine note
+  end subroutine report
 
   !> The blocks in the file at the time asked for.
   subroutine read_left(case, left, problems)
@@ -70,7 +70,7 @@ contains
     call file%open(found_file(case%start%folder, case%start%file), .false., .false.)
     if (file%info == 0) then
       if (.not. file%has('/bodies/position')) then
-        call note(case, 'holds no blocks; must be the run.h5 of a run with blocks', problems)
+        call report(case, 'holds no blocks; must be the run.h5 of a run with blocks', problems)
         call file%close()
         return
       end if
@@ -102,7 +102,7 @@ contains
         end if
       end if
     end associate
-    if (file%info /= 0) call note(case, file%message, problems)
+    if (file%info /= 0) call report(case, file%message, problems)
     call file%close()
   contains
     !> One row of a column of vectors.
@@ -129,7 +129,7 @@ contains
     if (case%start%time < 0.0_wp .and. row > 0) return
     row = count(time <= case%start%time + same_time)
     if (size(time) == 0) then
-      call note(case, 'holds no rows', problems)
+      call report(case, 'holds no rows', problems)
     else if (row == 0 .or. case%start%time > time(size(time)) + same_time) then
       row = 0
       call problems%add_message('&start time = '//to_text(case%start%time)//': the run in ' &
@@ -158,12 +158,12 @@ contains
       n_there = count(taken .and. left%shape == left%shape(i))
       s = findloc(shapes%name == left%shape(i), .true., 1)
       if (s == 0) then
-        call note(case, 'has '//to_text(n_there)//' free blocks of the shape ' &
+        call report(case, 'has '//to_text(n_there)//' free blocks of the shape ' &
           //quoted_text(trim(left%shape(i)))//', which no &shape here has', problems)
         cycle
       end if
       if (abs(left%mass(i) - shapes(s)%density*shapes(s)%volume) > same_mass*left%mass(i)) then
-        call note(case, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
+        call report(case, 'a block of the shape '//quoted_text(trim(left%shape(i)))//' has ' &
           //to_text(left%mass(i))//' kg there and '//to_text(shapes(s)%density*shapes(s)%volume) &
           //' kg here; shapes must be the same', problems)
         cycle
@@ -171,7 +171,7 @@ contains
       n_here = count(blocks%shape == s .and. .not. blocks%fixed)
       if (n_here == 0) cycle   ! they come along
       if (last_taken(s) > n_here) then
-        call note(case, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
+        call report(case, 'has free blocks of the shape '//quoted_text(trim(left%shape(i))) &
           //' up to number '//to_text(last_taken(s))//', this case names '//to_text(n_here) &
           //'; name as many, or none and they come along', problems)
         cycle

@@ -65,7 +65,7 @@ contains
     call read_bed_file(found_file(case%bed%folder, trim(case%bed%file)), case%bed%kind, form, &
       message)
     if (len(message) > 0) then
-      call note(message)
+      call report(message)
       return
     end if
     if (case%grid%extent_faulty .or. any(case%boundary%faulty)) return
@@ -75,14 +75,14 @@ contains
     call set_bed(case, form, bed, message)
     if (len(message) == 0) call check_border(case, bed, message)
     if (len(message) == 0) call check_layers(case, bed, message)
-    if (len(message) > 0) call note(message)
+    if (len(message) > 0) call report(message)
   contains
-    subroutine note(what)
+    subroutine report(what)
       character(*), intent(in) :: what
 
       call problems%add_message('&bed file = '//quoted_text(trim(case%bed%file))//': '//what, &
                                 case%bed%line)
-    end subroutine note
+    end subroutine report
 
     !> The size of the form beside that of the tank.
     subroutine check_extent()
@@ -97,33 +97,33 @@ contains
       to = from + case%grid%length
       slack = round_off*case%grid%length
       if (any(high(1:2) - low(1:2) > far_too_large*maxval(case%grid%length(1:2)))) then
-        call note('it is '//to_text(maxval(high(1:2) - low(1:2)))//' m long, more than ' &
+        call report('it is '//to_text(maxval(high(1:2) - low(1:2)))//' m long, more than ' &
           //to_text(nint(far_too_large))//' times the tank; are its coordinates in mm? ' &
           //'They must be in m')
         return
       end if
       if (high(3) - low(3) > far_too_large*maxval(case%grid%length)) then
-        call note('it is '//to_text(high(3) - low(3))//' m high, more than ' &
+        call report('it is '//to_text(high(3) - low(3))//' m high, more than ' &
           //to_text(nint(far_too_large))//' times the tank; its coordinates must be in m')
         return
       end if
       do d = 1, 2
         if (case%bed%kind == 'heightmap') then
           if (low(d) > from(d) + slack(d) .or. high(d) < to(d) - slack(d)) then
-            call note('the map does not cover the tank, which reaches from '//to_text(from(d)) &
+            call report('the map does not cover the tank, which reaches from '//to_text(from(d)) &
               //' to '//to_text(to(d))//' m in '//axis(d)//'; the map reaches from ' &
               //to_text(low(d))//' to '//to_text(high(d))//' m')
           else if (case%boundary%kind(1, d) == 'periodic' .and. high(d) - low(d) &
                    > case%grid%length(d) + 2*slack(d)) then
-            call note('the map must be as long as the period '//to_text(case%grid%length(d)) &
+            call report('the map must be as long as the period '//to_text(case%grid%length(d)) &
               //' m in '//axis(d))
           end if
         else if (high(d) < from(d) .or. low(d) > to(d)) then
-          call note('the bed lies outside the tank in '//axis(d))
+          call report('the bed lies outside the tank in '//axis(d))
         end if
       end do
-      if (high(3) <= from(3)) call note('the bed lies below the tank')
-      if (case%boundary%kind(1, 3) == 'periodic') call note('a bed needs sides in z that are ' &
+      if (high(3) <= from(3)) call report('the bed lies below the tank')
+      if (case%boundary%kind(1, 3) == 'periodic') call report('a bed needs sides in z that are ' &
         //'not periodic')
     end subroutine check_extent
   end subroutine make_bed

@@ -1,4 +1,4 @@
-!> The HDF5 layer: what is written comes back, columns grow and shrink, trouble is named.
+!> The HDF5 layer: what is written comes back, columns grow and shrink, errors are named.
 ! ranks: 2 3
 program test_hdf5_file
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
@@ -35,7 +35,7 @@ contains
     if (info == 0) close (unit, status='delete')
   end subroutine remove
 
-  !> No trouble so far; otherwise the trouble is shown.
+  !> No error so far; otherwise the error is shown.
   subroutine check_file(name, file)
     character(*), intent(in) :: name
     type(h5_file_t), intent(in) :: file
@@ -149,7 +149,7 @@ contains
     call file%open_column('/nobody', file_real64, nobody)
     call check('a column without elements has rows too', int(nobody%extent(3)), 11)
     call file%close()
-    call check_file('no trouble with columns', file)
+    call check_file('no error with columns', file)
   end subroutine test_columns
 
   !> What was flushed can be read while the writer holds the file: no locks.
@@ -171,7 +171,7 @@ contains
     call check('a flushed row is on disk', x(1), 42.0_wp, 0.0_wp)
     call reader%close()
     call writer%close()
-    call check('no trouble while reading', reader%info + writer%info, 0)
+    call check('no error while reading', reader%info + writer%info, 0)
     call remove('copy_'//path)
   end subroutine test_read_while_open
 
@@ -220,7 +220,7 @@ contains
     call file%read('/count', x(:3))
     call check('rows of the root process arrive', x(:3), [1.0_wp, 2.0_wp, 3.0_wp], 0.0_wp)
     call file%close()
-    call check_file('no trouble with a shared file', file)
+    call check_file('no error with a shared file', file)
   end subroutine test_shared_blocks
 
   !> All processes together go on in a file that one process began.
@@ -311,7 +311,7 @@ contains
     call file%flush()
     file%path = no_room
     call file%make_room(1000_i8)
-    call check('no room is trouble', file%info /= 0)
+    call check('no room is an error', file%info /= 0)
     call check('and named', index(file%message, no_room//': cannot') == 1)
     call file%append(time, [3.0_wp])
     call file%last_integer('/', 'exit_status', 4)
@@ -331,18 +331,18 @@ contains
 
     if (.not. is_root()) return
     call file%create('no/such/folder/run.h5', .false.)
-    call check('a folder that is not there is trouble', file%info /= 0)
+    call check('a folder that is not there is an error', file%info /= 0)
     call check('the message names file and reason', index(file%message, &
       'no/such/folder/run.h5') == 1 &
                .and. index(file%message, 'No such file or directory') > 0)
-    call file%store('/a', 'm', [1.0_wp])   ! after trouble everything returns at once
+    call file%store('/a', 'm', [1.0_wp])   ! after an error everything returns at once
     call file%flush()
     call file%close()
     open (newunit=unit, file=path, status='replace')
     write (unit, '(a)') 'this is no HDF5 file'
     close (unit)
     call file%open(path, .false., .false.)
-    call check('a file of another kind is trouble', file%info /= 0)
+    call check('a file of another kind is an error', file%info /= 0)
     call file%close()
     call file%create(path, .false.)
     call file%read('/series/time', x)

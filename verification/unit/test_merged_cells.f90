@@ -134,17 +134,17 @@ contains
     end associate
   end subroutine the_lever
 
-  subroutine note()
+  subroutine report()
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
         noted(:, m) = u(c(1), c(2), c(3), :)
       end associate
     end do
     to_wall = 0.0_wp
-  end subroutine note
+  end subroutine report
 
   subroutine share()
-    call note()
+    call report()
     call share_momentum(box%grid, merged, mass, box%bodies, noted, u, to_wall)
   end subroutine share
 
@@ -178,7 +178,7 @@ contains
     small = merged%number(4, 5, top)
     t = r + (1.0_wp - r)*0.25_wp
     call fill(u)
-    call note()
+    call report()
     before = u
     u(4, 5, top + 1, :) = u(4, 5, top + 1, :) + change
     u(4, 5, top, :) = 99.0_wp

@@ -1,5 +1,5 @@
 !> A run of prescribed numbers through the whole output: what is due is written, a run that goes on
-!! gives the files of one that was never stopped, older results are kept, trouble is told.
+!! gives the files of one that was never stopped, older results are kept, errors are reported.
 ! ranks: 2 3
 program test_output
   use kinds_m, only: wp
@@ -243,7 +243,7 @@ contains
     options%output = here//'/other/thesis.tex/below'
     call open_output(s%case, s%parameters, options, s%run_state_t, no_bed, &
       output)
-    call check('a folder that cannot be made is trouble', output%code, exit_files)
+    call check('a folder that cannot be made is an error', output%code, exit_files)
     options%output = here//'/empty'
     call shell('mkdir '//here//'/empty')
     call run(options, 0.5_wp, 9.0_wp, 0)

@@ -228,10 +228,10 @@ contains
     call make_sample(0.5_wp, .false., s)
     call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, &
                        s%run_state_t, info, message)
-    call check('a missing folder is trouble', info, 1)
+    call check('a missing folder is an error', info, 1)
     call read_restart('no-such-file.h5', s%parameters, s%run_state_t, &
                       info, message)
-    call check('a missing file is trouble', info, 1)
+    call check('a missing file is an error', info, 1)
     call check('the message names it', index(message, 'no-such-file.h5') > 0)
     if (is_root()) then
       call file%create(path, .false.)
@@ -240,7 +240,7 @@ contains
     end if
     call meet()
     call read_sample(s, info, message)
-    call check('a file of another kind is trouble', info, 1)
+    call check('a file of another kind is an error', info, 1)
   end subroutine test_trouble
 
 end program test_restart

@@ -87,7 +87,7 @@ contains
       .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, reach)]))
   end subroutine check_balanced
 
-  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) without a break;
+  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) on end;
   !! its turning counts, and one that is held or not there is never one.
   subroutine check_quiet()
     type(world_t) :: world
