@@ -46,7 +46,7 @@ contains
     real(wp) :: gap
 
     gap = gap_of(blocks, c)
-    way = least_gap(walls, blocks, c, overlap, -gap)
+    way = min_gap(walls, blocks, c, overlap, -gap)
     if (way < nothing_below) way = way - gap
   end function way_down
 
@@ -59,7 +59,7 @@ contains
     type(overlap_t), intent(in) :: overlap
     real(wp) :: height
 
-    height = least_gap(walls, blocks, c, overlap, -huge(1.0_wp))
+    height = min_gap(walls, blocks, c, overlap, -huge(1.0_wp))
     if (height < nothing_below) then
       height = blocks%x(3, c) - height + gap_of(blocks, c)
     else
@@ -77,7 +77,7 @@ contains
 
   !> Least height, of those from `least` on, between the lower side of block c and the floor, the
   !! bed and the upper sides of the other present blocks [m].
-  function least_gap(walls, blocks, c, overlap, least) result(gap)
+  function min_gap(walls, blocks, c, overlap, least) result(gap)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: c
@@ -107,7 +107,7 @@ contains
         end associate
       end do
     end associate
-  end function least_gap
+  end function min_gap
 
   !> Take a height between two surfaces if it counts and is the least so far.
   pure subroutine lower_to(here, least, gap)

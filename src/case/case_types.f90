@@ -9,13 +9,13 @@ module case_types_m
   private
   public :: case_t, run_t, grid_input_t, boundary_input_t, fluid_t, water_t, numerics_t
   public :: contact_input_t, shape_input_t, body_input_t, drop_input_t, bed_input_t
-  public :: place_t, handling_t, most_shapes, max_variants
+  public :: place_t, handling_t, max_drop_shapes, max_variants
   public :: absent, is_given, size_count, smallest_spacing, has_flow, not_resolved, member_name
   public :: start_t, begun_t
 
   real(wp), parameter :: absent = -huge(1.0_wp)   !! value of a real variable the user did not give
   character(*), parameter :: not_resolved = 'light: not resolved, no flow is computed'
-  integer, parameter :: most_shapes = 20          !! that a drop draws from
+  integer, parameter :: max_drop_shapes = 20          !! that a drop draws from
 
   integer, parameter :: max_variants = 5000   !! stones of a family
 
@@ -159,12 +159,12 @@ module case_types_m
 
   type :: drop_input_t
     character(name_length) :: shape = ''            !! required, or one of the next two
-    character(name_length) :: shapes(most_shapes) = ''   !! drawn by weight
+    character(name_length) :: shapes(max_drop_shapes) = ''   !! drawn by weight
     character(:), allocatable :: file               !! with a table of places
     character(:), allocatable :: folder             !! of the case, see `named_files_m`
     character(:), allocatable :: checksum           !! of the table
     type(place_t), allocatable :: row(:)            !! of the table
-    real(wp) :: weights(most_shapes) = absent
+    real(wp) :: weights(max_drop_shapes) = absent
     real(wp) :: position(3) = absent                !! required [m]
     real(wp) :: to(3) = absent                      !! of the last block [m]
     integer :: count = 1

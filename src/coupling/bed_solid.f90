@@ -10,7 +10,7 @@ module bed_solid_m
   use growing_m, only: ensure_room
   use grid_m, only: grid_t, n_halo
   use polygon_m, only: clip_polygon
-  use bed_m, only: bed_t, facet_within, most_corners
+  use bed_m, only: bed_t, facet_within, max_clip_corners
   use polyhedron_m, only: tet_volume
   use tet_mesh_m, only: shape_t
   implicit none
@@ -36,7 +36,7 @@ contains
     real(wp), intent(out) :: centre(3)   !! a corner of cells [m]
     type(shape_t), intent(out) :: solid
     type(parts_t) :: parts
-    real(wp) :: p(3, most_corners), low(3), high(3)
+    real(wp) :: p(3, max_clip_corners), low(3), high(3)
     integer :: d, f, n, beyond(3)
 
     beyond = merge(n_halo + 1, 0, grid%periodic)

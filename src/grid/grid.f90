@@ -45,7 +45,7 @@ module grid_m
     procedure :: side_of_face => grid_side_of_face
     procedure :: side_faces => grid_side_faces
     procedure :: side_cells => grid_side_cells
-    procedure :: min_spacing => grid_least_spacing
+    procedure :: min_spacing => grid_min_spacing
   end type grid_t
 
 contains
@@ -189,11 +189,11 @@ contains
 
   !> Least spacing of the directions that have more than one cell [m]: the thickness of a slice says
   !! nothing.
-  pure function grid_least_spacing(self) result(h)
+  pure function grid_min_spacing(self) result(h)
     class(grid_t), intent(in) :: self
     real(wp) :: h
 
     h = minval(self%h, self%n > 1)
-  end function grid_least_spacing
+  end function grid_min_spacing
 
 end module grid_m

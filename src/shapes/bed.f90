@@ -22,10 +22,10 @@ module bed_m
   implicit none
   private
   public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
-  public :: facet_within, most_corners, way_of, height_of
+  public :: facet_within, max_clip_corners, way_of, height_of
 
   integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
-  integer, parameter :: most_corners = 12  !! of a facet cut at five planes, and more
+  integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
 
   type :: bed_t
     logical :: there = .false.
@@ -342,7 +342,7 @@ contains
     type(bed_t), intent(in) :: bed
     character(:), allocatable, intent(out) :: message
     type(layers_t) :: layers
-    real(wp) :: p(3, most_corners), low(3), high(3), at(3), top
+    real(wp) :: p(3, max_clip_corners), low(3), high(3), at(3), top
     integer :: f, n, k, depth
 
     message = ''
@@ -551,7 +551,7 @@ contains
     integer, intent(in) :: f
     real(wp), intent(in) :: low(:), high(:)       !! in x and y first [m]
     integer, intent(out) :: n                     !! corners, none where they do not meet
-    real(wp), intent(out) :: p(3, most_corners)   !! [m]
+    real(wp), intent(out) :: p(3, max_clip_corners)   !! [m]
     integer :: d
 
     p(:, :3) = bed%point(:, bed%triangle(:, f))

@@ -2,7 +2,7 @@
 module bed_measure_m
   use kinds_m, only: wp
   use polygon_m, only: clip_polygon
-  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, most_corners
+  use bed_m, only: bed_t, bed_place, facet_within, way_of, height_of, max_clip_corners
   implicit none
   private
   public :: bed_volume, bed_height
@@ -17,7 +17,7 @@ contains
     type(bed_t), intent(in) :: bed
     real(wp), intent(in) :: low(3), high(3)   !! corners of the space: floor and level in z [m]
     real(wp) :: volume
-    real(wp) :: p(3, most_corners), under(3, most_corners), above(3, most_corners)
+    real(wp) :: p(3, max_clip_corners), under(3, max_clip_corners), above(3, max_clip_corners)
     integer :: f, n, m
 
     volume = 0.0_wp

@@ -19,7 +19,7 @@ module dense_spheres_m
   real(wp), parameter :: largest = 2.0_wp        !! radius of the largest ball [spacing]
   real(wp), parameter :: smallest = 0.1_wp       !! smaller balls are left out [spacing]
   real(wp), parameter :: alike = 0.3_wp          !! difference of balls that are one [spacing]
-  integer, parameter :: most_corners = 2*max_facet_corners
+  integer, parameter :: max_clip_corners = 2*max_facet_corners
 
   !> The facets as loose polygons.
   type :: facets_t
@@ -38,7 +38,7 @@ contains
     type(shape_t), intent(inout) :: shape
     type(facets_t) :: facets
     real(wp), allocatable :: ball(:, :)   ! (4, *) centre and radius
-    real(wp) :: polygon(3, most_corners), p(3), side(3)
+    real(wp) :: polygon(3, max_clip_corners), p(3), side(3)
     integer :: n, n_ball, m, ring, c, k, parts
 
     call load_facets(shape, facets)
@@ -94,9 +94,9 @@ contains
   !> The part of a convex polygon farther than `distance` from each of its sides; n < 3 if none.
   pure subroutine inset(x, normal, distance, part, n)
     real(wp), intent(in) :: x(:, :), normal(3), distance
-    real(wp), intent(out) :: part(3, most_corners)
+    real(wp), intent(out) :: part(3, max_clip_corners)
     integer, intent(out) :: n
-    real(wp) :: old(3, most_corners), h(most_corners), inward(3), side(3)
+    real(wp) :: old(3, max_clip_corners), h(max_clip_corners), inward(3), side(3)
     integer :: c, k, next, m
 
     n = size(x, 2)

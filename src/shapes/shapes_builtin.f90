@@ -24,7 +24,7 @@ module shapes_builtin_m
   public :: make_shape, given_size, max_refinement
 
   integer, parameter :: max_refinement = 8
-  real(wp), parameter :: most_parts = 1.0e5_wp   !! cuboids of a box
+  real(wp), parameter :: max_cuboids = 1.0e5_wp   !! cuboids of a box
   real(wp), parameter :: max_slender = 300.0_wp   !! height over diameter, refinement 1
   real(wp), parameter :: shortest = 1.0e-6_wp, longest = 1.0e6_wp   !! block from a file [m]
   real(wp), parameter :: min_share = 1.0e-6_wp   !! stones of a grade between its bounds [-]
@@ -269,7 +269,7 @@ contains
     select case (trim(input%kind))
     case ('box')
       parts = product(anint(input%size/minval(input%size)))
-      most = most_parts/real(input%refinement, wp)**3
+      most = max_cuboids/real(input%refinement, wp)**3
       if (parts > most) message = given_size(input)//': so slender a box would be cut into ' &
         //to_text(parts)//' cubes, at most '//to_text(nint(most))//' with refinement = ' &
         //to_text(input%refinement)
