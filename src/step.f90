@@ -196,12 +196,12 @@ contains
     call let_go_lowered(sim%walls, sim%case%fluid%gravity, sim%clock%t, sim%overlap, sim%blocks, &
                         sim%next_let_go, report%warnings)
     if (.not. sim%wet) return
-    if (released) call make_room(sim)
+    if (released) call reserve(sim)
     call first_force(sim)
   end subroutine release
 
   !> The liquid in the place of blocks that have come raises the free surface.
-  subroutine make_room(sim)
+  subroutine reserve(sim)
     type(simulation_t), intent(inout) :: sim
     type(fluid_sums_t) :: fluid
 
@@ -210,7 +210,7 @@ contains
     call mix_fluid(sim%case%fluid, sim%flow)
     fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
     call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
-  end subroutine make_room
+  end subroutine reserve
 
   !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
   !! each step the fluid force of that step takes over.

@@ -3,29 +3,29 @@ module growing_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: ensure_room, ensure_rows
+  public :: ensure_capacity, ensure_rows
 
   !> Make room for at least n entries in a list, or n columns in an array of them; the entries
   !! present are kept, the new ones are undefined.
   !!
   !! Columns hold `rows` numbers, three if not said otherwise: only the first call of an array asks.
-  interface ensure_room
+  interface ensure_capacity
     procedure :: ensure_integers, ensure_integer_columns
     procedure :: ensure_reals, ensure_real_columns
     procedure :: ensure_logicals
-  end interface ensure_room
+  end interface ensure_capacity
 
-  integer, parameter :: first_room = 16   !! entries that a list begins with, at least
+  integer, parameter :: first_capacity = 16   !! entries that a list begins with, at least
 
 contains
 
   !> Size of a list that has to hold n entries and has room for fewer.
-  pure function grown(n, room) result(size_new)
+  pure function grown(n, capacity) result(size_new)
     integer, intent(in) :: n      !! wanted
-    integer, intent(in) :: room   !! there is
+    integer, intent(in) :: capacity   !! there is
     integer :: size_new
 
-    size_new = max(n, 2*room, first_room)
+    size_new = max(n, 2*capacity, first_capacity)
   end function grown
 
   pure subroutine ensure_integers(n, list)

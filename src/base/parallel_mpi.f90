@@ -26,8 +26,8 @@ submodule (parallel_m) parallel_mpi_m
 
   !> Memory of the layers going out and coming in, lower and upper side. MPI hands it out, so every
   !! kind of number may see it as its own and one set of messages serves them all; it only grows.
-  type(c_ptr) :: going(2), coming(2)
-  integer :: room = 0             !! of each [bytes]
+  type(c_ptr) :: outgoing(2), incoming(2)
+  integer :: capacity = 0             !! of each [bytes]
   type(MPI_Request) :: request(4) !! two to receive, two to send
 
 contains
@@ -92,7 +92,7 @@ contains
     integer :: pieces(3), place(3), d
 
     pieces = best_pieces(n, n_processes)
-    if (product(pieces) /= n_processes) call no_room(n)
+    if (product(pieces) /= n_processes) call refuse_pieces(n)
     place(1) = modulo(rank, pieces(1))
     place(2) = modulo(rank/pieces(1), pieces(2))
     place(3) = rank/(pieces(1)*pieces(2))
@@ -108,7 +108,7 @@ contains
   end procedure decompose
 
   !> Say that there are too many processes and end them all.
-  subroutine no_room(n)
+  subroutine refuse_pieces(n)
     integer, intent(in) :: n(3)
     integer, parameter :: exit_input = 2
 
@@ -117,7 +117,7 @@ contains
       min_cells, ' cells in each direction that is cut; use fewer processes'
     if (rank > 0) call parallel_pause(1.0_wp)
     call parallel_abort(exit_input)
-  end subroutine no_room
+  end subroutine refuse_pieces
 
   !> Rank of the process one step away in direction d; itself or none where nothing is sent.
   pure function rank_beside(place, pieces, periodic, d, step) result(beside)
@@ -150,7 +150,7 @@ contains
       bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), box, [n])
+        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
         call pack_wp(a, extent, from, to, box)
         call send_layers(e, s, bytes)
@@ -158,7 +158,7 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), box, [n])
+        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
         call unpack_wp(box, extent, from, to, a)
       end do
@@ -180,7 +180,7 @@ contains
       bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), box, [n])
+        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
         call pack_sp(a, extent, from, to, box)
         call send_layers(e, s, bytes)
@@ -188,7 +188,7 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), box, [n])
+        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
         call unpack_sp(box, extent, from, to, a)
       end do
@@ -210,7 +210,7 @@ contains
       bytes = n*storage_size(box)/8
       call expect_layers(e, bytes)
       do s = 1, 2
-        call c_f_pointer(going(s), box, [n])
+        call c_f_pointer(outgoing(s), box, [n])
         call shift_box(e, inner(s, extent(e), width, layers), layers, from, to)
         call pack_integer(a, extent, from, to, box)
         call send_layers(e, s, bytes)
@@ -218,7 +218,7 @@ contains
       call MPI_Waitall(4, request, MPI_STATUSES_IGNORE)
       do s = 1, 2
         if (neighbour(s, e) == MPI_PROC_NULL) cycle
-        call c_f_pointer(coming(s), box, [n])
+        call c_f_pointer(incoming(s), box, [n])
         call shift_box(e, outer(s, extent(e), width, layers), layers, from, to)
         call unpack_integer(box, extent, from, to, a)
       end do
@@ -255,17 +255,17 @@ contains
 
     call grow(n)
     do s = 1, 2
-      call c_f_pointer(coming(s), bytes, [n])
+      call c_f_pointer(incoming(s), bytes, [n])
       call MPI_Irecv(bytes, n, MPI_BYTE, neighbour(s, e), 3 - s, MPI_COMM_WORLD, request(s))
     end do
   end subroutine expect_layers
 
-  !> Send the n bytes in `going(s)` through side s of direction e.
+  !> Send the n bytes in `outgoing(s)` through side s of direction e.
   subroutine send_layers(e, s, n)
     integer, intent(in) :: e, s, n
     integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
 
-    call c_f_pointer(going(s), bytes, [n])
+    call c_f_pointer(outgoing(s), bytes, [n])
     call MPI_Isend(bytes, n, MPI_BYTE, neighbour(s, e), s, MPI_COMM_WORLD, request(2 + s))
   end subroutine send_layers
 
@@ -274,12 +274,12 @@ contains
     integer, intent(in) :: n
     integer :: s
 
-    if (room >= n) return
+    if (capacity >= n) return
     call free_buffers()
-    room = 2*n
+    capacity = 2*n
     do s = 1, 2
-      call MPI_Alloc_mem(int(room, MPI_ADDRESS_KIND), MPI_INFO_NULL, going(s))
-      call MPI_Alloc_mem(int(room, MPI_ADDRESS_KIND), MPI_INFO_NULL, coming(s))
+      call MPI_Alloc_mem(int(capacity, MPI_ADDRESS_KIND), MPI_INFO_NULL, outgoing(s))
+      call MPI_Alloc_mem(int(capacity, MPI_ADDRESS_KIND), MPI_INFO_NULL, incoming(s))
     end do
   end subroutine grow
 
@@ -287,14 +287,14 @@ contains
     integer(c_int8_t), pointer, contiguous, asynchronous :: bytes(:)
     integer :: s
 
-    if (room == 0) return
+    if (capacity == 0) return
     do s = 1, 2
-      call c_f_pointer(going(s), bytes, [room])
+      call c_f_pointer(outgoing(s), bytes, [capacity])
       call MPI_Free_mem(bytes)
-      call c_f_pointer(coming(s), bytes, [room])
+      call c_f_pointer(incoming(s), bytes, [capacity])
       call MPI_Free_mem(bytes)
     end do
-    room = 0
+    capacity = 0
   end subroutine free_buffers
 
   !> First of the layers that side s sends.

@@ -1,7 +1,7 @@
 !> Forces of all touches on their partners, and the tangential springs that remember them.
 module contact_forces_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
   use touching_m, only: touching_t

@@ -2,7 +2,7 @@
 !! for the forces, the second for the length of the substep.
 module contact_response_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use touches_m, only: touch_t, touches_t
   use springs_m, only: comes_before
@@ -53,14 +53,14 @@ contains
     response%frequency2 = 0.0_wp
     response%stiffness = 0.0_wp
     response%damping = 0.0_wp
-    call ensure_room(touches%n, response%k)
-    call ensure_room(touches%n, response%pair_damping)
-    call ensure_room(touches%n, response%elastic)
-    call ensure_room(touches%n, response%energy)
-    call ensure_room(touches%n, response%stiff)
-    call ensure_room(touches%n, response%eta)
-    call ensure_room(touches%n, response%decay)
-    call ensure_room(touches%n, response%pair_frequency2)
+    call ensure_capacity(touches%n, response%k)
+    call ensure_capacity(touches%n, response%pair_damping)
+    call ensure_capacity(touches%n, response%elastic)
+    call ensure_capacity(touches%n, response%energy)
+    call ensure_capacity(touches%n, response%stiff)
+    call ensure_capacity(touches%n, response%eta)
+    call ensure_capacity(touches%n, response%decay)
+    call ensure_capacity(touches%n, response%pair_frequency2)
     first = 1
     do while (first <= touches%n)
       last = last_of_pair(touches, first)

@@ -4,7 +4,7 @@
 !! that others may touch. What comes out, and its order, do not depend on when the list was made.
 module contact_spheres_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: rotation_matrix
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
@@ -203,7 +203,7 @@ contains
         p = p + 1
       end do
     end do
-    call ensure_room(self%list%n_pairs + 1, self%list%first)
+    call ensure_capacity(self%list%n_pairs + 1, self%list%first)
     self%list%first(self%list%n_pairs + 1) = self%list%n + 1
     self%listed = .true.
     self%present = blocks%present
@@ -218,10 +218,10 @@ contains
     type(candidates_t), intent(inout) :: list
 
     list%n_pairs = list%n_pairs + 1
-    call ensure_room(list%n_pairs, list%a)
-    call ensure_room(list%n_pairs, list%b)
-    call ensure_room(list%n_pairs, list%first)
-    call ensure_room(list%n_pairs, list%shift)
+    call ensure_capacity(list%n_pairs, list%a)
+    call ensure_capacity(list%n_pairs, list%b)
+    call ensure_capacity(list%n_pairs, list%first)
+    call ensure_capacity(list%n_pairs, list%shift)
     list%a(list%n_pairs) = a
     list%b(list%n_pairs) = b
     list%first(list%n_pairs) = list%n + 1
@@ -234,8 +234,8 @@ contains
     type(candidates_t), intent(inout) :: list
 
     list%n = list%n + 1
-    call ensure_room(list%n, list%i)
-    call ensure_room(list%n, list%j)
+    call ensure_capacity(list%n, list%i)
+    call ensure_capacity(list%n, list%j)
     list%i(list%n) = i
     list%j(list%n) = j
   end subroutine add_candidate
@@ -252,10 +252,10 @@ contains
     self%n_slots = self%n_slots + 1
     slot = self%n_slots
     self%slot_of(self%offset(b) + sphere) = slot
-    call ensure_room(slot, self%body)
-    call ensure_room(slot, self%sphere)
-    call ensure_room(slot, self%centre)
-    call ensure_room(slot, self%radius)
+    call ensure_capacity(slot, self%body)
+    call ensure_capacity(slot, self%sphere)
+    call ensure_capacity(slot, self%centre)
+    call ensure_capacity(slot, self%radius)
     self%body(slot) = b
     self%sphere(slot) = sphere
     self%radius(slot) = blocks%shapes(blocks%shape(b))%sphere_radius(sphere)

@@ -13,7 +13,7 @@
 !! With a margin (impulses) only what comes near by its own motion counts as a touch to come.
 module contact_surface_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: distance, norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
@@ -177,16 +177,16 @@ contains
     integer :: p, n_old
 
     n_old = self%near%n
-    call ensure_room(n_old, self%old_slot)
-    call ensure_room(n_old, self%old_a)
-    call ensure_room(n_old, self%old_b)
+    call ensure_capacity(n_old, self%old_slot)
+    call ensure_capacity(n_old, self%old_a)
+    call ensure_capacity(n_old, self%old_b)
     if (n_old > 0) then
       self%old_slot(:n_old) = self%slot(:n_old)
       self%old_a(:n_old) = self%near%a(:n_old)
       self%old_b(:n_old) = self%near%b(:n_old)
     end if
     call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%wide_skin, self%near)
-    call ensure_room(self%near%n, self%slot)
+    call ensure_capacity(self%near%n, self%slot)
     call keep_slots(n_old, self)
     call take_slots(self)
     do p = 1, self%near%n
@@ -264,7 +264,7 @@ contains
     allocate (longer(max(n, 2*m, 16)))
     longer(:m) = self%pairs
     call move_alloc(longer, self%pairs)
-    call ensure_room(size(self%pairs), self%taken)
+    call ensure_capacity(size(self%pairs), self%taken)
     self%taken(m + 1:) = .false.
   end subroutine ensure_pairs
 

@@ -6,7 +6,7 @@
 !! their solution does not matter, nor the number of threads.
 module impulse_rows_m
   use kinds_m, only: wp, i8, pi
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_partner
@@ -165,19 +165,19 @@ contains
       if (n > size(rows%row)) deallocate (rows%row)
     end if
     if (.not. allocated(rows%row)) allocate (rows%row(2*n + 16))
-    call ensure_room(n, rows%touch)
-    call ensure_room(n, rows%closing)
-    call ensure_room(n, rows%largest)
-    call ensure_room(n, rows%total)
-    call ensure_room(n, rows%hit)
-    call ensure_room(n, rows%returned)
-    call ensure_room(n, rows%a)
-    call ensure_room(n, rows%b)
-    call ensure_room(n + 1, rows%first)
-    call ensure_room(n, rows%colour)
-    call ensure_room(n, rows%order)
-    call ensure_room(n, rows%push)
-    call ensure_room(n, rows%turn)
+    call ensure_capacity(n, rows%touch)
+    call ensure_capacity(n, rows%closing)
+    call ensure_capacity(n, rows%largest)
+    call ensure_capacity(n, rows%total)
+    call ensure_capacity(n, rows%hit)
+    call ensure_capacity(n, rows%returned)
+    call ensure_capacity(n, rows%a)
+    call ensure_capacity(n, rows%b)
+    call ensure_capacity(n + 1, rows%first)
+    call ensure_capacity(n, rows%colour)
+    call ensure_capacity(n, rows%order)
+    call ensure_capacity(n, rows%push)
+    call ensure_capacity(n, rows%turn)
   end subroutine reserve_rows
 
   !> Begin a new pair with row `rows%n`, unless it goes on with the last one.

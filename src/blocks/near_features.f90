@@ -2,7 +2,7 @@
 !! with the facets and edges of the other that may be nearest to them, and edges that may cross.
 module near_features_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
   use surface_search_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
@@ -165,10 +165,10 @@ contains
     call gather_facets(host, place - reach, place + reach, search%found%facets)
     call gather_edges(host, place - reach, place + reach, search%found%edges)
     list%n = list%n + 1
-    call ensure_room(list%n, list%probe)
-    call ensure_room(list%n, list%away)
-    call ensure_room(list%n, list%facet_first)
-    call ensure_room(list%n, list%edge_first)
+    call ensure_capacity(list%n, list%probe)
+    call ensure_capacity(list%n, list%away)
+    call ensure_capacity(list%n, list%facet_first)
+    call ensure_capacity(list%n, list%edge_first)
     list%probe(list%n) = probe
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
@@ -182,8 +182,8 @@ contains
   subroutine end_lists(list)
     type(probes_near_t), intent(inout) :: list
 
-    call ensure_room(list%n + 1, list%facet_first)
-    call ensure_room(list%n + 1, list%edge_first)
+    call ensure_capacity(list%n + 1, list%facet_first)
+    call ensure_capacity(list%n + 1, list%edge_first)
     list%facet_first(list%n + 1) = list%n_facets + 1
     list%edge_first(list%n + 1) = list%n_edges + 1
   end subroutine end_lists
@@ -197,7 +197,7 @@ contains
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
-    call ensure_room(n + size(facets), list)
+    call ensure_capacity(n + size(facets), list)
     do k = 1, size(facets)
       if (.not. facet_is_near(host, facets(k), place, reach)) cycle
       n = n + 1
@@ -214,7 +214,7 @@ contains
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
-    call ensure_room(n + size(edges), list)
+    call ensure_capacity(n + size(edges), list)
     do k = 1, size(edges)
       if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
       n = n + 1
@@ -291,9 +291,9 @@ contains
 
     n = near%n_crossings + 1
     near%n_crossings = n
-    call ensure_room(n, near%edge_a)
-    call ensure_room(n, near%edge_b)
-    call ensure_room(n, near%away)
+    call ensure_capacity(n, near%edge_a)
+    call ensure_capacity(n, near%edge_b)
+    call ensure_capacity(n, near%away)
     near%edge_a(n) = i
     near%edge_b(n) = j
     near%away(n) = away

@@ -18,9 +18,9 @@ module overlap_m
     reported_share
   implicit none
   private
-  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for, exclude
+  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, bytes_for, exclude
 
-  real(wp), parameter :: room_share = 0.01_wp   !! overlap over smallest edge that a release allows
+  real(wp), parameter :: release_overlap = 0.01_wp   !! allowed overlap over smallest edge
 
   !> The shapes of a run made ready, and the lists of the search.
   type :: overlap_t
@@ -80,7 +80,7 @@ contains
   end function wall_depth
 
   !> Whether body c has room where it is: nothing reaches deeper into it than 1 % of its size.
-  function room_for(walls, blocks, c, overlap) result(free)
+  function bytes_for(walls, blocks, c, overlap) result(free)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: c
@@ -88,8 +88,8 @@ contains
     logical :: free
 
     free = body_overlap(overlap, walls, blocks, c) &
-      <= room_share*blocks%shapes(blocks%shape(c))%smallest_edge
-  end function room_for
+      <= release_overlap*blocks%shapes(blocks%shape(c))%smallest_edge
+  end function bytes_for
 
   !> Whether the places of two bodies exclude one another: they reach deeper into one another than a
   !! release allows the smaller.
@@ -106,7 +106,7 @@ contains
     associate (one => overlap%solid(blocks%shape(a)), two => overlap%solid(blocks%shape(b)))
       yes = .false.
       if (norm(d) >= one%radius + two%radius) return
-      allowed = room_share*min(blocks%shapes(blocks%shape(a))%smallest_edge, &
+      allowed = release_overlap*min(blocks%shapes(blocks%shape(a))%smallest_edge, &
         blocks%shapes(blocks%shape(b))%smallest_edge)
       depth = allowed
       call deepen_pair(one, rotation_matrix(blocks%q(:, a)), two, rotation_matrix(blocks%q(:, b)), &

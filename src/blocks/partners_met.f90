@@ -1,6 +1,6 @@
 !> Which partners each body has touched in a step.
 module partners_met_m
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use rigid_body_m, only: blocks_t
   use walls_m, only: floor_wall
   use bed_m, only: bed_partner
@@ -35,8 +35,8 @@ contains
         m = m + 1
       end do
       if (is_met(met, m, a, b)) cycle
-      call ensure_room(met%n + 1, met%a)
-      call ensure_room(met%n + 1, met%b)
+      call ensure_capacity(met%n + 1, met%a)
+      call ensure_capacity(met%n + 1, met%b)
       met%a(m + 1:met%n + 1) = met%a(m:met%n)
       met%b(m + 1:met%n + 1) = met%b(m:met%n)
       met%a(m) = a

@@ -1,7 +1,7 @@
 !> Who falls asleep and who wakes, and what becomes of the springs between them.
 module resting_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
@@ -181,7 +181,7 @@ contains
     integer :: g, t, a, b
 
     associate (sleep => contacts%sleep, springs => contacts%springs)
-      call ensure_room(springs%n, sleep%chosen)
+      call ensure_capacity(springs%n, sleep%chosen)
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
@@ -211,7 +211,7 @@ contains
     integer :: i
 
     associate (sleep => contacts%sleep)
-      call ensure_room(sleep%rest%n, sleep%chosen)
+      call ensure_capacity(sleep%rest%n, sleep%chosen)
       do i = 1, sleep%rest%n
         sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
       end do

@@ -2,7 +2,7 @@
 !! of those that are near: all that is read in most substeps.
 module short_list_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use surface_search_m, only: surface_t, nearest_on_surface, nowhere
   use edge_crossing_m, only: edge_t
   use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
@@ -70,7 +70,7 @@ contains
     short%n_of_a = n
     short%edges = short%n + 1
     call choose_edges(now%a_in_b, way, surface_a, surface_b, near, short)
-    call ensure_room(short%n + 1, short%item)
+    call ensure_capacity(short%n + 1, short%item)
     ! without any feature in the lists nothing comes near as long as these hold
     if (near%of_a%n + near%of_b%n + near%n_crossings == 0) short%until = huge(1.0_wp)
   end subroutine choose_features
@@ -99,7 +99,7 @@ contains
         reach = abs(distance) + 2*margin
         at = short%n + 1
         short%n = short%n + 3
-        call ensure_room(short%n, short%item)
+        call ensure_capacity(short%n, short%item)
         short%item(at) = list%probe(m)
         call append_facets(host, facets, place, reach, short%n, short%item)
         short%item(at + 1) = short%n - at - 2
@@ -131,7 +131,7 @@ contains
       if (way_to_crossing(guest, surface_b%edge(near%edge_b(m)), margin, &
         margin + min(surface_a%length, surface_b%length), &
         min(surface_a%reach, surface_b%reach)) > margin) cycle
-      call ensure_room(short%n + 2, short%item)
+      call ensure_capacity(short%n + 2, short%item)
       short%item(short%n + 1:short%n + 2) = [near%edge_a(m), near%edge_b(m)]
       short%n = short%n + 2
       short%n_edges = short%n_edges + 1

@@ -1,7 +1,7 @@
 !> Tangential springs: what a touch remembers from substep to substep.
 module springs_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   implicit none
   private
   public :: springs_t, reserve_springs, comes_before, begins_pair, move_springs
@@ -38,16 +38,16 @@ contains
     integer, intent(in) :: n
     type(springs_t), intent(inout) :: springs
 
-    call ensure_room(n, springs%a)
-    call ensure_room(n, springs%b)
-    call ensure_room(n, springs%key)
-    call ensure_room(n, springs%other)
-    call ensure_room(n, springs%k)
-    call ensure_room(n, springs%xi)
-    call ensure_room(n, springs%force)
-    call ensure_room(n, springs%torque_a)
-    call ensure_room(n, springs%torque_b)
-    call ensure_room(n, springs%energy)
+    call ensure_capacity(n, springs%a)
+    call ensure_capacity(n, springs%b)
+    call ensure_capacity(n, springs%key)
+    call ensure_capacity(n, springs%other)
+    call ensure_capacity(n, springs%k)
+    call ensure_capacity(n, springs%xi)
+    call ensure_capacity(n, springs%force)
+    call ensure_capacity(n, springs%torque_a)
+    call ensure_capacity(n, springs%torque_b)
+    call ensure_capacity(n, springs%energy)
   end subroutine reserve_springs
 
   !> Order of springs and touches: by body, partner, key.

@@ -1,7 +1,7 @@
 !> Touches of one sphere or point with one partner, taken together: they share a tangential spring.
 module touch_groups_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use touches_m, only: touch_t, touches_t
   implicit none
@@ -26,11 +26,11 @@ contains
     integer :: t, g, last
 
     groups%n = 0
-    call ensure_room(touches%n + 1, groups%first)
-    call ensure_room(touches%n, groups%new)
-    call ensure_room(touches%n, groups%normal)
-    call ensure_room(touches%n, groups%arm_a)
-    call ensure_room(touches%n, groups%arm_b)
+    call ensure_capacity(touches%n + 1, groups%first)
+    call ensure_capacity(touches%n, groups%new)
+    call ensure_capacity(touches%n, groups%normal)
+    call ensure_capacity(touches%n, groups%arm_a)
+    call ensure_capacity(touches%n, groups%arm_b)
     t = 1
     do while (t <= touches%n)
       g = groups%n + 1

@@ -33,10 +33,10 @@ contains
   pure subroutine ensure_touches(n, touches)
     integer, intent(in) :: n
     type(touches_t), intent(inout) :: touches
-    integer, parameter :: first_room = 16
+    integer, parameter :: first_capacity = 16
     type(touch_t), allocatable :: longer(:)
 
-    if (.not. allocated(touches%item)) allocate (touches%item(max(n, first_room)))
+    if (.not. allocated(touches%item)) allocate (touches%item(max(n, first_capacity)))
     if (n <= size(touches%item)) return
     allocate (longer(max(n, 2*size(touches%item))))
     longer(:touches%n) = touches%item(:touches%n)

@@ -7,7 +7,7 @@
 !! periodic sides the bed reaches beyond the cells that are kept there, so it has no images.
 module bed_solid_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo
   use polygon_m, only: clip_polygon
   use bed_m, only: bed_t, facet_within, max_clip_corners
@@ -77,11 +77,11 @@ contains
     integer :: v
 
     parts%n_facet = parts%n_facet + 1
-    call ensure_room(parts%n_facet, parts%first)
+    call ensure_capacity(parts%n_facet, parts%first)
     parts%first(parts%n_facet) = parts%n_corner + 1
     do v = 1, size(p, 2)
       parts%n_corner = parts%n_corner + 1
-      call ensure_room(parts%n_corner, parts%corner)
+      call ensure_capacity(parts%n_corner, parts%corner)
       parts%corner(:, parts%n_corner) = p(:, v)
     end do
   end subroutine add_facet
@@ -139,7 +139,7 @@ contains
       real(wp), intent(in) :: corner(3, 4)
 
       if (abs(tet_volume(corner)) < least) return
-      call ensure_room(parts%n_tet_corner + 4, parts%tet_corner)
+      call ensure_capacity(parts%n_tet_corner + 4, parts%tet_corner)
       parts%tet_corner(:, parts%n_tet_corner + 1:parts%n_tet_corner + 4) = corner
       parts%n_tet_corner = parts%n_tet_corner + 4
     end subroutine add_tet

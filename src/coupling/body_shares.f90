@@ -23,7 +23,7 @@
 !! gives the same shares to round-off (tested), but takes all tetrahedra instead of the surface.
 module body_shares_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: rotation_matrix
   use grid_m, only: grid_t
   use tet_mesh_m, only: shape_t
@@ -80,8 +80,8 @@ contains
     integer :: d, v, m, n
 
     n = size(shape%point, 2)
-    call ensure_room(n, work%point)
-    call ensure_room(n, work%seen)
+    call ensure_capacity(n, work%point)
+    call ensure_capacity(n, work%seen)
     r = rotation_matrix(self%q)
     centre = (self%x - grid%origin)/grid%h
     self%base = floor(centre)
@@ -96,8 +96,8 @@ contains
       end do
     end do
     n = size(shape%facet) - 1
-    call ensure_room(n, work%low)
-    call ensure_room(n, work%high)
+    call ensure_capacity(n, work%low)
+    call ensure_capacity(n, work%high)
     do m = 1, n
       associate (p => shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
         do d = 1, 3

@@ -1,7 +1,7 @@
 !> Which tetrahedra of a body may reach into each of its cut cells.
 module cut_tets_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: cross
   use polyhedron_m, only: tet_volume
   use share_lists_m, only: body_shares_t
@@ -48,7 +48,7 @@ contains
     end if
     allocate (work%number(-m(1):m(1), -m(2):m(2), -m(3):m(3)), source=0)
     allocate (work%run(4, -m(2):m(2), -m(3):m(3)))
-    call ensure_room(1, work%pair, rows=2)
+    call ensure_capacity(1, work%pair, rows=2)
   end subroutine ensure_grid
 
   !> Number the cut cells on the grid; in each row, ends of their first run, and of all that follow.
@@ -99,7 +99,7 @@ contains
           do i = first, last
             if (work%number(i, j, k) == 0) cycle
             n_pair = n_pair + 1
-            call ensure_room(n_pair, work%pair)
+            call ensure_capacity(n_pair, work%pair)
             work%pair(:, n_pair) = [work%number(i, j, k), t]
           end do
         end do
@@ -158,8 +158,8 @@ contains
     type(body_shares_t), intent(inout) :: self
     integer :: p, m
 
-    call ensure_room(n_pair, self%tet)
-    call ensure_room(self%n_cell + 1, self%first_tet)
+    call ensure_capacity(n_pair, self%tet)
+    call ensure_capacity(self%n_cell + 1, self%first_tet)
     self%first_tet(:self%n_cell + 1) = 0
     do p = 1, n_pair
       m = pair(1, p)

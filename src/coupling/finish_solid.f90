@@ -2,7 +2,7 @@
 !! tetrahedra, links that round-off left open.
 module finish_solid_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, set_faces
   use share_lists_m, only: body_shares_t, full_cell, full_face
@@ -122,7 +122,7 @@ contains
         tets%first(m) = total + 1
       end do
       tets%first(solid%n_cut + 1) = total + 1
-      call ensure_room(total, tets%list)
+      call ensure_capacity(total, tets%list)
       do b = size(body), 1, -1
         do e = solid%body_cell(b + 1) - 1, solid%body_cell(b), -1
           tets%of_cell(:, e) = [1, 0]

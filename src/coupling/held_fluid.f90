@@ -13,7 +13,7 @@
 !! transport know the open share only. 7/2 is measured (docs/decisions/sharp_edges.md).
 module held_fluid_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, apertures
   use rigid_flux_m, only: closed_side
@@ -125,8 +125,8 @@ contains
                  effective => solid%effective(f(1), f(2), f(3), f(4)))
         if (aperture < least .or. closed_side(grid, f(f(4)), f(4))) return
         if (effective >= aperture) then
-          call ensure_room(next, solid%held_face)
-          call ensure_room(next, solid%held_share)
+          call ensure_capacity(next, solid%held_face)
+          call ensure_capacity(next, solid%held_share)
           solid%held_face(:, next) = f
           next = next + 1
         end if

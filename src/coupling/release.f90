@@ -15,7 +15,7 @@ module release_m
   use parallel_m, only: is_root
   use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, left_out
   use walls_m, only: walls_t
-  use overlap_m, only: overlap_t, room_for, exclude
+  use overlap_m, only: overlap_t, bytes_for, exclude
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
@@ -49,12 +49,12 @@ contains
     due = pack([(b, b=1, blocks%n)], is_due(time, blocks))
     allocate (free(size(due)))
     do i = 1, size(due)
-      call look_for_room(walls, overlap, due(i), blocks, free(i))
+      call check_place(walls, overlap, due(i), blocks, free(i))
     end do
     call order_due(walls, overlap, blocks, due, free)
     do i = 1, size(due)
       b = due(i)
-      if (free(i) .and. released) call look_for_room(walls, overlap, b, blocks, free(i))
+      if (free(i) .and. released) call check_place(walls, overlap, b, blocks, free(i))
       if (.not. free(i) .and. blocks%handling(b)%if_blocked == 'raise') then
         call raise_block(walls, overlap, b, blocks, free(i))
         if (free(i)) call warn(time, b, 'was raised by '//brief(blocks%raised(b), 3) &
@@ -90,7 +90,7 @@ contains
   end subroutine warn
 
   !> Has a block room at its place? One without a given height is set on what lies there first.
-  subroutine look_for_room(walls, overlap, b, blocks, free)
+  subroutine check_place(walls, overlap, b, blocks, free)
     type(walls_t), intent(in) :: walls
     type(overlap_t), intent(in) :: overlap
     integer, intent(in) :: b
@@ -104,8 +104,8 @@ contains
       if (.not. free) return
       blocks%x(3, b) = height
     end if
-    free = room_for(walls, blocks, b, overlap)
-  end subroutine look_for_room
+    free = bytes_for(walls, blocks, b, overlap)
+  end subroutine check_place
 
   !> Raise a block above all that lies at its place, if it has room there.
   subroutine raise_block(walls, overlap, b, blocks, free)
@@ -121,7 +121,7 @@ contains
     free = height > place
     if (.not. free) return
     blocks%x(3, b) = height
-    free = room_for(walls, blocks, b, overlap)
+    free = bytes_for(walls, blocks, b, overlap)
     if (free) then
       blocks%raised(b) = height - place
     else

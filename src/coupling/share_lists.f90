@@ -1,7 +1,7 @@
 !> Lists of what one body fills: cells, faces, and where grid lines meet its surface.
 module share_lists_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use share_moments_m, only: along, up
   implicit none
   private
@@ -71,10 +71,10 @@ contains
     integer, intent(in) :: n
     type(body_shares_t), intent(inout) :: self
 
-    call ensure_room(n, self%cell)
-    call ensure_room(n, self%inside)
-    call ensure_room(n, self%alpha)
-    call ensure_room(n, self%centroid)
+    call ensure_capacity(n, self%cell)
+    call ensure_capacity(n, self%inside)
+    call ensure_capacity(n, self%alpha)
+    call ensure_capacity(n, self%centroid)
   end subroutine ensure_cell
 
   !> Append a face.
@@ -104,9 +104,9 @@ contains
     integer, intent(in) :: n
     type(body_shares_t), intent(inout) :: self
 
-    call ensure_room(n, self%face, rows=4)
-    call ensure_room(n, self%beta)
-    call ensure_room(n, self%face_centroid)
+    call ensure_capacity(n, self%face, rows=4)
+    call ensure_capacity(n, self%beta)
+    call ensure_capacity(n, self%face_centroid)
   end subroutine ensure_face
 
   !> Append a hit.
@@ -128,8 +128,8 @@ contains
     integer, intent(in) :: n
     type(body_shares_t), intent(inout) :: self
 
-    call ensure_room(n, self%hit, rows=4)
-    call ensure_room(n, self%at)
+    call ensure_capacity(n, self%hit, rows=4)
+    call ensure_capacity(n, self%at)
   end subroutine ensure_hit
 
 end module share_lists_m

@@ -35,15 +35,15 @@ contains
     integer :: d, cells(3), squares(3)
 
     cells = self%high - self%low + 1
-    call make_room(n*cells, work%cell)
-    call make_room(cells + 1, work%full)
+    call reserve(n*cells, work%cell)
+    call reserve(cells + 1, work%full)
     call mark_points(self, n*cells, spread(n, 1, 3), spread(0.5_wp, 1, 3), work%cell)
     call count_cells(n, work, self)
     self%n_face = 0
     do d = 1, 3
       squares = n
       squares(d) = 1
-      call make_room(squares*cells, work%face)
+      call reserve(squares*cells, work%face)
       call mark_points(self, squares*cells, squares, &
                        0.5_wp*real(1 - unit_step(:, d), wp), work%face)
       call count_faces(n, d, squares, work, self)
@@ -51,7 +51,7 @@ contains
   end subroutine count_subcells
 
   !> An array at least this long.
-  subroutine make_room(n, mark)
+  subroutine reserve(n, mark)
     integer, intent(in) :: n(3)
     logical, allocatable, intent(inout) :: mark(:, :, :)
     integer :: m(3)
@@ -63,7 +63,7 @@ contains
       deallocate (mark)
     end if
     allocate (mark(m(1), m(2), m(3)))
-  end subroutine make_room
+  end subroutine reserve
 
   !> Points of a lattice over the box of the body that lie in one of its tetrahedra; those on a
   !! face of a tetrahedron count.

@@ -2,7 +2,7 @@
 !! lists.
 module voxels_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, clear_cells, clear_faces, clear_links
   use share_lists_m, only: body_shares_t
@@ -108,21 +108,21 @@ contains
       links = links + copies*(body(b)%n_hit + 6*body(b)%n_cell)
       tets = tets + (1 + copies)*size(body(b)%corner, 3)
     end do
-    call ensure_room(images, self%image, rows=4)
-    call ensure_room(cells, solid%cell)
-    call ensure_room(cells, solid%cell_alpha)
-    call ensure_room(cells, solid%cell_centroid)
-    call ensure_room(cells, solid%cut_cell)
-    call ensure_room(cells + 1, solid%tets%first)
-    call ensure_room(cells, solid%closed_cell)
-    call ensure_room(cells, solid%tets%of_cell)
-    call ensure_room(cells, self%source)
-    call ensure_room(faces, solid%face)
-    call ensure_room(faces, solid%face_beta)
-    call ensure_room(faces, solid%face_centroid)
-    call ensure_room(links, solid%link)
-    call ensure_room(links, solid%link_length)
-    call ensure_room(links, solid%link_body)
+    call ensure_capacity(images, self%image, rows=4)
+    call ensure_capacity(cells, solid%cell)
+    call ensure_capacity(cells, solid%cell_alpha)
+    call ensure_capacity(cells, solid%cell_centroid)
+    call ensure_capacity(cells, solid%cut_cell)
+    call ensure_capacity(cells + 1, solid%tets%first)
+    call ensure_capacity(cells, solid%closed_cell)
+    call ensure_capacity(cells, solid%tets%of_cell)
+    call ensure_capacity(cells, self%source)
+    call ensure_capacity(faces, solid%face)
+    call ensure_capacity(faces, solid%face_beta)
+    call ensure_capacity(faces, solid%face_centroid)
+    call ensure_capacity(links, solid%link)
+    call ensure_capacity(links, solid%link_length)
+    call ensure_capacity(links, solid%link_body)
     if (size(solid%tets%corner, 3) < tets) then
       tets = max(tets, 2*size(solid%tets%corner, 3))
       deallocate (solid%tets%corner)

@@ -12,7 +12,7 @@
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
@@ -58,11 +58,11 @@ contains
     type(wall_balance_t), intent(inout) :: self
     integer :: m
 
-    call ensure_room(merged%n, self%mass)
-    call ensure_room(merged%n, self%pushed)
-    call ensure_room(merged%n, self%gained)
-    call ensure_room(merged%n, self%before)
-    call ensure_room(merged%n, self%to_wall)
+    call ensure_capacity(merged%n, self%mass)
+    call ensure_capacity(merged%n, self%pushed)
+    call ensure_capacity(merged%n, self%gained)
+    call ensure_capacity(merged%n, self%before)
+    call ensure_capacity(merged%n, self%to_wall)
     !$omp parallel do schedule(static)
     do m = 1, merged%n
       associate (c => merged%cell(:, m))

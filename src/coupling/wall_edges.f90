@@ -5,7 +5,7 @@
 !! an upright edge takes the centre of the cell, by less than 0.1 with a sphere eight cells wide.
 module wall_edges_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, apertures
   use plic_m, only: unit_constant, unit_volume
@@ -28,8 +28,8 @@ contains
     real(wp) :: w(3, 2), excess
     integer :: m
 
-    call ensure_room(solid%n_cut, solid%edge)
-    call ensure_room(solid%n_cut, solid%behind_plane)
+    call ensure_capacity(solid%n_cut, solid%edge)
+    call ensure_capacity(solid%n_cut, solid%behind_plane)
     !$omp parallel do private(w, excess) schedule(static)
     do m = 1, solid%n_cut
       associate (c => solid%cut_cell(:, m), plane => solid%behind_plane(:, m))

@@ -1,6 +1,6 @@
 !> Lists of marked cells, made on all threads, in the order of the grid.
 module cell_list_m
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   implicit none
   private
@@ -29,7 +29,7 @@ contains
         before(k + 1) = before(k + 1) + before(k)
       end do
       n = before(b(3) + 1)
-      call ensure_room(n, cell, rows=3)
+      call ensure_capacity(n, cell, rows=3)
       !$omp parallel do private(i, j, place) schedule(static)
       do k = a(3), b(3)
         place = before(k)

@@ -89,7 +89,7 @@ contains
     real(wp) :: s(6)
 
     n_face = solid%body_face(bodies%n + 1) + solid%first_held(bodies%n + 1) - 2
-    call make_room(self, n_face)
+    call reserve(self, n_face)
     do b = 1, bodies%n
       self%first_face(b) = solid%body_face(b) + solid%first_held(b) - 1
       self%held_from(b) = solid%body_face(b + 1) + solid%first_held(b) - 1
@@ -196,7 +196,7 @@ contains
   end function middle_of_face
 
   !> Lists long enough for n_face faces; a face gives at most two cells.
-  subroutine make_room(self, n_face)
+  subroutine reserve(self, n_face)
     type(rigid_flux_t), intent(inout) :: self
     integer, intent(in) :: n_face
 
@@ -204,7 +204,7 @@ contains
     deallocate (self%face, self%s, self%mine, self%cell, self%j)
     allocate (self%face(4, 2*n_face), self%s(6, 2*n_face), self%mine(2*n_face))
     allocate (self%cell(3, 4*n_face), self%j(4*n_face, 6))
-  end subroutine make_room
+  end subroutine reserve
 
   !> A lower face of index i on a side of the domain where no pressure is given: what a body does
   !! there moves no fluid, and nothing pushes from outside.

@@ -9,7 +9,7 @@
 module extended_fraction_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use fields_m, only: flow_t
   use boundary_m, only: fill_scalar_halo
@@ -129,15 +129,15 @@ contains
         do i = grid%lo(1), grid%hi(1)
           if (solid%alpha(i, j, k) <= 0.0_wp) cycle
           n = n + 1
-          call ensure_room(n, self%cell)
+          call ensure_capacity(n, self%cell)
           self%cell(:, n) = [i, j, k]
         end do
       end do
     end do
     self%n = n
-    call ensure_room(n, self%open_list)
-    call ensure_room(n, self%has_plane)
-    call ensure_room(n, self%value)
+    call ensure_capacity(n, self%open_list)
+    call ensure_capacity(n, self%has_plane)
+    call ensure_capacity(n, self%value)
   end subroutine list_solid_cells
 
   !> Give cells without a value the mean of their neighbours in the row, ring by ring; where a whole

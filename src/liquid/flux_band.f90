@@ -7,7 +7,7 @@
 !! processes.
 module flux_band_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: no_side
   use exact_sum_m, only: exact_add, exact_totals, accumulator_size, no_terms
@@ -15,7 +15,7 @@ module flux_band_m
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: flux_band_t, flux_band_init, make_room, make_room_for_all, find_parts, sum_by_part, &
+  public :: flux_band_t, flux_band_init, reserve, reserve_for_all, find_parts, sum_by_part, &
             drop_part, find_open_lines
 
   !> Work of finding and sorting the parts.
@@ -77,8 +77,8 @@ contains
     end if
     allocate (self%line(2, size(self%marked, 2), size(self%marked, 3)), source=0)
     allocate (self%finder%held(0:nproc() - 1), source=0_i8)
-    call ensure_room(1, self%cell)
-    call make_room(self)
+    call ensure_capacity(1, self%cell)
+    call reserve(self)
     call allocate_parts(first_parts, self)
   end subroutine flux_band_init
 
@@ -91,21 +91,21 @@ contains
   end subroutine allocate_parts
 
   !> Room in the lists for all cells.
-  subroutine make_room(self)
+  subroutine reserve(self)
     type(flux_band_t), intent(inout) :: self
     integer :: n
 
     n = size(self%cell, 2)
-    call ensure_room(n, self%r)
-    call ensure_room(n, self%open)
+    call ensure_capacity(n, self%r)
+    call ensure_capacity(n, self%open)
     associate (f => self%finder)
-      call ensure_room(n, f%root)
-      call ensure_room(n, f%part)
+      call ensure_capacity(n, f%root)
+      call ensure_capacity(n, f%part)
     end associate
-  end subroutine make_room
+  end subroutine reserve
 
   !> Room in the lists for all own cells and no more; what they held is lost.
-  subroutine make_room_for_all(grid, self)
+  subroutine reserve_for_all(grid, self)
     type(grid_t), intent(in) :: grid
     type(flux_band_t), intent(inout) :: self
     integer :: n
@@ -114,7 +114,7 @@ contains
     if (size(self%cell, 2) >= n) return
     deallocate (self%cell, self%r, self%open, self%finder%root, self%finder%part)
     allocate (self%cell(3, n), self%r(n), self%open(n), self%finder%root(n), self%finder%part(n))
-  end subroutine make_room_for_all
+  end subroutine reserve_for_all
 
   !> Number of a cell in the whole domain, from 1.
   pure function global_number(grid, c) result(g)

@@ -7,7 +7,7 @@ module liquid_sweep_m
   use omp_lib, only: omp_get_max_threads, omp_get_thread_num
   use kinds_m, only: wp
   use swap_m, only: swap
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use case_types_m, only: absent, is_given
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_kinds_m, only: side_inflow, side_outflow
@@ -128,7 +128,7 @@ contains
       self%in_plane(k + 1) = self%in_plane(k + 1) + self%in_plane(k)
     end do
     self%n_mixed = self%in_plane(grid%hi(3) + 1)
-    call ensure_room(self%n_mixed, self%mixed_cell)
+    call ensure_capacity(self%n_mixed, self%mixed_cell)
     !$omp parallel do private(i, j, n) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       n = self%in_plane(k)

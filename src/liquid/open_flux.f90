@@ -20,7 +20,7 @@ module open_flux_m
   use boundary_kinds_m, only: is_wall, gives_pressure
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, make_room, make_room_for_all, &
+  use flux_band_m, only: flux_band_t, flux_band_init, reserve, reserve_for_all, &
                          find_parts, sum_by_part, drop_part, find_open_lines
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
@@ -265,7 +265,7 @@ contains
       end do
     end do
     call list_marked(grid, lbound(band%number), band%number, band%cell, band%n)
-    call make_room(band)
+    call reserve(band)
   end subroutine list_band
 
   !> Volume balance r of the cells of the band.
@@ -343,7 +343,7 @@ contains
     band%marked(grid%lo(1):grid%hi(1), grid%lo(2):grid%hi(2), grid%lo(3):grid%hi(3)) = 1
     call halo_exchange(band%marked, 1)
     call find_conductances(grid, old%aperture, new%aperture, band)
-    call make_room_for_all(grid, band)
+    call reserve_for_all(grid, band)
     call list_band(grid, band)
     call find_parts(grid, band)
   end subroutine widen_to_domain

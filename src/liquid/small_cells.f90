@@ -7,7 +7,7 @@
 !! `move_implicit`).
 module small_cells_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use cell_list_m, only: list_marked
   use grid_m, only: grid_t, n_halo, unit_step
   use boundary_m, only: fill_scalar_halo
@@ -69,9 +69,9 @@ contains
 
     call mark_small_cells(grid, old, volumes, self%number)
     call list_marked(grid, lbound(self%number), self%number, self%cell, self%n)
-    call ensure_room(self%n, self%amount)
-    call ensure_room(self%n, self%mass)
-    call ensure_room(self%n, self%ratio)
+    call ensure_capacity(self%n, self%amount)
+    call ensure_capacity(self%n, self%mass)
+    call ensure_capacity(self%n, self%ratio)
     call halo_exchange(self%number, n_halo, layers=1)
     call find_implicit_faces(grid, volumes, self)
   end subroutine find_small_cells
@@ -121,10 +121,10 @@ contains
             donor = merge(low, up, volumes%q(i, j, k, d) > 0.0_wp)
             if (self%number(donor(1), donor(2), donor(3)) == 0) cycle
             n = n + 1
-            call ensure_room(n, self%face)
-            call ensure_room(n, self%donor)
-            call ensure_room(n, self%receiver)
-            call ensure_room(n, self%q_implicit)
+            call ensure_capacity(n, self%face)
+            call ensure_capacity(n, self%donor)
+            call ensure_capacity(n, self%receiver)
+            call ensure_capacity(n, self%q_implicit)
             self%face(:, n) = [i, j, k, d]
             self%donor(:, n) = donor
             self%receiver(:, n) = up + low - donor
@@ -135,8 +135,8 @@ contains
       end do
     end do
     self%n_implicit = n
-    call ensure_room(n, self%q_implicit)
-    call ensure_room(n, self%g_implicit)
+    call ensure_capacity(n, self%q_implicit)
+    call ensure_capacity(n, self%g_implicit)
   end subroutine find_implicit_faces
 
   !> How many faces of direction d have a small donor, in each row.

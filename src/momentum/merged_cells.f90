@@ -7,7 +7,7 @@
 !! cell) is a group of its own. Derivation and trials: docs/decisions/cut_cells.md.
 module merged_cells_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t, apertures, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
@@ -99,7 +99,7 @@ contains
     call find_middles(grid, solid, self)
     call order_by_body(size(solid%body_cell) - 1, self)
     call group_small_cells(grid, self)
-    call ensure_room(self%n, self%centre)
+    call ensure_capacity(self%n, self%centre)
     self%centre(:self%n) = 1.0_wp
   end subroutine find_merged_cells
 
@@ -137,8 +137,8 @@ contains
 
     if (self%number(c(1), c(2), c(3)) > 0) return
     self%n = self%n + 1
-    call ensure_room(self%n, self%cell)
-    call ensure_room(self%n, self%body)
+    call ensure_capacity(self%n, self%cell)
+    call ensure_capacity(self%n, self%body)
     self%cell(:, self%n) = c
     self%body(self%n) = body
     self%number(c(1), c(2), c(3)) = self%n
@@ -162,7 +162,7 @@ contains
         if (n == 0) then
           call add_cell(c, b, self)
           n = self%n
-          call ensure_room(n, most)
+          call ensure_capacity(n, most)
           most(n) = 0.0_wp
         end if
         if (solid%cell_alpha(m) <= most(n)) cycle
@@ -195,8 +195,8 @@ contains
     type(merged_cells_t), intent(inout) :: self
     integer :: b, m
 
-    call ensure_room(n_bodies + 1, self%first_of_body)
-    call ensure_room(self%n, self%by_body)
+    call ensure_capacity(n_bodies + 1, self%first_of_body)
+    call ensure_capacity(self%n, self%by_body)
     associate (first => self%first_of_body)
       first(:n_bodies + 1) = 0
       do m = 1, self%n
@@ -220,13 +220,13 @@ contains
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, o(3), body
 
-    call ensure_room(self%n_small, self%normal)
-    call ensure_room(self%n_small, self%step)
-    call ensure_room(self%n_small, self%target)
-    call ensure_room(self%n_small, self%share)
-    call ensure_room(self%n_small, self%by_wall)
-    call ensure_room(self%n_small, self%nearer)
-    call ensure_room(self%n_small, self%distance)
+    call ensure_capacity(self%n_small, self%normal)
+    call ensure_capacity(self%n_small, self%step)
+    call ensure_capacity(self%n_small, self%target)
+    call ensure_capacity(self%n_small, self%share)
+    call ensure_capacity(self%n_small, self%by_wall)
+    call ensure_capacity(self%n_small, self%nearer)
+    call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
@@ -283,9 +283,9 @@ contains
     real(wp) :: middle, y
     integer :: m
 
-    call ensure_room(self%n, self%normal)
-    call ensure_room(self%n, self%middle)
-    call ensure_room(self%n, self%ratio)
+    call ensure_capacity(self%n, self%normal)
+    call ensure_capacity(self%n, self%middle)
+    call ensure_capacity(self%n, self%ratio)
     !$omp parallel do private(middle, y) schedule(dynamic, 64)
     do m = self%n_small + 1, self%n
       associate (c => self%cell(:, m), n => self%normal(:, m))
@@ -358,7 +358,7 @@ contains
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, f, g, n_parts
 
-    call ensure_room(self%n, self%group)
+    call ensure_capacity(self%n, self%group)
     self%group(:self%n) = 0
     do f = 1, self%n_small   ! count the parts of each target
       do n = 1, targets_at_most
@@ -375,14 +375,14 @@ contains
       if (any(self%cell(:, m) < grid%lo - 1) .or. any(self%cell(:, m) > grid%hi + 1)) cycle
       self%n_groups = self%n_groups + 1
       self%group(m) = self%n_groups
-      call ensure_room(self%n_groups, self%leader)
-      call ensure_room(self%n_groups + 1, self%first)
+      call ensure_capacity(self%n_groups, self%leader)
+      call ensure_capacity(self%n_groups + 1, self%first)
       self%leader(self%n_groups) = m
       n_parts = n_parts + n
       self%first(self%n_groups) = n_parts + 1   ! behind the end, until the parts are there
     end do
     self%first(self%n_groups + 1) = n_parts + 1
-    call ensure_room(n_parts, self%part, rows=2)
+    call ensure_capacity(n_parts, self%part, rows=2)
     do f = 1, self%n_small
       do n = 1, targets_at_most
         m = self%target(n, f)

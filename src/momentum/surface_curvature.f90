@@ -6,7 +6,7 @@
 !! there are none the divergence of the normals; both are counted.
 module surface_curvature_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use plic_m, only: unit_normal
@@ -185,13 +185,13 @@ contains
         do i = grid%lo(1), grid%hi(1)
           if (self%state(i, j, k) /= wanted) cycle
           n = n + 1
-          call ensure_room(n, self%cell)
+          call ensure_capacity(n, self%cell)
           self%cell(:, n) = [i, j, k]
         end do
       end do
     end do
     self%n_wanted = n
-    call ensure_room(n, self%value)
+    call ensure_capacity(n, self%value)
   end subroutine list_wanted
 
   !> Mean of the neighbours that have heights, or the divergence of the normals.

@@ -14,7 +14,7 @@ module viscous_links_m
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
-  use viscous_system_m, only: viscous_t, wall_links_t, room_for_walls, set_wall, add_side
+  use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall, add_side
   use wall_shear_m, only: distance_of_links, rough_viscosity
   use merged_cells_m, only: merged_cells_t, is_alone, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
@@ -200,7 +200,7 @@ contains
 
     spacing = grid%volume**(1.0_wp/3.0_wp)
     self%walls%n = 2*solid%n_link
-    call room_for_walls(self%walls%n, self%walls)
+    call bytes_for_walls(self%walls%n, self%walls)
     !$omp parallel do private(f) schedule(static)
     do m = 1, solid%n_link
       self%walls%found_body(2*m - 1:2*m) = 0

@@ -4,12 +4,12 @@
 module viscous_system_m
   use kinds_m, only: wp
   use vectors_m, only: cross
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   use scratch_m, only: scratch_t, take, give
   implicit none
   private
-  public :: viscous_t, wall_links_t, viscous_init, add_wall, room_for_walls, set_wall, add_side
+  public :: viscous_t, wall_links_t, viscous_init, add_wall, bytes_for_walls, set_wall, add_side
   public :: wrench, take_arrays, give_arrays
 
   !> Links between cells and bodies, grouped by body.
@@ -121,23 +121,23 @@ contains
     real(wp), intent(in) :: arm(3)   !! [m]
 
     self%walls%n = self%walls%n + 1
-    call room_for_walls(self%walls%n, self%walls)
+    call bytes_for_walls(self%walls%n, self%walls)
     call set_wall(self%walls%n, c, body, k, arm, self%walls)
   end subroutine add_wall
 
   !> Room for n wall links.
-  subroutine room_for_walls(n, walls)
+  subroutine bytes_for_walls(n, walls)
     integer, intent(in) :: n
     type(wall_links_t), intent(inout) :: walls
 
-    call ensure_room(n, walls%found_cell)
-    call ensure_room(n, walls%found_body)
-    call ensure_room(n, walls%found_k)
-    call ensure_room(n, walls%found_arm)
-    call ensure_room(n, walls%cell)
-    call ensure_room(n, walls%k)
-    call ensure_room(n, walls%arm)
-  end subroutine room_for_walls
+    call ensure_capacity(n, walls%found_cell)
+    call ensure_capacity(n, walls%found_body)
+    call ensure_capacity(n, walls%found_k)
+    call ensure_capacity(n, walls%found_arm)
+    call ensure_capacity(n, walls%cell)
+    call ensure_capacity(n, walls%k)
+    call ensure_capacity(n, walls%arm)
+  end subroutine bytes_for_walls
 
   !> What was found as number n.
   pure subroutine set_wall(n, c, body, k, arm, walls)

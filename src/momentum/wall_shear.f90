@@ -13,7 +13,7 @@ module wall_shear_m
   use solid_geometry_m, only: solid_geometry_t, link_to_wall
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   implicit none
   private
   public :: find_wall_speeds, distance_of_links, rough_viscosity
@@ -35,7 +35,7 @@ contains
     real(wp), intent(inout), allocatable :: speed(:)   !! (at least 2 n_leg) [m/s]
     integer :: m, s, c(3)
 
-    call ensure_room(2*solid%n_link, speed)
+    call ensure_capacity(2*solid%n_link, speed)
     !$omp parallel do private(s, c) schedule(static)
     do m = 1, solid%n_link
       do s = 1, 2

@@ -11,7 +11,7 @@ module hdf5_file_m
   use hdf5, only: H5P_DATASET_CREATE_F, H5T_NATIVE_REAL
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root
-  use file_room_m, only: room_for_chunks
+  use file_space_m, only: bytes_for_chunks
   use hdf5_kinds_m, only: file_real64, file_real32, file_integer32, file_integer64, bytes_of
   use hdf5_kinds_m, only: type_in_file, memory_type
   use hdf5_datasets_m, only: h5_datasets_t, max_rank, close_selection
@@ -32,7 +32,7 @@ module hdf5_file_m
     integer :: kind = 0
     logical :: compressed = .false.
   contains
-    procedure :: room_for
+    procedure :: bytes_for
   end type h5_column_t
 
   !> A file with all that a writer or reader asks of it.
@@ -176,7 +176,7 @@ contains
   end subroutine open_column
 
   !> Most that `n` more rows take at the end of the file [bytes].
-  pure function room_for(column, n) result(bytes)
+  pure function bytes_for(column, n) result(bytes)
     class(h5_column_t), intent(in) :: column
     integer, intent(in) :: n   !! rows
     integer(i8) :: bytes
@@ -188,10 +188,10 @@ contains
       layers = product((extent(:r - 1) + chunk(:r - 1) - 1)/chunk(:r - 1))
       before = layers*((extent(r) + chunk(r) - 1)/chunk(r))
       after = layers*((extent(r) + n + chunk(r) - 1)/chunk(r))
-      bytes = room_for_chunks(product(chunk(:r))*bytes_of(column%kind), column%compressed, before, &
-        after - before, r)
+      bytes = bytes_for_chunks(product(chunk(:r))*bytes_of(column%kind), column%compressed, &
+        before, after - before, r)
     end associate
-  end function room_for
+  end function bytes_for
 
   !> Give a column this many rows: later ones are dropped, missing ones have the fill value.
   subroutine resize(self, column, rows)

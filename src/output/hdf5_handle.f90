@@ -11,7 +11,7 @@
 !!
 !! The files keep the oldest format and no locks, and columns without compression never move a chunk
 !! once it is there: a file that was flushed opens again whatever happens to the program. Whoever
-!! changes such a file asks for the room of it first (`make_room`). A file is left as it is on the
+!! changes such a file reserves its space first (`reserve`). A file is left as it is on the
 !! disk, without the changes that HDF5 still keeps in memory, once HDF5 has failed to write to it.
 module hdf5_handle_m
   use hdf5, only: hid_t, hsize_t, size_t, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f
@@ -25,7 +25,7 @@ module hdf5_handle_m
   use parallel_m, only: global_min, broadcast, share_failure
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
   use posix_file_m, only: cut_file, delete_file, is_pipe
-  use file_room_m, only: lengthen_file, shorten_file
+  use file_space_m, only: lengthen_file, shorten_file
   implicit none
   private
   public :: h5_handle_t
@@ -47,7 +47,7 @@ module hdf5_handle_m
     procedure :: open => file_open
     procedure :: close => file_close
     procedure :: flush => file_flush
-    procedure :: make_room
+    procedure :: reserve
     procedure :: group => file_group
     procedure :: has => file_has
     procedure :: remove => file_remove
@@ -248,7 +248,7 @@ contains
 
   !> See to it that the next changes of a file that was just flushed find this much room at its end.
   !! Without room nothing more is written to it but by `last_integer`.
-  subroutine make_room(self, bytes)
+  subroutine reserve(self, bytes)
     class(h5_handle_t), intent(inout) :: self
     integer(i8), intent(in) :: bytes
     character(:), allocatable :: reason
@@ -261,7 +261,7 @@ contains
     if (len(reason) == 0) return
     self%info = 1
     self%message = reason
-  end subroutine make_room
+  end subroutine reserve
 
   !> Create a group; the group around it must exist.
   subroutine file_group(self, name)

@@ -28,7 +28,7 @@ module restart_m
   use posix_file_m, only: delete_file, store_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
   use state_visitors_m, only: checksum_visitor_t, size_visitor_t
-  use file_room_m, only: room_for_change
+  use file_space_m, only: bytes_for_change
   implicit none
   private
   public :: write_restart, read_restart
@@ -72,7 +72,7 @@ contains
       call file%create(path//unfinished, .true.)
       if (nproc() > 1) then   ! one that failed alone could not stop the others
         call visit_state(needed, state)
-        call file%make_room(needed%bytes + len(text) + len(parameters) + room_for_change)
+        call file%reserve(needed%bytes + len(text) + len(parameters) + bytes_for_change)
       end if
       call file%attribute('/', 'format', format_name)
       call file%attribute('/', 'format_version', format_version)

@@ -14,7 +14,7 @@ module write_run_m
   use errors_m, only: exit_files
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_integer32
-  use file_room_m, only: room_for_change
+  use file_space_m, only: bytes_for_change
   use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
   implicit none
   private
@@ -286,7 +286,7 @@ contains
 
     if (.not. is_root()) return
     associate (file => self%file)
-      call file%make_room(room_for_change + 2*(len(text) + len(parameters)))
+      call file%reserve(bytes_for_change + 2*(len(text) + len(parameters)))
       call resize_all(self)
       do c = 1, size(once_name)
         call file%rewrite('/bodies/'//trim(once_name(c)), self%once(:, c))
@@ -334,7 +334,7 @@ contains
       call resize_all(self)
       call self%file%flush()
     end if
-    call self%file%make_room(room_for_row(self))
+    call self%file%reserve(bytes_for_row(self))
     call follow_sign(blocks%q, self%q)
     values = row_values(row)
     associate (file => self%file, n => 3*blocks%n)
@@ -359,20 +359,20 @@ contains
   end subroutine write_row
 
   !> Most that another row takes at the end of the file [bytes].
-  pure function room_for_row(self) result(bytes)
+  pure function bytes_for_row(self) result(bytes)
     type(run_file_t), intent(in) :: self
     integer(i8) :: bytes
     integer :: c
 
-    bytes = room_for_change + self%time%room_for(1) + self%quaternion%room_for(1) &
-      + self%contacts%room_for(1) + self%on_floor%room_for(1)
+    bytes = bytes_for_change + self%time%bytes_for(1) + self%quaternion%bytes_for(1) &
+      + self%contacts%bytes_for(1) + self%on_floor%bytes_for(1)
     do c = 1, n_vectors
-      bytes = bytes + self%vector(c)%room_for(1)
+      bytes = bytes + self%vector(c)%bytes_for(1)
     end do
     do c = 1, n_columns
-      bytes = bytes + self%series(c)%room_for(1)
+      bytes = bytes + self%series(c)%bytes_for(1)
     end do
-  end function room_for_row
+  end function bytes_for_row
 
   !> Of the two quaternions of each attitude take the one nearer to that of the row before.
   pure subroutine follow_sign(q, followed)
@@ -398,7 +398,7 @@ contains
       name(i) = timer_name(i)
     end do
     associate (file => self%file)
-      call file%make_room(6*room_for_change)
+      call file%reserve(6*bytes_for_change)
       if (file%has('/timers')) call file%remove('/timers')
       call file%group('/timers')
       call file%store('/timers/name', '1', name)

@@ -17,7 +17,7 @@ module write_vtkhdf_m
   use clock_m, only: clock_t
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real32, file_real64, file_integer32, &
     file_integer64
-  use file_room_m, only: room_for_change
+  use file_space_m, only: bytes_for_change
   implicit none
   private
   public :: field_file_t, create_field_file, reopen_field_file, continue_field_file, &
@@ -86,7 +86,7 @@ contains
       end do
       call file%flush()
     end associate
-    call make_room(grid, self)
+    call reserve(grid, self)
   end subroutine create_field_file
 
   !> Where the offsets of a field stand.
@@ -98,12 +98,12 @@ contains
     if (s <= n_scalars) name = steps//'/CellDataOffsets/'//trim(scalar_name(s))
   end function offset_name
 
-  subroutine make_room(grid, self)
+  subroutine reserve(grid, self)
     type(grid_t), intent(in) :: grid
     type(field_file_t), intent(inout) :: self
 
     allocate (self%values(3*product(grid%hi - grid%lo + 1)))
-  end subroutine make_room
+  end subroutine reserve
 
   !> The attributes that say what the file is.
   subroutine start_file(file, kind)
@@ -152,7 +152,7 @@ contains
     type(field_file_t), intent(inout) :: self
 
     call drop_field_frames(self)
-    call make_room(grid, self)
+    call reserve(grid, self)
   end subroutine continue_field_file
 
   !> Keep the first `self%frames` frames.
@@ -199,7 +199,7 @@ contains
       self%frames = frames_before
       call drop_field_frames(self)
     end if
-    call self%file%make_room(room_for_field_frame(self))
+    call self%file%reserve(bytes_for_field_frame(self))
     n = product(grid%hi - grid%lo + 1)
     associate (file => self%file, first => grid%lo, extent => grid%hi - grid%lo + 1, &
       values => self%values)
@@ -221,19 +221,19 @@ contains
   end subroutine write_field_frame
 
   !> Most that another frame takes at the end of the file [bytes].
-  pure function room_for_field_frame(self) result(bytes)
+  pure function bytes_for_field_frame(self) result(bytes)
     type(field_file_t), intent(in) :: self
     integer(i8) :: bytes
     integer :: s
 
-    bytes = room_for_change + self%velocity%room_for(1) + self%time%room_for(1)
+    bytes = bytes_for_change + self%velocity%bytes_for(1) + self%time%bytes_for(1)
     do s = 1, n_scalars
-      bytes = bytes + self%scalar(s)%room_for(1)
+      bytes = bytes + self%scalar(s)%bytes_for(1)
     end do
     do s = 1, n_scalars + 1
-      bytes = bytes + self%offset(s)%room_for(1)
+      bytes = bytes + self%offset(s)%bytes_for(1)
     end do
-  end function room_for_field_frame
+  end function bytes_for_field_frame
 
   !> Share of liquid in the fluid of each cell; in cells without fluid the extended share.
   pure subroutine liquid_share(grid, liquid, fluid_volume, c, values)
@@ -501,7 +501,7 @@ contains
       self%frames = frames_before
       call drop_block_frames(self)
     end if
-    call self%file%make_room(room_for_block_frame(self))
+    call self%file%reserve(bytes_for_block_frame(self))
     allocate (x(3, self%n_points), v(3, self%n_points))
     m = 0
     do b = 1, blocks%n
@@ -536,16 +536,16 @@ contains
   end subroutine write_block_frame
 
   !> Most that another frame takes at the end of the file [bytes].
-  pure function room_for_block_frame(self) result(bytes)
+  pure function bytes_for_block_frame(self) result(bytes)
     type(block_file_t), intent(in) :: self
     integer(i8) :: bytes
 
-    bytes = room_for_change + self%points%room_for(self%n_points) &
-      + self%velocity%room_for(self%n_points) + self%released%room_for(self%n_cells) &
-      + self%time%room_for(1) + self%fixed_offset%room_for(1) + self%released_offset%room_for(1) &
-      + self%part_offset%room_for(1) + self%parts%room_for(1) + self%point_offset%room_for(1) &
-      + self%cell_offset%room_for(1) + self%connectivity_offset%room_for(1) &
-      + self%body_offset%room_for(1) + self%velocity_offset%room_for(1)
-  end function room_for_block_frame
+    bytes = bytes_for_change + self%points%bytes_for(self%n_points) &
+      + self%velocity%bytes_for(self%n_points) + self%released%bytes_for(self%n_cells) &
+      + self%time%bytes_for(1) + self%fixed_offset%bytes_for(1) &
+      + self%released_offset%bytes_for(1) + self%part_offset%bytes_for(1) + self%parts%bytes_for(1) &
+      + self%point_offset%bytes_for(1) + self%cell_offset%bytes_for(1) + self%connectivity_offset%bytes_for(1) &
+      + self%body_offset%bytes_for(1) + self%velocity_offset%bytes_for(1)
+  end function bytes_for_block_frame
 
 end module write_vtkhdf_m

@@ -6,7 +6,7 @@
 !! the form is repeated.
 module bed_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use errors_m, only: problems_t, to_text, brief
   use case_types_m, only: case_t
   use named_files_m, only: found_file
@@ -395,8 +395,8 @@ contains
       if (way == 0) cycle
       height = height_of(bed, f, at)
       layers%n = layers%n + 1
-      call ensure_room(layers%n, layers%height)
-      call ensure_room(layers%n, layers%way)
+      call ensure_capacity(layers%n, layers%height)
+      call ensure_capacity(layers%n, layers%way)
       k = layers%n
       do while (k > 1)
         if (layers%height(k - 1) > height + same .or. (layers%height(k - 1) > height - same .and. &

@@ -13,7 +13,7 @@ module bed_file_m
   use, intrinsic :: iso_fortran_env, only: real32
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use errors_m, only: to_text
   use checksum_m, only: checksum_t
   use value_text_m, only: quoted_text, lower_case
@@ -202,7 +202,7 @@ contains
     type(bed_form_t), intent(inout) :: form
     integer :: c
 
-    call ensure_room(n, form%point)
+    call ensure_capacity(n, form%point)
     do c = 1, 3
       call get_real(words, form%point(c, n))
     end do

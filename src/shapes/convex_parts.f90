@@ -5,7 +5,7 @@
 !! centre, and the faces that belong to one part only are the surface.
 module convex_parts_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: cross
   use polyhedron_m, only: tet_volume
   implicit none
@@ -126,7 +126,7 @@ contains
 
     number = points%n + 1
     points%n = number
-    call ensure_room(number, points%x)
+    call ensure_capacity(number, points%x)
     points%x(:, number) = x
   end subroutine append
 

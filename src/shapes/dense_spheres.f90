@@ -8,7 +8,7 @@
 !! Departure from the paper, which names dense spheres as an improvement and says no more.
 module dense_spheres_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use tet_mesh_m, only: shape_t, max_facet_corners
   implicit none
@@ -142,7 +142,7 @@ contains
       if (norm(ball(1:3, i) - c) + abs(ball(4, i) - radius) < alike*spacing) return
     end do
     n = n + 1
-    call ensure_room(n, ball)
+    call ensure_capacity(n, ball)
     ball(:, n) = [c, radius]
   end subroutine add_ball
 

@@ -1,7 +1,7 @@
 !> Who is near whom: boxes sorted into bins, and pairs of bodies whose bounding spheres come close.
 module neighbours_m
   use kinds_m, only: wp, i8
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   implicit none
   private
   public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
@@ -262,9 +262,9 @@ contains
     type(pair_list_t), intent(inout) :: pairs
 
     pairs%n = pairs%n + 1
-    call ensure_room(pairs%n, pairs%a)
-    call ensure_room(pairs%n, pairs%b)
-    call ensure_room(pairs%n, pairs%shift)
+    call ensure_capacity(pairs%n, pairs%a)
+    call ensure_capacity(pairs%n, pairs%b)
+    call ensure_capacity(pairs%n, pairs%shift)
     pairs%a(pairs%n) = a
     pairs%b(pairs%n) = b
     pairs%shift(:, pairs%n) = shift

@@ -4,7 +4,7 @@
 !! them (`surface_features_m` makes them). Body axes, origin at the centre of mass.
 module surface_search_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use neighbours_m, only: bins_t
   use edge_crossing_m, only: edge_t
@@ -87,7 +87,7 @@ contains
     integer :: a(3), b(3), i, j, k, m, bin, item
 
     list%n = 0
-    call ensure_room(1, list%item)
+    call ensure_capacity(1, list%item)
     if (any(low > bins%high) .or. any(high < bins%low)) return
     if (.not. allocated(list%mark)) allocate (list%mark(n_items), source=0)
     if (size(list%mark) < n_items) then
@@ -97,7 +97,7 @@ contains
     a = bins%place(low)
     b = bins%place(high)
     if (product(b - a + 1) > n_items) then
-      call ensure_room(n_items, list%item)
+      call ensure_capacity(n_items, list%item)
       list%n = n_items
       list%item(:n_items) = [(item, item=1, n_items)]
       return
@@ -107,7 +107,7 @@ contains
       do j = a(2), b(2)
         do i = a(1), b(1)
           bin = bins%number([i, j, k])
-          call ensure_room(list%n + bins%first(bin + 1) - bins%first(bin), list%item)
+          call ensure_capacity(list%n + bins%first(bin + 1) - bins%first(bin), list%item)
           do m = bins%first(bin), bins%first(bin + 1) - 1
             item = bins%item(m)
             if (list%mark(item) == list%search) cycle

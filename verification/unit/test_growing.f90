@@ -2,7 +2,7 @@
 program test_growing
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   implicit none
 
   call check_lists()
@@ -17,29 +17,29 @@ contains
     integer, allocatable :: whole(:)
     real(wp), allocatable :: x(:)
     logical, allocatable :: even(:)
-    integer :: i, changes, room
+    integer :: i, changes, capacity
 
     changes = 0
-    room = 0
+    capacity = 0
     do i = 1, n
-      call ensure_room(i, whole)
-      call ensure_room(i, x)
-      call ensure_room(i, even)
+      call ensure_capacity(i, whole)
+      call ensure_capacity(i, x)
+      call ensure_capacity(i, even)
       whole(i) = i
       x(i) = 0.5_wp*i
       even(i) = modulo(i, 2) == 0
-      if (size(whole) /= room) changes = changes + 1
-      room = size(whole)
+      if (size(whole) /= capacity) changes = changes + 1
+      capacity = size(whole)
     end do
     call check('integers are kept', all(whole(:n) == [(i, i=1, n)]))
     call check('reals are kept', maxval(abs(x(:n) - [(0.5_wp*i, i=1, n)])), 0.0_wp, 0.0_wp)
     call check('logicals are kept', all(even(:n) .eqv. [(modulo(i, 2) == 0, i=1, n)]))
     call check('room of 16, 32, 64, 128: by doubling', changes, 4)
-    call check('no more room than that', room, 128)
-    call ensure_room(1000, whole)
+    call check('no more room than that', capacity, 128)
+    call ensure_capacity(1000, whole)
     call check('as much as asked for at once', size(whole), 1000)
     call check('and still kept', all(whole(:n) == [(i, i=1, n)]))
-    call ensure_room(3, whole)
+    call ensure_capacity(3, whole)
     call check('never less', size(whole), 1000)
   end subroutine check_lists
 
@@ -51,9 +51,9 @@ contains
     integer :: i
 
     do i = 1, n
-      call ensure_room(i, x)
-      call ensure_room(i, quaternion, rows=4)
-      call ensure_room(i, face, rows=2)
+      call ensure_capacity(i, x)
+      call ensure_capacity(i, quaternion, rows=4)
+      call ensure_capacity(i, face, rows=2)
       x(:, i) = real([i, -i, 2*i], wp)
       quaternion(:, i) = real(i, wp)
       face(:, i) = [i, i + 1]

@@ -5,7 +5,7 @@ program test_hdf5_file
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: parallel_init, parallel_final, is_root, nproc, my_rank, broadcast
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_real32, file_integer32
-  use file_room_m, only: room_for_change
+  use file_space_m, only: bytes_for_change
   use check_m, only: check, finish_checks
   implicit none
   character(*), parameter :: path = 'test_hdf5_file.h5'
@@ -263,7 +263,7 @@ contains
     type(h5_file_t) :: file
     type(h5_column_t) :: time, field, place
     integer, parameter :: rows = 2500, n = 96
-    integer(i8) :: before, after, room
+    integer(i8) :: before, after, capacity
     real(sp) :: noise(n)
     integer :: i, row, too_large
     logical :: grew
@@ -278,14 +278,14 @@ contains
     grew = .false.
     inquire (file=path, size=before)
     do row = 1, rows
-      room = room_for_change + time%room_for(1) + field%room_for(1) + place%room_for(1)
+      capacity = bytes_for_change + time%bytes_for(1) + field%bytes_for(1) + place%bytes_for(1)
       noise = [(real(mod(sin(real(row*n + i, wp))*43758.5453_wp, 1.0_wp), sp), i=1, n)]
       call file%append(time, [1.0_wp*row])
       call file%append_block(field, [1, 1], [3, n/3], noise)
       call file%append(place, [(1.0_wp*i, i=1, 1200)])
       call file%flush()
       inquire (file=path, size=after)
-      if (after > before + room) too_large = too_large + 1
+      if (after > before + capacity) too_large = too_large + 1
       grew = grew .or. after > before + 50000
       before = after
     end do
@@ -299,7 +299,7 @@ contains
   subroutine test_no_room()
     type(h5_file_t) :: file
     type(h5_column_t) :: time
-    character(*), parameter :: no_room = 'no/such/folder/run.h5'   !! nothing can grow there
+    character(*), parameter :: no_folder = 'no/such/folder/run.h5'   !! nothing can grow there
     real(wp) :: x(2)
     integer :: n
 
@@ -309,10 +309,10 @@ contains
     call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
     call file%append_rows(time, 2, [1.0_wp, 2.0_wp])
     call file%flush()
-    file%path = no_room
-    call file%make_room(1000_i8)
+    file%path = no_folder
+    call file%reserve(1000_i8)
     call check('no room is an error', file%info /= 0)
-    call check('and named', index(file%message, no_room//': cannot') == 1)
+    call check('and named', index(file%message, no_folder//': cannot') == 1)
     call file%append(time, [3.0_wp])
     call file%last_integer('/', 'exit_status', 4)
     call file%close()

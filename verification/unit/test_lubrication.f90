@@ -153,7 +153,7 @@ contains
   !! nobody else: the forces are those of all pairs, each alone in the tank.
   subroutine check_swarm()
     integer, parameter :: n = 40
-    real(wp), parameter :: room = 4*d   ! of the swarm, astride the periodic side [m]
+    real(wp), parameter :: capacity = 4*d   ! of the swarm, astride the periodic side [m]
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contacts_t) :: contacts
@@ -162,7 +162,7 @@ contains
 
     call random_number(x)
     call random_number(v)
-    x = 0.5_wp + room*(x - 0.5_wp)
+    x = 0.5_wp + capacity*(x - 0.5_wp)
     x(1, :) = modulo(x(1, :) - 0.5_wp, 1.0_wp)
     v = v - 0.5_wp
     expected = 0.0_wp

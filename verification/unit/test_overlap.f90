@@ -12,7 +12,7 @@ program test_overlap
   use walls_m, only: walls_t, walls_init
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, room_for
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, bytes_for
   implicit none
 
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -190,13 +190,13 @@ contains
     blocks%q = spread(upright, 2, n + 1)
     blocks%x(:, 1) = [0.15_wp, 0.1_wp, 0.1_wp]
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.011_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room', .not. room_for(walls, blocks, n + 1, overlap))
+    call check('no room', .not. bytes_for(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
-    call check('room', room_for(walls, blocks, n + 1, overlap))
+    call check('room', bytes_for(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room beside the image', .not. room_for(walls, blocks, n + 1, overlap))
+    call check('no room beside the image', .not. bytes_for(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
-    call check('no room in the floor', .not. room_for(walls, blocks, n + 1, overlap))
+    call check('no room in the floor', .not. bytes_for(walls, blocks, n + 1, overlap))
   end subroutine check_run
 
   !> The list of near pairs against all pairs, with and without periods.

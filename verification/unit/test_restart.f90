@@ -7,7 +7,7 @@ program test_restart
   use restart_m, only: write_restart, read_restart
   use state_m, only: visit_state
   use state_visitors_m, only: image_visitor_t, size_visitor_t
-  use file_room_m, only: room_for_change
+  use file_space_m, only: bytes_for_change
   use sample_state_m, only: sample_t, make_sample
   use check_m, only: check, checked, finish_checks
   implicit none
@@ -32,17 +32,17 @@ contains
     type(sample_t) :: s
     type(size_visitor_t) :: needed
     character(:), allocatable :: message
-    integer(i8) :: there, room
+    integer(i8) :: there, capacity
     integer :: info
 
     call make_sample(0.5_wp, .false., s)
     call write_sample(s, info, message)
     call visit_state(needed, s%run_state_t)
     if (.not. is_root()) return
-    room = needed%bytes + len(s%case%text) + len(s%parameters) + room_for_change
+    capacity = needed%bytes + len(s%case%text) + len(s%parameters) + bytes_for_change
     inquire (file=path, size=there)
-    call check('a restart file fits into the room asked for', there <= room)
-    call check('the room is not much too large', room <= 2*there)
+    call check('a restart file fits into the room asked for', there <= capacity)
+    call check('the room is not much too large', capacity <= 2*there)
   end subroutine test_size
 
   subroutine remove(name)

@@ -3,7 +3,7 @@
 program test_viscous
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use kinds_m, only: wp
-  use growing_m, only: ensure_room
+  use growing_m, only: ensure_capacity
   use case_types_m, only: grid_input_t, boundary_input_t
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
@@ -284,9 +284,9 @@ contains
     real(wp), intent(in) :: length   !! [h]
     integer :: i, j
 
-    call ensure_room(product(grid%n), solid%link)
-    call ensure_room(product(grid%n), solid%link_length)
-    call ensure_room(product(grid%n), solid%link_body)
+    call ensure_capacity(product(grid%n), solid%link)
+    call ensure_capacity(product(grid%n), solid%link_length)
+    call ensure_capacity(product(grid%n), solid%link_body)
     do j = 1, grid%n(2)
       do i = 1, grid%n(1)
         solid%n_link = solid%n_link + 1
@@ -362,7 +362,7 @@ contains
           solid%n_cut = solid%n_cut + 1
           solid%cut(i, j, k) = solid%n_cut
           solid%cut_cell(:, solid%n_cut) = [i, j, k]
-          call ensure_room(solid%n_cut, solid%edge)
+          call ensure_capacity(solid%n_cut, solid%edge)
           solid%edge(solid%n_cut) = 0.0_wp
         end do
       end do

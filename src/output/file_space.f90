@@ -1,18 +1,18 @@
-!> Room on the disk for what is about to be written.
+!> Space on the disk for what is about to be written.
 !!
 !! HDF5 keeps the structure of a file in memory and changes it in place when the file is flushed. A
 !! disk that is full in the middle of that leaves pieces that point to others which are not there.
 !! So the end of the file is made longer first, with zeros, by as much as a row or a frame can need:
 !! if that fails nothing has been touched, and otherwise nothing that follows can fail for want of
-!! room. HDF5 cuts off most of what it did not need when it flushes.
-module file_room_m
+!! space. HDF5 cuts off most of what it did not need when it flushes.
+module file_space_m
   use kinds_m, only: i8
   use posix_file_m, only: posix_file_t, cut_file
   implicit none
   private
-  public :: lengthen_file, shorten_file, room_for_chunks
+  public :: lengthen_file, shorten_file, bytes_for_chunks
 
-  integer(i8), parameter, public :: room_for_change = 8192
+  integer(i8), parameter, public :: bytes_for_change = 8192
   !! attributes, headers and ends of blocks that a row or a frame may touch [bytes]
 
 contains
@@ -59,7 +59,7 @@ contains
   !! short one of fill values. The index is a B-tree whose nodes hold 32 to 64 entries, all in one
   !! while there are few; later every level may split a node besides the new leaves. Source: HDF5
   !! File Format Specification 2.0, III.A.
-  pure function room_for_chunks(chunk_bytes, compressed, old, new, rank) result(bytes)
+  pure function bytes_for_chunks(chunk_bytes, compressed, old, new, rank) result(bytes)
     integer(i8), intent(in) :: chunk_bytes   !! of one chunk
     logical, intent(in) :: compressed
     integer(i8), intent(in) :: old, new      !! chunks that are there, and that will come
@@ -78,6 +78,6 @@ contains
       n = n/32
     end do
     bytes = bytes + nodes*(24 + 64*8 + 65*(8 + 8*(rank + 1)))
-  end function room_for_chunks
+  end function bytes_for_chunks
 
-end module file_room_m
+end module file_space_m
