@@ -15,7 +15,7 @@ module group_momentum_m
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
   use rigid_motion_m, only: rigid_motion_t
-  use merged_cells_m, only: merged_cells_t, targets_at_most, is_alone, along_share, &
+  use merged_cells_m, only: merged_cells_t, targets_at_most, is_unmerged, along_share, &
                             mean_apertures, velocity_at_wall
   use wall_profile_m, only: slip_at
   implicit none
@@ -51,7 +51,7 @@ contains
 
     !$omp parallel do private(n, given) schedule(static)
     do m = 1, self%n_small
-      if (is_alone(self, m)) cycle
+      if (is_unmerged(self, m)) cycle
       do n = 1, targets_at_most
         if (self%target(n, m) == 0) cycle
         call profile(grid, self, [m, n], bodies, t(:, :, n, m), wall(:, n, m))
@@ -84,7 +84,7 @@ contains
     end do
     !$omp parallel do private(given, n) schedule(static)
     do m = 1, self%n_small
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       given = small_velocity(grid, self, m, t(:, :, :, m), wall(:, :, m), u)
       associate (f => self%cell(:, m))
         u(f(1), f(2), f(3), :) = given
@@ -174,7 +174,7 @@ contains
 
     !$omp parallel do private(total) schedule(static)
     do m = 1, self%n_small
-      if (is_alone(self, m)) cycle
+      if (is_unmerged(self, m)) cycle
       call mean_of_targets(grid, self, m, a, total)
       associate (f => self%cell(:, m))
         excess(:, m) = a(f(1), f(2), f(3), :) - total
@@ -200,7 +200,7 @@ contains
     end do
     !$omp parallel do private(total) schedule(static)
     do m = 1, self%n_small
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       call mean_of_targets(grid, self, m, a, total)
       associate (f => self%cell(:, m))
         a(f(1), f(2), f(3), :) = total
@@ -243,7 +243,7 @@ contains
 
     !$omp parallel do private(n, t, change, changed) schedule(static)
     do m = 1, self%n_small
-      if (is_alone(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
+      if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       changed = before(:, m)
       do n = 1, targets_at_most
         if (self%target(n, m) == 0) cycle

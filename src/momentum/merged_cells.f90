@@ -17,7 +17,7 @@ module merged_cells_m
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: targets_at_most, is_alone, along_share, match_densities, mean_apertures
+  public :: targets_at_most, is_unmerged, along_share, match_densities, mean_apertures
   public :: velocity_at_wall
 
   integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
@@ -423,13 +423,13 @@ contains
   end subroutine sort_parts
 
   !> Is this small cell a group of its own?
-  elemental function is_alone(self, small) result(yes)
+  elemental function is_unmerged(self, small) result(yes)
     type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: small
     logical :: yes
 
     yes = all(self%target(:, small) == 0)
-  end function is_alone
+  end function is_unmerged
 
   !> Share of the velocity of its target number n along the wall, seen from the wall, that a small
   !! cell has.

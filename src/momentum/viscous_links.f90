@@ -16,7 +16,7 @@ module viscous_links_m
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall, add_side
   use wall_shear_m, only: distance_of_links, rough_viscosity
-  use merged_cells_m, only: merged_cells_t, is_alone, along_share
+  use merged_cells_m, only: merged_cells_t, is_unmerged, along_share
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   use parallel_m, only: global_max
   implicit none
@@ -142,7 +142,7 @@ contains
         if (.not. grid%owns(c)) cycle
         if (m > merged%n_small) then
           self%mass(c(1), c(2), c(3)) = self%mass(c(1), c(2), c(3))/merged%centre(m)
-        else if (is_alone(merged, m)) then
+        else if (is_unmerged(merged, m)) then
           self%mass(c(1), c(2), c(3)) = small_mass(c)
         end if
       end associate

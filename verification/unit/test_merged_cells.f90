@@ -5,7 +5,7 @@ program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities, &
-    is_alone
+    is_unmerged
   use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
@@ -64,7 +64,7 @@ contains
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a small lies at half of it', &
                1.0_wp - merged%nearer(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
-    call check('no small is alone', .not. any([(is_alone(merged, m), m=1, merged%n_small)]))
+    call check('no small is alone', .not. any([(is_unmerged(merged, m), m=1, merged%n_small)]))
     call check('the shares of a small are one', sum(merged%share(:, :merged%n_small), 1), &
                spread(1.0_wp, 1, merged%n_small), 1.0e-13_wp)
     call check('every part is in one group', merged%first(merged%n_groups + 1) - 1, &
