@@ -543,9 +543,10 @@ contains
     bytes = bytes_for_change + self%points%bytes_for(self%n_points) &
       + self%velocity%bytes_for(self%n_points) + self%released%bytes_for(self%n_cells) &
       + self%time%bytes_for(1) + self%fixed_offset%bytes_for(1) &
-      + self%released_offset%bytes_for(1) + self%part_offset%bytes_for(1) + self%parts%bytes_for(1) &
-      + self%point_offset%bytes_for(1) + self%cell_offset%bytes_for(1) + self%connectivity_offset%bytes_for(1) &
-      + self%body_offset%bytes_for(1) + self%velocity_offset%bytes_for(1)
+      + self%released_offset%bytes_for(1) + self%part_offset%bytes_for(1) &
+      + self%parts%bytes_for(1) + self%point_offset%bytes_for(1) + self%cell_offset%bytes_for(1) &
+      + self%connectivity_offset%bytes_for(1) + self%body_offset%bytes_for(1) &
+      + self%velocity_offset%bytes_for(1)
   end function bytes_for_block_frame
 
 end module write_vtkhdf_m
