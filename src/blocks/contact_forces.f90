@@ -108,7 +108,7 @@ contains
     end associate
   end subroutine stretch_springs
 
-  !> Contact forces and torques of this substep on all bodies.
+  !> Contact forces and torques of this substep on the walls and the bodies that act.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
@@ -122,8 +122,12 @@ contains
     type(wrench_t) :: wrench
     integer :: g
 
-    loads%force = 0.0_wp
-    loads%torque = 0.0_wp
+    loads%force(:, :0) = 0.0_wp
+    loads%torque(:, :0) = 0.0_wp
+    do g = 1, touching%acting%n
+      loads%force(:, touching%acting%body(g)) = 0.0_wp
+      loads%torque(:, touching%acting%body(g)) = 0.0_wp
+    end do
     associate (n => touching%groups%n)
       do g = 1, n
         if (begins_pair(springs, g)) then

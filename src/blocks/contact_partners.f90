@@ -87,25 +87,31 @@ contains
     end do
   end subroutine update_partners
 
-  !> Velocities of the bodies as partners.
-  pure subroutine update_motion(blocks, partners)
+  !> Velocities of some bodies as partners.
+  pure subroutine update_motion(blocks, bodies, partners)
     type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: bodies(:)
     type(partners_t), intent(inout) :: partners
+    integer :: k
 
-    partners%v(:, 1:) = blocks%v
-    partners%omega(:, 1:) = blocks%omega
+    do k = 1, size(bodies)
+      partners%v(:, bodies(k)) = blocks%v(:, bodies(k))
+      partners%omega(:, bodies(k)) = blocks%omega(:, bodies(k))
+    end do
   end subroutine update_motion
 
-  !> Moments of inertia of the free bodies at their present poses.
-  pure subroutine update_inertia(blocks, partners)
+  !> Moments of inertia of those of some bodies that are free, at their present poses.
+  pure subroutine update_inertia(blocks, bodies, partners)
     type(blocks_t), intent(in) :: blocks
+    integer, intent(in) :: bodies(:)
     type(partners_t), intent(inout) :: partners
-    integer :: b
+    integer :: k
 
-    do b = 1, blocks%n
-      if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      partners%inverse_inertia(:, :, b) = space_tensor(blocks%q(:, b), &
-        blocks%inverse_inertia(:, :, b))
+    do k = 1, size(bodies)
+      associate (b => bodies(k))
+        if (.not. blocks%fixed(b)) partners%inverse_inertia(:, :, b) = &
+          space_tensor(blocks%q(:, b), blocks%inverse_inertia(:, :, b))
+      end associate
     end do
   end subroutine update_inertia
 

@@ -31,6 +31,8 @@ module contact_state_m
     type(lubrication_t) :: lubrication
     real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
     real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
+    real(wp), allocatable :: held(:, :)          !! (6, n) what holds those asleep at its start
+    logical :: check_all = .true.                !! who sleeps may wake, though nothing touches it
     type(loads_t) :: loads
     type(start_t) :: start                       !! the place to go back to
     type(met_t) :: met                           !! pairs that touched in this step
@@ -60,7 +62,7 @@ contains
       allocate (loads%film(3, bed_partner:n), source=0.0_wp)
       allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
     end associate
-    allocate (contacts%share(n), contacts%steady(3, n), source=0.0_wp)
+    allocate (contacts%share(n), contacts%steady(3, n), contacts%held(6, n), source=0.0_wp)
     call reserve_springs(1, contacts%springs)
     call reserve_springs(1, contacts%before)
     call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)

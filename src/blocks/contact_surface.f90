@@ -56,6 +56,7 @@ module contact_surface_m
     logical, allocatable :: present(:)
     real(wp), allocatable :: x(:, :)
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
+    real(wp), allocatable :: q(:, :)             !! (4, bodies) the attitudes of that
     integer, allocatable :: old_slot(:), old_a(:), old_b(:)   !! work
   end type contact_surface_t
 
@@ -78,7 +79,7 @@ contains
       call surface_init(blocks%shapes(s), self%surface(s))
     end do
     allocate (self%reach(blocks%n), self%present(blocks%n))
-    allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
+    allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
     allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
@@ -115,7 +116,10 @@ contains
     integer :: a, b, p, w
 
     do b = 1, blocks%n
-      if (blocks%present(b)) self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
+      if (.not. blocks%present(b)) cycle
+      if (all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)) cycle
+      self%q(:, b) = blocks%q(:, b)
+      self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
     touches%n = 0

@@ -4,13 +4,14 @@
 !! them the other half, so that springs are second order in time and a free fall is exact.
 module contacts_m
   use kinds_m, only: wp
-  use rigid_body_m, only: blocks_t, begin_step, drift, kick, hold_sleepers, look_ahead, &
+  use rigid_body_m, only: blocks_t, begin_step, drift, kick_body, hold_sleepers, look_ahead, &
     follow_motions
   use walls_m, only: walls_t
   use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
                      all_still
   use lubrication_m, only: lubricate
   use contact_partners_m, only: update_partners, update_motion
+  use acting_bodies_m, only: list_present
   use touching_m, only: find_touches
   use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
     elastic_energy, energy_in_memory
@@ -65,6 +66,7 @@ contains
       call move_by_impulses(walls, gravity, dt, contacts, blocks, report)
       left = 0.0_wp
     end if
+    if (left > 0.0_wp) call hold_for_step(gravity, dt, contacts, blocks)
     do while (left > 0.0_wp)
       limit = substep_limit(walls, contacts%touching, blocks, dt, contacts%limits)
       if (.not. left < limit*real(max_substeps, wp)) then
@@ -102,12 +104,16 @@ contains
     real(wp), intent(out) :: dt_b         !! the substep [s]
     real(wp), parameter :: bearable = 1.3_wp   !! times the limit of stiffness: not worth going back
     real(wp) :: longest, allowed, time
+    integer :: b
 
     time = blocks%time
-    contacts%start%x = blocks%x
-    contacts%start%q = blocks%q
-    contacts%start%l = blocks%l
-    contacts%start%omega = blocks%omega
+    do b = 1, blocks%n
+      if (.not. moves(b)) cycle
+      contacts%start%x(:, b) = blocks%x(:, b)
+      contacts%start%q(:, b) = blocks%q(:, b)
+      contacts%start%l(:, b) = blocks%l(:, b)
+      contacts%start%omega(:, b) = blocks%omega(:, b)
+    end do
     longest = limit
     do
       dt_b = equal_part(left, longest)
@@ -115,13 +121,22 @@ contains
       call find_touches(walls, blocks, 0.5_wp*dt_b, contacts%touching)
       allowed = stiffness_limit(contacts%touching)
       if (.not. dt_b > bearable*min(allowed, longest)) exit
-      blocks%x = contacts%start%x
-      blocks%q = contacts%start%q
-      blocks%l = contacts%start%l
-      blocks%omega = contacts%start%omega
+      do b = 1, blocks%n
+        if (.not. moves(b)) cycle
+        blocks%x(:, b) = contacts%start%x(:, b)
+        blocks%q(:, b) = contacts%start%q(:, b)
+        blocks%l(:, b) = contacts%start%l(:, b)
+        blocks%omega(:, b) = contacts%start%omega(:, b)
+      end do
       blocks%time = time
       longest = allowed
     end do
+  contains
+    pure logical function moves(b)
+      integer, intent(in) :: b
+
+      moves = blocks%present(b) .and. .not. blocks%asleep(b)
+    end function moves
   end subroutine go_half_way
 
   !> The rest of a substep: contact and the other half of the drift.
@@ -132,35 +147,68 @@ contains
     type(blocks_t), intent(inout) :: blocks
     type(contact_report_t), intent(inout) :: report
     real(wp), parameter :: none(3) = 0.0_wp
-    integer :: b
+    integer :: k
 
-    associate (touching => contacts%touching, springs => contacts%springs, loads => contacts%loads)
+    if (contacts%check_all .or. contacts%lubrication%active) call list_present(blocks, &
+      contacts%touching%acting)
+    associate (touching => contacts%touching, springs => contacts%springs, &
+               loads => contacts%loads, held => contacts%held, &
+               acting => contacts%touching%acting%body(:contacts%touching%acting%n))
       associate (touch => touching%touches%item(:touching%touches%n))
         call store_partners(touch%a, touch%b, contacts%met)
       end associate
       call match_springs(touching, contacts%before, springs)
       call stretch_springs(0.5_wp*dt_b, touching, springs)
-      call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
-      call update_motion(blocks, touching%partners)
+      do k = 1, size(acting)
+        associate (b => acting(k))
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+                         b, blocks)
+        end associate
+      end do
+      call update_motion(blocks, acting, touching%partners)
       call sum_forces(dt_b, touching, springs, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
         loads%force)
-      if (contacts%sleep%active) call hold_or_wake(gravity, contacts%steady, blocks, &
+      if (contacts%sleep%active) call hold_or_wake(acting, gravity, contacts%steady, blocks, &
         contacts%sleep, loads%force(:, 1:), loads%torque(:, 1:), contacts%woken)
-      loads%impulse = loads%impulse + dt_b*loads%force
-      loads%twist = loads%twist + dt_b*loads%torque
-      do b = 1, blocks%n
-        loads%force(:, b) = contacts%share(b)*loads%force(:, b)
+      do k = 1, size(acting)
+        associate (b => acting(k))
+          loads%impulse(:, b) = loads%impulse(:, b) + dt_b*(loads%force(:, b) - held(1:3, b))
+          loads%twist(:, b) = loads%twist(:, b) + dt_b*(loads%torque(:, b) - held(4:6, b))
+          call kick_body(none, dt_b, contacts%share(b)*loads%force(:, b), loads%torque(:, b), b, &
+                         blocks)
+          call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
+                         b, blocks)
+        end associate
       end do
-      call kick(none, dt_b, loads%force(:, 1:), loads%torque(:, 1:), blocks)
-      call kick(gravity, 0.5_wp*dt_b, contacts%steady, blocks%fluid_torque, blocks)
-      call stop_sleepers(blocks)
-      call update_motion(blocks, touching%partners)
+      call stop_sleepers(acting, blocks)
+      call update_motion(blocks, acting, touching%partners)
       call stretch_springs(0.5_wp*dt_b, touching, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)
-    if (contacts%sleep%active .and. any(contacts%woken)) call wake_touching(blocks, contacts)
+    contacts%check_all = contacts%sleep%active .and. any(contacts%woken)
+    if (contacts%check_all) call wake_touching(blocks, contacts)
   end subroutine finish_substep
+
+  !> Hold those asleep for the whole step: a substep adds by how much the force on them differs. All
+  !! of them are looked at in the first substep, and after one in which somebody woke.
+  pure subroutine hold_for_step(gravity, dt, contacts, blocks)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    real(wp), intent(in) :: dt           !! fluid step [s]
+    type(contacts_t), intent(inout) :: contacts
+    type(blocks_t), intent(in) :: blocks
+    integer :: b
+
+    contacts%check_all = .true.
+    do b = 1, blocks%n
+      contacts%held(:, b) = 0.0_wp
+      if (.not. blocks%asleep(b)) cycle
+      contacts%held(1:3, b) = -(contacts%steady(:, b) + blocks%mass(b)*gravity)
+      contacts%held(4:6, b) = -blocks%fluid_torque(:, b)
+      contacts%loads%impulse(:, b) = contacts%loads%impulse(:, b) + dt*contacts%held(1:3, b)
+      contacts%loads%twist(:, b) = contacts%loads%twist(:, b) + dt*contacts%held(4:6, b)
+    end do
+  end subroutine hold_for_step
 
   !> The part of a contact force that moves a body, and what else acts on it all through the step.
   !!

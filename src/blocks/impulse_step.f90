@@ -19,6 +19,7 @@ module impulse_step_m
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
   use sleep_m, only: hold_or_wake
+  use acting_bodies_m, only: list_present
   use resting_m, only: wake_touching
   use partners_met_m, only: store_partners
   implicit none
@@ -60,8 +61,11 @@ contains
       do
         call solve_step(walls, gravity, step, h, n, contacts, blocks)
         if (.not. contacts%sleep%active) exit
-        call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
-          contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
+        associate (acting => contacts%touching%acting)
+          call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
+            contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
+            contacts%woken)
+        end associate
         if (.not. any(contacts%woken)) exit
         call wake_touching(blocks, contacts)   ! what wakes takes part: once more
       end do
@@ -163,8 +167,11 @@ contains
     associate (touching => contacts%touching, rows => contacts%rows, loads => contacts%loads)
       touching%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
       call find_surface_touches(walls, blocks, step, touching%surface, touching%touches)
-      call update_motion(blocks, touching%partners)
-      call update_inertia(blocks, touching%partners)
+      call list_present(blocks, touching%acting)
+      associate (there => touching%acting%body(:touching%acting%n))
+        call update_motion(blocks, there, touching%partners)
+        call update_inertia(blocks, there, touching%partners)
+      end associate
       loads%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
         loads%film)

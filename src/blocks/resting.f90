@@ -10,6 +10,7 @@ module resting_m
     all_still
   use contact_law_m, only: stored_energy
   use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
+  use acting_bodies_m, only: list_present
   use touching_m, only: find_touches
   use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
   use substep_limits_m, only: substep_limit, equal_part
@@ -37,8 +38,12 @@ contains
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      call hold_or_wake(gravity, contacts%steady, blocks, contacts%sleep, &
-        contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), contacts%woken)
+      associate (acting => contacts%touching%acting)
+        call list_present(blocks, acting)
+        call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
+          contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
+          contacts%woken)
+      end associate
       changed = any(contacts%woken)
       if (changed) call wake_touching(blocks, contacts)
     else
@@ -108,7 +113,9 @@ contains
     type(contacts_t), intent(inout) :: contacts
     integer :: b
 
-    call update_motion(blocks, contacts%touching%partners)
+    associate (acting => contacts%touching%acting)
+      call update_motion(blocks, acting%body(:acting%n), contacts%touching%partners)
+    end associate
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
       associate (v => contacts%touching%partners%v(:, b), &

@@ -177,12 +177,13 @@ contains
   end subroutine put_to_sleep
 
   !> Take from sleepers the velocity of the middle of a substep, at the end of which they have none.
-  pure subroutine stop_sleepers(blocks)
+  pure subroutine stop_sleepers(bodies, blocks)
+    integer, intent(in) :: bodies(:)
     type(blocks_t), intent(inout) :: blocks
-    integer :: b
+    integer :: k
 
-    do b = 1, blocks%n
-      if (blocks%asleep(b)) call put_to_sleep(b, blocks)
+    do k = 1, size(bodies)
+      if (blocks%asleep(bodies(k))) call put_to_sleep(bodies(k), blocks)
     end do
   end subroutine stop_sleepers
 
@@ -196,12 +197,14 @@ contains
     blocks%still(b) = .false.
   end subroutine wake
 
-  !> Complete the contact forces by those of the touches at rest, and wake who is out of balance.
+  !> Complete the contact forces on some bodies by those of the touches at rest, and wake who is out
+  !! of balance.
   !!
   !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
   !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those
   !! who sleep on get the force and torque that hold them.
-  subroutine hold_or_wake(gravity, steady, blocks, sleep, force, torque, woken)
+  subroutine hold_or_wake(bodies, gravity, steady, blocks, sleep, force, torque, woken)
+    integer, intent(in) :: bodies(:)
     real(wp), intent(in) :: gravity(3)         !! [m/s2]
     real(wp), intent(in) :: steady(:, :)       !! (3, n) of the fluid [N]
     type(blocks_t), intent(inout) :: blocks
@@ -209,10 +212,11 @@ contains
     real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) of contact [N], [N m]
     logical, intent(out) :: woken(:)           !! (n)
     real(wp) :: other(3)
-    integer :: b
+    integer :: b, k
 
     woken = .false.
-    do b = 1, blocks%n
+    do k = 1, size(bodies)
+      b = bodies(k)
       if (.not. blocks%still(b)) cycle
       force(:, b) = force(:, b) + sleep%load(:, b)
       torque(:, b) = torque(:, b) + sleep%load_torque(:, b)

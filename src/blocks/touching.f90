@@ -12,6 +12,7 @@ module touching_m
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, partners_init, update_motion, update_inertia
+  use acting_bodies_m, only: acting_t, acting_init, list_acting
   use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
     bound_by_sums
   implicit none
@@ -24,6 +25,7 @@ module touching_m
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
     type(partners_t) :: partners
+    type(acting_t) :: acting                     !! bodies that are awake or touch
     type(touches_t) :: touches
     type(touches_t) :: soon                      !! those that may come before the substep ends
     type(groups_t) :: groups
@@ -54,6 +56,7 @@ contains
       call contact_spheres_init(input%courant_max, blocks, self%spheres)
     end if
     call partners_init(blocks, self%partners)
+    call acting_init(blocks%n, self%acting)
     allocate (self%response%frequency2(bed_partner:blocks%n))
     allocate (self%response_soon%frequency2(bed_partner:blocks%n))
     allocate (self%response%stiffness(bed_partner:blocks%n))
@@ -82,9 +85,12 @@ contains
     self%frequency2 = 0.0_wp
     self%sum_frequency2 = 0.0_wp
     self%damping = 0.0_wp
-    call update_motion(blocks, self%partners)
-    if (self%touches%n + self%soon%n == 0) return
-    call update_inertia(blocks, self%partners)
+    call list_acting(blocks, self%touches, self%soon, self%acting)
+    associate (acting => self%acting%body(:self%acting%n))
+      call update_motion(blocks, acting, self%partners)
+      if (self%touches%n + self%soon%n == 0) return
+      call update_inertia(blocks, acting, self%partners)
+    end associate
     call respond(self%touches, self%law, self%partners, self%response)
     if (self%soon%n > 0) then
       call respond(self%soon, self%law, self%partners, self%response_soon)

@@ -33,6 +33,9 @@ module case_plan_m
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
+  real(wp), parameter :: seconds_per_substep = 4.0e-5_wp   !! of a block that is awake [s]
+  real(wp), parameter :: substeps_per_contact = 20.0_wp
+  real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
 
 contains
 
@@ -361,7 +364,8 @@ contains
     call heading(unit, 'Time steps')
     call entry(unit, 'largest', brief(case%run%dt)//' s, at least ' &
                //count_text(max(1.0_wp, case%run%t_end/case%run%dt))//' steps')
-    call entry(unit, 'time of the run', 'about '//time_text(wet, case)//' or more on one core')
+    call entry(unit, 'time of the run', 'about '//time_text(wet, case, shapes) &
+               //' or more on one core')
     h = smallest_spacing(case%grid)
     if (wet .and. maxval(case%grid%cells) > 1) then
       if (case%run%cfl_max > 0.0_wp) then
@@ -380,18 +384,23 @@ contains
     if (blocks .and. size(shapes) > 0) call print_body_steps(unit, case, shapes, d_s)
   end subroutine print_steps
 
-  !> Time for the fewest steps that the run can take.
-  pure function time_text(wet, case) result(text)
+  !> Time for the fewest steps that the run can take with a flow; without one for the substeps of
+  !! the blocks that are awake.
+  function time_text(wet, case, shapes) result(text)
     logical, intent(in) :: wet
     type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
     character(:), allocatable :: text
     real(wp) :: seconds
-    integer, parameter :: min_substeps = 100   !! a history step of a dry run
 
-    seconds = seconds_per_block*real(size(case%body) + sum(case%drop%count), wp)
-    if (.not. wet) seconds = 0.1_wp*min_substeps*seconds
-    if (wet) seconds = seconds + seconds_per_cell*product(real(case%grid%cells, wp))
-    seconds = seconds*case%run%t_end/case%run%dt
+    if (wet) then
+      seconds = seconds_per_block*real(size(case%body) + sum(case%drop%count), wp) &
+        + seconds_per_cell*product(real(case%grid%cells, wp))
+      seconds = seconds*case%run%t_end/case%run%dt
+    else
+      seconds = seconds_per_substep*block_seconds(case, shapes) &
+        *substeps_per_contact/case%contact%contact_time
+    end if
     if (seconds < 100.0_wp) then
       text = brief(seconds, 2)//' s'
     else if (seconds < 6000.0_wp) then
@@ -400,6 +409,40 @@ contains
       text = brief(seconds/3600.0_wp, 2)//' hours'
     end if
   end function time_text
+
+  !> Times for which the blocks are awake, all together [s].
+  function block_seconds(case, shapes) result(seconds)
+    type(case_t), intent(in) :: case
+    type(shape_t), intent(in) :: shapes(:)
+    real(wp) :: seconds
+    type(place_t) :: place
+    integer :: i, k
+
+    seconds = 0.0_wp
+    do i = 1, size(case%drop)
+      do k = 1, case%drop(i)%count
+        place = place_of_block(case%drop(i), k)
+        seconds = seconds + awake(shape_of_place(place, shapes), place%time)
+      end do
+    end do
+    do i = 1, size(case%body)
+      if (case%body(i)%fixed) cycle
+      seconds = seconds + awake(findloc(shapes%name, case%body(i)%shape, 1), &
+                                case%body(i)%release_time)
+    end do
+  contains
+    !> Time for which a block of shape s is awake that is let go at a time.
+    pure real(wp) function awake(s, time)
+      integer, intent(in) :: s
+      real(wp), intent(in) :: time
+
+      awake = max(case%run%t_end - time, 0.0_wp)
+      associate (g => norm2(case%fluid%gravity))
+        if (case%contact%sleep .and. s > 0 .and. g > 0.0_wp) awake = min(awake, &
+          time_awake*sqrt(shapes(s)%volume**(1.0_wp/3.0_wp)/g))
+      end associate
+    end function awake
+  end function block_seconds
 
   !> Limits of the body steps, and how far the lightest shape gives way.
   subroutine print_body_steps(unit, case, shapes, d_s)
@@ -413,7 +456,7 @@ contains
     integer :: s
 
     ratio_step = case%contact%substep_ratio*case%run%dt
-    time_step = case%contact%contact_time/20.0_wp
+    time_step = case%contact%contact_time/substeps_per_contact
     courant_step = case%contact%courant_max*d_s/speed
     call entry(unit, 'body step', brief(min(ratio_step, time_step, courant_step)) &
                //' s, the smallest of')

@@ -11,6 +11,7 @@ program test_contact_forces
   use springs_m, only: springs_t, reserve_springs
   use contact_laws_m, only: choose_law
   use contact_response_m, only: respond
+  use acting_bodies_m, only: acting_init
   use touching_m, only: touching_t
   use contact_forces_m, only: loads_t, contact_report_t, match_springs, stretch_springs, &
     sum_forces, elastic_energy
@@ -79,6 +80,9 @@ contains
 
     call reserve_springs(1, springs)
     call reserve_springs(1, before)
+    call acting_init(3, touching%acting)
+    touching%acting%n = 3
+    touching%acting%body = [1, 2, 3]
     touching%touches%n = 0
     do t = 1, size(touch)
       call add_touch(touch(t), touching%touches)
