@@ -124,27 +124,40 @@ contains
     call sim%clock%advance()
     call describe(sim, contact, coupling_report, report)
     report%overlap_known = .false.
-    if (sim%clock%row_due() .or. sim%clock%finished() .or. (sim%contacts%touching%exact &
-      .and. contact%deepest > worth_measuring*reported_share)) call measure_overlap(sim, report)
-    if (.not. report%overlap_known) call forget_overlaps(sim%deep)
+    if (sim%clock%row_due() .or. sim%clock%finished()) then
+      call measure_overlap(sim, report)
+    else if (sim%contacts%touching%exact &
+             .and. contact%deepest > worth_measuring*reported_share) then
+      call look_for_overlaps(.true., sim, report)
+    else
+      call forget_overlaps(sim%deep)
+    end if
     associate (touching => sim%contacts%touching)
       if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
     end associate
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
 
-  !> How deep the true shapes are in one another, unless it is known: for rows, or where touches
-  !! are deep.
+  !> How deep the true shapes are in one another, for rows, unless it is known.
   subroutine measure_overlap(sim, report)
     type(simulation_t), intent(inout) :: sim
     type(step_report_t), intent(inout) :: report
 
     if (report%overlap_known) return
-    call tic(sim%timer_blocks)
-    call max_overlap(sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
-    call toc(sim%timer_blocks)
+    call look_for_overlaps(.false., sim, report)
     report%overlap_known = .true.
   end subroutine measure_overlap
+
+  !> The same of all bodies, or of those that move and what these touch: where touches are deep.
+  subroutine look_for_overlaps(moving, sim, report)
+    logical, intent(in) :: moving
+    type(simulation_t), intent(inout) :: sim
+    type(step_report_t), intent(inout) :: report
+
+    call tic(sim%timer_blocks)
+    call max_overlap(moving, sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
+    call toc(sim%timer_blocks)
+  end subroutine look_for_overlaps
 
   !> What the parts of the step found out, in one report.
   subroutine describe(sim, contact, stage, report)

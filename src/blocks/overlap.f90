@@ -18,7 +18,7 @@ module overlap_m
     reported_share
   implicit none
   private
-  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, bytes_for, exclude
+  public :: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place, exclude
 
   real(wp), parameter :: release_overlap = 0.01_wp   !! allowed overlap over smallest edge
 
@@ -80,7 +80,7 @@ contains
   end function wall_depth
 
   !> Whether body c has room where it is: nothing reaches deeper into it than 1 % of its size.
-  function bytes_for(walls, blocks, c, overlap) result(free)
+  function has_place(walls, blocks, c, overlap) result(free)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: c
@@ -89,7 +89,7 @@ contains
 
     free = body_overlap(overlap, walls, blocks, c) &
       <= release_overlap*blocks%shapes(blocks%shape(c))%smallest_edge
-  end function bytes_for
+  end function has_place
 
   !> Whether the places of two bodies exclude one another: they reach deeper into one another than a
   !! release allows the smaller.
@@ -145,8 +145,10 @@ contains
   !> Largest depth of the present bodies in one another, in the walls and in the bed [m], and those
   !! that reach deep for their size.
   !!
-  !! Pairs of bodies that are both held or moved are left out.
-  subroutine max_overlap(walls, blocks, overlap, depth, deep)
+  !! Pairs of bodies that are both held or moved are left out, and where only `moving` bodies are
+  !! asked for, those that are both still.
+  subroutine max_overlap(moving, walls, blocks, overlap, depth, deep)
+    logical, intent(in) :: moving
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(overlap_t), intent(inout) :: overlap
@@ -163,6 +165,7 @@ contains
       associate (solid => overlap%solid(blocks%shape(a)))
         overlap%radius(a) = solid%radius
         if (.not. blocks%present(a) .or. blocks%fixed(a)) cycle
+        if (moving .and. blocks%still(a)) cycle
         found = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           overlap%turn(:, :, a), walls, found)
@@ -177,6 +180,7 @@ contains
       a = overlap%pairs%a(p)
       b = overlap%pairs%b(p)
       if (blocks%fixed(a) .and. blocks%fixed(b)) cycle
+      if (moving .and. blocks%still(a) .and. blocks%still(b)) cycle
       found = worth_finding(a, b, depth, deep)
       call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
         overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &

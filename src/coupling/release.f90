@@ -15,7 +15,7 @@ module release_m
   use parallel_m, only: is_root
   use rigid_body_m, only: blocks_t, release_body, body_text, own_mass, to_come, lowering, left_out
   use walls_m, only: walls_t
-  use overlap_m, only: overlap_t, bytes_for, exclude
+  use overlap_m, only: overlap_t, has_place, exclude
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
@@ -104,7 +104,7 @@ contains
       if (.not. free) return
       blocks%x(3, b) = height
     end if
-    free = bytes_for(walls, blocks, b, overlap)
+    free = has_place(walls, blocks, b, overlap)
   end subroutine check_place
 
   !> Raise a block above all that lies at its place, if it has room there.
@@ -121,7 +121,7 @@ contains
     free = height > place
     if (.not. free) return
     blocks%x(3, b) = height
-    free = bytes_for(walls, blocks, b, overlap)
+    free = has_place(walls, blocks, b, overlap)
     if (free) then
       blocks%raised(b) = height - place
     else

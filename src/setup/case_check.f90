@@ -1,6 +1,6 @@
 !> Checks of a case that need geometry: bodies inside the tank and apart, room for the drops.
 !!
-!! They measure with the true shapes and the rule of a release (`bytes_for`): a body has room where
+!! They measure with the true shapes and the rule of a release (`has_place`): a body has room where
 !! nothing reaches deeper into it than 1 % of its size. What `read_case` found faulty is left out
 !! (a side, a shape, a body, but nothing else), so these problems can be listed together with those.
 module case_check_m
@@ -21,7 +21,7 @@ module case_check_m
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
   use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, bytes_for
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, has_place
   use overlap_solid_m, only: expected_samples
   use panels_m, only: surface_triangles
   use panel_method_m, only: max_surface_panels
@@ -353,13 +353,13 @@ contains
     text = ''
     call place(scene, b, 1)
     scene%two%present = .false.
-    if (.not. bytes_for(scene%walls, scene%two, 1, scene%overlap)) then
+    if (.not. has_place(scene%walls, scene%two, 1, scene%overlap)) then
       deepest = 0.0_wp
       do w = 1, scene%walls%n
         one%n = 1
         one%normal(:, 1) = scene%walls%normal(:, w)
         one%offset(1) = scene%walls%offset(w)
-        if (bytes_for(one, scene%two, 1, scene%overlap)) cycle
+        if (has_place(one, scene%two, 1, scene%overlap)) cycle
         depth = wall_depth(scene%blocks%shapes(scene%blocks%shape(b)), scene%blocks%x(:, b), &
                            scene%blocks%q(:, b), one)
         if (depth <= deepest) cycle
@@ -494,7 +494,7 @@ contains
     call place(scene, a, 1)
     call place(scene, b, 2)
     scene%two%present = .true.
-    free = bytes_for(scene%no_walls, scene%two, 2, scene%overlap)
+    free = has_place(scene%no_walls, scene%two, 2, scene%overlap)
   end function is_free_beside
 
   !> Put body b in place 1 or 2 of the two bodies looked at.

@@ -12,7 +12,7 @@ program test_overlap
   use walls_m, only: walls_t, walls_init
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
-  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, bytes_for
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place
   implicit none
 
   real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
@@ -148,7 +148,7 @@ contains
     type(overlap_t) :: overlap
     type(deep_overlaps_t) :: deep
     real(wp) :: depth, expected, x(3), one, share(n + 1)
-    integer :: a, b
+    integer :: a, b, deepest
 
     allocate (case%body(n + 1), case%drop(0))
     case%grid%length = 0.2_wp
@@ -178,25 +178,34 @@ contains
         share([a, b]) = max(share([a, b]), one/min(deep%size(a), deep%size(b)))
       end do
     end do
-    call max_overlap(walls, blocks, overlap, depth, deep)
+    call max_overlap(.false., walls, blocks, overlap, depth, deep)
     call check('some overlap', expected > 1.0e-3_wp)
     call check('largest overlap', depth, expected, 1.0e-15_wp)
     call check('that of the body with the deepest', maxval(deep%depth), expected, 1.0e-15_wp)
     where (share <= 0.05_wp) share = 0.0_wp
     call check('several reach deep', count(share > 0.0_wp) > 3)
     call check('all that reach deep are noted', deep%share, share, 1.0e-12_wp)
+    blocks%still = .true.
+    call max_overlap(.true., walls, blocks, overlap, depth, deep)
+    call check('nothing moves', depth <= 0.0_wp .and. all(deep%share <= 0.0_wp))
+    deepest = maxloc(share, 1)
+    blocks%still(deepest) = .false.
+    call max_overlap(.true., walls, blocks, overlap, depth, deep)
+    call check('of one that moves', deep%share(deepest), share(deepest), 1.0e-12_wp)
+    call check('and of what it touches alone', count(deep%share > 0.0_wp) &
+      < count(share > 0.0_wp))
     blocks%present = .false.
     blocks%present(1) = .true.
     blocks%q = spread(upright, 2, n + 1)
     blocks%x(:, 1) = [0.15_wp, 0.1_wp, 0.1_wp]
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.011_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room', .not. bytes_for(walls, blocks, n + 1, overlap))
+    call check('no room', .not. has_place(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
-    call check('room', bytes_for(walls, blocks, n + 1, overlap))
+    call check('room', has_place(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
-    call check('no room beside the image', .not. bytes_for(walls, blocks, n + 1, overlap))
+    call check('no room beside the image', .not. has_place(walls, blocks, n + 1, overlap))
     blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
-    call check('no room in the floor', .not. bytes_for(walls, blocks, n + 1, overlap))
+    call check('no room in the floor', .not. has_place(walls, blocks, n + 1, overlap))
   end subroutine check_run
 
   !> The list of near pairs against all pairs, with and without periods.
