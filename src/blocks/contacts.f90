@@ -186,12 +186,12 @@ contains
       call stretch_springs(0.5_wp*dt_b, touching, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)
-    contacts%check_all = contacts%sleep%active .and. any(contacts%woken)
-    if (contacts%check_all) call wake_touching(blocks, contacts)
+    if (contacts%sleep%active .and. any(contacts%woken)) call wake_touching(blocks, contacts)
+    contacts%check_all = .false.
   end subroutine finish_substep
 
   !> Hold those asleep for the whole step: a substep adds by how much the force on them differs. All
-  !! of them are looked at in the first substep, and after one in which somebody woke.
+  !! of them are tested in the first substep, those that something touches in the others.
   pure subroutine hold_for_step(gravity, dt, contacts, blocks)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! fluid step [s]
