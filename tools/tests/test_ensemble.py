@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import pytest
 
 from micstools import cli
@@ -204,6 +205,22 @@ def test_no_complete_pile_has_no_median(tmp_path: Path) -> None:
     write_run(member.result, Motion(t_end=0.5, cells=(6, 2, 4)))
     with pytest.raises(BadRun, match="no run ended with a complete pile"):
         ensemble_fields.medians({member: ensemble.State("time over")})
+
+
+def test_a_door_is_no_part_of_a_pile(tmp_path: Path) -> None:
+    """A body that a table moves, above the pile, does not count as its top."""
+    folder = write_run(tmp_path, Motion(cells=(6, 2, 4)))
+    top = ensemble_fields.top_of_pile(Run(folder))
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        h5["bodies/position"][:, 0, 2] = 0.18
+    assert ensemble_fields.top_of_pile(Run(folder)) > top + 0.02
+    with h5py.File(folder / "run.h5", "r+") as h5:
+        said = h5["provenance"].attrs
+        moved = said["parameters"].replace(
+            "fixed = .true.", "fixed = .true. motion = 'door.csv'", 1
+        )
+        said["parameters"] = moved
+    assert ensemble_fields.top_of_pile(Run(folder)) == pytest.approx(top)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from micstools.cases import settings
 from micstools.ensembles.ensemble import Member, Plan, State, members
-from micstools.reading.overlap import present_bodies
+from micstools.reading.overlap import present_bodies, without_machines
 from micstools.reading.reader import BadRun, Run
 
 MEDIAN = "median"
@@ -51,15 +51,16 @@ def medians(table: Mapping[Member, State]) -> list[int]:
     for member, end in table.items():
         run = Run(member.result) if end.counts else None
         if run is not None and run.bodies.n and run.bodies.present(-1).all():
-            tops.setdefault(member.choice, []).append((_top(run), member.number))
+            tops.setdefault(member.choice, []).append((top_of_pile(run), member.number))
     if not tops:
         raise BadRun(f"{OPTION} {MEDIAN}: no run ended with a complete pile, there is no median")
     return sorted(sorted(piles)[(len(piles) - 1) // 2][1] for piles in tops.values())
 
 
-def _top(run: Run) -> float:
-    """Highest point of the pile at the end [m]."""
-    return max(float(body.points[:, 2].max()) for body in present_bodies(run, -1).values())
+def top_of_pile(run: Run) -> float:
+    """Highest point at the end of what no table moves [m]."""
+    pile = without_machines(run, present_bodies(run, -1))
+    return max(float(body.points[:, 2].max()) for body in pile.values())
 
 
 def numbered(numbers: Iterable[int]) -> str:
