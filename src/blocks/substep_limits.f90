@@ -75,7 +75,7 @@ contains
     end if
     fastest = 0.0_wp
     do b = 1, blocks%n
-      if (.not. blocks%present(b)) cycle
+      if (.not. blocks%present(b) .or. blocks%still(b)) cycle
       speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b) &
         + haste(blocks, b, limits%reach(b))
       if (.not. speed <= fastest(2)) fastest(2) = speed
@@ -104,6 +104,7 @@ contains
     fastest = 0.0_wp
     do p = 1, near%n
       associate (a => near%a(p), b => near%b(p), reach => limits%reach)
+        if (blocks%still(a) .and. blocks%still(b)) cycle
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
             > reach(a) + reach(b) + limits%clear) cycle
         speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &

@@ -33,6 +33,7 @@ contains
     blocks%n = 2
     allocate (blocks%x(3, 2), blocks%v(3, 2), blocks%omega(3, 2), source=0.0_wp)
     allocate (blocks%present(2), source=.true.)
+    allocate (blocks%still(2), source=.false.)
     allocate (blocks%ahead(2, 2), source=0.0_wp)
     blocks%x(3, :) = [0.1_wp, 5.0_wp]
     walls%n = 1
