@@ -32,7 +32,6 @@ module contact_state_m
     real(wp), allocatable :: share(:)            !! (n) of a contact force that moves the body [-]
     real(wp), allocatable :: steady(:, :)        !! (3, n) force all through the step [N]
     real(wp), allocatable :: held(:, :)          !! (6, n) what holds those asleep at its start
-    logical :: check_all = .true.                !! test all sleepers in the next substep
     type(loads_t) :: loads
     type(start_t) :: start                       !! the place to go back to
     type(met_t) :: met                           !! pairs that touched in this step

@@ -149,7 +149,7 @@ contains
     real(wp), parameter :: none(3) = 0.0_wp
     integer :: k
 
-    if (contacts%check_all .or. contacts%lubrication%active) call list_present(blocks, &
+    if (report%substeps == 0 .or. contacts%lubrication%active) call list_present(blocks, &
       contacts%touching%acting)
     associate (touching => contacts%touching, springs => contacts%springs, &
                loads => contacts%loads, held => contacts%held, &
@@ -187,7 +187,6 @@ contains
     end associate
     call drift(0.5_wp*dt_b, blocks)
     if (contacts%sleep%active .and. any(contacts%woken)) call wake_touching(blocks, contacts)
-    contacts%check_all = .false.
   end subroutine finish_substep
 
   !> Hold those asleep for the whole step: a substep adds by how much the force on them differs. All
@@ -199,7 +198,6 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer :: b
 
-    contacts%check_all = .true.
     do b = 1, blocks%n
       contacts%held(:, b) = 0.0_wp
       if (.not. blocks%asleep(b)) cycle

@@ -21,7 +21,7 @@ module deep_overlaps_m
     real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
     real(wp), allocatable :: share(:)    !! of the size of the smaller of the two [-]
     integer, allocatable :: partner(:)   !! body, or below 1: wall or bed
-    logical, allocatable :: warned(:)      !! has been warned of
+    logical, allocatable :: warned(:)    !! has been warned of
   end type deep_overlaps_t
 
 contains

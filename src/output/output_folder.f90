@@ -102,7 +102,7 @@ contains
     character(*), intent(in) :: path
     type(folder_lock_t), intent(inout) :: lock             !! of the root process, if all went well
     integer, intent(out) :: code                           !! exit_ok, exit_input or exit_files
-    character(:), allocatable, intent(out)  :: message      !! of an error
+    character(:), allocatable, intent(out) :: message      !! of an error
 
     call check_folder(what, path, code, message)
     if (code /= exit_ok) return
