@@ -27,7 +27,7 @@ module monolithic_m
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
                          add_second_half, add_whole
   use buoyancy_m, only: displaced_force, mass_defect
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use wall_layer_m, only: find_slip
   use centre_velocity_m, only: find_centres, to_centres, to_means
@@ -182,7 +182,6 @@ contains
     call find_merged_cells(grid, solid, self%merged)
     call begin_balance(case%fluid, self%merged, flow, self%balance)
     call find_inertia(grid, self%merged, self%balance%mass, flow, self%rho)
-    call match_densities(grid, self%rho, self%merged)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &

@@ -17,7 +17,7 @@ module merged_cells_m
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: targets_at_most, is_unmerged, along_share, match_densities, mean_apertures
+  public :: targets_at_most, is_unmerged, along_share, mean_apertures
   public :: velocity_at_wall
 
   integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
@@ -37,8 +37,7 @@ module merged_cells_m
     integer, allocatable :: step(:, :)           !! (3*targets_at_most, n_small) to the targets
     integer, allocatable :: target(:, :)         !! (targets_at_most, n_small) numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the small cell, sum 1
-    real(wp), allocatable :: by_wall(:, :)       !! likewise: 1 - r
-    real(wp), allocatable :: nearer(:, :)        !! likewise, less under heavy small cells
+    real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the small cell in a cell, 0 to 1
     !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
@@ -67,8 +66,8 @@ contains
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%middle(0), self%ratio(0), self%centre(0))
     allocate (self%step(3*targets_at_most, 0), self%target(targets_at_most, 0))
-    allocate (self%share(targets_at_most, 0), self%by_wall(targets_at_most, 0))
-    allocate (self%nearer(targets_at_most, 0), self%distance(targets_at_most, 0))
+    allocate (self%share(targets_at_most, 0), self%nearer(targets_at_most, 0))
+    allocate (self%distance(targets_at_most, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -224,14 +223,12 @@ contains
     call ensure_capacity(self%n_small, self%step)
     call ensure_capacity(self%n_small, self%target)
     call ensure_capacity(self%n_small, self%share)
-    call ensure_capacity(self%n_small, self%by_wall)
     call ensure_capacity(self%n_small, self%nearer)
     call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
-                     self%share(:, m), self%by_wall(:, m), self%distance(:, m))
-      self%nearer(:, m) = self%by_wall(:, m)
+                     self%share(:, m), self%nearer(:, m), self%distance(:, m))
     end do
     do m = 1, self%n_small
       body = self%body(m)
@@ -442,31 +439,6 @@ contains
       share = 1.0_wp - nearer*(1.0_wp - slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - nearer))
     end associate
   end function along_share
-
-  !> Flatten the profile of small cells that are heavier than their target.
-  !!
-  !! What a heavy small cell does would else be extrapolated to the light cell beside it, which
-  !! amplifies it by up to 1/r. With 1 - r times the ratio of the densities a group of water under
-  !! gas is as well conditioned as one of gas alone.
-  subroutine match_densities(grid, rho, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of the fluid [kg/m3]
-    type(merged_cells_t), intent(inout) :: self
-    integer :: m, n
-
-    !$omp parallel do private(n) schedule(static)
-    do m = 1, self%n_small
-      self%nearer(:, m) = self%by_wall(:, m)
-      do n = 1, targets_at_most
-        if (self%target(n, m) == 0) cycle
-        associate (c => self%cell(:, m), p => self%cell(:, self%target(n, m)))
-          self%nearer(n, m) = self%by_wall(n, m) &
-                              *min(1.0_wp, rho(p(1), p(2), p(3))/rho(c(1), c(2), c(3)))
-        end associate
-      end do
-    end do
-  end subroutine match_densities
 
   !> Velocity of the wall of a small cell [m/s].
   pure function velocity_at_wall(grid, self, small, bodies) result(v)
