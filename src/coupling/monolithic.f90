@@ -12,27 +12,25 @@ module monolithic_m
   use scratch_m, only: scratch_t, take, give, take_faces, give_faces
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity
-  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, velocity_in_cell
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
-  use wall_shear_m, only: find_wall_speeds
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
-  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
-                             predict_face_velocity
+  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
+  use effective_aperture_m, only: hold_in_cells
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use old_time_correction_m, only: store_correction
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
-                         add_second_half, add_whole
+                         add_second_half, add_whole, force_of_half_kick
   use buoyancy_m, only: displaced_force, mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
-  use wall_layer_m, only: find_slip
-  use centre_velocity_m, only: find_centres, to_centres, to_means
+  use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
+  use wall_layer_m, only: find_slip, find_centres, to_centres, to_means, find_wall_speeds
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
-                            store_velocity, force_of_walls, force_of_half_kick
+                            store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
   use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
@@ -54,7 +52,7 @@ module monolithic_m
     type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
-    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_shear_m`) [m/s]
+    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_layer_m`) [m/s]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
@@ -352,10 +350,9 @@ contains
       else
         call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction, given, in_liquid)
         call give(scratch, self%correction)
-        call shorten_at_walls(grid, dt, self%bodies, merged%cell(:, :merged%n), merged%body, &
-                              merged%number, in_liquid, self%rho, a, flow)
+        call shorten_at_walls(grid, dt, self%bodies, merged, in_liquid, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged%slip, dt, &
+      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged, dt, &
                                   self%implicit_momentum, given, in_liquid, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)
@@ -558,17 +555,15 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, b
-    real(wp) :: arm(3)
 
-    !$omp parallel do private(i, j, b, arm) schedule(static)
+    !$omp parallel do private(i, j, b) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         if (maxval(solid%inside(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
           if (b == 0 .or. merged%number(i, j, k) > 0) cycle
-          arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
-          u(i, j, k, :) = wall_velocity(bodies%motion(:, b), arm)
+          u(i, j, k, :) = velocity_in_cell(grid, bodies, b, [i, j, k])
         end do
       end do
     end do

@@ -3,7 +3,7 @@ program test_centre_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use centre_velocity_m, only: find_centres, to_centres, to_means
+  use wall_layer_m, only: find_centres, to_centres, to_means
   use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
   implicit none

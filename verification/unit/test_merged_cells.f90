@@ -5,7 +5,7 @@ program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, is_unmerged
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
+  use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks

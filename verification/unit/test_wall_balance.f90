@@ -6,16 +6,17 @@ program test_wall_balance
   use grid_m, only: n_halo
   use boundary_m, only: fill_scalar_halo
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
-    cell_mean_of_faces, hold_in_cells
+    cell_mean_of_faces
+  use effective_aperture_m, only: hold_in_cells
+  use solid_geometry_m, only: mean_apertures
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: mass_defect
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body, &
-    mean_apertures
-  use group_momentum_m, only: share_acceleration
-  use half_kick_m, only: half_kick_t, half_kick_init
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
+  use merged_momentum_m, only: share_acceleration
+  use half_kick_m, only: half_kick_t, half_kick_init, force_of_half_kick
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
-    force_of_walls, force_of_half_kick
+    force_of_walls
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none

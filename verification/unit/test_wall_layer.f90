@@ -3,8 +3,7 @@ program test_wall_layer
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use wall_layer_m, only: find_slip, layer_slip
-  use wall_profile_m, only: slip_at
+  use wall_layer_m, only: find_slip, layer_slip, slip_at
   use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
   implicit none

@@ -7,9 +7,10 @@ module wall_faces_m
   use boundary_kinds_m, only: no_side
   use solid_geometry_m, only: solid_geometry_t, wall_area, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm, arm_to_cell
+  use rigid_flux_m, only: nearest_arm, velocity_in_cell
   use mixture_m, only: face_mean
-  use wall_profile_m, only: slip_at
+  use merged_cells_m, only: merged_cells_t
+  use wall_layer_m, only: slip_at
   use face_velocity_m, only: acceleration_t, rhie_chow_time, face_step
   implicit none
   private
@@ -20,14 +21,11 @@ contains
   !> Faces of the cells at walls: their Rhie-Chow acceleration counts for `rhie_chow_time` by the
   !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
   !! all of its damping and has no drag worth the name.
-  subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
+  subroutine shorten_at_walls(grid, dt, bodies, merged, in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt                   !! [s]
     type(rigid_motion_t), intent(in) :: bodies
-    integer, intent(in) :: wall_cell(:, :)       !! (3, *) those cells, of the halo too
-    integer, intent(in) :: body(:)               !! (*) whose wall it is
-    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of a wall cell in that list, 0: none
+    type(merged_cells_t), intent(in) :: merged
     logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
@@ -38,12 +36,12 @@ contains
 
     reach = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(d, c) schedule(dynamic, 64)
-    do m = 1, size(wall_cell, 2)
+    do m = 1, merged%n
       do d = 1, 3
-        call shorten(wall_cell(:, m), d, body(m))
-        c = wall_cell(:, m) + unit_step(:, d)
+        call shorten(merged%cell(:, m), d, merged%body(m))
+        c = merged%cell(:, m) + unit_step(:, d)
         if (c(d) > grid%hi(d) + 1) cycle
-        if (number(c(1), c(2), c(3)) == 0) call shorten(c, d, body(m))
+        if (merged%number(c(1), c(2), c(3)) == 0) call shorten(c, d, merged%body(m))
       end do
     end do
   contains
@@ -59,7 +57,7 @@ contains
       if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
-          - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
+          - velocity_in_cell(grid, bodies, b, f)
         time = rhie_chow_time(dt, dt*sum(abs(past)/grid%h))
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
@@ -87,14 +85,13 @@ contains
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
   !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
-  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, slip, dt, c_ismac, given, &
+  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, merged, dt, c_ismac, given, &
                                     in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
     type(rigid_motion_t), intent(in) :: predicted   !! motion as far as the old pressure makes it
-    real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of the layer along the wall, in cells with their centre in a body, 0 to 1
+    type(merged_cells_t), intent(in) :: merged     !! with the slip of the layer at small cells
     real(wp), intent(in) :: dt                   !! [s]
     logical, intent(in) :: c_ismac
       !! all cells are given their acceleration, and the compact one counts for dt
@@ -198,7 +195,7 @@ contains
       real(wp) :: s
 
       s = 1.0_wp
-      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(slip(o(1), o(2), o(3)), r)
+      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(merged%slip(o(1), o(2), o(3)), r)
     end function slip_beyond
 
     !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the

@@ -12,22 +12,21 @@
 !! start; the bodies get the difference. Fluid and bodies together keep their momentum.
 module wall_balance_m
   use kinds_m, only: wp, i8
+  use vectors_m, only: wrench
   use growing_m, only: ensure_capacity
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
   use fields_m, only: flow_t
-  use solid_geometry_m, only: solid_geometry_t
+  use mixture_m, only: mass_through
+  use solid_geometry_m, only: solid_geometry_t, mean_apertures
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use rigid_flux_m, only: arm_to_cell
-  use merged_cells_m, only: merged_cells_t, mean_apertures
-  use half_kick_m, only: half_kick_t
-  use viscous_system_m, only: wrench
-  use momentum_conservative_m, only: mass_through
+  use merged_cells_m, only: merged_cells_t
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   implicit none
   private
   public :: wall_balance_t, wall_balance_init, begin_balance, store_change, store_velocity
-  public :: force_of_walls, force_of_half_kick
+  public :: force_of_walls, add_to_bodies
 
   integer, parameter :: worth_threads = 1000   !! fewer wall cells are looked at by one thread
 
@@ -121,115 +120,57 @@ contains
       !! [kg/m3]
     type(wall_balance_t), intent(in) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    real(wp) :: owed(3, merged%n)
+    real(wp) :: wall(3), moved(3), faster(6, bodies%n)   ! than at the start
+    real(wp) :: total(6*bodies%n)
     integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n), term(terms_at_once, 6), load(6)
-    real(wp) :: faster(6, bodies%n)   ! than at the start
-    integer :: b, e, n, from
+    integer :: m
 
     faster = bodies%motion(:, :bodies%n) - at_start%motion(:, :bodies%n)
+    !$omp parallel do private(wall, moved) schedule(static)
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m), b => merged%body(m))
+        if (.not. grid%owns(c)) cycle
+        wall = wall_velocity(faster(:, b), arm_to_cell(grid, c, bodies%x(:, b)))
+        moved = rho(c(1), c(2), c(3))*grid%volume*mean_apertures(grid, solid%aperture, c)
+        owed(:, m) = (moved*(self%pushed(:, m) - wall) - self%mass(m)*(self%gained(:, m) - wall) &
+                      + self%to_wall(:, m))/dt
+      end associate
+    end do
     accumulator = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b, e, n, term, load) if (merged%n > worth_threads)
+    call add_to_bodies(grid, merged, bodies, owed, accumulator)
+    call exact_totals(accumulator, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
+  end subroutine force_of_walls
+
+  !> Add forces at the own wall cells, and their torques, to the sums of the bodies.
+  subroutine add_to_bodies(grid, merged, bodies, f, accumulator)
+    type(grid_t), intent(in) :: grid
+    type(merged_cells_t), intent(in) :: merged
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: f(:, :)                     !! (3, wall cells) [N]
+    integer(i8), intent(inout) :: accumulator(:, :)   !! (accumulator_size, 6 bodies)
+    real(wp) :: term(terms_at_once, 6)
+    integer :: b, e, n, from
+
+    if (merged%n == 0) return
+    !$omp parallel private(b, e, n, term) if (merged%n > worth_threads)
     do b = 1, bodies%n
       !$omp do schedule(dynamic)
       do from = merged%first_of_body(b), merged%first_of_body(b + 1) - 1, terms_at_once
         n = 0
         do e = from, min(from + terms_at_once, merged%first_of_body(b + 1)) - 1
-          if (.not. grid%owns(merged%cell(:, merged%by_body(e)))) cycle
-          n = n + 1
-          load = of_cell(merged%by_body(e), b)
-          term(n, :) = load
+          associate (m => merged%by_body(e))
+            if (.not. grid%owns(merged%cell(:, m))) cycle
+            n = n + 1
+            term(n, :) = wrench(f(:, m), arm_to_cell(grid, merged%cell(:, m), bodies%x(:, b)))
+          end associate
         end do
         call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
       end do
       !$omp end do nowait
     end do
     !$omp end parallel
-    call exact_totals(accumulator, total)
-    force(:, :bodies%n) = reshape(total, [6, bodies%n])
-  contains
-    !> Force and torque that wall cell m owes body b.
-    pure function of_cell(m, b) result(owed)
-      integer, intent(in) :: m, b
-      real(wp) :: owed(6)
-      real(wp) :: arm(3), wall(3), moved(3)
-
-      associate (c => merged%cell(:, m))
-        arm = arm_to_cell(grid, c, bodies%x(:, b))
-        wall = wall_velocity(faster(:, b), arm)
-        moved = rho(c(1), c(2), c(3))*grid%volume*mean_apertures(grid, solid%aperture, c)
-        owed = wrench((moved*(self%pushed(:, m) - wall) &
-                       - self%mass(m)*(self%gained(:, m) - wall) + self%to_wall(:, m))/dt, arm)
-      end associate
-    end function of_cell
-  end subroutine force_of_walls
-
-  !> Force and torque on each body by which the impulses of the old pressure on the surface of the
-  !! start (`half_kick%given`) and on that of the end differ [N, N m]; `a` is the acceleration on
-  !! the surface of the end, of groups.
-  subroutine force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, half_kick, force)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    type(merged_cells_t), intent(in) :: before, merged   !! of the start and of the end
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(in) :: flow
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s2]
-    type(half_kick_t), intent(in) :: half_kick
-    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
-    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n)
-    integer :: b
-
-    accumulator = spread(no_terms, 2, 6*bodies%n)
-    !$omp parallel private(b) if (merged%n > worth_threads)
-    do b = 1, bodies%n
-      call add_cells(merged, .false., b)
-      call add_cells(before, .true., b)
-    end do
-    !$omp end parallel
-    call exact_totals(accumulator, total)
-    force(:, :bodies%n) = reshape(total, [6, bodies%n])
-  contains
-    !> Add the wall cells of body b in a list; of those of the start only what is none at the end.
-    subroutine add_cells(list, at_start, b)
-      type(merged_cells_t), intent(in) :: list
-      logical, intent(in) :: at_start
-      integer, intent(in) :: b
-      real(wp) :: term(terms_at_once, 6), load(6)
-      integer :: e, n, from, c(3)
-
-      if (list%n == 0) return
-      !$omp do schedule(dynamic)
-      do from = list%first_of_body(b), list%first_of_body(b + 1) - 1, terms_at_once
-        n = 0
-        do e = from, min(from + terms_at_once, list%first_of_body(b + 1)) - 1
-          c = list%cell(:, list%by_body(e))
-          if (.not. grid%owns(c)) cycle
-          if (at_start .and. merged%number(c(1), c(2), c(3)) > 0) cycle
-          n = n + 1
-          load = of_cell(c, b)
-          term(n, :) = load
-        end do
-        call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))
-      end do
-      !$omp end do nowait
-    end subroutine add_cells
-
-    !> Force and torque that cell c owes body b.
-    pure function of_cell(c, b) result(owed)
-      integer, intent(in) :: c(3), b
-      real(wp) :: owed(6)
-      real(wp) :: f(3), mass
-
-      f = -half_kick%given(c(1), c(2), c(3), :)
-      if (half_kick%takes_part(c(1), c(2), c(3))) then
-        mass = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
-                            flow%liquid(c(1), c(2), c(3)))
-        f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
-      end if
-      owed = wrench(f/dt, arm_to_cell(grid, c, bodies%x(:, b)))
-    end function of_cell
-  end subroutine force_of_half_kick
+  end subroutine add_to_bodies
 
 end module wall_balance_m

@@ -10,14 +10,14 @@
 !! of its velocity that the small cell has there, and the rest the wall. What the group cannot give
 !! to a small cell so that it keeps this profile is the same kind of force. Derivation and trials:
 !! docs/decisions/cut_cells.md.
-module group_momentum_m
+module merged_momentum_m
   use kinds_m, only: wp
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
+  use solid_geometry_m, only: mean_apertures
   use rigid_motion_m, only: rigid_motion_t
-  use merged_cells_m, only: merged_cells_t, targets_at_most, is_unmerged, along_share, &
-                            mean_apertures, velocity_at_wall
-  use wall_profile_m, only: slip_at
+  use merged_cells_m, only: merged_cells_t, max_targets, is_unmerged, velocity_at_wall
+  use wall_layer_m, only: slip_at, along_share
   implicit none
   private
   public :: share_momentum, share_acceleration, follow_targets
@@ -45,14 +45,14 @@ contains
       !! (3, wall cells) momentum that the wall bears at own small cells, added to [kg m/s]
     real(wp) :: matrix(3, 3), given(3), part
     real(wp) :: excess(3, self%n_small)   !! of a small cell over the mean that its targets make it
-    real(wp) :: t(3, 3, targets_at_most, self%n_small), wall(3, targets_at_most, self%n_small)
+    real(wp) :: t(3, 3, max_targets, self%n_small), wall(3, max_targets, self%n_small)
       !! T and (1 - T) U_w of the parts of small cells
     integer :: g, m, d, n
 
     !$omp parallel do private(n, given) schedule(static)
     do m = 1, self%n_small
       if (is_unmerged(self, m)) cycle
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         if (self%target(n, m) == 0) cycle
         call profile(grid, self, [m, n], bodies, t(:, :, n, m), wall(:, n, m))
       end do
@@ -89,7 +89,7 @@ contains
       associate (f => self%cell(:, m))
         u(f(1), f(2), f(3), :) = given
       end associate
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         if (self%target(n, m) == 0) cycle
         associate (c => self%cell(:, self%target(n, m)))
           given = u(c(1), c(2), c(3), :) - before(:, self%target(n, m))
@@ -124,7 +124,7 @@ contains
     integer :: n
 
     velocity = 0.0_wp
-    do n = 1, targets_at_most
+    do n = 1, max_targets
       if (self%target(n, small) == 0) cycle
       associate (c => self%cell(:, self%target(n, small)))
         velocity = velocity + self%share(n, small)*(matmul(t(:, :, n), u(c(1), c(2), c(3), :)) &
@@ -218,7 +218,7 @@ contains
     integer :: n
 
     mean = 0.0_wp
-    do n = 1, targets_at_most
+    do n = 1, max_targets
       if (self%target(n, small) == 0) cycle
       associate (c => self%cell(:, self%target(n, small)))
         mean = mean + self%share(n, small)*a(c(1), c(2), c(3), :)
@@ -245,7 +245,7 @@ contains
     do m = 1, self%n_small
       if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       changed = before(:, m)
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         if (self%target(n, m) == 0) cycle
         t = along_share(self, m, n)
         associate (c => self%cell(:, self%target(n, m)))
@@ -260,4 +260,4 @@ contains
     end do
   end subroutine follow_targets
 
-end module group_momentum_m
+end module merged_momentum_m
