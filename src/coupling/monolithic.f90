@@ -28,8 +28,8 @@ module monolithic_m
   use buoyancy_m, only: displaced_force, mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
-  use wall_layer_m, only: find_slip, find_centres, to_centres, to_means, find_wall_speeds
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
+  use wall_layer_m, only: find_slip, find_centres, to_centres, find_wall_speeds
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
                             store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
@@ -178,8 +178,8 @@ contains
     end associate
     self%unforced_motion = self%bodies%motion
     call find_merged_cells(grid, solid, self%merged)
-    call begin_balance(case%fluid, self%merged, flow, self%balance)
-    call find_inertia(grid, self%merged, self%balance%mass, flow, self%rho)
+    call copy_density(flow%rho, self%rho)
+    call begin_balance(grid, case%fluid, solid, self%merged, flow, self%rho, self%balance)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
@@ -193,29 +193,18 @@ contains
   end subroutine merge_cells
 
   !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
-  !! cell lies, bodies thought away, so that still water stays still; inertia in a cut cell that of
-  !! the fluid in its open part.
-  subroutine find_inertia(grid, merged, mass, flow, rho)
-    type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: merged
-    real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
-    type(flow_t), intent(in) :: flow
-    real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), parameter :: min_volume = 1.0e-3_wp   !! of a cell with a density of its own
-    integer :: k, m
+  !! cell lies, bodies thought away, so that still water stays still; inertia has it, too, but in
+  !! the cells at walls, for which `begin_balance` finds it.
+  subroutine copy_density(level, rho)
+    real(wp), intent(in), contiguous :: level(:, :, :)   !! [kg/m3]
+    real(wp), intent(inout), contiguous :: rho(:, :, :)
+    integer :: k
 
     !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      rho(:, :, k) = flow%rho(:, :, k)
+    do k = 1, size(rho, 3)
+      rho(:, :, k) = level(:, :, k)
     end do
-    do m = 1, merged%n
-      associate (c => merged%cell(:, m))
-        associate (fluid_volume => flow%fluid_volume(c(1), c(2), c(3)))
-          if (fluid_volume > min_volume*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/fluid_volume
-        end associate
-      end associate
-    end do
-  end subroutine find_inertia
+  end subroutine copy_density
 
   !> Stage 10: weight, old pressure, surface tension and surface stress, on cells and bodies. Cells
   !! at the surface and in gas get the first three after the faces.
@@ -265,10 +254,10 @@ contains
     associate (a => self%acceleration, balance => self%balance)
       call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
       call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
-      call store_change(grid, self%merged, dt, a%cell, balance%pushed)
+      call add_push(grid, self%merged, dt, a%cell, balance)
       call halo_exchange(a%cell, n_halo)
       call share_acceleration(grid, solid%aperture, self%rho, self%merged, a%cell)
-      call store_change(grid, self%merged, dt, a%cell, balance%gained)
+      call add_push(grid, self%merged, dt, a%cell, balance, taken=.true.)
     end associate
   end subroutine accelerations_of_groups
 
@@ -315,7 +304,7 @@ contains
       call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged, &
                          self%wall_speed)
       call predict_velocity(grid, self%rho, flow, self)
-      call to_means(grid, merged, self%at_start, flow%u)
+      call to_centres(grid, merged, self%at_start, flow%u, back=.true.)
       call fill_velocity_halo(grid, flow%u, layers=1)
       call follow_targets(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
@@ -388,8 +377,7 @@ contains
         call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
                               from_faces)
         self%total = self%total + from_faces
-        call force_of_walls(grid, solid, merged, bodies, self%at_start, dt, self%rho, balance, &
-                            from_walls)
+        call force_of_walls(grid, merged, bodies, self%at_start, dt, balance, from_walls)
         if (solve == 1) then
           self%lagged = from_walls
           if (.not. any(bodies%free)) exit

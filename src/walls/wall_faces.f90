@@ -10,7 +10,7 @@ module wall_faces_m
   use rigid_flux_m, only: nearest_arm, velocity_in_cell
   use mixture_m, only: face_mean
   use merged_cells_m, only: merged_cells_t
-  use wall_layer_m, only: slip_at
+  use wall_layer_m, only: scaled_to_wall, share_along
   use face_velocity_m, only: acceleration_t, rhie_chow_time, face_step
   implicit none
   private
@@ -68,19 +68,14 @@ contains
     end subroutine shorten
   end subroutine shorten_at_walls
 
-  !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
-  !! that of the cell to that of the wall, where the link through the face ends; the rest by the
-  !! layer along the wall, as with the small cell on the other side of the face.
-  !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
-  !! `solid%edge` goes to 1: the stream leaves the edge straight.
+  !> Faces beside a moving surface: between the velocity of the cell and that of the wall, where the
+  !! line through the face ends, as the layer along the wall has it. A wide open face before a cell
+  !! with an edge keeps the mean of its cells instead, as `solid%edge` goes to 1: the stream leaves
+  !! the edge straight.
   !!
   !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
-  !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
-  !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
-  !! smaller (measured: docs/decisions/coupling.md). Without viscosity the fluid slips past the
-  !! wall: taking the wall's whole velocity there makes the added mass wrong by some per cent. With
-  !! it the cell's whole velocity carries up to twice what flows along the wall, and friction is too
-  !! large (docs/decisions/cut_cells.md).
+  !! the mean of the two cells each layer of faces that the side crosses takes an impulse of about
+  !! rho A h (U - u) from the body, whatever grid and step (docs/decisions/coupling.md).
   !!
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
@@ -153,7 +148,8 @@ contains
       integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: velocity
-      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), near, along, gain
+      integer :: o(3)
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), r, along, gain
 
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
@@ -170,10 +166,12 @@ contains
         gain = dt*a%face(f(1), f(2), f(3), d)
         if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
-      near = near_wall(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
-      along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
-      velocity = u(d) + near*(along*(wall(d) - u(d)) &
-                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
+      r = middle_of_face(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
+      o = c + sense*unit_step(:, d)
+      along = 1.0_wp   ! free slip where there is fluid beyond the wall again
+      if (solid%inside(o(1), o(2), o(3)) /= 0) along = share_along(r, merged%slip(o(1), o(2), o(3)))
+      u = wall + scaled_to_wall(u - wall, n, along, r)
+      velocity = u(d) + gain
     end function seen_from
 
     !> Time for which the Rhie-Chow acceleration at a wall counts in liquid [s].
@@ -187,23 +185,12 @@ contains
       time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
     end function time_in_liquid
 
-    !> Slip along the wall at r times the distance of the cell, by the layer at the small cell o
-    !! beyond the face; free slip where there is fluid again.
-    pure function slip_beyond(o, r) result(s)
-      integer, intent(in) :: o(3)
-      real(wp), intent(in) :: r
-      real(wp) :: s
-
-      s = 1.0_wp
-      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(merged%slip(o(1), o(2), o(3)), r)
-    end function slip_beyond
-
-    !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
-    !! centre of the cell is.
-    pure function near_wall(theta, n, d, aperture) result(b)
+    !> r of the middle of the open part of the face: 0 at the wall, 1 as far as the centre of the
+    !! cell.
+    pure function middle_of_face(theta, n, d, aperture) result(r)
       real(wp), intent(in) :: theta, n(3), aperture   !! link [cells], normal, open share
       integer, intent(in) :: d                    !! direction of the link
-      real(wp) :: b
+      real(wp) :: r
       real(wp) :: cell, face   !! distances from the wall [spacings along the link]
 
       cell = theta*abs(n(d))
@@ -212,8 +199,8 @@ contains
       else
         face = 0.5_wp*aperture*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
       end if
-      b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
-    end function near_wall
+      r = max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
+    end function middle_of_face
 
     !> Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
     pure function spacing_across(n, d) result(ratio)

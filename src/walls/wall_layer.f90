@@ -16,8 +16,8 @@ module wall_layer_m
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: slip_at, layer_slip, along_share, find_slip, find_centres, to_centres, to_means
-  public :: find_wall_speeds, rough_viscosity
+  public :: scaled_to_wall, share_along, layer_slip, along_share, find_slip, find_centres
+  public :: to_centres, find_wall_speeds, rough_viscosity
 
   real(wp), parameter :: min_share = 1.0e-3_wp
     !! T_c of a centre on the wall: its velocity means nothing, the wall flux holds it
@@ -28,15 +28,24 @@ module wall_layer_m
 
 contains
 
-  !> S: share of the velocity of a cell along the wall that the fluid at r times its distance has
-  !! beyond the line to the wall.
-  elemental function slip_at(layer, r) result(slip)
-    real(wp), intent(in) :: layer   !! slip s of the layer, 0 to 1
-    real(wp), intent(in) :: r       !! distance from the wall over that of the cell, 0 to 1
-    real(wp) :: slip
+  !> A velocity seen from a wall of normal n, its part along the wall and that across it scaled.
+  pure function scaled_to_wall(v, n, along, across) result(scaled)
+    real(wp), intent(in) :: v(3), n(3)
+    real(wp), intent(in) :: along, across
+    real(wp) :: scaled(3)
 
-    slip = r*layer/max(r*layer + 1.0_wp - layer, tiny(1.0_wp))
-  end function slip_at
+    scaled = along*v + (across - along)*dot_product(n, v)*n
+  end function scaled_to_wall
+
+  !> T_t = r + (1 - r) S, S = r s/(r s + 1 - s): share of the velocity of a cell along the wall that
+  !! the fluid at r times its distance has.
+  elemental function share_along(r, layer) result(share)
+    real(wp), intent(in) :: r       !! distance from the wall over that of the cell, 0 to 1
+    real(wp), intent(in) :: layer   !! slip s of the layer, 0 to 1
+    real(wp) :: share
+
+    share = r + (1.0_wp - r)*r*layer/max(r*layer + 1.0_wp - layer, tiny(1.0_wp))
+  end function share_along
 
   !> s of a layer by the velocities of two cells: 0 if they are on a line to the wall or below it.
   elemental function layer_slip(ratio, distances) result(slip)
@@ -54,8 +63,8 @@ contains
     integer, intent(in) :: small, n
     real(wp) :: share
 
-    associate (c => merged%cell(:, small), nearer => merged%nearer(n, small))
-      share = 1.0_wp - nearer*(1.0_wp - slip_at(merged%slip(c(1), c(2), c(3)), 1.0_wp - nearer))
+    associate (c => merged%cell(:, small))
+      share = share_along(1.0_wp - merged%nearer(n, small), merged%slip(c(1), c(2), c(3)))
     end associate
   end function along_share
 
@@ -109,21 +118,13 @@ contains
 
     wall = velocity_at_wall(grid, merged, m, bodies)
     associate (n => merged%normal(:, m))
-      near = along_wall(u(c(1), c(2), c(3), :) - wall, n)
-      far = along_wall(u(behind(1), behind(2), behind(3), :) - wall, n)
+      near = scaled_to_wall(u(c(1), c(2), c(3), :) - wall, n, 1.0_wp, 0.0_wp)
+      far = scaled_to_wall(u(behind(1), behind(2), behind(3), :) - wall, n, 1.0_wp, 0.0_wp)
       further = dot_product(n, (behind - c)*grid%h)
     end associate
     slip = layer_slip(dot_product(near, far)/max(dot_product(far, far), tiny(1.0_wp)), &
                       distance/(distance + further))
   end function slip_by_two
-
-  !> Part of a velocity along a wall of normal n.
-  pure function along_wall(v, n) result(along)
-    real(wp), intent(in) :: v(3), n(3)
-    real(wp) :: along(3)
-
-    along = v - n*dot_product(n, v)
-  end function along_wall
 
   !> T_c of the own cut cells with their centre in the fluid (`merged%centre`), one elsewhere: share
   !! of the mean velocity of the fluid that the centre has, where viscosity acts, both seen from the
@@ -149,7 +150,7 @@ contains
       if (merged%middle(m) <= 0.0_wp) cycle
       slip = 0.0_wp
       weights = 0.0_wp
-      associate (c => merged%cell(:, m), n => merged%normal(:, m), r => merged%ratio(m))
+      associate (c => merged%cell(:, m), n => merged%normal(:, m))
         do d = 1, 3
           behind = c + nint(sign(1.0_wp, n(d)))*unit_step(:, d)
           if (.not. centre_in_fluid(grid, solid, behind)) cycle
@@ -159,53 +160,35 @@ contains
           slip = slip + weight*slip_by_two(grid, merged, m, bodies, u, c, behind, merged%middle(m))
           weights = weights + weight
         end do
-        slip = slip_at(min(max_slip, slip/max(weights, tiny(weights))), r)
-        merged%centre(m) = max(r + (1.0_wp - r)*slip, min_share)
       end associate
+      slip = min(max_slip, slip/max(weights, tiny(weights)))
+      merged%centre(m) = max(share_along(merged%ratio(m), slip), min_share)
     end do
   end subroutine find_centres
 
-  !> Mean velocities of the own wall cells become those at their centres, U_w + T_c (u - U_w).
-  subroutine to_centres(grid, merged, bodies, u)
+  !> Mean velocities of the own wall cells become those at their centres, U_w + T_c (u - U_w), or
+  !! back.
+  subroutine to_centres(grid, merged, bodies, u, back)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
-    type(rigid_motion_t), intent(in) :: bodies   !! the walls, as for `to_means`
+    type(rigid_motion_t), intent(in) :: bodies   !! the walls, the same there and back
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-
-    call stretch(grid, merged, bodies, merged%centre(:merged%n), u)
-  end subroutine to_centres
-
-  !> And back.
-  subroutine to_means(grid, merged, bodies, u)
-    type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: merged
-    type(rigid_motion_t), intent(in) :: bodies   !! the walls
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
-
-    call stretch(grid, merged, bodies, 1.0_wp/merged%centre(:merged%n), u)
-  end subroutine to_means
-
-  !> Velocities of the own wall cells, seen from the wall, times a factor each.
-  subroutine stretch(grid, merged, bodies, factor, u)
-    type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: merged
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: factor(:)   !! (wall cells)
-    real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp) :: wall(3)
+    logical, intent(in), optional :: back
+    real(wp) :: wall(3), factor
     integer :: m
 
-    !$omp parallel do private(wall) schedule(static)
+    !$omp parallel do private(wall, factor) schedule(static)
     do m = merged%n_small + 1, merged%n
       associate (c => merged%cell(:, m))
-        if (.not. grid%owns(c) .or. abs(factor(m) - 1.0_wp) <= 0.0_wp) cycle
+        if (.not. grid%owns(c) .or. abs(merged%centre(m) - 1.0_wp) <= 0.0_wp) cycle
+        factor = merged%centre(m)
+        if (present(back)) factor = 1.0_wp/factor
         wall = velocity_at_wall(grid, merged, m, bodies)
-        u(c(1), c(2), c(3), :) = wall + factor(m)*(u(c(1), c(2), c(3), :) - wall)
+        u(c(1), c(2), c(3), :) = wall + factor*(u(c(1), c(2), c(3), :) - wall)
       end associate
     end do
-  end subroutine stretch
+  end subroutine to_centres
 
   !> Speed of the fluid past the wall at either end of each line between centres that a surface
   !! cuts; 0 where the end is no own cell with its centre in the fluid. Taken before the forces of
