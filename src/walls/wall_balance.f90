@@ -74,8 +74,8 @@ contains
     end do
   end subroutine begin_balance
 
-  !> The walls of the own wall cells bear what the faces, whose mean acceleration is a, give the mass
-  !! that they move in dt; with `taken` less what the fluid takes by its acceleration a.
+  !> The wall of an own wall cell bears what the faces give the mass that they move in dt, at the
+  !! mean acceleration a; less what the fluid takes by an acceleration a, with `taken`.
   subroutine add_push(grid, merged, dt, a, self, taken)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
