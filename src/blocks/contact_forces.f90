@@ -1,10 +1,10 @@
-!> Forces of all touches on their partners, and the tangential springs that remember them.
+!> Forces of all contact points, and the tangential springs that remember them.
 module contact_forces_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
-  use touching_m, only: touching_t
+  use contact_detection_m, only: contact_detection_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_apart
@@ -26,12 +26,12 @@ module contact_forces_m
     integer :: substeps = 0
     integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
-    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
-    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m],
+    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a contact point [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m],
     real(wp) :: deepest = 0.0_wp        !! and over the smallest edge of the smaller block [-]
   end type contact_report_t
 
-  !> What the touches of one group do along their normals.
+  !> What the contact points of one group do along their normals.
   type :: push_t
     real(wp) :: force = 0.0_wp          !! sum [N]
     real(wp) :: eta = 0.0_wp            !! largest damping [N s/m]
@@ -41,13 +41,13 @@ module contact_forces_m
 contains
 
   !> Give each group its spring: that in memory turned into the present plane, or a new one.
-  subroutine match_springs(touching, before, springs)
-    type(touching_t), intent(inout) :: touching
+  subroutine match_springs(detected, before, springs)
+    type(contact_detection_t), intent(inout) :: detected
     type(springs_t), intent(inout) :: before   !! work: springs of the substep before
     type(springs_t), intent(inout) :: springs
     integer :: g, m, t
 
-    associate (touches => touching%touches, groups => touching%groups, old => before, &
+    associate (points => detected%points, groups => detected%groups, old => before, &
       new => springs)
       call reserve_springs(new%n, old)
       old%n = new%n
@@ -60,9 +60,9 @@ contains
       m = 1
       do g = 1, groups%n
         t = groups%first(g)
-        new%a(g) = touches%item(t)%a
-        new%b(g) = touches%item(t)%b
-        new%key(g) = touches%item(t)%key
+        new%a(g) = points%item(t)%a
+        new%b(g) = points%item(t)%b
+        new%key(g) = points%item(t)%key
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
@@ -89,17 +89,17 @@ contains
   end function turned_into_plane
 
   !> Let the springs follow the present tangential velocities for a time dt.
-  pure subroutine stretch_springs(dt, touching, springs)
+  pure subroutine stretch_springs(dt, detected, springs)
     real(wp), intent(in) :: dt   !! [s]
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(springs_t), intent(inout) :: springs
     type(motion_t) :: motion
     real(wp) :: v(3)
     integer :: g
 
-    associate (groups => touching%groups)
+    associate (groups => detected%groups)
       do g = 1, groups%n
-        if (begins_pair(springs, g)) motion = motion_between(touching%partners, springs%a(g), &
+        if (begins_pair(springs, g)) motion = motion_between(detected%partners, springs%a(g), &
                                                              springs%b(g))
         v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
         springs%xi(:, g) = springs%xi(:, g) &
@@ -112,9 +112,9 @@ contains
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
-  pure subroutine sum_forces(dt, touching, springs, loads, report)
+  pure subroutine sum_forces(dt, detected, springs, loads, report)
     real(wp), intent(in) :: dt   !! [s]
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(springs_t), intent(inout) :: springs
     type(loads_t), intent(inout) :: loads
     type(contact_report_t), intent(inout) :: report
@@ -124,17 +124,17 @@ contains
 
     loads%force(:, :0) = 0.0_wp
     loads%torque(:, :0) = 0.0_wp
-    do g = 1, touching%acting%n
-      loads%force(:, touching%acting%body(g)) = 0.0_wp
-      loads%torque(:, touching%acting%body(g)) = 0.0_wp
+    do g = 1, detected%acting%n
+      loads%force(:, detected%acting%body(g)) = 0.0_wp
+      loads%torque(:, detected%acting%body(g)) = 0.0_wp
     end do
-    associate (n => touching%groups%n)
+    associate (n => detected%groups%n)
       do g = 1, n
         if (begins_pair(springs, g)) then
-          motion = motion_between(touching%partners, springs%a(g), springs%b(g))
+          motion = motion_between(detected%partners, springs%a(g), springs%b(g))
           wrench = wrench_t()
         end if
-        call push_group(g, dt, motion, touching, springs, wrench, report)
+        call push_group(g, dt, motion, detected, springs, wrench, report)
         if (g < n) then
           if (.not. begins_pair(springs, g + 1)) cycle
         end if
@@ -149,11 +149,11 @@ contains
   end subroutine sum_forces
 
   !> Normal and tangential forces of one group.
-  pure subroutine push_group(g, dt, motion, touching, springs, wrench, report)
+  pure subroutine push_group(g, dt, motion, detected, springs, wrench, report)
     integer, intent(in) :: g
     real(wp), intent(in) :: dt   !! [s]
     type(motion_t), intent(in) :: motion
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(springs_t), intent(inout) :: springs
     type(wrench_t), intent(inout) :: wrench
     type(contact_report_t), intent(inout) :: report
@@ -161,22 +161,22 @@ contains
     real(wp) :: v_n, opening, part, force_n, decay
     integer :: t
 
-    associate (touches => touching%touches, groups => touching%groups, r => touching%response, &
-      law => touching%law)
+    associate (points => detected%points, groups => detected%groups, r => detected%response, &
+      law => detected%law)
       decay = 0.0_wp
       do t = groups%first(g), groups%first(g + 1) - 1
-        associate (touch => touches%item(t))
-          v_n = dot_product(relative_velocity(motion, touch%arm_a, touch%arm_b), touch%normal)
+        associate (point => points%item(t))
+          v_n = dot_product(relative_velocity(motion, point%arm_a, point%arm_b), point%normal)
           part = 1.0_wp
-          if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
-          opening = opening_speed(touch, law%gamma_n, motion)
+          if (groups%new(g)) part = damped_part(point%depth, v_n, dt)
+          opening = opening_speed(point, law%gamma_n, motion)
           force_n = normal_force(r%elastic(t), part*r%eta(t), opening) &
             /slowing_of(part*r%decay(t)*dt)
-          call push_apart(touch, law%gamma_n, force_n, wrench)
-          report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
-          report%overlap_max = max(report%overlap_max, touch%depth)
-          report%deepest = max(report%deepest, give_share*touch%depth &
-            /min(touching%partners%give(touch%a), touching%partners%give(touch%b)))
+          call push_apart(point, law%gamma_n, force_n, wrench)
+          report%courant_max = max(report%courant_max, abs(v_n)*dt/point%length)
+          report%overlap_max = max(report%overlap_max, point%depth)
+          report%deepest = max(report%deepest, give_share*point%depth &
+            /min(detected%partners%give(point%a), detected%partners%give(point%b)))
         end associate
         push%force = push%force + force_n
         decay = max(decay, r%decay(t))
@@ -184,7 +184,7 @@ contains
       end do
     end associate
     push%slowing = slowing_of(decay*dt)
-    call rub(g, push, motion, touching, springs, wrench)
+    call rub(g, push, motion, detected, springs, wrench)
   end subroutine push_group
 
   !> Force of a dashpot at the velocity of the start of a substep over that which acts.
@@ -199,9 +199,10 @@ contains
     s = max(1.0_wp + d, 2*d)
   end function slowing_of
 
-  !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
+  !> Time since a new contact point began up to the end of the substep, over the substep: 1/2 to
+  !! 3/2.
   !!
-  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a
+  !! Damping sets in with a jump. A contact point is seen first when bodies touch in the middle of a
   !! substep, and may have begun up to a substep before.
   pure function damped_part(depth, v_n, dt) result(part)
     real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
@@ -215,22 +216,22 @@ contains
   !!
   !! The force of the spring alone is limited too: while it slips, the spring holds what friction
   !! lets it hold, and the dashpot puts no energy into it.
-  pure subroutine rub(g, push, motion, touching, springs, wrench)
+  pure subroutine rub(g, push, motion, detected, springs, wrench)
     integer, intent(in) :: g
     type(push_t), intent(in) :: push   !! along the normal
     type(motion_t), intent(in) :: motion
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(springs_t), intent(inout) :: springs
     type(wrench_t), intent(inout) :: wrench
     real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
     integer :: t
 
-    associate (groups => touching%groups, law => touching%law)
+    associate (groups => detected%groups, law => detected%law)
       t = groups%first(g)
-      k_n = touching%response%k(t)
-      k = law%tangential_constant(k_n, touching%touches%item(t)%weight)
+      k_n = detected%response%k(t)
+      k = law%tangential_constant(k_n, detected%points%item(t)%weight)
       springs%k(g) = k
-      eta = law%tangential_damping(touching%touches%item(t)%weight, push%eta, k, k_n)
+      eta = law%tangential_damping(detected%points%item(t)%weight, push%eta, k, k_n)
       bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
@@ -248,23 +249,23 @@ contains
   end subroutine rub
 
   !> Energy in the normal springs at the present poses and in the tangential springs [J].
-  pure function elastic_energy(touching, springs, rest) result(energy)
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(in) :: springs, rest   !! of touches at work, of those at rest
+  pure function elastic_energy(detected, springs, rest) result(energy)
+    type(contact_detection_t), intent(in) :: detected
+    type(springs_t), intent(in) :: springs, rest   !! of contact points at work, of those at rest
     real(wp) :: energy
     integer :: t, g
 
     energy = 0.0_wp
-    do t = 1, touching%touches%n
-      energy = energy + touching%response%energy(t)
+    do t = 1, detected%points%n
+      energy = energy + detected%response%energy(t)
     end do
     do g = 1, springs%n
-      energy = energy + stored_energy(springs%k(g), touching%law%gamma_t, norm(springs%xi(:, g)))
+      energy = energy + stored_energy(springs%k(g), detected%law%gamma_t, norm(springs%xi(:, g)))
     end do
     energy = energy + energy_in_memory(rest)
   end function elastic_energy
 
-  !> Energy of touches whose energy is remembered [J].
+  !> Energy of contact points whose energy is remembered [J].
   pure function energy_in_memory(springs) result(energy)
     type(springs_t), intent(in) :: springs
     real(wp) :: energy

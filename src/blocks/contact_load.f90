@@ -1,4 +1,4 @@
-!> What touches have to carry at rest, and how far they give way.
+!> Load of contact points at rest, and how far they give way.
 module contact_load_m
   use kinds_m, only: wp
   use mass_properties_m, only: surface_area
@@ -12,7 +12,7 @@ module contact_load_m
 
 contains
 
-  !> Load of a touch that carries a block.
+  !> Load of a contact point that carries a block.
   elemental function load_of(mass, gravity) result(load)
     real(wp), intent(in) :: mass      !! of the block [kg]
     real(wp), intent(in) :: gravity   !! >= 0 [m/s2]
@@ -22,8 +22,8 @@ contains
     load%weight = mass*gravity
   end function load_of
 
-  !> Depth at which touches of a block harden: a quarter of its mean thickness, twice the volume
-  !! over the surface [m].
+  !> Depth at which contact points of a block harden: a quarter of its mean thickness, twice the
+  !! volume over the surface [m].
   pure function hard_depth(shape) result(hard)
     type(shape_t), intent(in) :: shape
     real(wp) :: hard
@@ -31,11 +31,11 @@ contains
     hard = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
   end function hard_depth
 
-  !> Depth at which the spring of a touch of weight one holds a force, by bisection [m].
+  !> Depth at which the spring of a contact point of weight one holds a force, by bisection [m].
   pure function depth_at_rest(law, k, hard, force) result(depth)
     class(contact_law_t), intent(in) :: law
     real(wp), intent(in) :: k       !! of the law, `normal_constant` [N/m^gamma]
-    real(wp), intent(in) :: hard    !! depth d_h where touches harden, > 0 [m]
+    real(wp), intent(in) :: hard    !! depth d_h where contacts harden, > 0 [m]
     real(wp), intent(in) :: force   !! >= 0 [N]
     real(wp) :: depth
     integer, parameter :: halvings = 60

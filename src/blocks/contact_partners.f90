@@ -18,9 +18,10 @@ module contact_partners_m
   type :: partners_t
     real(wp) :: gravity = 0.0_wp                       !! [m/s2]
     real(wp), allocatable :: v(:, :), omega(:, :)      !! (3, partners) [m/s], [rad/s]
-    real(wp), allocatable :: hard(:)                   !! (partners) depth where touches harden [m]
+    real(wp), allocatable :: hard(:)                   !! (partners) depth where contacts harden [m]
     real(wp), allocatable :: give(:)                   !! (partners) largest overlap at rest [m]
-    type(load_t) :: load                               !! of a touch under the heaviest free body
+    type(load_t) :: load
+      !! of a contact point under the heaviest free body
     real(wp), allocatable :: inverse_mass(:)           !! (partners) 0: walls, fixed bodies [1/kg]
     real(wp), allocatable :: inverse_inertia(:, :, :)  !! (3, 3, partners) likewise [1/(kg m2)]
   end type partners_t
@@ -37,7 +38,7 @@ module contact_partners_m
     real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp   !! [rad/s]
   end type motion_t
 
-  !> What a touch does to its two partners.
+  !> What a contact point does to its two partners.
   type :: wrench_t
     real(wp) :: force(3) = 0.0_wp                            !! on a; the opposite on b [N]
     real(wp) :: torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp   !! about their centres [N m]
@@ -45,8 +46,8 @@ module contact_partners_m
 
 contains
 
-  !> Room for the walls and the bodies, the depth at which touches of each harden, and the overlap
-  !! that each may have at rest, a share of its smallest edge.
+  !> Room for the walls and the bodies, the depth at which contact points of each harden, and the
+  !! overlap that each may have at rest, a share of its smallest edge.
   pure subroutine partners_init(blocks, partners)
     type(blocks_t), intent(in) :: blocks
     type(partners_t), intent(out) :: partners

@@ -1,4 +1,5 @@
-!> Touches of the contact spheres of the T-type model with one another, the plane walls and the bed.
+!> Contact points of the contact spheres of the T-type model with one another, the plane walls and
+!! the bed.
 !!
 !! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved so far
 !! that others may touch. What comes out, and its order, do not depend on when the list was made.
@@ -12,10 +13,10 @@ module contact_spheres_m
   use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
   use surface_search_m, only: found_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
-  use touches_m, only: touch_t, touches_t, add_touch
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
   implicit none
   private
-  public :: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  public :: contact_spheres_t, contact_spheres_init, find_sphere_points
 
   !> The spheres of a shape in bins, to find those near a point.
   type :: sphere_set_t
@@ -93,14 +94,14 @@ contains
     self%skin = 2*self%free_way + self%clear
   end subroutine contact_spheres_init
 
-  !> All touches at the present poses, but for those between bodies that are still, and those
+  !> All contact points at the present poses, but for those between bodies that are still, and those
   !! (depth <= 0) that may come within a time `ahead`.
-  subroutine find_sphere_touches(walls, blocks, ahead, self, touches)
+  subroutine find_sphere_points(walls, blocks, ahead, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_spheres_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     integer :: p, s, b
 
     do b = 1, blocks%n
@@ -114,21 +115,21 @@ contains
         self%centre(:, s) = blocks%x(:, b) + r(:, 1)*c(1) + r(:, 2)*c(2) + r(:, 3)*c(3)
       end associate
     end do
-    touches%n = 0
+    points%n = 0
     do p = 1, self%list%n_pairs
       if (blocks%still(self%list%a(p))) then
         if (self%list%b(p) < 0) cycle
         if (blocks%still(self%list%b(p))) cycle
       end if
       if (self%list%b(p) == bed_partner) then
-        call touch_bed(walls%bed, blocks, self, p, way(self, blocks, p, ahead), touches)
+        call add_bed_points(walls%bed, blocks, self, p, way(self, blocks, p, ahead), points)
       else if (self%list%b(p) < 0) then
-        call touch_wall(walls, blocks, self, p, way(self, blocks, p, ahead), touches)
+        call add_wall_points(walls, blocks, self, p, way(self, blocks, p, ahead), points)
       else
-        call touch_body(blocks, self, p, way(self, blocks, p, ahead), touches)
+        call add_body_points(blocks, self, p, way(self, blocks, p, ahead), points)
       end if
     end do
-  end subroutine find_sphere_touches
+  end subroutine find_sphere_points
 
   !> The way by which two points of pair p may come nearer within a time [m].
   pure function way(self, blocks, p, time)
@@ -365,61 +366,61 @@ contains
     end associate
   end subroutine list_sphere
 
-  !> Touches of pair p, a body and a wall. The contact lies on the wall.
-  subroutine touch_wall(walls, blocks, self, p, gap, touches)
+  !> Contact points of pair p, a body and a wall. The contact lies on the wall.
+  subroutine add_wall_points(walls, blocks, self, p, gap, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
     integer :: c, s, w
 
     w = findloc_wall(walls, self%list%b(p))
-    touch%a = self%list%a(p)
-    touch%b = self%list%b(p)
-    touch%normal = walls%normal(:, w)
+    point%a = self%list%a(p)
+    point%b = self%list%b(p)
+    point%normal = walls%normal(:, w)
     do c = self%list%first(p), self%list%first(p + 1) - 1
       s = self%list%i(c)
-      touch%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
+      point%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
         + self%radius(s)
-      if (touch%depth <= -gap) cycle
-      touch%key = self%sphere(s)
-      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) &
-        + (self%radius(s) - touch%depth)*walls%normal(:, w)
-      touch%length = 2*self%radius(s)
-      call add_touch(touch, touches)
+      if (point%depth <= -gap) cycle
+      point%key = self%sphere(s)
+      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) &
+        + (self%radius(s) - point%depth)*walls%normal(:, w)
+      point%length = 2*self%radius(s)
+      call add_point(point, points)
     end do
-  end subroutine touch_wall
+  end subroutine add_wall_points
 
-  !> Touches of pair p, a body and the bed, each sphere at the nearest place of the bed.
-  subroutine touch_bed(bed, blocks, self, p, gap, touches)
+  !> Contact points of pair p, a body and the bed, each sphere at the nearest place of the bed.
+  subroutine add_bed_points(bed, blocks, self, p, gap, points)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(inout) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
     real(wp) :: distance, outward(3)
     integer :: c, s
 
-    touch%a = self%list%a(p)
-    touch%b = bed_partner
+    point%a = self%list%a(p)
+    point%b = bed_partner
     do c = self%list%first(p), self%list%first(p + 1) - 1
       s = self%list%i(c)
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
         2*self%radius(s) + gap, self%found, distance, outward)
       if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
-      touch%key = self%sphere(s)
-      touch%normal = -outward
-      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) - distance*outward
-      touch%depth = self%radius(s) - distance
-      touch%length = 2*self%radius(s)
-      call add_touch(touch, touches)
+      point%key = self%sphere(s)
+      point%normal = -outward
+      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) - distance*outward
+      point%depth = self%radius(s) - distance
+      point%length = 2*self%radius(s)
+      call add_point(point, points)
     end do
-  end subroutine touch_bed
+  end subroutine add_bed_points
 
   !> Place of a wall in the list of walls.
   pure function findloc_wall(walls, number) result(w)
@@ -432,19 +433,19 @@ contains
     end do
   end function findloc_wall
 
-  !> Touches of pair p of bodies. The contact lies in the middle of the overlap.
-  subroutine touch_body(blocks, self, p, gap, touches)
+  !> Contact points of pair p of bodies. The contact lies in the middle of the overlap.
+  subroutine add_body_points(blocks, self, p, gap, points)
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
     real(wp) :: d(3), shift(3), square, distance, reach
     integer :: c, i, j
 
-    touch%a = self%list%a(p)
-    touch%b = self%list%b(p)
+    point%a = self%list%a(p)
+    point%b = self%list%b(p)
     shift = self%list%shift(:, p)
     do c = self%list%first(p), self%list%first(p + 1) - 1
       i = self%list%i(c)
@@ -454,15 +455,15 @@ contains
       square = dot_product(d, d)
       if (square >= (reach + gap)**2) cycle
       distance = sqrt(square)
-      touch%key = self%sphere(i)
-      touch%normal = d/max(distance, tiny(1.0_wp))
-      touch%depth = reach - distance
-      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*touch%depth)*touch%normal
-      touch%arm_a = d - blocks%x(:, touch%a)
-      touch%arm_b = d - (blocks%x(:, touch%b) + shift)
-      touch%length = 2*min(self%radius(i), self%radius(j))
-      call add_touch(touch, touches)
+      point%key = self%sphere(i)
+      point%normal = d/max(distance, tiny(1.0_wp))
+      point%depth = reach - distance
+      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*point%depth)*point%normal
+      point%arm_a = d - blocks%x(:, point%a)
+      point%arm_b = d - (blocks%x(:, point%b) + shift)
+      point%length = 2*min(self%radius(i), self%radius(j))
+      call add_point(point, points)
     end do
-  end subroutine touch_body
+  end subroutine add_body_points
 
 end module contact_spheres_m

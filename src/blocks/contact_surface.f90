@@ -1,4 +1,4 @@
-!> Touches of the exact surfaces of the blocks with one another, the plane walls and the bed.
+!> Contact points of the exact surfaces of the blocks with one another, the plane walls and the bed.
 !!
 !! A probe of one body (see `surface_features_m`) touches where it is inside the other; its depth is
 !! its distance from the surface of the other. A sharp edge touches an edge of the other where the
@@ -10,7 +10,8 @@
 !! another by a skin (`near_features_m`), and a short one of those that may touch soon
 !! (`short_list_m`). What comes out, and its order, do not depend on when the lists were made.
 !!
-!! With a margin (impulses) only what comes near by its own motion counts as a touch to come.
+!! With a margin (impulses) only what comes near by its own motion counts as a contact point to
+!! come.
 module contact_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
@@ -19,7 +20,7 @@ module contact_surface_m
   use walls_m, only: walls_t
   use bed_m, only: bed_t, bed_partner, bed_place
   use neighbours_m, only: pair_list_t, near_pairs
-  use touches_m, only: touch_t, touches_t, add_touch
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
@@ -28,7 +29,7 @@ module contact_surface_m
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
   private
-  public :: contact_surface_t, contact_surface_init, find_surface_touches, cover_way, renew_pairs
+  public :: contact_surface_t, contact_surface_init, find_surface_points, cover_way, renew_pairs
 
   !> What may touch of a pair of bodies a > b, or of body a and the bed.
   type :: pair_t
@@ -104,14 +105,14 @@ contains
     self%wide_skin = max(wide_share*maxval(self%reach), 2*way)
   end subroutine cover_way
 
-  !> All touches at the present poses, but for those between bodies that are still, and those
+  !> All contact points at the present poses, but for those between bodies that are still, and those
   !! (depth <= 0) that may come within a time `ahead`.
-  subroutine find_surface_touches(walls, blocks, ahead, self, touches)
+  subroutine find_surface_points(walls, blocks, ahead, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: speed, gap
     integer :: a, b, p, w
 
@@ -122,16 +123,16 @@ contains
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
-    touches%n = 0
+    points%n = 0
     p = 1
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
         speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
         gap = ahead*speed + self%search%margin
-        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, speed, ahead, self, touches)
+        if (walls%bed%there) call add_bed_points(walls%bed, blocks, a, speed, ahead, self, points)
         do w = 1, walls%n
-          call touch_wall(walls, blocks, a, w, gap, self, touches)
+          call add_wall_points(walls, blocks, a, w, gap, self, points)
         end do
       end if
       do while (p <= self%near%n)
@@ -139,12 +140,12 @@ contains
         b = self%near%b(p)
         if (.not. ((blocks%fixed(a) .and. blocks%fixed(b)) &
                    .or. (blocks%still(a) .and. blocks%still(b)))) then
-          call touch_pair(blocks, ahead, self%slot(p), self, touches)
+          call add_pair_points(blocks, ahead, self%slot(p), self, points)
         end if
         p = p + 1
       end do
     end do
-  end subroutine find_surface_touches
+  end subroutine find_surface_points
 
   !> Renew the list of pairs where it no longer holds.
   subroutine renew_pairs(walls, blocks, self)
@@ -272,14 +273,14 @@ contains
     self%taken(m + 1:) = .false.
   end subroutine ensure_pairs
 
-  !> Touches of body a and wall w: its corners, or its lowest point where it is a sphere.
-  subroutine touch_wall(walls, blocks, a, w, gap, self, touches)
+  !> Contact points of body a and wall w: its corners, or its lowest point where it is a sphere.
+  subroutine add_wall_points(walls, blocks, a, w, gap, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, w
-    real(wp), intent(in) :: gap     !! still taken as a touch [m]
+    real(wp), intent(in) :: gap     !! still taken as a contact point [m]
     type(contact_surface_t), intent(in) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: above, n(3), depth, arm(3)
     integer :: i
 
@@ -289,30 +290,30 @@ contains
       n = matmul(walls%normal(:, w), turn)
       if (surface%ball > 0.0_wp) then
         arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
-        call add_touch(touch_t(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
-          walls%normal(:, w), surface%ball - above, 1.0_wp, surface%length), touches)
+        call add_point(contact_point_t(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), surface%ball - above, 1.0_wp, surface%length), points)
         return
       end if
       do i = 1, surface%n_corners
         depth = dot_product(n, surface%probe(:, i)) - above
         if (depth <= -gap) cycle
         arm = matmul(turn, surface%probe(:, i))
-        call add_touch(touch_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
-          walls%normal(:, w), depth, surface%weight(i), surface%length), touches)
+        call add_point(contact_point_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), depth, surface%weight(i), surface%length), points)
       end do
     end associate
-  end subroutine touch_wall
+  end subroutine add_wall_points
 
-  !> Touches of body a and the bed: corners of the bed, corners of the body, crossing edges. The
-  !! points inside the faces of a body do not touch it: as on a wall, some corner always does.
-  subroutine touch_bed(bed, blocks, a, speed, ahead, self, touches)
+  !> Contact points of body a and the bed: corners of the bed, corners of the body, crossing edges.
+  !! The points inside the faces of a body do not touch it: as on a wall, some corner always does.
+  subroutine add_bed_points(bed, blocks, a, speed, ahead, self, points)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     real(wp), intent(in) :: speed   !! of its points, at most [m/s]
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(meeting_t) :: now
@@ -328,17 +329,17 @@ contains
     now%gap = ahead*speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    call touch_features(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
-      self%with_bed(a), touches, bed)
-  end subroutine touch_bed
+    call add_feature_points(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
+      self%with_bed(a), points, bed)
+  end subroutine add_bed_points
 
-  !> Touches of a listed pair of bodies.
-  subroutine touch_pair(blocks, ahead, slot, self, touches)
+  !> Contact points of a listed pair of bodies.
+  subroutine add_pair_points(blocks, ahead, slot, self, points)
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead                !! [s]
     integer, intent(in) :: slot                  !! place of the pair
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(meeting_t) :: now
     integer :: a, b
 
@@ -359,22 +360,22 @@ contains
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
-        call touch_balls(now, surface_a, surface_b, self%pairs(slot), touches)
+        call add_ball_point(now, surface_a, surface_b, self%pairs(slot), points)
       else
-        call touch_features(surface_a, surface_b, self%search, now, self%pairs(slot), touches)
+        call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(slot), points)
       end if
     end associate
-  end subroutine touch_pair
+  end subroutine add_pair_points
 
-  !> Touches of a pair of bodies, or of body a and the bed: probes of b, probes of a, crossing
-  !! edges. They come from the short list of the pair; this and the lists it comes from are renewed
-  !! first where they no longer hold.
-  subroutine touch_features(surface_a, surface_b, search, now, pair, touches, bed)
+  !> Contact points of a pair of bodies, or of body a and the bed: probes of b, probes of a,
+  !! crossing edges. They come from the short list of the pair; this and the lists it comes from are
+  !! renewed first where they no longer hold.
+  subroutine add_feature_points(surface_a, surface_b, search, now, pair, points, bed)
     type(surface_t), intent(in) :: surface_a, surface_b
     type(search_t), intent(inout) :: search
     type(meeting_t), intent(inout) :: now
     type(pair_t), intent(inout) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(bed_t), intent(in), optional :: bed  !! where it is b
     real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
     real(wp) :: way
@@ -397,17 +398,17 @@ contains
       call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
       if (n_chosen(pair%close) == 0) return
     end if
-    call touch_probes(.false., now, surface_b, surface_a, pair, touches)
-    call touch_probes(.true., now, surface_a, surface_b, pair, touches)
-    call touch_edges(now, surface_a, surface_b, pair, touches)
-  end subroutine touch_features
+    call add_probe_points(.false., now, surface_b, surface_a, pair, points)
+    call add_probe_points(.true., now, surface_a, surface_b, pair, points)
+    call add_edge_points(now, surface_a, surface_b, pair, points)
+  end subroutine add_feature_points
 
-  !> The one touch of two spheres.
-  subroutine touch_balls(now, surface_a, surface_b, pair, touches)
+  !> The one contact point of two spheres.
+  subroutine add_ball_point(now, surface_a, surface_b, pair, points)
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: apart, depth, normal(3), arm(3)
 
     apart = norm(now%to_b)
@@ -415,25 +416,26 @@ contains
     if (depth <= -now%gap) return
     normal = now%to_b/max(apart, tiny(1.0_wp))
     arm = (surface_a%ball - 0.5_wp*depth)*normal
-    call add_touch(touch_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
-      min(surface_a%length, surface_b%length)), touches)
-  end subroutine touch_balls
+    call add_point(contact_point_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
+      min(surface_a%length, surface_b%length)), points)
+  end subroutine add_ball_point
 
-  !> Touches of the chosen probes of one body (the guest) with the surface of the other (the host).
-  subroutine touch_probes(guest_is_a, now, guest, host, pair, touches)
+  !> Contact points of the chosen probes of one body (the guest) with the surface of the other (the
+  !! host).
+  subroutine add_probe_points(guest_is_a, now, guest, host, pair, points)
     logical, intent(in) :: guest_is_a
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: guest, host
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(view_t) :: view                      ! of the guest, host axes
-    type(touch_t) :: touch
+    type(contact_point_t) :: point
     real(wp) :: turn_host(3, 3), place(3), apart, outward(3), arm(3)
     integer :: c, m, n, i, edges, next
 
-    touch%a = pair%a
-    touch%b = pair%b
-    touch%length = min(guest%length, host%length)
+    point%a = pair%a
+    point%b = pair%b
+    point%length = min(guest%length, host%length)
     if (guest_is_a) then
       view = now%a_in_b
       turn_host = now%turn_b
@@ -456,36 +458,36 @@ contains
         call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
           apart, outward)
       end associate
-      touch%depth = guest%ball - apart
-      if (touch%depth <= -now%gap) cycle
-      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*touch%depth)*outward)
+      point%depth = guest%ball - apart
+      if (point%depth <= -now%gap) cycle
+      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
       outward = matmul(turn_host, outward)
-      touch%weight = guest%weight(i)
+      point%weight = guest%weight(i)
       if (guest_is_a) then
-        touch%key = i
-        touch%arm_a = arm + now%to_b
-        touch%arm_b = arm
-        touch%normal = -outward
+        point%key = i
+        point%arm_a = arm + now%to_b
+        point%arm_b = arm
+        point%normal = -outward
       else
-        touch%key = i - size(guest%weight) - 1
-        touch%arm_a = arm
-        touch%arm_b = arm - now%to_b
-        touch%normal = outward
+        point%key = i - size(guest%weight) - 1
+        point%arm_a = arm
+        point%arm_b = arm - now%to_b
+        point%normal = outward
       end if
-      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
-      call add_touch(touch, touches)
+      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
+      call add_point(point, points)
     end do
-  end subroutine touch_probes
+  end subroutine add_probe_points
 
-  !> Touches of the chosen pairs of edges that cross.
-  subroutine touch_edges(now, surface_a, surface_b, pair, touches)
+  !> Contact points of the chosen pairs of edges that cross.
+  subroutine add_edge_points(now, surface_a, surface_b, pair, points)
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(edge_t) :: guest
     type(crossing_t) :: crossing
-    type(touch_t) :: touch
+    type(contact_point_t) :: point
     real(wp) :: arm(3), with_shift(3), with_turn(3)
     integer :: m, i, j, last
 
@@ -495,24 +497,24 @@ contains
       j = pair%close%item(m + 1)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      touch = touch_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, other=j, &
+      point = contact_point_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, other=j, &
         length=min(surface_a%length, surface_b%length))
-      call cross_edges(guest, surface_b%edge(j), -now%gap, touch%length, crossing)
+      call cross_edges(guest, surface_b%edge(j), -now%gap, point%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle
       arm = matmul(now%turn_b, crossing%place)
-      touch%arm_a = arm + now%to_b
-      touch%arm_b = arm
-      touch%normal = matmul(now%turn_b, crossing%normal)
-      touch%depth = crossing%depth
-      touch%weight = crossing%weight
-      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
+      point%arm_a = arm + now%to_b
+      point%arm_b = arm
+      point%normal = matmul(now%turn_b, crossing%normal)
+      point%depth = crossing%depth
+      point%weight = crossing%weight
+      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
       if (crossing%weight < 1.0_wp .and. crossing%depth > 0.0_wp) then
         call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
-        touch%weight_shift = matmul(now%turn_b, with_shift)
-        touch%weight_turn = matmul(now%turn_b, with_turn)
+        point%weight_shift = matmul(now%turn_b, with_shift)
+        point%weight_turn = matmul(now%turn_b, with_turn)
       end if
-      call add_touch(touch, touches)
+      call add_point(point, points)
     end do
-  end subroutine touch_edges
+  end subroutine add_edge_points
 
 end module contact_surface_m

@@ -5,11 +5,11 @@ module deep_overlaps_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
-  use touches_m, only: touches_t
+  use contact_points_m, only: contact_points_t
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_touches
+  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_points
   public :: size_of_pair, warn_of_overlaps, overlap_fault, reported_share
 
   real(wp), parameter :: reported_share = 0.05_wp   !! overlap over size to report a body
@@ -81,17 +81,17 @@ contains
     deep%partner(body) = partner
   end subroutine keep_deepest
 
-  !> Note the overlaps of touches: of contact spheres, where the true shapes overlap at rest.
-  pure subroutine store_touches(touches, deep)
-    type(touches_t), intent(in) :: touches
+  !> Note the overlaps of contact points: of contact spheres, where the true shapes overlap at rest.
+  pure subroutine store_points(points, deep)
+    type(contact_points_t), intent(in) :: points
     type(deep_overlaps_t), intent(inout) :: deep
     integer :: t
 
     call forget_overlaps(deep)
-    do t = 1, touches%n
-      call store_overlap(touches%item(t)%a, touches%item(t)%b, touches%item(t)%depth, deep)
+    do t = 1, points%n
+      call store_overlap(points%item(t)%a, points%item(t)%b, points%item(t)%depth, deep)
     end do
-  end subroutine store_touches
+  end subroutine store_points
 
   !> Warn once of each body that reaches deep into another one, a wall or the bed, or into which one
   !! reaches.

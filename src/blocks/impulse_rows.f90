@@ -1,16 +1,16 @@
-!> The touches of one contact step as constraints: what is solved for the impulses, and what is
-!! remembered of them.
+!> The contact points of one contact step as constraints: what is solved for the impulses, and what
+!! is remembered of them.
 !!
-!! A row is a touch that is there or may come in the step. Rows of one pair of partners stand
-!! together. Pairs have colours: those of one colour share no body that moves, so that the order of
-!! their solution does not matter, nor the number of threads.
+!! A row is a contact point that is there or may come in the step. Rows of one pair of partners
+!! stand together. Pairs have colours: those of one colour share no body that moves, so that the
+!! order of their solution does not matter, nor the number of threads.
 module impulse_rows_m
   use kinds_m, only: wp, i8, pi
   use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_partner
-  use touches_m, only: touch_t, touches_t
+  use contact_points_m, only: contact_point_t, contact_points_t
   use springs_m, only: springs_t, reserve_springs, comes_before
   use contact_partners_m, only: partners_t
   use contact_law_m, only: contact_law_t
@@ -18,7 +18,7 @@ module impulse_rows_m
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
 
-  !> One touch: its frame, the masses it works on, and its impulse, on partner b.
+  !> One contact point: its frame, the masses it works on, and its impulse, on partner b.
   type :: row_t
     real(wp) :: n(3) = 0.0_wp, e1(3) = 0.0_wp, e2(3) = 0.0_wp  !! normal from a to b, tangents [-]
     real(wp) :: arm_a(3) = 0.0_wp, arm_b(3) = 0.0_wp  !! from the centres to the contact [m]
@@ -37,7 +37,7 @@ module impulse_rows_m
   type :: rows_t
     integer :: n = 0
     type(row_t), allocatable :: row(:)
-    integer, allocatable :: touch(:)              !! (n) number in the list of touches
+    integer, allocatable :: point(:)              !! (n) number in the list of contact points
     real(wp), allocatable :: closing(:)           !! (n) normal velocity at the start [m/s]
     real(wp), allocatable :: largest(:)           !! (n) largest normal impulse of the step [N s]
     real(wp), allocatable :: total(:, :)          !! (3, n) impulse of the whole step [N s]
@@ -64,8 +64,9 @@ module impulse_rows_m
     real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, partners) [1/(kg m2)]
   end type rows_t
 
-  real(wp), parameter :: damping_ratio = 5.0_wp   !! of the soft touches: they do not swing [-]
-  real(wp), parameter :: min_weight = 0.02_wp     !! of a touch that counts [-]
+  real(wp), parameter :: damping_ratio = 5.0_wp
+    !! of the soft contact points: they do not swing [-]
+  real(wp), parameter :: min_weight = 0.02_wp     !! of a contact point that counts [-]
   integer, parameter :: max_colours = 64          !! pairs of the last one are solved one by one
 
 contains
@@ -85,14 +86,15 @@ contains
     allocate (rows%begin(max_colours + 1), source=1)
   end subroutine rows_init
 
-  !> Rows of all touches of a contact step, with the impulses and stretches remembered.
+  !> Rows of all contact points of a contact step, with the impulses and stretches remembered.
   !!
-  !! The soft touch is a spring of the frequency 1/contact_time of what it pushes, damped so much
-  !! that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D (2024).
-  subroutine make_rows(h, contact_time, touches, law, partners, blocks, memory, rows)
+  !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, damped so
+  !! much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D
+  !! (2024).
+  subroutine make_rows(h, contact_time, points, law, partners, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
     real(wp), intent(in) :: contact_time          !! [s]
-    type(touches_t), intent(in) :: touches
+    type(contact_points_t), intent(in) :: points
     class(contact_law_t), intent(in) :: law
     type(partners_t), intent(in) :: partners
     type(blocks_t), intent(in) :: blocks
@@ -102,29 +104,29 @@ contains
     integer :: t, m, r
 
     call copy_partners(partners, blocks, rows)
-    call reserve_rows(touches%n, rows)
+    call reserve_rows(points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
     m = 1
-    do t = 1, touches%n
-      associate (touch => touches%item(t))
-        if (touch%weight < min_weight) cycle
+    do t = 1, points%n
+      associate (point => points%item(t))
+        if (point%weight < min_weight) cycle
         r = rows%n + 1
         rows%n = r
-        rows%touch(r) = t
-        call begin_pair(touch%a, touch%b, rows)
-        w = 2*pi*sqrt(touch%weight)/contact_time
+        rows%point(r) = t
+        call begin_pair(point%a, point%b, rows)
+        w = 2*pi*sqrt(point%weight)/contact_time
         a1 = 2*damping_ratio + h*w
         a2 = h*w*a1
-        rows%row(r) = row_t(n=touch%normal, arm_a=touch%arm_a, arm_b=touch%arm_b, &
-          gap=-touch%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
-          friction=merge(law%wall_friction, law%friction, touch%b < 0))
-        call weigh(touch%a, touch%b, rows, rows%row(r))
-        rows%closing(r) = dot_product(past(rows%v(:, touch%a), rows%v(:, touch%b), rows%row(r)), &
-                                      touch%normal)
+        rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
+          gap=-point%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
+          friction=merge(law%wall_friction, law%friction, point%b < 0))
+        call weigh(point%a, point%b, rows, rows%row(r))
+        rows%closing(r) = dot_product(past(rows%v(:, point%a), rows%v(:, point%b), rows%row(r)), &
+                                      point%normal)
         rows%largest(r) = 0.0_wp
         rows%total(:, r) = 0.0_wp
-        call recall(touch, h, memory, m, rows%row(r))
+        call recall(point, h, memory, m, rows%row(r))
       end associate
     end do
     rows%first(rows%n_pairs + 1) = rows%n + 1
@@ -165,7 +167,7 @@ contains
       if (n > size(rows%row)) deallocate (rows%row)
     end if
     if (.not. allocated(rows%row)) allocate (rows%row(2*n + 16))
-    call ensure_capacity(n, rows%touch)
+    call ensure_capacity(n, rows%point)
     call ensure_capacity(n, rows%closing)
     call ensure_capacity(n, rows%largest)
     call ensure_capacity(n, rows%total)
@@ -270,10 +272,10 @@ contains
     p = part(1)*row%n + part(2)*row%e1 + part(3)*row%e2
   end function in_space
 
-  !> What is remembered of a touch: the force that it bore, and its tangential way. Both lists are
-  !! sorted; m is the place in the memory.
-  pure subroutine recall(touch, h, memory, m, row)
-    type(touch_t), intent(in) :: touch
+  !> What is remembered of a contact point: the force that it bore, and its tangential way. Both
+  !! lists are sorted; m is the place in the memory.
+  pure subroutine recall(point, h, memory, m, row)
+    type(contact_point_t), intent(in) :: point
     real(wp), intent(in) :: h                    !! sub-sweep [s]
     type(springs_t), intent(in) :: memory
     integer, intent(inout) :: m
@@ -281,15 +283,15 @@ contains
 
     do while (m <= memory%n)
       if (.not. comes_before(memory%a(m), memory%b(m), memory%key(m), &
-                             touch%a, touch%b, touch%key)) then
-        if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
-            .or. memory%other(m) >= touch%other) exit
+                             point%a, point%b, point%key)) then
+        if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%key(m) /= point%key &
+            .or. memory%other(m) >= point%other) exit
       end if
       m = m + 1
     end do
     if (m > memory%n) return
-    if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
-        .or. memory%other(m) /= touch%other) return
+    if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%key(m) /= point%key &
+        .or. memory%other(m) /= point%other) return
     row%impulse(1) = max(0.0_wp, -h*dot_product(memory%force(:, m), row%n))
     row%impulse(2) = -h*dot_product(memory%force(:, m), row%e1)
     row%impulse(3) = -h*dot_product(memory%force(:, m), row%e2)
@@ -384,9 +386,9 @@ contains
 
   !> Remember the rows that bear something: force and torques of the last sub-sweep, and the
   !! tangential way where friction holds. They store no energy: overlaps open without speed.
-  subroutine store_memory(h, touches, rows, memory)
+  subroutine store_memory(h, points, rows, memory)
     real(wp), intent(in) :: h                    !! sub-sweep [s]
-    type(touches_t), intent(in) :: touches
+    type(contact_points_t), intent(in) :: points
     type(rows_t), intent(in) :: rows
     type(springs_t), intent(inout) :: memory
     real(wp), parameter :: sticking = 0.999_wp   !! of the bound of friction: below it nothing slips
@@ -397,15 +399,15 @@ contains
     m = 0
     do k = 1, rows%n_pairs
       do r = rows%first(k), rows%first(k + 1) - 1
-        associate (row => rows%row(r), touch => touches%item(rows%touch(r)))
+        associate (row => rows%row(r), point => points%item(rows%point(r)))
           if (.not. row%impulse(1) > 0.0_wp) cycle
           m = m + 1
-          memory%a(m) = touch%a
-          memory%b(m) = touch%b
-          memory%key(m) = touch%key
-          memory%other(m) = touch%other
+          memory%a(m) = point%a
+          memory%b(m) = point%b
+          memory%key(m) = point%key
+          memory%other(m) = point%other
           memory%k(m) = 0.0_wp
-          way = past(rows%way(:, touch%a), rows%way(:, touch%b), row)
+          way = past(rows%way(:, point%a), rows%way(:, point%b), row)
           memory%xi(:, m) = 0.0_wp
           if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &

@@ -1,5 +1,5 @@
 !> Contact by impulses: few long steps within a fluid step, each of which finds what touches or may
-!! come to touch once, and solves for the impulses of all touches together.
+!! come to touch once, and solves for the impulses of all contact points together.
 !!
 !! A step is as long as the fastest motion of what can meet in it allows; what is far from all
 !! others falls in one step.
@@ -9,7 +9,7 @@ module impulse_step_m
   use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body, haste, change_by_motion
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
-  use contact_surface_m, only: contact_surface_t, find_surface_touches, cover_way, renew_pairs
+  use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
   use contact_partners_m, only: update_motion, update_inertia
   use contact_forces_m, only: contact_report_t
   use contact_load_m, only: give_share
@@ -20,7 +20,7 @@ module impulse_step_m
   use lubrication_m, only: lubricate
   use sleep_m, only: hold_or_wake
   use acting_bodies_m, only: list_present
-  use resting_m, only: wake_touching
+  use resting_m, only: restore_contacts
   use partners_met_m, only: store_partners
   implicit none
   private
@@ -29,7 +29,7 @@ module impulse_step_m
   integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
   integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
   real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
-  real(wp), parameter :: margin = 5.0e-3_wp       !! of a touch to come, over that edge [-]
+  real(wp), parameter :: margin = 5.0e-3_wp       !! of a contact point to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
   real(wp), parameter :: free_way = 0.5_wp        !! covered by the list of pairs, over a reach [-]
   real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
@@ -61,13 +61,13 @@ contains
       do
         call solve_step(walls, gravity, step, h, n, contacts, blocks)
         if (.not. contacts%sleep%active) exit
-        associate (acting => contacts%touching%acting)
+        associate (acting => contacts%detected%acting)
           call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
             contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
             contacts%woken)
         end associate
         if (.not. any(contacts%woken)) exit
-        call wake_touching(blocks, contacts)   ! what wakes takes part: once more
+        call restore_contacts(blocks, contacts)   ! what wakes takes part: once more
       end do
       call finish_step(gravity, step, h, contacts, blocks, report)
       left = merge(left - step, 0.0_wp, step < left)
@@ -97,7 +97,7 @@ contains
       end if
       contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
                                blocks%fixed(b))*left &
-        + haste(blocks, b, contacts%touching%surface%reach(b))
+        + haste(blocks, b, contacts%detected%surface%reach(b))
       speed = fastest(b)
       if (.not. speed <= two(2)) two(2) = speed
       if (.not. two(2) <= two(1)) two = two([2, 1])
@@ -105,7 +105,7 @@ contains
     most = sum(two)
     longest = 0.0_wp
     if (.not. most <= huge(most)) return   ! not a number
-    associate (s => contacts%touching%surface)
+    associate (s => contacts%detected%surface)
       edge = contacts%smallest_edge
       longest = left
       if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
@@ -141,7 +141,7 @@ contains
     pure real(wp) function fastest(b)
       integer, intent(in) :: b
 
-      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%touching%surface%reach(b) &
+      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%detected%surface%reach(b) &
         + contacts%gain(b)
     end function fastest
 
@@ -155,7 +155,7 @@ contains
     end subroutine limit_by
   end subroutine longest_step
 
-  !> Find the touches of a contact step and their impulses; the bodies stay where they are.
+  !> Find the contact points of a contact step and their impulses; the bodies stay where they are.
   subroutine solve_step(walls, gravity, step, h, n, contacts, blocks)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -164,18 +164,18 @@ contains
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
 
-    associate (touching => contacts%touching, rows => contacts%rows, loads => contacts%loads)
-      touching%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
-      call find_surface_touches(walls, blocks, step, touching%surface, touching%touches)
-      call list_present(blocks, touching%acting)
-      associate (there => touching%acting%body(:touching%acting%n))
-        call update_motion(blocks, there, touching%partners)
-        call update_inertia(blocks, there, touching%partners)
+    associate (detected => contacts%detected, rows => contacts%rows, loads => contacts%loads)
+      detected%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
+      call find_surface_points(walls, blocks, step, detected%surface, detected%points)
+      call list_present(blocks, detected%acting)
+      associate (there => detected%acting%body(:detected%acting%n))
+        call update_motion(blocks, there, detected%partners)
+        call update_inertia(blocks, there, detected%partners)
       end associate
       loads%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
         loads%film)
-      call make_rows(h, contacts%contact_time, touching%touches, touching%law, touching%partners, &
+      call make_rows(h, contacts%contact_time, detected%points, detected%law, detected%partners, &
                      blocks, contacts%springs, rows)
       if (rows%n > 0) then
         call fall_freely(gravity, step, contacts, blocks, rows)
@@ -210,7 +210,7 @@ contains
     end do
   end subroutine fall_freely
 
-  !> Move the bodies by what was found, book the impulses, remember the touches.
+  !> Move the bodies by what was found, book the impulses, remember the contact points.
   subroutine finish_step(gravity, step, h, contacts, blocks, report)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: step, h      !! [s]
@@ -237,7 +237,7 @@ contains
       loads%impulse = loads%impulse + step*loads%force
       loads%twist = loads%twist + step*loads%torque
       call report_rows(step, contacts, report)
-      call store_memory(h, contacts%touching%touches, rows, contacts%springs)
+      call store_memory(h, contacts%detected%points, rows, contacts%springs)
     end associate
   end subroutine finish_step
 
@@ -249,7 +249,7 @@ contains
     logical :: touched(contacts%rows%n_pairs)
     integer :: k, r
 
-    associate (rows => contacts%rows, give => contacts%touching%partners%give)
+    associate (rows => contacts%rows, give => contacts%detected%partners%give)
       do k = 1, rows%n_pairs
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
@@ -258,7 +258,7 @@ contains
             report%deepest = max(report%deepest, -give_share*rows%row(r)%gap &
               /min(give(rows%a(k)), give(rows%b(k))))
             if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
-              abs(rows%closing(r))*step/contacts%touching%touches%item(rows%touch(r))%length)
+              abs(rows%closing(r))*step/contacts%detected%points%item(rows%point(r))%length)
           end do
         end associate
       end do

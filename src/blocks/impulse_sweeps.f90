@@ -315,9 +315,9 @@ contains
     end do
   end subroutine go_on
 
-  !> Restitution after Newton: where a body was hit faster than `slowest`, all its touches leave
-  !! with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of the
-  !! whole step would pull. So no energy is made: that of impulses P is the sum of
+  !> Restitution after Newton: where a body was hit faster than `slowest`, all its contact points
+  !! leave with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of
+  !! the whole step would pull. So no energy is made: that of impulses P is the sum of
   !! P (v_n + v_n(start))/2. The arms are those of where the bodies are now.
   pure subroutine restore(e, slowest, rows)
     real(wp), intent(in) :: e         !! [-]

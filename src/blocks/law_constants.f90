@@ -71,7 +71,7 @@ contains
     spring%energy = energy_of_force(spring%force, law%gamma_n, d)
   end subroutine normal_spring
 
-  !> Each touch damps by itself.
+  !> Each contact point damps by itself.
   elemental subroutine damping(law, share, k, total, inverse, eta, decay)
     class(law_constants_t), intent(in) :: law
     real(wp), intent(in) :: share, k, total, inverse

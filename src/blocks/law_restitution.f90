@@ -144,7 +144,7 @@ contains
     spring%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
   end subroutine normal_spring
 
-  !> How far a touch is into the range where it hardens: (u/d_h)^4 [-].
+  !> How far a contact point is into the range where it hardens: (u/d_h)^4 [-].
   elemental function beyond(weight, d, hard) result(h)
     real(wp), intent(in) :: weight    !! [-]
     real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
@@ -153,7 +153,7 @@ contains
     h = (weight*(max(0.0_wp, d)/hard)**2)**2
   end function beyond
 
-  !> The share of a touch in the damping of the pair, whose ratio is that of the impact.
+  !> The share of a contact point in the damping of the pair, whose ratio is that of the impact.
   elemental subroutine damping(law, share, k, total, inverse, eta, decay)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: share, k, total, inverse

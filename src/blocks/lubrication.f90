@@ -175,7 +175,7 @@ contains
 
   !> What a film takes from the momentum between the two sides while it opens from nothing to a gap:
   !! the integral of `film_resistance` down to the roughness, and below that of the roughness; none
-  !! while the sides touch, for the touch lasts longer than it does in truth [N s].
+  !! while the sides touch, for the contact lasts longer than it does in truth [N s].
   pure function film_impulse(viscosity, radius, a, gap) result(impulse)
     real(wp), intent(in) :: viscosity        !! of the liquid [Pa s]
     real(wp), intent(in) :: radius, a, gap   !! [m]

@@ -39,7 +39,8 @@ module near_features_m
   type :: search_t
     real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
     real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
-    real(wp) :: min_ahead = 0.0_wp               !! way of a touch that comes soon, at least [m],
+    real(wp) :: min_ahead = 0.0_wp
+      !! way of a contact point that comes soon, at least [m],
     real(wp) :: ahead = 0.0_wp                   !! and of the pair whose lists are made [m]
     real(wp) :: margin = 0.0_wp                  !! added to all gaps [m]
     real(wp) :: lasting_gaps = 10.0_wp           !! multiple of the gap for which short lists hold

@@ -18,18 +18,18 @@ module partners_met_m
 contains
 
   !> Add pairs that touch to those that touched in this step.
-  subroutine store_partners(touches_a, touches_b, met)
-    integer, intent(in) :: touches_a(:), touches_b(:)     !! (touches) sorted
+  subroutine store_partners(points_a, points_b, met)
+    integer, intent(in) :: points_a(:), points_b(:)       !! (points) sorted
     type(met_t), intent(inout) :: met
     integer :: t, m, a, b
 
     a = 0
     b = 0
     m = 1
-    do t = 1, size(touches_a)
-      if (a == touches_a(t) .and. b == touches_b(t)) cycle
-      a = touches_a(t)
-      b = touches_b(t)
+    do t = 1, size(points_a)
+      if (a == points_a(t) .and. b == points_b(t)) cycle
+      a = points_a(t)
+      b = points_b(t)
       do while (m <= met%n)
         if (.not. comes_before(met%a(m), met%b(m), 0, a, b, 0)) exit
         m = m + 1

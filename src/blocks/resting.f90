@@ -11,14 +11,14 @@ module resting_m
   use contact_law_m, only: stored_energy
   use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
-  use touching_m, only: find_touches
+  use contact_detection_m, only: detect_contacts
   use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
   use substep_limits_m, only: substep_limit, equal_part
   use partners_met_m, only: store_partners
   use contact_state_m, only: contacts_t
   implicit none
   private
-  public :: wake_or_sleep, wake_touching
+  public :: wake_or_sleep, restore_contacts
 
 contains
 
@@ -38,14 +38,14 @@ contains
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      associate (acting => contacts%touching%acting)
+      associate (acting => contacts%detected%acting)
         call list_present(blocks, acting)
         call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
           contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
           contacts%woken)
       end associate
       changed = any(contacts%woken)
-      if (changed) call wake_touching(blocks, contacts)
+      if (changed) call restore_contacts(blocks, contacts)
     else
       changed = .false.
       do b = 1, blocks%n
@@ -54,13 +54,13 @@ contains
       if (any(contacts%sleep%candidate)) then
         dt_b = dt
         if (.not. contacts%by_impulses) dt_b = equal_part(dt, substep_limit(walls, &
-          contacts%touching, blocks, dt, contacts%limits))
+          contacts%detected, blocks, dt, contacts%limits))
         call let_sleep(gravity, dt_b, contacts, blocks, changed)
       end if
     end if
     contacts%woken = .false.
-    if (changed .and. .not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, &
-      contacts%touching)
+    if (changed .and. .not. contacts%by_impulses) call detect_contacts(walls, blocks, 0.0_wp, &
+      contacts%detected)
     associate (rest => contacts%sleep%rest)
       call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
@@ -83,9 +83,9 @@ contains
       contacts%loads%torque = 0.0_wp
       call sum_memory(contacts%springs, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:))
     else
-      call match_springs(contacts%touching, contacts%before, contacts%springs)
+      call match_springs(contacts%detected, contacts%before, contacts%springs)
       call foresee_motion(gravity, dt_b, blocks, contacts)
-      call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
+      call sum_forces(dt_b, contacts%detected, contacts%springs, contacts%loads, ignored)
     end if
     call update_supported(blocks, contacts)
     changed = .false.
@@ -113,18 +113,18 @@ contains
     type(contacts_t), intent(inout) :: contacts
     integer :: b
 
-    associate (acting => contacts%touching%acting)
-      call update_motion(blocks, acting%body(:acting%n), contacts%touching%partners)
+    associate (acting => contacts%detected%acting)
+      call update_motion(blocks, acting%body(:acting%n), contacts%detected%partners)
     end associate
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      associate (v => contacts%touching%partners%v(:, b), &
-        omega => contacts%touching%partners%omega(:, b))
+      associate (v => contacts%detected%partners%v(:, b), &
+        omega => contacts%detected%partners%omega(:, b))
         if (contacts%sleep%candidate(b)) v = 0.0_wp
         if (contacts%sleep%candidate(b)) omega = 0.0_wp
         v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
         omega = omega + 0.5_wp*dt_b*matmul( &
-          contacts%touching%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+          contacts%detected%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
       end associate
     end do
   end subroutine foresee_motion
@@ -141,9 +141,9 @@ contains
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
-        if (is_carried(blocks, contacts%touching%partners, b)) sleep%candidate(a) = .false.
+        if (is_carried(blocks, contacts%detected%partners, b)) sleep%candidate(a) = .false.
         if (b < 1) cycle
-        if (is_carried(blocks, contacts%touching%partners, a)) sleep%candidate(b) = .false.
+        if (is_carried(blocks, contacts%detected%partners, a)) sleep%candidate(b) = .false.
       end do
       sleep%supported = blocks%fixed .or. blocks%asleep
       changed = .true.
@@ -178,7 +178,8 @@ contains
     end if
   end function is_carried
 
-  !> Move the springs of touches between what does not move to those at rest, with their forces.
+  !> Move the springs of contact points between what does not move to those at rest, with their
+  !! forces.
   subroutine freeze_contacts(dt_b, blocks, contacts)
     real(wp), intent(in) :: dt_b         !! the substep [s]
     type(blocks_t), intent(in) :: blocks
@@ -195,15 +196,15 @@ contains
         sleep%chosen(g) = at_rest(blocks, a, b)
         if (contacts%by_impulses .or. .not. sleep%chosen(g)) cycle
         wrench = wrench_t()
-        call push_group(g, dt_b, motion_between(contacts%touching%partners, a, b), &
-          contacts%touching, springs, wrench, ignored)
+        call push_group(g, dt_b, motion_between(contacts%detected%partners, a, b), &
+          contacts%detected, springs, wrench, ignored)
         springs%force(:, g) = wrench%force
         springs%torque_a(:, g) = wrench%torque_a
         springs%torque_b(:, g) = wrench%torque_b
-        springs%energy(g) = stored_energy(springs%k(g), contacts%touching%law%gamma_t, &
+        springs%energy(g) = stored_energy(springs%k(g), contacts%detected%law%gamma_t, &
           norm(springs%xi(:, g)))
-        do t = contacts%touching%groups%first(g), contacts%touching%groups%first(g + 1) - 1
-          springs%energy(g) = springs%energy(g) + contacts%touching%response%energy(t)
+        do t = contacts%detected%groups%first(g), contacts%detected%groups%first(g + 1) - 1
+          springs%energy(g) = springs%energy(g) + contacts%detected%response%energy(t)
         end do
       end do
       call move_springs(sleep%chosen, springs, sleep%rest)
@@ -211,8 +212,8 @@ contains
     end associate
   end subroutine freeze_contacts
 
-  !> Give the springs of touches with a body that moves now back to those at work.
-  subroutine wake_touching(blocks, contacts)
+  !> Give the springs of contact points with a body that moves now back to those at work.
+  subroutine restore_contacts(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
     integer :: i
@@ -225,7 +226,7 @@ contains
       call move_springs(sleep%chosen, sleep%rest, contacts%springs)
       call update_loads(sleep)
     end associate
-  end subroutine wake_touching
+  end subroutine restore_contacts
 
   !> Whether neither body a nor its partner moves.
   pure function at_rest(blocks, a, b) result(yes)

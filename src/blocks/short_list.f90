@@ -27,7 +27,7 @@ module short_list_m
 
 contains
 
-  !> Number of features in a short list, and of touches at most.
+  !> Number of features in a short list, and of contact points at most.
   pure function n_chosen(short) result(n)
     type(short_list_t), intent(in) :: short
     integer :: n

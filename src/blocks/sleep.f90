@@ -1,5 +1,5 @@
-!> Blocks at rest sleep: they keep their pose, and touches among them are not looked for, until the
-!! forces on them no longer balance.
+!> Blocks at rest sleep: they keep their pose, and contact points among them are not looked for,
+!! until the forces on them no longer balance.
 !!
 !! A block falls asleep when it has been slow for some time, rests on something, and the forces on
 !! it balance within half of a small share of its load. It stays asleep as long as they balance
@@ -28,7 +28,7 @@ module sleep_m
     real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
-    type(springs_t) :: rest                    !! touches at rest, between what does not move
+    type(springs_t) :: rest                    !! contact points at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
     logical, allocatable :: candidate(:), supported(:), chosen(:)   !! (n), (n), (springs) work
@@ -79,7 +79,7 @@ contains
     yes = all(blocks%still .or. .not. blocks%present)
   end function all_still
 
-  !> Force and torque on each body of the touches at rest.
+  !> Force and torque on each body of the contact points at rest.
   pure subroutine update_loads(sleep)
     type(sleep_t), intent(inout) :: sleep
 
@@ -88,7 +88,7 @@ contains
     call sum_memory(sleep%rest, sleep%load, sleep%load_torque)
   end subroutine update_loads
 
-  !> Add the forces and torques on bodies of touches that remember them.
+  !> Add the forces and torques on bodies of contact points that remember them.
   pure subroutine sum_memory(springs, force, torque)
     type(springs_t), intent(in) :: springs
     real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) [N], [N m]
@@ -197,8 +197,8 @@ contains
     blocks%still(b) = .false.
   end subroutine wake
 
-  !> Complete the contact forces on some bodies by those of the touches at rest, and wake who is out
-  !! of balance.
+  !> Complete the contact forces on some bodies by those of the contact points at rest, and wake who
+  !! is out of balance.
   !!
   !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
   !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those

@@ -1,4 +1,4 @@
-!> Tangential springs: what a touch remembers from substep to substep.
+!> Tangential springs: what a contact point remembers from substep to substep.
 module springs_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
@@ -13,12 +13,13 @@ module springs_m
   !! slides from a sphere of the partner to the next, so that resting blocks do not creep.
   type :: springs_t
     integer :: n = 0
-    integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `touch_t`
-    integer, allocatable :: other(:)             !! (n) edge of b, of touches solved for impulses
+    integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `contact_point_t`
+    integer, allocatable :: other(:)
+      !! (n) edge of b, of contact points solved for impulses
     real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
     real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
-    !> Of touches at rest (`sleep_m`) and of those solved for impulses: force on a, torques on a and
-    !! b, energy of the touch.
+    !> Of contact points at rest (`sleep_m`) and of those solved for impulses: force on a, torques
+    !! on a and b, energy of the contact point.
     real(wp), allocatable :: force(:, :), torque_a(:, :), torque_b(:, :)   !! (3, n) [N], [N m]
     real(wp), allocatable :: energy(:)           !! (n) [J]
   end type springs_t
@@ -50,7 +51,7 @@ contains
     call ensure_capacity(n, springs%energy)
   end subroutine reserve_springs
 
-  !> Order of springs and touches: by body, partner, key.
+  !> Order of springs and contact points: by body, partner, key.
   pure function comes_before(a1, b1, key1, a2, b2, key2) result(yes)
     integer, intent(in) :: a1, b1, key1, a2, b2, key2
     logical :: yes

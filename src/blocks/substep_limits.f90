@@ -7,7 +7,7 @@ module substep_limits_m
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use neighbours_m, only: pair_list_t
-  use touching_m, only: touching_t
+  use contact_detection_m, only: contact_detection_t
   use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
@@ -25,22 +25,22 @@ module substep_limits_m
 contains
 
   !> The limits of a case.
-  pure subroutine limits_init(input, touching, limits)
+  pure subroutine limits_init(input, detected, limits)
     type(contact_input_t), intent(in) :: input
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(limits_t), intent(out) :: limits
 
     limits%substep_ratio = input%substep_ratio
     limits%longest_substep = longest_substep_of(input)
     limits%courant_max = input%courant_max
-    if (touching%exact) then
-      limits%reach = touching%surface%reach
-      limits%smallest = touching%surface%smallest
-      limits%clear = touching%surface%clear
+    if (detected%exact) then
+      limits%reach = detected%surface%reach
+      limits%smallest = detected%surface%smallest
+      limits%clear = detected%surface%clear
     else
-      limits%reach = touching%spheres%reach
-      limits%smallest = touching%spheres%smallest
-      limits%clear = touching%spheres%clear
+      limits%reach = detected%spheres%reach
+      limits%smallest = detected%spheres%smallest
+      limits%clear = detected%spheres%clear
     end if
   end subroutine limits_init
 
@@ -57,9 +57,9 @@ contains
   !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness,
   !! and the Courant limit of eq. (6) with the highest relative speed any two points can have of two
   !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
-  pure function substep_limit(walls, touching, blocks, dt, limits) result(limit)
+  pure function substep_limit(walls, detected, blocks, dt, limits) result(limit)
     type(walls_t), intent(in) :: walls
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt   !! fluid step [s]
     type(limits_t), intent(in) :: limits
@@ -67,11 +67,11 @@ contains
     real(wp) :: speed, near, fastest(2)
     integer :: b
 
-    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(touching))
-    if (touching%exact) then
-      near = fastest_near(blocks, limits, touching%surface%near)
+    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(detected))
+    if (detected%exact) then
+      near = fastest_near(blocks, limits, detected%surface%near)
     else
-      near = fastest_near(blocks, limits, touching%spheres%near)
+      near = fastest_near(blocks, limits, detected%spheres%near)
     end if
     fastest = 0.0_wp
     do b = 1, blocks%n
@@ -133,19 +133,19 @@ contains
     yes = bed_is_near(walls%bed, place - reach, place + reach)
   end function near_wall
 
-  !> Longest substep the present touches allow [s].
+  !> Longest substep the present contacts allow [s].
   !!
   !! For one pair of bodies a sixth of the bound of stability, which keeps the restitution within
   !! 0.01, or a third where they are slow; for all pairs together little more than half of it, also
   !! where bodies turn, and for the dashpots of several pairs.
-  pure function stiffness_limit(touching) result(limit)
-    type(touching_t), intent(in) :: touching
+  pure function stiffness_limit(detected) result(limit)
+    type(contact_detection_t), intent(in) :: detected
     real(wp) :: limit
     real(wp), parameter :: damping_turn = 4.0_wp   ! the sums are twice too large, 2 is stable
 
     limit = huge(1.0_wp)
-    if (touching%frequency2 > 0.0_wp) limit = impact_turn/sqrt(touching%frequency2)
-    associate (frequency2 => touching%sum_frequency2, damping => touching%damping)
+    if (detected%frequency2 > 0.0_wp) limit = impact_turn/sqrt(detected%frequency2)
+    associate (frequency2 => detected%sum_frequency2, damping => detected%damping)
       if (frequency2 > 0.0_wp) limit = min(limit, pile_turn/sqrt(frequency2))
       if (damping > 0.0_wp) limit = min(limit, damping_turn/damping)
     end associate

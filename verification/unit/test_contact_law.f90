@@ -1,4 +1,4 @@
-!> The contact law: closed form of the impact, its inversion, forces of one touch.
+!> The contact law: closed form of the impact, its inversion, forces of one contact point.
 program test_contact_law
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
@@ -173,8 +173,8 @@ contains
       time, 1.0e-15_wp)
   end subroutine check_overdamped
 
-  !> A touch carries a load within what it may give way, but is no stiffer than that of two blocks
-  !! of that mass.
+  !> A contact point carries a load within what it may give way, but is no stiffer than that of two
+  !! blocks of that mass.
   subroutine check_load()
     real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, g = 9.81_wp, time = 1.0e-2_wp
     type(contact_input_t) :: input
@@ -197,7 +197,7 @@ contains
       input%k_n, 0.0_wp)
   end subroutine check_load
 
-  !> Equations (1) and (2) for one touch.
+  !> Equations (1) and (2) for one contact point.
   subroutine check_forces()
     type(law_constants_t) :: law
     type(spring_t) :: spring

@@ -1,4 +1,4 @@
-!> What touches have to carry at rest, and how far they give way.
+!> Load of contact points at rest, and how far they give way.
 program test_contact_load
   use kinds_m, only: wp
   use check_m, only: check, finish_checks

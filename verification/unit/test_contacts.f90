@@ -246,7 +246,7 @@ contains
     end do
   end subroutine check_colliding_balls
 
-  !> Many touches at once damp like one: a cube on its face, edge and corner.
+  !> Many contact points at once damp like one: a cube on its face, edge and corner.
   subroutine check_landing_cube()
     real(wp), parameter :: e(3) = [0.1_wp, 0.3_wp, 0.7_wp]
     type(world_t) :: world
@@ -701,7 +701,7 @@ contains
     two%case = one%case
     two%gravity = one%gravity
     call start(two)
-    associate (spheres => two%contacts%touching%spheres)
+    associate (spheres => two%contacts%detected%spheres)
       spheres%skin = spheres%skin - 1.98_wp*spheres%free_way
       spheres%free_way = 0.01_wp*spheres%free_way
     end associate

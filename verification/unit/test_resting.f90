@@ -1,4 +1,5 @@
-!> Who falls asleep and who wakes at the start of a step, and where the springs of its touches go.
+!> Who falls asleep and who wakes at the start of a step, and where the springs of its contact
+!! points go.
 program test_resting
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
@@ -9,7 +10,7 @@ program test_resting
   use walls_m, only: walls_t, walls_init
   use sleep_m, only: update_stillness
   use contact_partners_m, only: update_partners
-  use touching_m, only: find_touches
+  use contact_detection_m, only: detect_contacts
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep
   implicit none
@@ -29,7 +30,7 @@ program test_resting
 
   call make_ball()
   call check_balance()
-  call check_touch()
+  call check_contact()
   call check_springs()
   call check_held()
   call finish_checks()
@@ -78,9 +79,9 @@ contains
     call blocks_init(case, shapes, world%blocks)
     call walls_init(case%grid, case%boundary, world%walls)
     call contacts_init(case%contact, world%blocks, world%contacts)
-    call update_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
+    call update_partners(world%walls, gravity, world%blocks, world%contacts%detected%partners)
     call update_stillness(world%blocks, changed)
-    call find_touches(world%walls, world%blocks, 0.0_wp, world%contacts%touching)
+    call detect_contacts(world%walls, world%blocks, 0.0_wp, world%contacts%detected)
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin
 
@@ -122,7 +123,7 @@ contains
   end subroutine check_balance
 
   !> What is no candidate, or touches nothing, or what is moved, stays awake.
-  subroutine check_touch()
+  subroutine check_contact()
     type(world_t) :: world
     integer :: support
 
@@ -139,10 +140,11 @@ contains
       call start_step(world)
       call check('on what is moved', .not. world%blocks%asleep(1 + support))
     end do
-  end subroutine check_touch
+  end subroutine check_contact
 
-  !> The spring of a sleeper rests with the force and the energy of its touch, is told as a partner
-  !! met, and is at work again when the sleeper wakes. What it had of momentum went into the touch.
+  !> The spring of a sleeper rests with the force and the energy of its contact, is told as a
+  !! partner met, and is at work again when the sleeper wakes. What it had of momentum went into the
+  !! contact point.
   subroutine check_springs()
     type(world_t) :: world
     real(wp), parameter :: slow = 1.0e-6_wp   !! [m/s]
@@ -159,7 +161,7 @@ contains
       call check('its energy', contacts%sleep%rest%energy(1), energy, 1.0e-9_wp*energy)
       call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
-      call check('no more touches', contacts%touching%touches%n, 0)
+      call check('no more contact points', contacts%detected%points%n, 0)
       call check('but a partner', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
         == [1, 1, -5]))
       call check('stands', norm2(blocks%v(:, 1)), 0.0_wp, 0.0_wp)
@@ -169,7 +171,7 @@ contains
       call start_step(world)
       call check('at work again', all([contacts%springs%n, contacts%sleep%rest%n] == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp, 0.0_wp)
-      call check('touches again', contacts%touching%touches%n, 1)
+      call check('touches again', contacts%detected%points%n, 1)
     end associate
   end subroutine check_springs
 

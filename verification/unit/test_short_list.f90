@@ -24,8 +24,8 @@ program test_short_list
 
 contains
 
-  !> A short list holds until the way since then and the gap that counts as a touch are as told; no
-  !! longer than the lists it was chosen from, and as long as these where they are empty.
+  !> A short list holds until the way since then and the gap that counts as a contact point are as
+  !! told; no longer than the lists it was chosen from, and as long as these where they are empty.
   subroutine check_how_long()
     real(wp), parameter :: none(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     type(near_features_t) :: near
@@ -46,7 +46,8 @@ contains
     now%poses%x_b(1) = 1.001_wp*left
     call check('moved too far', .not. short_list_holds(now, cube%reach, cube%reach, short))
     now%gap = 0.9_wp*gap
-    call check('less counts as a touch', short_list_holds(now, cube%reach, cube%reach, short))
+    call check('less counts as a contact point', short_list_holds(now, cube%reach, cube%reach, &
+      short))
     now%poses = short%when
     call choose_features(now, near%valid - 0.5_wp*gap, search, cube, cube, near, short)
     now%poses%x_b(1) = 0.49_wp*gap

@@ -1,16 +1,16 @@
-!> Lists of touches and springs: order, parting, joining, and the groups that share a spring.
+!> Lists of contact points and springs: order, parting, joining, and the groups that share a spring.
 program test_springs
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
-  use touches_m, only: touch_t, touches_t, add_touch, set_apart
-  use touch_groups_m, only: groups_t, form_groups
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point, set_apart
+  use contact_groups_m, only: groups_t, form_groups
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair, move_springs
   use partners_met_m, only: met_t, store_partners
   implicit none
 
   call check_order()
   call check_moving()
-  call check_touches()
+  call check_points()
   call check_groups()
   call check_met()
   call finish_checks()
@@ -85,33 +85,34 @@ contains
     call check('one pair has two springs', .not. begins_pair(from, 2))
   end subroutine check_moving
 
-  !> Touches that do not touch yet get a list of their own.
-  subroutine check_touches()
-    type(touches_t) :: touches, soon
+  !> Contact points that do not touch yet get a list of their own.
+  subroutine check_points()
+    type(contact_points_t) :: points, soon
     integer :: i
 
     do i = 1, 40
-      call add_touch(touch_t(a=i, b=-i, depth=merge(1.0_wp, -1.0_wp, modulo(i, 3) == 0)), touches)
+      call add_point(contact_point_t(a=i, b=-i, depth=merge(1.0_wp, -1.0_wp, modulo(i, 3) == 0)), &
+        points)
     end do
-    call set_apart(touches, soon)
-    call check('those that touch', all(touches%item(:touches%n)%a == [(3*i, i=1, 13)]))
+    call set_apart(points, soon)
+    call check('those that touch', all(points%item(:points%n)%a == [(3*i, i=1, 13)]))
     call check('the others', soon%n, 27)
     call check('in order', all(soon%item(2:soon%n)%a > soon%item(:soon%n - 1)%a))
     call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
-  end subroutine check_touches
+  end subroutine check_points
 
-  !> Touches of one key and partner have a mean normal and point, weighted by overlap.
+  !> Contact points of one key and partner have a mean normal and point, weighted by overlap.
   subroutine check_groups()
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     type(groups_t) :: groups
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
 
-    call add_touch(touch_t(2, 1, 5, x, x - y, x, 2.0_wp, 1.0_wp), touches)
-    call add_touch(touch_t(2, 1, 6, x, x - y, x, 2.0_wp, 1.5_wp), touches)
-    call add_touch(touch_t(2, 1, 6, 3*y, 2*y, y, 8.0_wp, 0.5_wp), touches)
-    call add_touch(touch_t(3, 1, 6, y, y, x, 1.0_wp), touches)
-    call add_touch(touch_t(3, 1, 6, y, y, -x, 1.0_wp), touches)
-    call form_groups(touches, groups)
+    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp, 1.0_wp), points)
+    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 2.0_wp, 1.5_wp), points)
+    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 8.0_wp, 0.5_wp), points)
+    call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), points)
+    call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), points)
+    call form_groups(points, groups)
     call check('keys and bodies', groups%n, 3)
     call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
     call check('one alone', groups%normal(:, 1), x, 0.0_wp)

@@ -4,7 +4,7 @@ program test_substep_limits
   use check_m, only: check, finish_checks
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use touching_m, only: touching_t
+  use contact_detection_m, only: contact_detection_t
   use contact_response_m, only: impact_turn
   use substep_limits_m, only: limits_t, substep_limit, stiffness_limit, equal_part
   implicit none
@@ -25,7 +25,7 @@ contains
 
   !> A body above a floor, another far up: each of the limits in turn.
   subroutine check_limits()
-    type(touching_t) :: touching
+    type(contact_detection_t) :: detected
     type(limits_t) :: limits
     type(blocks_t) :: blocks
     type(walls_t) :: walls
@@ -44,21 +44,21 @@ contains
     limits%reach = [0.1_wp, 0.1_wp]
     limits%smallest = 0.02_wp
     limits%clear = 0.05_wp
-    call check('a share of the step', substep_limit(walls, touching, blocks, 0.01_wp, limits), &
+    call check('a share of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), &
       0.005_wp, 0.0_wp)
-    call check('of the contact time', substep_limit(walls, touching, blocks, 1.0_wp, limits), &
+    call check('of the contact time', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       0.01_wp, 0.0_wp)
     blocks%v(3, 2) = -100.0_wp
-    call check('no jump into another', substep_limit(walls, touching, blocks, 1.0_wp, limits), &
+    call check('no jump into another', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       0.05_wp/100.0_wp, 1.0e-18_wp)
     blocks%v(1, 1) = 1.0_wp
     blocks%omega(2, 1) = 30.0_wp
     blocks%v(3, 2) = 0.0_wp
-    call check('Courant number', substep_limit(walls, touching, blocks, 1.0_wp, limits), &
+    call check('Courant number', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       0.1_wp*0.02_wp/(1.0_wp + 30.0_wp*0.1_wp), 1.0e-18_wp)
-    touching%frequency2 = 1.0e6_wp
-    call check('stiffness', stiffness_limit(touching), impact_turn/1.0e3_wp, 1.0e-18_wp)
-    call check('is one of them', substep_limit(walls, touching, blocks, 1.0_wp, limits), &
+    detected%frequency2 = 1.0e6_wp
+    call check('stiffness', stiffness_limit(detected), impact_turn/1.0e3_wp, 1.0e-18_wp)
+    call check('is one of them', substep_limit(walls, detected, blocks, 1.0_wp, limits), &
       impact_turn/1.0e3_wp, 1.0e-18_wp)
   end subroutine check_limits
 

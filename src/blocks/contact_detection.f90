@@ -1,14 +1,14 @@
-!> What touches now or soon, found by the model of the case, and how each touch responds.
-module touching_m
+!> What touches now or soon, found by the model of the case, and how each contact point responds.
+module contact_detection_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use bed_m, only: bed_partner
-  use touches_m, only: touches_t, ensure_touches, set_apart
-  use touch_groups_m, only: groups_t, form_groups
-  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
-  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
+  use contact_points_m, only: contact_points_t, ensure_points, set_apart
+  use contact_groups_m, only: groups_t, form_groups
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
   use contact_partners_m, only: partners_t, partners_init, update_motion, update_inertia
@@ -17,32 +17,32 @@ module touching_m
     bound_by_sums
   implicit none
   private
-  public :: touching_t, touching_init, find_touches
+  public :: contact_detection_t, detection_init, detect_contacts
 
-  type :: touching_t
+  type :: contact_detection_t
     class(contact_law_t), allocatable :: law
     logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
     type(partners_t) :: partners
     type(acting_t) :: acting                     !! bodies that are awake or touch
-    type(touches_t) :: touches
-    type(touches_t) :: soon                      !! those that may come before the substep ends
+    type(contact_points_t) :: points
+    type(contact_points_t) :: soon               !! those that may come before the substep ends
     type(groups_t) :: groups
     type(response_t) :: response, response_soon
     real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
     real(wp) :: sum_frequency2 = 0.0_wp          !! by `bound_by_sums` [1/s2]
     real(wp) :: damping = 0.0_wp                 !! rate of the dashpots, likewise [1/s]
-  end type touching_t
+  end type contact_detection_t
 
 contains
 
-  !> The contact law and model of a case, without any touch yet.
-  subroutine touching_init(input, longest_substep, blocks, self)
+  !> The contact law and model of a case, without any contact point yet.
+  subroutine detection_init(input, longest_substep, blocks, self)
     type(contact_input_t), intent(in) :: input
     real(wp), intent(in) :: longest_substep      !! [s]
     type(blocks_t), intent(in) :: blocks
-    type(touching_t), intent(out) :: self
+    type(contact_detection_t), intent(out) :: self
 
     call choose_law(input, self%law)
     select case (input%model)
@@ -63,42 +63,42 @@ contains
     allocate (self%response%damping(bed_partner:blocks%n))
     allocate (self%response_soon%stiffness, mold=self%response%stiffness)
     allocate (self%response_soon%damping, mold=self%response%damping)
-    call ensure_touches(1, self%touches)
-    call ensure_touches(1, self%soon)
-  end subroutine touching_init
+    call ensure_points(1, self%points)
+    call ensure_points(1, self%soon)
+  end subroutine detection_init
 
-  !> Find what touches at the present poses, how each touch responds, and how stiff all is together,
-  !! counting also what may touch within a time `ahead`.
-  subroutine find_touches(walls, blocks, ahead, self)
+  !> Find what touches at the present poses, how each contact point responds, and how stiff all is
+  !! together, counting also what may touch within a time `ahead`.
+  subroutine detect_contacts(walls, blocks, ahead, self)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
-    type(touching_t), intent(inout) :: self
+    type(contact_detection_t), intent(inout) :: self
 
     if (self%exact) then
-      call find_surface_touches(walls, blocks, ahead, self%surface, self%touches)
+      call find_surface_points(walls, blocks, ahead, self%surface, self%points)
     else
-      call find_sphere_touches(walls, blocks, ahead, self%spheres, self%touches)
+      call find_sphere_points(walls, blocks, ahead, self%spheres, self%points)
     end if
-    call set_apart(self%touches, self%soon)
-    call form_groups(self%touches, self%groups)
+    call set_apart(self%points, self%soon)
+    call form_groups(self%points, self%groups)
     self%frequency2 = 0.0_wp
     self%sum_frequency2 = 0.0_wp
     self%damping = 0.0_wp
-    call list_acting(blocks, self%touches, self%soon, self%acting)
+    call list_acting(blocks, self%points, self%soon, self%acting)
     associate (acting => self%acting%body(:self%acting%n))
       call update_motion(blocks, acting, self%partners)
-      if (self%touches%n + self%soon%n == 0) return
+      if (self%points%n + self%soon%n == 0) return
       call update_inertia(blocks, acting, self%partners)
     end associate
-    call respond(self%touches, self%law, self%partners, self%response)
+    call respond(self%points, self%law, self%partners, self%response)
     if (self%soon%n > 0) then
       call respond(self%soon, self%law, self%partners, self%response_soon)
-      call add_frequencies(self%touches, self%soon, self%response, self%response_soon)
+      call add_frequencies(self%points, self%soon, self%response, self%response_soon)
       self%frequency2 = highest_frequency2(self%soon, self%response_soon)
     end if
-    self%frequency2 = max(self%frequency2, highest_frequency2(self%touches, self%response))
-    call bound_by_sums(self%touches, self%response, self%sum_frequency2, self%damping)
-  end subroutine find_touches
+    self%frequency2 = max(self%frequency2, highest_frequency2(self%points, self%response))
+    call bound_by_sums(self%points, self%response, self%sum_frequency2, self%damping)
+  end subroutine detect_contacts
 
-end module touching_m
+end module contact_detection_m
