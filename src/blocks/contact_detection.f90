@@ -4,14 +4,14 @@ module contact_detection_m
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_points_t, ensure_points, set_apart
   use contact_groups_m, only: groups_t, form_groups
   use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use contact_law_m, only: contact_law_t
   use contact_laws_m, only: choose_law
-  use contact_partners_m, only: partners_t, partners_init, update_motion, update_inertia
+  use counterparts_m, only: counterparts_t, counterparts_init, update_motion, update_inertia
   use acting_bodies_m, only: acting_t, acting_init, list_acting
   use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
     bound_by_sums
@@ -24,7 +24,7 @@ module contact_detection_m
     logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
     type(contact_spheres_t) :: spheres
     type(contact_surface_t) :: surface
-    type(partners_t) :: partners
+    type(counterparts_t) :: counterparts
     type(acting_t) :: acting                     !! bodies that are awake or touch
     type(contact_points_t) :: points
     type(contact_points_t) :: soon               !! those that may come before the substep ends
@@ -55,12 +55,12 @@ contains
     else
       call contact_spheres_init(input%courant_max, blocks, self%spheres)
     end if
-    call partners_init(blocks, self%partners)
+    call counterparts_init(blocks, self%counterparts)
     call acting_init(blocks%n, self%acting)
-    allocate (self%response%frequency2(bed_partner:blocks%n))
-    allocate (self%response_soon%frequency2(bed_partner:blocks%n))
-    allocate (self%response%stiffness(bed_partner:blocks%n))
-    allocate (self%response%damping(bed_partner:blocks%n))
+    allocate (self%response%frequency2(bed_counterpart:blocks%n))
+    allocate (self%response_soon%frequency2(bed_counterpart:blocks%n))
+    allocate (self%response%stiffness(bed_counterpart:blocks%n))
+    allocate (self%response%damping(bed_counterpart:blocks%n))
     allocate (self%response_soon%stiffness, mold=self%response%stiffness)
     allocate (self%response_soon%damping, mold=self%response%damping)
     call ensure_points(1, self%points)
@@ -87,13 +87,13 @@ contains
     self%damping = 0.0_wp
     call list_acting(blocks, self%points, self%soon, self%acting)
     associate (acting => self%acting%body(:self%acting%n))
-      call update_motion(blocks, acting, self%partners)
+      call update_motion(blocks, acting, self%counterparts)
       if (self%points%n + self%soon%n == 0) return
-      call update_inertia(blocks, acting, self%partners)
+      call update_inertia(blocks, acting, self%counterparts)
     end associate
-    call respond(self%points, self%law, self%partners, self%response)
+    call respond(self%points, self%law, self%counterparts, self%response)
     if (self%soon%n > 0) then
-      call respond(self%soon, self%law, self%partners, self%response_soon)
+      call respond(self%soon, self%law, self%counterparts, self%response_soon)
       call add_frequencies(self%points, self%soon, self%response, self%response_soon)
       self%frequency2 = highest_frequency2(self%soon, self%response_soon)
     end if

@@ -6,7 +6,7 @@ module contact_forces_m
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
   use contact_detection_m, only: contact_detection_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
-  use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
+  use counterparts_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_apart
   use contact_load_m, only: give_share
   implicit none
@@ -14,7 +14,7 @@ module contact_forces_m
   public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
     elastic_energy, energy_in_memory
 
-  !> Contact forces and torques on all partners: (3, partners).
+  !> Contact forces and torques on all counterparts: (3, counterparts).
   type :: loads_t
     real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
@@ -99,7 +99,7 @@ contains
 
     associate (groups => detected%groups)
       do g = 1, groups%n
-        if (begins_pair(springs, g)) motion = motion_between(detected%partners, springs%a(g), &
+        if (begins_pair(springs, g)) motion = motion_between(detected%counterparts, springs%a(g), &
                                                              springs%b(g))
         v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
         springs%xi(:, g) = springs%xi(:, g) &
@@ -131,7 +131,7 @@ contains
     associate (n => detected%groups%n)
       do g = 1, n
         if (begins_pair(springs, g)) then
-          motion = motion_between(detected%partners, springs%a(g), springs%b(g))
+          motion = motion_between(detected%counterparts, springs%a(g), springs%b(g))
           wrench = wrench_t()
         end if
         call push_group(g, dt, motion, detected, springs, wrench, report)
@@ -176,7 +176,7 @@ contains
           report%courant_max = max(report%courant_max, abs(v_n)*dt/point%length)
           report%overlap_max = max(report%overlap_max, point%depth)
           report%deepest = max(report%deepest, give_share*point%depth &
-            /min(detected%partners%give(point%a), detected%partners%give(point%b)))
+            /min(detected%counterparts%give(point%a), detected%counterparts%give(point%b)))
         end associate
         push%force = push%force + force_n
         decay = max(decay, r%decay(t))

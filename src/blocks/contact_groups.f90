@@ -1,5 +1,5 @@
-!> Contact points of one sphere or point with one partner, taken together: they share a tangential
-!! spring.
+!> Contact points of one sphere or point with one counterpart, taken together: they share a
+!! tangential spring.
 module contact_groups_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
@@ -9,7 +9,7 @@ module contact_groups_m
   private
   public :: groups_t, form_groups
 
-  !> Contact points with one key and one partner act on one tangential spring.
+  !> Contact points with one key and one counterpart act on one tangential spring.
   type :: groups_t
     integer :: n = 0
     logical, allocatable :: new(:)               !! (n) was not there in the substep before
@@ -20,7 +20,7 @@ module contact_groups_m
 
 contains
 
-  !> Gather the contact points of each key and partner.
+  !> Gather the contact points of each key and counterpart.
   pure subroutine form_groups(points, groups)
     type(contact_points_t), intent(in) :: points
     type(groups_t), intent(inout) :: groups

@@ -124,8 +124,8 @@ contains
   !!
   !! $$ F_n = k_n d_n^{\gamma_n} - \eta_n (v_r \cdot n) $$
   !!
-  !! The paper leaves the sense of v_r open; here it is partner minus self, so that v_r.n < 0 while
-  !! closing and the damping dissipates.
+  !! The paper leaves the sense of v_r open; here it is counterpart minus self, so that v_r.n < 0
+  !! while closing and the damping dissipates.
   elemental function normal_force(elastic, eta, v_n) result(f)
     real(wp), intent(in) :: elastic   !! k_n d_n^gamma_n of the spring [N]
     real(wp), intent(in) :: eta       !! [N s/m]
@@ -140,7 +140,8 @@ contains
   !! $$ F_t = k_t |\xi|^{\gamma_t - 1} \xi + \eta_t v_t $$
   pure function tangential_force(k, gamma, eta, xi, v_t) result(f)
     real(wp), intent(in) :: k, gamma, eta   !! [N/m^gamma, -, N s/m]
-    real(wp), intent(in) :: xi(3)           !! way of the partner past the body since they touch [m]
+    real(wp), intent(in) :: xi(3)
+      !! way of the counterpart past the body since they touch [m]
     real(wp), intent(in) :: v_t(3)          !! tangential part of v_r [m/s]
     real(wp) :: f(3)
 

@@ -6,10 +6,10 @@ module contact_points_m
   private
   public :: contact_point_t, contact_points_t, ensure_points, add_point, set_apart
 
-  !> A contact point of body a and its partner b, which has a lower number: another body, a wall
+  !> A contact point of body a and its counterpart b, which has a lower number: another body, a wall
   !! (-6..-1, see `walls_m`) or the bed.
   type :: contact_point_t
-    integer :: a = 0, b = 0                  !! body and partner
+    integer :: a = 0, b = 0                  !! body and counterpart
     integer :: key = 0                       !! the sphere or vertex of a in contact; of b: negative
     real(wp) :: arm_a(3) = 0.0_wp            !! from the centre of a to the contact [m]
     real(wp) :: arm_b(3) = 0.0_wp            !! from the (image of the) centre of b [m]

@@ -7,7 +7,7 @@ module contact_response_m
   use contact_points_m, only: contact_point_t, contact_points_t
   use springs_m, only: comes_before
   use contact_law_m, only: contact_law_t, spring_t, energy_of_force
-  use contact_partners_m, only: partners_t, inertia_t, motion_t, wrench_t, inertia_of, &
+  use counterparts_m, only: counterparts_t, inertia_t, motion_t, wrench_t, inertia_of, &
     inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
   implicit none
   private
@@ -29,15 +29,16 @@ module contact_response_m
     real(wp), allocatable :: eta(:)              !! eta_n of the contact point [N s/m]
     real(wp), allocatable :: decay(:)            !! eta of the pair over twice its mass m* [1/s]
     real(wp), allocatable :: pair_frequency2(:)  !! square of the frequency of the pair [1/s2]
-    real(wp), allocatable :: frequency2(:)       !! (partners) sum over pairs of a free body [1/s2]
+    real(wp), allocatable :: frequency2(:)
+      !! (counterparts) sum over pairs of a free body [1/s2]
     !> Sums over the contact points of a pair, and over all contact points of a body: stiffness and
     !! damping over the mass that the bodies, or the body, set against a force there, rotation
     !! included.
     real(wp), allocatable :: pair_damping(:)                !! (points) [1/s]
-    real(wp), allocatable :: stiffness(:), damping(:)       !! (partners) [1/s2], [1/s]
+    real(wp), allocatable :: stiffness(:), damping(:)       !! (counterparts) [1/s2], [1/s]
   end type response_t
 
-  !> Two partners that touch.
+  !> Two counterparts that touch.
   type :: couple_t
     type(inertia_t) :: a, b
   end type couple_t
@@ -45,10 +46,10 @@ module contact_response_m
 contains
 
   !> Stiffness and damping of all contact points of a list.
-  subroutine respond(points, law, partners, response)
+  subroutine respond(points, law, counterparts, response)
     type(contact_points_t), intent(in) :: points
     class(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     type(response_t), intent(inout) :: response
     integer :: first, last
 
@@ -66,7 +67,7 @@ contains
     first = 1
     do while (first <= points%n)
       last = last_of_pair(points, first)
-      call respond_pair(points, first, last, law, partners, response)
+      call respond_pair(points, first, last, law, counterparts, response)
       first = last + 1
     end do
   end subroutine respond
@@ -93,11 +94,11 @@ contains
   !!
   !! It is no impact where the bodies move against one another no faster than weight, or a share of
   !! their load, makes them move within a swing.
-  pure subroutine respond_pair(points, first, last, law, partners, response)
+  pure subroutine respond_pair(points, first, last, law, counterparts, response)
     type(contact_points_t), intent(in) :: points
     integer, intent(in) :: first, last
     class(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     type(response_t), intent(inout) :: response
     type(couple_t) :: of
     type(spring_t) :: spring
@@ -108,14 +109,14 @@ contains
 
     a = points%item(first)%a
     b = points%item(first)%b
-    of = couple_t(inertia_of(partners, a), inertia_of(partners, b))
+    of = couple_t(inertia_of(counterparts, a), inertia_of(counterparts, b))
     weights = 0.0_wp
     centres = 0.0_wp
     load = 0.0_wp
     steep = 0.0_wp
-    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), partners%load, &
-      min(partners%give(a), partners%give(b)))
-    hard = min(partners%hard(a), partners%hard(b))
+    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), counterparts%load, &
+      min(counterparts%give(a), counterparts%give(b)))
+    hard = min(counterparts%hard(a), counterparts%hard(b))
     do t = first, last
       associate (point => points%item(t))
         response%k(t) = point%weight*k
@@ -155,8 +156,8 @@ contains
                                                      highest)
     call sum_up(points, first, last, steep, of, response)
     highest = steep*highest
-    calm = max(partners%gravity, calm_share*norm(load)*(of%a%inverse_mass + of%b%inverse_mass))
-    speed = largest_speed(motion_between(partners, a, b), points%item(first)%arm_a, &
+    calm = max(counterparts%gravity, calm_share*norm(load)*(of%a%inverse_mass + of%b%inverse_mass))
+    speed = largest_speed(motion_between(counterparts, a, b), points%item(first)%arm_a, &
       points%item(first)%arm_b)
     if (speed**2*highest < calm**2) highest = highest*(impact_turn/slow_turn)**2
     response%pair_frequency2(first:last) = highest

@@ -10,7 +10,7 @@ module contact_spheres_m
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
+  use bed_m, only: bed_t, bed_counterpart, bed_place, bed_is_near, bed_distance
   use surface_search_m, only: found_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
@@ -121,7 +121,7 @@ contains
         if (self%list%b(p) < 0) cycle
         if (blocks%still(self%list%b(p))) cycle
       end if
-      if (self%list%b(p) == bed_partner) then
+      if (self%list%b(p) == bed_counterpart) then
         call add_bed_points(walls%bed, blocks, self, p, way(self, blocks, p, ahead), points)
       else if (self%list%b(p) < 0) then
         call add_wall_points(walls, blocks, self, p, way(self, blocks, p, ahead), points)
@@ -297,7 +297,7 @@ contains
     x = bed_place(bed, blocks%x(:, a))
     reach = self%reach(a) + self%skin
     if (.not. bed_is_near(bed, x - reach, x + reach)) return
-    call add_pair(a, bed_partner, [0.0_wp, 0.0_wp, 0.0_wp], self%list)
+    call add_pair(a, bed_counterpart, [0.0_wp, 0.0_wp, 0.0_wp], self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         c = x + matmul(self%turn(:, :, a), shape%sphere_centre(:, i))
@@ -407,7 +407,7 @@ contains
     integer :: c, s
 
     point%a = self%list%a(p)
-    point%b = bed_partner
+    point%b = bed_counterpart
     do c = self%list%first(p), self%list%first(p + 1) - 1
       s = self%list%i(c)
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &

@@ -3,14 +3,14 @@ module contact_state_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use springs_m, only: springs_t, reserve_springs
   use sleep_m, only: sleep_t, sleep_init
   use lubrication_m, only: lubrication_t
   use contact_detection_m, only: contact_detection_t, detection_init
   use contact_forces_m, only: loads_t
   use substep_limits_m, only: limits_t, limits_init, longest_substep_of
-  use partners_met_m, only: met_t
+  use counterparts_met_m, only: met_t
   use impulse_rows_m, only: rows_t, rows_init
   implicit none
   private
@@ -56,9 +56,11 @@ contains
     call limits_init(input, contacts%detected, contacts%limits)
     n = blocks%n
     associate (loads => contacts%loads, start => contacts%start)
-      allocate (loads%force(3, bed_partner:n), loads%torque(3, bed_partner:n), source=0.0_wp)
-      allocate (loads%impulse(3, bed_partner:n), loads%twist(3, bed_partner:n), source=0.0_wp)
-      allocate (loads%film(3, bed_partner:n), source=0.0_wp)
+      allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
+        source=0.0_wp)
+      allocate (loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), &
+        source=0.0_wp)
+      allocate (loads%film(3, bed_counterpart:n), source=0.0_wp)
       allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
     end associate
     allocate (contacts%share(n), contacts%steady(3, n), contacts%held(6, n), source=0.0_wp)

@@ -18,7 +18,7 @@ module contact_surface_m
   use vectors_m, only: distance, norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_t, bed_partner, bed_place
+  use bed_m, only: bed_t, bed_counterpart, bed_place
   use neighbours_m, only: pair_list_t, near_pairs
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use surface_features_m, only: surface_init
@@ -87,7 +87,7 @@ contains
       self%reach(b) = self%surface(blocks%shape(b))%reach
       self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
-      self%with_bed(b)%b = bed_partner
+      self%with_bed(b)%b = bed_counterpart
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest

@@ -10,14 +10,14 @@ module contacts_m
   use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
                      all_still
   use lubrication_m, only: lubricate
-  use contact_partners_m, only: update_partners, update_motion
+  use counterparts_m, only: update_counterparts, update_motion
   use acting_bodies_m, only: list_present
   use contact_detection_m, only: detect_contacts
   use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
     elastic_energy, energy_in_memory
   use impulse_step_m, only: move_by_impulses
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
-  use partners_met_m, only: store_partners, count_partners
+  use counterparts_met_m, only: store_counterparts, count_counterparts
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep, restore_contacts
   implicit none
@@ -50,7 +50,7 @@ contains
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
     contacts%met%n = 0
-    call update_partners(walls, gravity, blocks, contacts%detected%partners)
+    call update_counterparts(walls, gravity, blocks, contacts%detected%counterparts)
     if (contacts%sleep%active) then
       call update_stillness(blocks, changed)
       if (changed) call restore_contacts(blocks, contacts)
@@ -83,7 +83,7 @@ contains
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
-    call count_partners(contacts%met, blocks)
+    call count_counterparts(contacts%met, blocks)
     if (contacts%by_impulses) then
       report%energy = energy_in_memory(contacts%springs) + energy_in_memory(contacts%sleep%rest)
     else
@@ -155,7 +155,7 @@ contains
                loads => contacts%loads, held => contacts%held, &
                acting => contacts%detected%acting%body(:contacts%detected%acting%n))
       associate (point => detected%points%item(:detected%points%n))
-        call store_partners(point%a, point%b, contacts%met)
+        call store_counterparts(point%a, point%b, contacts%met)
       end associate
       call match_springs(detected, contacts%before, springs)
       call stretch_springs(0.5_wp*dt_b, detected, springs)
@@ -165,7 +165,7 @@ contains
                          b, blocks)
         end associate
       end do
-      call update_motion(blocks, acting, detected%partners)
+      call update_motion(blocks, acting, detected%counterparts)
       call sum_forces(dt_b, detected, springs, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
         loads%force)
@@ -182,7 +182,7 @@ contains
         end associate
       end do
       call stop_sleepers(acting, blocks)
-      call update_motion(blocks, acting, detected%partners)
+      call update_motion(blocks, acting, detected%counterparts)
       call stretch_springs(0.5_wp*dt_b, detected, springs)
     end associate
     call drift(0.5_wp*dt_b, blocks)

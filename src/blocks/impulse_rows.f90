@@ -1,7 +1,7 @@
 !> The contact points of one contact step as constraints: what is solved for the impulses, and what
 !! is remembered of them.
 !!
-!! A row is a contact point that is there or may come in the step. Rows of one pair of partners
+!! A row is a contact point that is there or may come in the step. Rows of one pair of counterparts
 !! stand together. Pairs have colours: those of one colour share no body that moves, so that the
 !! order of their solution does not matter, nor the number of threads.
 module impulse_rows_m
@@ -9,16 +9,16 @@ module impulse_rows_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t
   use springs_m, only: springs_t, reserve_springs, comes_before
-  use contact_partners_m, only: partners_t
+  use counterparts_m, only: counterparts_t
   use contact_law_m, only: contact_law_t
   implicit none
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
 
-  !> One contact point: its frame, the masses it works on, and its impulse, on partner b.
+  !> One contact point: its frame, the masses it works on, and its impulse, on counterpart b.
   type :: row_t
     real(wp) :: n(3) = 0.0_wp, e1(3) = 0.0_wp, e2(3) = 0.0_wp  !! normal from a to b, tangents [-]
     real(wp) :: arm_a(3) = 0.0_wp, arm_b(3) = 0.0_wp  !! from the centres to the contact [m]
@@ -54,14 +54,17 @@ module impulse_rows_m
     integer(i8), allocatable :: used(:)           !! (n) work: colours of each body
     integer :: n_active = 0
     integer, allocatable :: active(:)             !! bodies that move and have rows
-    logical, allocatable :: busy(:), struck(:)    !! (partners) has rows; was hit
-    real(wp), allocatable :: v(:, :)              !! (6, partners) velocity and spin [m/s], [rad/s]
-    real(wp), allocatable :: v_start(:, :)        !! (6, partners) at the start of the step
-    real(wp), allocatable :: way(:, :)            !! (6, partners) since the step began [m], [rad]
-    real(wp), allocatable :: a_free(:, :)         !! (6, partners) without contact [m/s2], [rad/s2]
-    real(wp), allocatable :: by_contact(:, :)     !! (6, partners) change of v in a sub-sweep
-    real(wp), allocatable :: inverse_mass(:)      !! (partners) 0: does not yield [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, partners) [1/(kg m2)]
+    logical, allocatable :: busy(:), struck(:)    !! (counterparts) has rows; was hit
+    real(wp), allocatable :: v(:, :)
+      !! (6, counterparts) velocity and spin [m/s], [rad/s]
+    real(wp), allocatable :: v_start(:, :)        !! (6, counterparts) at the start of the step
+    real(wp), allocatable :: way(:, :)
+      !! (6, counterparts) since the step began [m], [rad]
+    real(wp), allocatable :: a_free(:, :)
+      !! (6, counterparts) without contact [m/s2], [rad/s2]
+    real(wp), allocatable :: by_contact(:, :)     !! (6, counterparts) change of v in a sub-sweep
+    real(wp), allocatable :: inverse_mass(:)      !! (counterparts) 0: does not yield [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, counterparts) [1/(kg m2)]
   end type rows_t
 
   real(wp), parameter :: damping_ratio = 5.0_wp
@@ -71,18 +74,18 @@ module impulse_rows_m
 
 contains
 
-  !> Room for the partners of a case.
+  !> Room for the counterparts of a case.
   subroutine rows_init(n, rows)
     integer, intent(in) :: n                      !! bodies
     type(rows_t), intent(out) :: rows
 
-    allocate (rows%v(6, bed_partner:n), rows%v_start(6, bed_partner:n), source=0.0_wp)
-    allocate (rows%way(6, bed_partner:n), rows%a_free(6, bed_partner:n), &
-      rows%by_contact(6, bed_partner:n), rows%inverse_mass(bed_partner:n), &
-      rows%inverse_inertia(3, 3, bed_partner:n), source=0.0_wp)
+    allocate (rows%v(6, bed_counterpart:n), rows%v_start(6, bed_counterpart:n), source=0.0_wp)
+    allocate (rows%way(6, bed_counterpart:n), rows%a_free(6, bed_counterpart:n), &
+      rows%by_contact(6, bed_counterpart:n), rows%inverse_mass(bed_counterpart:n), &
+      rows%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
     allocate (rows%used(n), source=0_i8)
-    allocate (rows%active(n + 1 - bed_partner), source=0)
-    allocate (rows%busy(bed_partner:n), rows%struck(bed_partner:n), source=.false.)
+    allocate (rows%active(n + 1 - bed_counterpart), source=0)
+    allocate (rows%busy(bed_counterpart:n), rows%struck(bed_counterpart:n), source=.false.)
     allocate (rows%begin(max_colours + 1), source=1)
   end subroutine rows_init
 
@@ -91,19 +94,19 @@ contains
   !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, damped so
   !! much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D
   !! (2024).
-  subroutine make_rows(h, contact_time, points, law, partners, blocks, memory, rows)
+  subroutine make_rows(h, contact_time, points, law, counterparts, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
     real(wp), intent(in) :: contact_time          !! [s]
     type(contact_points_t), intent(in) :: points
     class(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
     type(springs_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
     integer :: t, m, r
 
-    call copy_partners(partners, blocks, rows)
+    call copy_counterparts(counterparts, blocks, rows)
     call reserve_rows(points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
@@ -134,29 +137,29 @@ contains
     call colour_pairs(rows)
   end subroutine make_rows
 
-  !> Velocities and inverse inertia of the partners; what is held, sleeps or is moved at a given
+  !> Velocities and inverse inertia of the counterparts; what is held, sleeps or is moved at a given
   !! rate does not yield.
-  pure subroutine copy_partners(partners, blocks, rows)
-    type(partners_t), intent(in) :: partners
+  pure subroutine copy_counterparts(counterparts, blocks, rows)
+    type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
     type(rows_t), intent(inout) :: rows
     integer :: b
 
-    do b = bed_partner, blocks%n
-      rows%v(1:3, b) = partners%v(:, b)
-      rows%v(4:6, b) = partners%omega(:, b)
+    do b = bed_counterpart, blocks%n
+      rows%v(1:3, b) = counterparts%v(:, b)
+      rows%v(4:6, b) = counterparts%omega(:, b)
       rows%v_start(:, b) = rows%v(:, b)
       rows%way(:, b) = 0.0_wp
       rows%by_contact(:, b) = 0.0_wp
       rows%busy(b) = .false.
-      rows%inverse_mass(b) = partners%inverse_mass(b)
-      rows%inverse_inertia(:, :, b) = partners%inverse_inertia(:, :, b)
+      rows%inverse_mass(b) = counterparts%inverse_mass(b)
+      rows%inverse_inertia(:, :, b) = counterparts%inverse_inertia(:, :, b)
       if (b < 1) cycle
       if (.not. blocks%fixed(b) .and. .not. blocks%asleep(b)) cycle
       rows%inverse_mass(b) = 0.0_wp
       rows%inverse_inertia(:, :, b) = 0.0_wp
     end do
-  end subroutine copy_partners
+  end subroutine copy_counterparts
 
   !> Make room for n rows and pairs.
   subroutine reserve_rows(n, rows)
@@ -199,7 +202,7 @@ contains
     rows%busy([a, b]) = .true.
   end subroutine begin_pair
 
-  !> Tangents of a row and the masses that two partners set against an impulse at it,
+  !> Tangents of a row and the masses that two counterparts set against an impulse at it,
   !! K = J M^-1 J^T.
   pure subroutine weigh(a, b, rows, row)
     integer, intent(in) :: a, b
@@ -232,7 +235,7 @@ contains
     row%mass_slip = 1.0_wp/(0.5_wp*(k_11 + k_22) + sqrt(0.25_wp*(k_11 - k_22)**2 + k_12**2))
   end subroutine weigh
 
-  !> Add what a partner yields at its arm to a unit impulse: 1/m - [r] I^-1 [r].
+  !> Add what a counterpart yields at its arm to a unit impulse: 1/m - [r] I^-1 [r].
   pure subroutine add_response(inverse_mass, inverse_inertia, arm, k)
     real(wp), intent(in) :: inverse_mass, inverse_inertia(3, 3), arm(3)   !! [1/kg], [1/(kg m2)]
     real(wp), intent(inout) :: k(3, 3)           !! [1/kg]
@@ -299,14 +302,14 @@ contains
     row%stretch(2) = dot_product(memory%xi(:, m), row%e2)
   end subroutine recall
 
-  !> List the partners that have rows and move.
+  !> List the counterparts that have rows and move.
   pure subroutine list_active(n, rows)
     integer, intent(in) :: n                     !! bodies
     type(rows_t), intent(inout) :: rows
     integer :: b
 
     rows%n_active = 0
-    do b = bed_partner, n
+    do b = bed_counterpart, n
       if (.not. rows%busy(b)) cycle
       if (rows%inverse_mass(b) <= 0.0_wp .and. all(abs(rows%v(:, b)) <= 0.0_wp)) cycle
       rows%n_active = rows%n_active + 1
@@ -346,7 +349,7 @@ contains
     end do
   end subroutine colour_pairs
 
-  !> Whether a partner is a body that yields to impulses.
+  !> Whether a counterpart is a body that yields to impulses.
   pure function yields(rows, b) result(yes)
     type(rows_t), intent(in) :: rows
     integer, intent(in) :: b
@@ -356,12 +359,12 @@ contains
     if (yes) yes = rows%inverse_mass(b) > 0.0_wp
   end function yields
 
-  !> Mean forces and torques of the step on all partners.
+  !> Mean forces and torques of the step on all counterparts.
   pure subroutine sum_loads(step, rows, force, torque)
     real(wp), intent(in) :: step                                   !! [s]
     type(rows_t), intent(in) :: rows
-    real(wp), intent(inout) :: force(:, bed_partner:), torque(:, bed_partner:)
-      !! (3, partners) [N], [N m]
+    real(wp), intent(inout) :: force(:, bed_counterpart:), torque(:, bed_counterpart:)
+      !! (3, counterparts) [N], [N m]
     real(wp) :: p(3)
     integer :: k, r
 

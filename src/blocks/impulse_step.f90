@@ -10,7 +10,7 @@ module impulse_step_m
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
-  use contact_partners_m, only: update_motion, update_inertia
+  use counterparts_m, only: update_motion, update_inertia
   use contact_forces_m, only: contact_report_t
   use contact_load_m, only: give_share
   use contact_state_m, only: contacts_t
@@ -21,7 +21,7 @@ module impulse_step_m
   use sleep_m, only: hold_or_wake
   use acting_bodies_m, only: list_present
   use resting_m, only: restore_contacts
-  use partners_met_m, only: store_partners
+  use counterparts_met_m, only: store_counterparts
   implicit none
   private
   public :: move_by_impulses
@@ -169,14 +169,14 @@ contains
       call find_surface_points(walls, blocks, step, detected%surface, detected%points)
       call list_present(blocks, detected%acting)
       associate (there => detected%acting%body(:detected%acting%n))
-        call update_motion(blocks, there, detected%partners)
-        call update_inertia(blocks, there, detected%partners)
+        call update_motion(blocks, there, detected%counterparts)
+        call update_inertia(blocks, there, detected%counterparts)
       end associate
       loads%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
         loads%film)
-      call make_rows(h, contacts%contact_time, detected%points, detected%law, detected%partners, &
-                     blocks, contacts%springs, rows)
+      call make_rows(h, contacts%contact_time, detected%points, detected%law, &
+                     detected%counterparts, blocks, contacts%springs, rows)
       if (rows%n > 0) then
         call fall_freely(gravity, step, contacts, blocks, rows)
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
@@ -241,7 +241,7 @@ contains
     end associate
   end subroutine finish_step
 
-  !> Partners that touched, how deep at the start of the step, and how far they came in it.
+  !> Counterparts that touched, how deep at the start of the step, and how far they came in it.
   subroutine report_rows(step, contacts, report)
     real(wp), intent(in) :: step   !! [s]
     type(contacts_t), intent(inout) :: contacts
@@ -249,7 +249,7 @@ contains
     logical :: touched(contacts%rows%n_pairs)
     integer :: k, r
 
-    associate (rows => contacts%rows, give => contacts%detected%partners%give)
+    associate (rows => contacts%rows, give => contacts%detected%counterparts%give)
       do k = 1, rows%n_pairs
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
@@ -262,7 +262,7 @@ contains
           end do
         end associate
       end do
-      call store_partners(pack(rows%a(:rows%n_pairs), touched), &
+      call store_counterparts(pack(rows%a(:rows%n_pairs), touched), &
                           pack(rows%b(:rows%n_pairs), touched), contacts%met)
     end associate
   end subroutine report_rows

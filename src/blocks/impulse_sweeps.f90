@@ -13,7 +13,7 @@
 module impulse_sweeps_m
   use kinds_m, only: wp
   use vectors_m, only: cross
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use impulse_rows_m, only: row_t, rows_t, past, in_space
   implicit none
   private

@@ -8,7 +8,7 @@ module lubrication_m
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   implicit none
   private
@@ -56,7 +56,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
     type(lubrication_t), intent(inout) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! (3, partners) of all partners [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:)
+      !! (3, counterparts) of all counterparts [N]
     real(wp), parameter :: round_off = 1.0e-9_wp
     logical :: active(blocks%n)
     integer :: a, p
@@ -86,7 +87,7 @@ contains
     integer, intent(in) :: a
     real(wp), intent(in) :: dt                        !! [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
     real(wp) :: n(3), f(3), gap, sides
     integer :: w
 
@@ -108,7 +109,7 @@ contains
     integer, intent(in) :: a, b
     real(wp), intent(in) :: dt                        !! [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
     real(wp) :: d(3), n(3), f(3), gap, distance, radius
 
     d = blocks%x(:, b) - blocks%x(:, a)

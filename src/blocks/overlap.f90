@@ -190,8 +190,8 @@ contains
     end do
   end subroutine max_overlap
 
-  !> Depth below which that of a body and its partner is of no interest: neither the largest of all
-  !! nor deep for their size [m].
+  !> Depth below which that of a body and its counterpart is of no interest: neither the largest of
+  !! all nor deep for their size [m].
   pure function worth_finding(a, b, depth, deep) result(least)
     integer, intent(in) :: a, b           !! body; body, or below 1: wall or bed
     real(wp), intent(in) :: depth         !! largest so far [m]

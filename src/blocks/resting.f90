@@ -9,12 +9,12 @@ module resting_m
   use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
-  use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
+  use counterparts_m, only: counterparts_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
   use contact_detection_m, only: detect_contacts
   use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
   use substep_limits_m, only: substep_limit, equal_part
-  use partners_met_m, only: store_partners
+  use counterparts_met_m, only: store_counterparts
   use contact_state_m, only: contacts_t
   implicit none
   private
@@ -62,7 +62,7 @@ contains
     if (changed .and. .not. contacts%by_impulses) call detect_contacts(walls, blocks, 0.0_wp, &
       contacts%detected)
     associate (rest => contacts%sleep%rest)
-      call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
+      call store_counterparts(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
   end subroutine wake_or_sleep
 
@@ -105,7 +105,7 @@ contains
     if (changed) call freeze_contacts(dt_b, blocks, contacts)
   end subroutine let_sleep
 
-  !> Velocities of the partners in the middle of a substep, if the candidates begin it at rest.
+  !> Velocities of the counterparts in the middle of a substep, if the candidates begin it at rest.
   subroutine foresee_motion(gravity, dt_b, blocks, contacts)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt_b         !! the substep [s]
@@ -114,17 +114,17 @@ contains
     integer :: b
 
     associate (acting => contacts%detected%acting)
-      call update_motion(blocks, acting%body(:acting%n), contacts%detected%partners)
+      call update_motion(blocks, acting%body(:acting%n), contacts%detected%counterparts)
     end associate
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      associate (v => contacts%detected%partners%v(:, b), &
-        omega => contacts%detected%partners%omega(:, b))
+      associate (v => contacts%detected%counterparts%v(:, b), &
+        omega => contacts%detected%counterparts%omega(:, b))
         if (contacts%sleep%candidate(b)) v = 0.0_wp
         if (contacts%sleep%candidate(b)) omega = 0.0_wp
         v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
         omega = omega + 0.5_wp*dt_b*matmul( &
-          contacts%detected%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+          contacts%detected%counterparts%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
       end associate
     end do
   end subroutine foresee_motion
@@ -141,9 +141,9 @@ contains
       do g = 1, springs%n
         a = springs%a(g)
         b = springs%b(g)
-        if (is_carried(blocks, contacts%detected%partners, b)) sleep%candidate(a) = .false.
+        if (is_carried(blocks, contacts%detected%counterparts, b)) sleep%candidate(a) = .false.
         if (b < 1) cycle
-        if (is_carried(blocks, contacts%detected%partners, a)) sleep%candidate(b) = .false.
+        if (is_carried(blocks, contacts%detected%counterparts, a)) sleep%candidate(b) = .false.
       end do
       sleep%supported = blocks%fixed .or. blocks%asleep
       changed = .true.
@@ -164,15 +164,15 @@ contains
     end associate
   end subroutine update_supported
 
-  !> Whether a partner is moved at a given rate.
-  pure function is_carried(blocks, partners, b) result(yes)
+  !> Whether a counterpart is moved at a given rate.
+  pure function is_carried(blocks, counterparts, b) result(yes)
     type(blocks_t), intent(in) :: blocks
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     integer, intent(in) :: b
     logical :: yes
 
     if (b < 0) then
-      yes = any(abs(partners%v(:, b)) > 0.0_wp)
+      yes = any(abs(counterparts%v(:, b)) > 0.0_wp)
     else
       yes = blocks%fixed(b) .and. .not. blocks%still(b)
     end if
@@ -196,7 +196,7 @@ contains
         sleep%chosen(g) = at_rest(blocks, a, b)
         if (contacts%by_impulses .or. .not. sleep%chosen(g)) cycle
         wrench = wrench_t()
-        call push_group(g, dt_b, motion_between(contacts%detected%partners, a, b), &
+        call push_group(g, dt_b, motion_between(contacts%detected%counterparts, a, b), &
           contacts%detected, springs, wrench, ignored)
         springs%force(:, g) = wrench%force
         springs%torque_a(:, g) = wrench%torque_a
@@ -228,7 +228,7 @@ contains
     end associate
   end subroutine restore_contacts
 
-  !> Whether neither body a nor its partner moves.
+  !> Whether neither body a nor its counterpart moves.
   pure function at_rest(blocks, a, b) result(yes)
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, b

@@ -77,7 +77,7 @@ module rigid_body_m
     real(wp), allocatable :: lagged_force(:, :)
       !! (6, n) force and torque of the fluid that the next step adds (`wall_balance_m`) [N, N m]
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
-    integer, allocatable :: contacts(:)   !! (n) different partners touched during the last step
+    integer, allocatable :: contacts(:)   !! (n) different counterparts touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them
   end type blocks_t
 

@@ -6,17 +6,17 @@ module springs_m
   private
   public :: springs_t, reserve_springs, comes_before, begins_pair, move_springs
 
-  !> Tangential springs, one for each sphere or point (key) of a body and the partner it touches;
-  !! arrays side by side, as the state of a run is written.
+  !> Tangential springs, one for each sphere or point (key) of a body and the counterpart it
+  !! touches; arrays side by side, as the state of a run is written.
   !!
-  !! The paper keeps one for each pair of spheres; one for each partner survives when a sphere
-  !! slides from a sphere of the partner to the next, so that resting blocks do not creep.
+  !! The paper keeps one for each pair of spheres; one for each counterpart survives when a sphere
+  !! slides from a sphere of the counterpart to the next, so that resting blocks do not creep.
   type :: springs_t
     integer :: n = 0
     integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `contact_point_t`
     integer, allocatable :: other(:)
       !! (n) edge of b, of contact points solved for impulses
-    real(wp), allocatable :: xi(:, :)            !! (3, n) way of the partner past the body [m]
+    real(wp), allocatable :: xi(:, :)            !! (3, n) way of the counterpart past the body [m]
     real(wp), allocatable :: k(:)                !! (n) k_t when last at work, for the energy [N/m]
     !> Of contact points at rest (`sleep_m`) and of those solved for impulses: force on a, torques
     !! on a and b, energy of the contact point.
@@ -51,7 +51,7 @@ contains
     call ensure_capacity(n, springs%energy)
   end subroutine reserve_springs
 
-  !> Order of springs and contact points: by body, partner, key.
+  !> Order of springs and contact points: by body, counterpart, key.
   pure function comes_before(a1, b1, key1, a2, b2, key2) result(yes)
     integer, intent(in) :: a1, b1, key1, a2, b2, key2
     logical :: yes
@@ -65,7 +65,7 @@ contains
     end if
   end function comes_before
 
-  !> Whether spring g is the first of its pair of partners.
+  !> Whether spring g is the first of its pair of counterparts.
   pure function begins_pair(springs, g) result(yes)
     type(springs_t), intent(in) :: springs
     integer, intent(in) :: g

@@ -202,7 +202,7 @@ contains
     class(state_visitor_t), intent(inout) :: visitor
     character(*), intent(in) :: name
     logical, intent(in) :: with_force   !! it remembers forces, torques and energies
-    logical, intent(in) :: with_edge    !! and the edge of the partner
+    logical, intent(in) :: with_edge    !! and the edge of the counterpart
     type(springs_t), intent(inout) :: s
 
     call visitor%whole_number(name//'n', s%n)

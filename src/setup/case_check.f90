@@ -20,7 +20,7 @@ module case_check_m
   use start_bodies_m, only: with_begun
   use walls_m, only: walls_t, walls_init
   use bed_m, only: bed_t
-  use neighbours_m, only: pair_list_t, sort_bodies, add_partners, nearest_shift
+  use neighbours_m, only: pair_list_t, sort_bodies, add_neighbours, nearest_shift
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, has_place
   use overlap_solid_m, only: expected_samples
   use panels_m, only: surface_triangles
@@ -412,7 +412,7 @@ contains
     do b = 2, scene%n
       if (scene%outside(b) .or. .not. scene%dated(b)) cycle
       pairs%n = 0
-      call add_partners(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
+      call add_neighbours(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
       do p = 1, pairs%n
         a = pairs%b(p)
         if (n == max_counted .or. .not. together(scene, a, b)) cycle

@@ -21,10 +21,11 @@ module bed_m
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
   private
-  public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
+  public :: bed_t, make_bed, set_bed, bed_counterpart, bed_place, bed_covers, bed_distance, &
+    bed_is_near
   public :: facet_within, max_clip_corners, way_of, height_of
 
-  integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
+  integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
 
   type :: bed_t

@@ -5,7 +5,7 @@ module neighbours_m
   implicit none
   private
   public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
-  public :: sort_bodies, add_partners
+  public :: sort_bodies, add_neighbours
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
   type :: bins_t
@@ -155,12 +155,12 @@ contains
     if (count(active) < 2) return
     call sort_bodies(x, radius, active, period, skin, cells, pairs)
     do a = 1, size(radius)
-      if (active(a)) call add_partners(a, x, radius, period, skin, cells, pairs)
+      if (active(a)) call add_neighbours(a, x, radius, period, skin, cells, pairs)
     end do
   end subroutine near_pairs
 
   !> Append the pairs of body a with the active bodies before it, after `sort_bodies`.
-  subroutine add_partners(a, x, radius, period, skin, cells, pairs)
+  subroutine add_neighbours(a, x, radius, period, skin, cells, pairs)
     integer, intent(in) :: a
     real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     integer, intent(in) :: cells(3)   !! from `sort_bodies`
@@ -194,8 +194,8 @@ contains
         end do
       end do
     end do
-    call sort_partners(begin, pairs)
-  end subroutine add_partners
+    call sort_neighbours(begin, pairs)
+  end subroutine add_neighbours
 
   !> What to add to the distance d so that it points to the nearest periodic image [m].
   pure function nearest_shift(period, d) result(shift)
@@ -270,8 +270,8 @@ contains
     pairs%shift(:, pairs%n) = shift
   end subroutine add_pair
 
-  !> Sort the pairs from `begin` on, all of one body, by partner.
-  pure subroutine sort_partners(begin, pairs)
+  !> Sort the pairs from `begin` on, all of one body, by counterpart.
+  pure subroutine sort_neighbours(begin, pairs)
     integer, intent(in) :: begin
     type(pair_list_t), intent(inout) :: pairs
     integer :: i, j, b
@@ -290,6 +290,6 @@ contains
       pairs%b(j + 1) = b
       pairs%shift(:, j + 1) = shift
     end do
-  end subroutine sort_partners
+  end subroutine sort_neighbours
 
 end module neighbours_m

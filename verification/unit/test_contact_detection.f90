@@ -8,7 +8,7 @@ program test_contact_detection
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use contact_partners_m, only: update_partners
+  use counterparts_m, only: update_counterparts
   use substep_limits_m, only: longest_substep_of
   use contact_detection_m, only: contact_detection_t, detection_init, detect_contacts
   implicit none
@@ -55,7 +55,7 @@ contains
     call blocks_init(case, shapes, blocks)
     call walls_init(case%grid, case%boundary, walls)
     call detection_init(case%contact, longest_substep_of(case%contact), blocks, detected)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, detected%partners)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, detected%counterparts)
     call check(model//': the model', detected%exact .eqv. model == 'surface')
     call detect_contacts(walls, blocks, 0.0_wp, detected)
     call check(model//': nothing touches', detected%points%n + detected%soon%n, 0)

@@ -5,7 +5,7 @@ program test_contact_forces
   use case_types_m, only: contact_input_t
   use random_counter_m, only: uniform
   use vectors_m, only: cross
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, add_point
   use contact_groups_m, only: form_groups
   use springs_m, only: springs_t, reserve_springs
@@ -26,7 +26,7 @@ program test_contact_forces
   type(springs_t) :: rest
   type(contact_report_t) :: report
 
-  allocate (loads%force(3, bed_partner:3), loads%torque(3, bed_partner:3))
+  allocate (loads%force(3, bed_counterpart:3), loads%torque(3, bed_counterpart:3))
   call check_reaction()
   call check_energy()
   call check_friction()
@@ -55,19 +55,21 @@ contains
     input%friction = mu
     input%wall_friction = wall_mu
     call choose_law(input, detected%law)
-    associate (partners => detected%partners)
-      allocate (partners%v(3, bed_partner:3), partners%omega(3, bed_partner:3), source=0.0_wp)
-      allocate (partners%hard(bed_partner:3), source=1.0_wp)
-      allocate (partners%give(bed_partner:3), source=1.0_wp)
-      allocate (partners%inverse_mass(bed_partner:3), source=0.0_wp)
-      allocate (partners%inverse_inertia(3, 3, bed_partner:3), source=0.0_wp)
-      partners%inverse_mass(1:3) = 1/mass
+    associate (counterparts => detected%counterparts)
+      allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
+        source=0.0_wp)
+      allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
+      allocate (counterparts%give(bed_counterpart:3), source=1.0_wp)
+      allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
+      allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
+      counterparts%inverse_mass(1:3) = 1/mass
       do b = 1, 3
-        partners%inverse_inertia(b, b, 1:3) = 1.0_wp
+        counterparts%inverse_inertia(b, b, 1:3) = 1.0_wp
       end do
     end associate
-    allocate (detected%response%frequency2(bed_partner:3))
-    allocate (detected%response%stiffness(bed_partner:3), detected%response%damping(bed_partner:3))
+    allocate (detected%response%frequency2(bed_counterpart:3))
+    allocate (detected%response%stiffness(bed_counterpart:3), &
+      detected%response%damping(bed_counterpart:3))
   end subroutine begin
 
   !> Contact points and springs as a substep finds them.
@@ -88,7 +90,7 @@ contains
       call add_point(point(t), detected%points)
     end do
     call form_groups(detected%points, detected%groups)
-    call respond(detected%points, detected%law, detected%partners, detected%response)
+    call respond(detected%points, detected%law, detected%counterparts, detected%response)
     call match_springs(detected, before, springs)
   end subroutine detect_again
 
@@ -99,15 +101,15 @@ contains
     type(contact_detection_t) :: detected
     type(springs_t) :: springs
     type(contact_point_t) :: point(8)
-    real(wp) :: place(3, bed_partner:3), p(3), moment(3)
+    real(wp) :: place(3, bed_counterpart:3), p(3), moment(3)
     integer :: t, i
 
     call begin(1.5_wp, 20.0_wp, detected)
     place = 0.0_wp
     do i = 1, 3
       place(:, i) = vector(i, 1)
-      detected%partners%v(:, i) = vector(i, 2)
-      detected%partners%omega(:, i) = vector(i, 3)
+      detected%counterparts%v(:, i) = vector(i, 2)
+      detected%counterparts%omega(:, i) = vector(i, 3)
     end do
     do t = 1, 8
       p = vector(t, 4)
@@ -152,7 +154,7 @@ contains
       springs%xi(:, 1) = (stretch + i*step)*x
       call sum_forces(1.0e-3_wp, detected, springs, loads, report)
       energy(i) = elastic_energy(detected, springs, rest)
-      if (i == 0) call check('a partner that went by pulls along', loads%force(:, 2), &
+      if (i == 0) call check('a counterpart that went by pulls along', loads%force(:, 2), &
         k_t*stretch**1.5_wp*x - k_n*(d + step)**1.5_wp*z, 1.0e-12_wp*k_n)
     end do
     call check('slope of its energy', (energy(1) - energy(-1))/(2*step), k_t*stretch**1.5_wp, &
@@ -200,7 +202,7 @@ contains
     point = contact_point_t(2, floor, 1, normal=-z, depth=d, length=0.5_wp)
     call detect_again([point], detected, springs)
     call detect_again([point], detected, springs)   ! it is not new any more
-    detected%partners%v(3, 2) = -closing
+    detected%counterparts%v(3, 2) = -closing
     report = contact_report_t()
     call sum_forces(dt, detected, springs, loads, report)
     force = loads%force(3, 2)
@@ -208,7 +210,7 @@ contains
       1.0e-12_wp*force)
     call check('Courant number', report%courant_max, closing*dt/0.5_wp, 1.0e-15_wp)
     call check('overlap', report%overlap_max, d, 0.0_wp)
-    detected%partners%v(3, 2) = 2*k_n*d/eta
+    detected%counterparts%v(3, 2) = 2*k_n*d/eta
     call sum_forces(dt, detected, springs, loads, report)
     call check('never pulls', loads%force(3, 2), 0.0_wp, 0.0_wp)
   end subroutine check_damping
@@ -227,7 +229,7 @@ contains
       call begin(1.0_wp, eta(i), detected)
       call detect_again([point], detected, springs)
       call detect_again([point], detected, springs)   ! it is not new any more
-      detected%partners%v(3, 2) = -closing
+      detected%counterparts%v(3, 2) = -closing
       call sum_forces(dt, detected, springs, loads, report)
       call check('a strong dashpot stops', dt*loads%force(3, 2)/mass(2), closing + k_n*d/eta(i), &
         1.0e-12_wp)
@@ -250,7 +252,7 @@ contains
       springs%n = 0
       call detect_again([contact_point_t(2, floor, 1, normal=-z, depth=depth(i), length=1.0_wp)], &
         detected, springs)
-      detected%partners%v(3, 2) = -closing
+      detected%counterparts%v(3, 2) = -closing
       call sum_forces(dt, detected, springs, loads, report)
       force = loads%force(3, 2)
       call check('damping of a new contact point', force, &
@@ -258,8 +260,8 @@ contains
     end do
   end subroutine check_new_point
 
-  !> A spring follows its contact point by body, partner and key, lies in the present plane as long
-  !! as it was, and grows by the tangential way; others begin anew or are forgotten.
+  !> A spring follows its contact point by body, counterpart and key, lies in the present plane as
+  !! long as it was, and grows by the tangential way; others begin anew or are forgotten.
   subroutine check_memory()
     real(wp), parameter :: dt = 0.5_wp
     type(contact_detection_t) :: detected
@@ -271,8 +273,8 @@ contains
       depth=1.0_wp), contact_point_t(3, 1, 4, normal=z, depth=1.0_wp, arm_a=2*z)]
     call detect_again(point, detected, springs)
     call check('all are new', all(detected%groups%new(:3)))
-    detected%partners%v(:, 1) = 3*x + 7*z
-    detected%partners%omega(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
+    detected%counterparts%v(:, 1) = 3*x + 7*z
+    detected%counterparts%omega(:, 3) = [0.0_wp, 1.0_wp, 0.0_wp]
     call stretch_springs(dt, detected, springs)
     call check('tangential way', springs%xi(:, 1), 3*dt*x, 1.0e-15_wp)
     call check('turning takes part', springs%xi(:, 3), dt*(3 - 2)*x, 1.0e-15_wp)

@@ -10,7 +10,7 @@ program test_contact_load
   use contact_load_m, only: load_of, hard_depth, depth_at_rest
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t
-  use contact_partners_m, only: partners_t, partners_init, update_partners
+  use counterparts_m, only: counterparts_t, counterparts_init, update_counterparts
   implicit none
 
   real(wp), parameter :: g = 9.81_wp, size(2) = [0.02_wp, 0.3_wp]
@@ -64,13 +64,13 @@ contains
       1.0e-12_wp)
   end subroutine check_depth
 
-  !> What the partners of a case carry: the heaviest body that moves freely; and each may give way
-  !! by a hundredth of its edge.
+  !> What the counterparts of a case carry: the heaviest body that moves freely; and each may give
+  !! way by a hundredth of its edge.
   subroutine check_heaviest()
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(walls_t) :: walls
-    type(partners_t) :: partners
+    type(counterparts_t) :: counterparts
     type(load_t) :: load
     integer :: b
 
@@ -80,20 +80,20 @@ contains
       case%body(b)%position = 0.5_wp*b
     end do
     call blocks_init(case, shapes, blocks)
-    call partners_init(blocks, partners)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
+    call counterparts_init(blocks, counterparts)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
     load = load_of(blocks%mass(2), g)
-    call check('the heaviest', partners%load%mass, blocks%mass(2), 0.0_wp)
-    call check('its weight', partners%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
-    call check('may give way', partners%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
+    call check('the heaviest', counterparts%load%mass, blocks%mass(2), 0.0_wp)
+    call check('its weight', counterparts%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
+    call check('may give way', counterparts%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
     case%body(2)%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
-    call check('nobody carries a held one', partners%load%mass, blocks%mass(1), 0.0_wp)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
+    call check('nobody carries a held one', counterparts%load%mass, blocks%mass(1), 0.0_wp)
     case%body%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
-    call check('all held: no load', partners%load%mass, 0.0_wp, 0.0_wp)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
+    call check('all held: no load', counterparts%load%mass, 0.0_wp, 0.0_wp)
   end subroutine check_heaviest
 
 end program test_contact_load

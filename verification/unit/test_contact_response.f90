@@ -5,11 +5,11 @@ program test_contact_response
   use check_m, only: check, finish_checks
   use case_types_m, only: contact_input_t
   use random_counter_m, only: uniform
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use contact_law_m, only: contact_law_t, load_t
   use contact_laws_m, only: choose_law
-  use contact_partners_m, only: partners_t, motion_t, wrench_t, act
+  use counterparts_m, only: counterparts_t, motion_t, wrench_t, act
   use contact_response_m, only: response_t, respond, highest_frequency2, bound_by_sums, &
     opening_speed, push_apart, impact_turn
   implicit none
@@ -17,7 +17,7 @@ program test_contact_response
   real(wp), parameter :: mass(3) = [2.0_wp, 3.0_wp, 6.0_wp]   !! of three balls [kg]
   real(wp), parameter :: z(3) = [0.0_wp, 0.0_wp, 1.0_wp]
   class(contact_law_t), allocatable :: law
-  type(partners_t) :: partners
+  type(counterparts_t) :: counterparts
 
   call make_balls()
   call check_damping()
@@ -36,14 +36,15 @@ contains
 
     input%restitution = 0.3_wp
     call choose_law(input, law)
-    allocate (partners%v(3, bed_partner:3), partners%omega(3, bed_partner:3), source=0.0_wp)
-    allocate (partners%hard(bed_partner:3), source=1.0_wp)
-    allocate (partners%give(bed_partner:3), source=1.0_wp)
-    allocate (partners%inverse_mass(bed_partner:3), source=0.0_wp)
-    allocate (partners%inverse_inertia(3, 3, bed_partner:3), source=0.0_wp)
-    partners%inverse_mass(1:3) = 1/mass
-    partners%v(3, 1) = 1.0e3_wp
-    partners%v(3, 3) = -1.0e3_wp
+    allocate (counterparts%v(3, bed_counterpart:3), counterparts%omega(3, bed_counterpart:3), &
+      source=0.0_wp)
+    allocate (counterparts%hard(bed_counterpart:3), source=1.0_wp)
+    allocate (counterparts%give(bed_counterpart:3), source=1.0_wp)
+    allocate (counterparts%inverse_mass(bed_counterpart:3), source=0.0_wp)
+    allocate (counterparts%inverse_inertia(3, 3, bed_counterpart:3), source=0.0_wp)
+    counterparts%inverse_mass(1:3) = 1/mass
+    counterparts%v(3, 1) = 1.0e3_wp
+    counterparts%v(3, 3) = -1.0e3_wp
   end subroutine make_balls
 
   !> Contact points (weight, depth) between balls a and b along z.
@@ -64,18 +65,18 @@ contains
     type(response_t) :: response
     real(wp) :: reduced, k, eta
 
-    allocate (response%frequency2(bed_partner:3))
-    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    allocate (response%frequency2(bed_counterpart:3))
+    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     reduced = 1/(1/mass(1) + 1/mass(2))
     k = law%normal_constant(reduced, load_t(), 1.0_wp)
     call add_ball_point(2, 1, [1.0_wp], one)
-    call respond(one, law, partners, response)
+    call respond(one, law, counterparts, response)
     eta = 2*law%damping_ratio*sqrt(k*reduced)
     call check('damping of one contact point', response%eta(1), eta, 1.0e-6_wp*eta)
     call check('its decay', response%decay(1), 0.5_wp*eta/reduced, 1.0e-6_wp*eta/reduced)
     call check('its force', response%elastic(1), k*1.0e-6_wp, 1.0e-6_wp*k*1.0e-6_wp)
     call add_ball_point(2, 1, [0.1_wp, 0.3_wp, 0.4_wp, 0.2_wp], many)
-    call respond(many, law, partners, response)
+    call respond(many, law, counterparts, response)
     call check('four that are as stiff as one', sum(response%eta(:4)), eta, 1.0e-6_wp*eta)
     call check('each by its share', response%eta(3), 0.4_wp*eta, 1.0e-6_wp*eta)
     call check('with one decay', response%decay(2), 0.5_wp*eta/reduced, 1.0e-6_wp*eta/reduced)
@@ -90,12 +91,12 @@ contains
     type(response_t) :: response
     real(wp) :: lever   ! change of depth that stands for a shift [-]
 
-    allocate (response%frequency2(bed_partner:3))
-    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    allocate (response%frequency2(bed_counterpart:3))
+    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     call add_ball_point(2, 1, [1.0_wp], points)
     call add_point(contact_point_t(2, 1, 2, normal=[1.0_wp, 0.0_wp, 0.0_wp], depth=depth, &
                            weight=weight, weight_shift=[0.0_wp, growth, 0.0_wp]), points)
-    call respond(points, law, partners, response)
+    call respond(points, law, counterparts, response)
     lever = sqrt(1.0_wp + (0.5_wp*depth*growth)**2)
     call check('a contact point that begins: damping', response%eta(2)/response%eta(1), &
                sqrt(weight)/lever, 1.0e-6_wp*sqrt(weight)/lever)
@@ -108,11 +109,11 @@ contains
     type(response_t) :: response
     real(wp) :: pair(2), together
 
-    allocate (response%frequency2(bed_partner:3))
-    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    allocate (response%frequency2(bed_counterpart:3))
+    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     call add_ball_point(2, 1, [1.0_wp], points)
     call add_ball_point(3, 2, [1.0_wp], points)
-    call respond(points, law, partners, response)
+    call respond(points, law, counterparts, response)
     pair = law%normal_constant(1.0_wp, load_t(), 1.0_wp)   ! k/m* does not depend on the mass
     call check('frequency of a pair', response%pair_frequency2(:2), pair, 1.0e-6_wp*pair(1))
     call check('of the ball between two', response%frequency2(2), sum(pair), 1.0e-6_wp*sum(pair))
@@ -135,20 +136,20 @@ contains
     real(wp) :: frequency2, rate, k, at_2, eta, pair(2)
     integer :: i
 
-    allocate (response%frequency2(bed_partner:3))
-    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
+    allocate (response%frequency2(bed_counterpart:3))
+    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
     do i = 1, 3
-      partners%inverse_inertia(i, i, 2) = inverse_inertia
+      counterparts%inverse_inertia(i, i, 2) = inverse_inertia
     end do
     call add_point(contact_point_t(2, 1, 1, arm_a=arm, normal=-z, depth=1.0e-6_wp), points)
-    call respond(points, law, partners, response)
+    call respond(points, law, counterparts, response)
     call bound_by_sums(points, response, frequency2, rate)
     k = response%k(1)
     at_2 = 1/mass(2) + inverse_inertia*arm(1)**2
     call check('one pair: stiffness', frequency2, k*(1/mass(1) + at_2), 1.0e-6_wp*frequency2)
     call check('one pair: dashpots bound nothing', rate, 0.0_wp, 1.0e-9_wp)
     call add_point(contact_point_t(3, 2, 1, arm_b=arm, normal=-z, depth=1.0e-6_wp), points)
-    call respond(points, law, partners, response)
+    call respond(points, law, counterparts, response)
     call bound_by_sums(points, response, frequency2, rate)
     k = response%k(1)*(1/mass(1) + at_2)
     k = max(k + response%k(2)*at_2, response%k(2)*(1/mass(3) + at_2) + response%k(1)*at_2)
@@ -157,7 +158,7 @@ contains
     eta = min(response%eta(2)*at_2, pair(1)) + response%eta(2)*at_2
     eta = max(eta, min(response%eta(1)*at_2, pair(2)) + response%eta(1)*at_2)
     call check('two pairs: dashpots', rate, eta, 1.0e-6_wp*rate)
-    partners%inverse_inertia = 0.0_wp
+    counterparts%inverse_inertia = 0.0_wp
   end subroutine check_sums
 
   !> A pair carries the heaviest body within what the smaller of the two may give way.
@@ -165,19 +166,19 @@ contains
     type(contact_points_t) :: points
     type(response_t) :: response
 
-    allocate (response%frequency2(bed_partner:3))
-    allocate (response%stiffness(bed_partner:3), response%damping(bed_partner:3))
-    partners%load = load_t(1.0e9_wp, 1.0e10_wp)
-    partners%give(1) = 1.0e-2_wp
+    allocate (response%frequency2(bed_counterpart:3))
+    allocate (response%stiffness(bed_counterpart:3), response%damping(bed_counterpart:3))
+    counterparts%load = load_t(1.0e9_wp, 1.0e10_wp)
+    counterparts%give(1) = 1.0e-2_wp
     call add_ball_point(2, 1, [1.0_wp, 0.5_wp], points)
-    call respond(points, law, partners, response)
+    call respond(points, law, counterparts, response)
     call check('stiffness under a load', response%k(:2), 1.0e12_wp*[1.0_wp, 0.5_wp], 1.0_wp)
-    partners%load = load_t()
-    partners%give = 1.0_wp
+    counterparts%load = load_t()
+    counterparts%give = 1.0_wp
   end subroutine check_load
 
-  !> What the force of a contact point does to its partners is what its spring gives: F times the
-  !! speed at which it lets its energy go, also where its weight changes with position.
+  !> What the force of a contact point does to its counterparts is what its spring gives: F times
+  !! the speed at which it lets its energy go, also where its weight changes with position.
   subroutine check_power()
     type(contact_point_t) :: point
     type(motion_t) :: motion

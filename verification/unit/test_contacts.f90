@@ -58,7 +58,7 @@ contains
     call check_energy()
     if (solvers(model) == 'springs') call check_constants()
     call check_added_mass()
-    call check_moving_partners()
+    call check_moving_counterparts()
     call check_periodic_image()
     call check_bookkeeping()
     call check_runaway()
@@ -470,7 +470,8 @@ contains
       0.0_wp)
   end subroutine check_incline_on_body
 
-  !> Two cubes set one on the other come to rest; partners are counted; forces balance the weight.
+  !> Two cubes set one on the other come to rest; counterparts are counted; forces balance the
+  !! weight.
   subroutine check_stack()
     type(world_t) :: world
     real(wp) :: height, change(3, 2), weight, v(3, 2)
@@ -495,7 +496,7 @@ contains
     call check('at rest', maxval(abs(world%blocks%v)), 0.0_wp, &
       merge(1.0e-9_wp, 1.0e-8_wp, solvers(model) == 'springs'))
     call check('on the floor', all(world%blocks%on_floor == [1, 0]))
-    call check('partners', all(world%blocks%contacts == [2, 1]))
+    call check('counterparts', all(world%blocks%contacts == [2, 1]))
     call check('weight on each', maxval(abs(world%blocks%contact_force(3, :) - weight)), 0.0_wp, &
       1.0e-8_wp)
     call check('no torque', maxval(abs(world%blocks%contact_torque)), 0.0_wp, 1.0e-10_wp)
@@ -631,7 +632,7 @@ contains
   end subroutine check_constants
 
   !> A sliding floor drags a cube along; a moved body pushes a ball to (1 + e) times its own speed.
-  subroutine check_moving_partners()
+  subroutine check_moving_counterparts()
     type(world_t) :: world
 
     call new_world(world, 1, 'cube')
@@ -656,7 +657,7 @@ contains
     call check('pushed', world%blocks%v(1, 2), 0.6_wp, 0.005_wp)
     call check('the pusher keeps its speed', world%blocks%v(1, 1), 0.4_wp, 0.0_wp)
     call check('and its way', world%blocks%x(1, 1), 0.5_wp + 10*dt*0.4_wp, 1.0e-14_wp)
-  end subroutine check_moving_partners
+  end subroutine check_moving_counterparts
 
   !> Two balls collide through a periodic side as they do in the middle.
   subroutine check_periodic_image()

@@ -26,7 +26,7 @@ program test_deep_overlaps
   call store_overlap(2, floor, 0.024_wp, deep)
   call check('shares of both', deep%share(:3), [0.055_wp, 0.08_wp, 0.0_wp], 1.0e-12_wp)
   call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp], 0.0_wp)
-  call check('with whom', deep%partner(1) == 2 .and. deep%partner(2) == floor)
+  call check('with whom', deep%counterpart(1) == 2 .and. deep%counterpart(2) == floor)
   call check('no fault yet', len(overlap_fault(deep)) == 0)
   warnings = 3
   call warn_of_overlaps(0.5_wp, deep, warnings)

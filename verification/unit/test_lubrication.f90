@@ -7,7 +7,7 @@ program test_lubrication
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use lubrication_m, only: lubrication_t, lubrication_init, lubricate, film_resistance, &
     film_impulse, film_pull
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
@@ -157,7 +157,8 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contacts_t) :: contacts
-    real(wp) :: x(3, n), v(3, n), force(3, bed_partner:n), pair(3, bed_partner:2), expected(3, n)
+    real(wp) :: x(3, n), v(3, n), force(3, bed_counterpart:n), pair(3, bed_counterpart:2), &
+      expected(3, n)
     integer :: i, j, felt
 
     call random_number(x)

@@ -9,7 +9,7 @@ program test_resting
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use sleep_m, only: update_stillness
-  use contact_partners_m, only: update_partners
+  use counterparts_m, only: update_counterparts
   use contact_detection_m, only: detect_contacts
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep
@@ -79,7 +79,8 @@ contains
     call blocks_init(case, shapes, world%blocks)
     call walls_init(case%grid, case%boundary, world%walls)
     call contacts_init(case%contact, world%blocks, world%contacts)
-    call update_partners(world%walls, gravity, world%blocks, world%contacts%detected%partners)
+    call update_counterparts(world%walls, gravity, world%blocks, &
+      world%contacts%detected%counterparts)
     call update_stillness(world%blocks, changed)
     call detect_contacts(world%walls, world%blocks, 0.0_wp, world%contacts%detected)
     world%contacts%sleep%quiet = 1000.0_wp
@@ -143,8 +144,8 @@ contains
   end subroutine check_contact
 
   !> The spring of a sleeper rests with the force and the energy of its contact, is told as a
-  !! partner met, and is at work again when the sleeper wakes. What it had of momentum went into the
-  !! contact point.
+  !! counterpart met, and is at work again when the sleeper wakes. What it had of momentum went into
+  !! the contact point.
   subroutine check_springs()
     type(world_t) :: world
     real(wp), parameter :: slow = 1.0e-6_wp   !! [m/s]
@@ -162,7 +163,7 @@ contains
       call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
       call check('no more contact points', contacts%detected%points%n, 0)
-      call check('but a partner', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
+      call check('but a counterpart', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
         == [1, 1, -5]))
       call check('stands', norm2(blocks%v(:, 1)), 0.0_wp, 0.0_wp)
       call check('its momentum', contacts%loads%impulse(1, 1), -blocks%mass(1)*slow, &

@@ -135,7 +135,7 @@ contains
     end associate
   end subroutine creep
 
-  !> What rests bears on body and partner, on the partner the other way, and on no wall.
+  !> What rests bears on body and counterpart, on the counterpart the other way, and on no wall.
   subroutine check_loads()
     type(sleep_t) :: sleep
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
@@ -243,7 +243,7 @@ contains
     call check('no substeps', one%report%substeps, 0)
     call check('same poses', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 1.0e-8_wp)
     call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 1.0e-4_wp)
-    call check('same partners', all(one%blocks%contacts == two%blocks%contacts))
+    call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
     call check('balance', maxval(abs(one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g)), &
       0.0_wp, 1.0e-12_wp)
     call check('the slab bears all', one%blocks%contact_force(3, 1), -n*one%blocks%mass(2)*g, &

@@ -5,7 +5,7 @@ program test_springs
   use contact_points_m, only: contact_point_t, contact_points_t, add_point, set_apart
   use contact_groups_m, only: groups_t, form_groups
   use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair, move_springs
-  use partners_met_m, only: met_t, store_partners
+  use counterparts_met_m, only: met_t, store_counterparts
   implicit none
 
   call check_order()
@@ -19,12 +19,12 @@ contains
 
   subroutine check_order()
     call check('by body', comes_before(1, 9, 9, 2, 0, 0))
-    call check('then partner', comes_before(2, -7, 9, 2, -1, 0))
+    call check('then counterpart', comes_before(2, -7, 9, 2, -1, 0))
     call check('then key', comes_before(2, 1, 3, 2, 1, 4))
     call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
   end subroutine check_order
 
-  !> A list of springs of bodies with partner 1; all else of a spring follows from its body.
+  !> A list of springs of bodies with counterpart 1; all else of a spring follows from its body.
   subroutine make(bodies, springs)
     integer, intent(in) :: bodies(:)
     type(springs_t), intent(inout) :: springs
@@ -101,7 +101,7 @@ contains
     call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
   end subroutine check_points
 
-  !> Contact points of one key and partner have a mean normal and point, weighted by overlap.
+  !> Contact points of one key and counterpart have a mean normal and point, weighted by overlap.
   subroutine check_groups()
     type(contact_points_t) :: points
     type(groups_t) :: groups
@@ -126,11 +126,11 @@ contains
   subroutine check_met()
     type(met_t) :: met
 
-    call store_partners([3, 3, 4], [1, 1, -5], met)
-    call store_partners([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
+    call store_counterparts([3, 3, 4], [1, 1, -5], met)
+    call store_counterparts([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
     call check('each pair once', met%n, 5)
     call check('sorted', all(met%a(:5) == [2, 3, 3, 4, 5]))
-    call check('with their partners', all(met%b(:5) == [1, -1, 1, -5, 1]))
+    call check('with their counterparts', all(met%b(:5) == [1, -1, 1, -5, 1]))
   end subroutine check_met
 
 end program test_springs
