@@ -20,7 +20,7 @@ module group_visitor_m
   use namelist_text_m, only: group_text_t
   use value_text_m, only: parse_real, parse_integer, parse_logical, nearest_name, &
     edit_distance, quoted_text, printable, sanitise, value_ok, value_not_finite, value_too_large, &
-    value_not_whole, looks_like_name
+    value_not_whole, value_malformed, looks_like_name
   implicit none
   private
   public :: group_visitor_t
@@ -46,7 +46,7 @@ module group_visitor_m
     generic :: real => real_value, real_values
     generic :: integer => integer_value, integer_values
     procedure, private :: real_value, real_values, integer_value, integer_values
-    procedure, private :: lookup, fault, count_is, read_real, read_integer, read_text, put_variable
+    procedure, private :: numbers, lookup, fault, count_is, read_number, read_text, put_variable
   end type group_visitor_t
 
 contains
@@ -255,34 +255,9 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
-    type(variable_t) :: entry
-    character(:), allocatable :: problem
-    real(wp) :: values(size(x))
-    integer :: i, j, fewest
 
-    if (.not. self%reading) then
-      entry = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, &
-        required)
-      entry%allowed = allowed
-      entry%most = size(x)
-      call self%put_variable(entry)
-      return
-    end if
-    i = self%lookup(variable, meaning//' ['//allowed%unit//']', required)
-    if (i == 0) return
-    fewest = merge(allowed%fewest, size(x), allowed%fewest > 0)
-    if (.not. self%count_is(i, fewest, size(x))) return
-    values = x
-    do j = 1, self%group%assignment(i)%n
-      call self%read_real(i, j, values(j))
-    end do
-    if (.not. self%good(variable)) return
-    problem = allowed%problem(pack(values, is_given(values)))
-    if (len(problem) > 0) then
-      call self%fault(i, problem)
-    else
-      x = values
-    end if
+    call self%numbers(variable, to_text(pack(x, is_given(x))), .false., x, allowed, meaning, &
+      ' ['//allowed%unit//']', example, required)
   end subroutine real_values
 
   !> A whole number.
@@ -308,33 +283,49 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
+    real(wp) :: values(size(n))
+
+    values = n
+    call self%numbers(variable, to_text(n), .true., values, allowed, meaning, '', example, required)
+    n = nint(values)
+  end subroutine integer_values
+
+  !> Numbers of either kind.
+  subroutine numbers(self, variable, text, whole, x, allowed, meaning, unit, example, required)
+    class(group_visitor_t), intent(inout) :: self
+    character(*), intent(in) :: variable, text   !! `x` as the user would write it
+    logical, intent(in) :: whole
+    real(wp), intent(inout) :: x(:)
+    type(allowed_t), intent(in) :: allowed
+    character(*), intent(in) :: meaning, unit, example
+    logical, intent(in), optional :: required
     type(variable_t) :: entry
     character(:), allocatable :: problem
-    integer :: values(size(n))
+    real(wp) :: values(size(x))
     integer :: i, j
 
     if (.not. self%reading) then
-      entry = described(variable, 'number', to_text(n), meaning, example, required)
+      entry = described(variable, 'number', text, meaning, example, required)
       entry%allowed = allowed
-      entry%most = size(n)
+      entry%most = size(x)
       call self%put_variable(entry)
       return
     end if
-    i = self%lookup(variable, meaning, required)
+    i = self%lookup(variable, meaning//unit, required)
     if (i == 0) return
-    if (.not. self%count_is(i, size(n), size(n))) return
-    values = n
-    do j = 1, size(n)
-      call self%read_integer(i, j, values(j))
+    if (.not. self%count_is(i, merge(allowed%fewest, size(x), allowed%fewest > 0), size(x))) return
+    values = x
+    do j = 1, self%group%assignment(i)%n
+      call self%read_number(i, j, whole, values(j))
     end do
     if (.not. self%good(variable)) return
-    problem = allowed%problem(real(values, wp))
+    problem = allowed%problem(pack(values, is_given(values)))
     if (len(problem) > 0) then
       call self%fault(i, problem)
     else
-      n = values
+      x = values
     end if
-  end subroutine integer_values
+  end subroutine numbers
 
   !> A logical; its example is what it is not by default.
   subroutine logical_value(self, variable, flag, meaning)
@@ -537,52 +528,35 @@ contains
     call self%fault(i, what)
   end function count_is
 
-  !> Value j of assignment i as a real number.
-  subroutine read_real(self, i, j, x)
+  !> Value j of assignment i as a number.
+  subroutine read_number(self, i, j, whole, x)
     class(group_visitor_t), intent(inout) :: self
     integer, intent(in) :: i, j
+    logical, intent(in) :: whole
     real(wp), intent(inout) :: x
-    character(:), allocatable :: subject
-    integer :: info
+    character(:), allocatable :: what, must
+    integer :: n, info
 
-    subject = ''
     associate (a => self%group%assignment(i))
-      if (a%n > 1) subject = 'value '//to_text(j)//' '
-      if (a%value(j)%quoted) then
-        call self%fault(i, subject//'must be a number, without quotes')
-        return
+      must = 'must be '
+      if (a%n > 1) must = 'value '//to_text(j)//' must be '
+      if (whole) then
+        call parse_integer(a%value(j)%text, n, info)
+        if (info == value_ok) x = n
+        if (a%value(j)%quoted) info = value_not_whole
+        what = 'a whole number'
+        if (info == value_too_large) what = 'at most '//to_text(huge(n))//' in size'
+      else
+        call parse_real(a%value(j)%text, x, info)
+        what = 'a number'
+        if (info == value_too_large) what = '0 or between 1e-20 and 1e20 in size'
+        if (info == value_not_finite) what = 'a finite number'
+        if (a%value(j)%quoted) info = value_malformed
+        if (a%value(j)%quoted) what = 'a number, without quotes'
       end if
-      call parse_real(a%value(j)%text, x, info)
     end associate
-    select case (info)
-    case (value_ok)
-    case (value_not_finite); call self%fault(i, subject//'must be a finite number')
-    case (value_too_large)
-      call self%fault(i, subject//'must be 0 or between 1e-20 and 1e20 in size')
-    case default; call self%fault(i, subject//'must be a number')
-    end select
-  end subroutine read_real
-
-  !> Value j of assignment i as a whole number.
-  subroutine read_integer(self, i, j, n)
-    class(group_visitor_t), intent(inout) :: self
-    integer, intent(in) :: i, j
-    integer, intent(inout) :: n
-    character(:), allocatable :: subject
-    integer :: info
-
-    subject = ''
-    associate (a => self%group%assignment(i))
-      if (a%n > 1) subject = 'value '//to_text(j)//' '
-      call parse_integer(a%value(j)%text, n, info)
-      if (a%value(j)%quoted) info = value_not_whole
-    end associate
-    if (info == value_too_large) then
-      call self%fault(i, subject//'must be at most '//to_text(huge(n))//' in size')
-    else if (info /= value_ok) then
-      call self%fault(i, subject//'must be a whole number')
-    end if
-  end subroutine read_integer
+    if (info /= value_ok) call self%fault(i, must//what)
+  end subroutine read_number
 
   !> Is value j of assignment i a quoted text?
   subroutine read_text(self, i, j, ok)

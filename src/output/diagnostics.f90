@@ -12,7 +12,7 @@ module diagnostics_m
   use run_state_m, only: run_state_t
   implicit none
   private
-  public :: step_report_t, row_t, make_row, row_values, column_name, column_units, n_columns
+  public :: step_report_t, quantity_t, make_row, value_of
   public :: fluid_sums_t, measure_fluid, energy_of_level
 
   !> Of all the fluid.
@@ -46,104 +46,80 @@ module diagnostics_m
     real(wp) :: energy_excess = 0.0_wp        !! over what was put in (`energy_m`) [-]
   end type step_report_t
 
-  !> The columns of /series, in the order of `column_name`.
-  type :: row_t
-    real(wp) :: time = 0.0_wp                 !! [s]
-    real(wp) :: dt = 0.0_wp                   !! of the step that ends here [s]
-    real(wp) :: cfl = 0.0_wp
-    real(wp) :: divergence_max = 0.0_wp       !! [1/s]
-    real(wp) :: pressure_passes = 0.0_wp
-    real(wp) :: solver_iterations = 0.0_wp
-    real(wp) :: liquid_volume = 0.0_wp        !! [m3]
-    real(wp) :: liquid_volume_drift = 0.0_wp  !! (volume - initial - inflow)/initial
-    real(wp) :: volume_excess_max = 0.0_wp
-      !! largest |Vt - V (1 - alpha)|/V of a cell: fluid it holds beyond its volume, or lacks
-    real(wp) :: kinetic_energy_fluid = 0.0_wp, kinetic_energy_bodies = 0.0_wp      !! [J]
-    real(wp) :: potential_energy_fluid = 0.0_wp      !! zero at the lower corner of the tank [J]
-    real(wp) :: potential_energy_bodies = 0.0_wp, contact_energy = 0.0_wp          !! [J]
-    real(wp) :: energy_excess = 0.0_wp        !! over what was put in, over what was set free
-    real(wp) :: max_overlap = 0.0_wp          !! [m]
-    real(wp) :: contact_courant_max = 0.0_wp
-    real(wp) :: substeps = 0.0_wp
-    real(wp) :: sleeping = 0.0_wp             !! blocks asleep
-    real(wp) :: curvature_fallback = 0.0_wp   !! cells whose curvature does not come from heights
-    real(wp) :: transport_parts = 0.0_wp      !! in which the volumes of the step moved
-    real(wp) :: inertia_clips = 0.0_wp        !! limits of added inertia that cut it
-    real(wp) :: wall_time = 0.0_wp            !! since the start of the run [s]
-  end type row_t
-
-  integer, parameter :: n_columns = 23
-  character(*), parameter :: column_name(n_columns) = [character(23) :: 'time', 'dt', 'cfl', &
-    'divergence_max', 'pressure_passes', 'solver_iterations', 'liquid_volume', &
-    'liquid_volume_drift', 'volume_excess_max', &
-    'kinetic_energy_fluid', 'kinetic_energy_bodies', 'potential_energy_fluid', &
-    'potential_energy_bodies', 'contact_energy', 'energy_excess', 'max_overlap', &
-    'contact_courant_max', 'substeps', 'sleeping', &
-    'curvature_fallback', 'transport_parts', 'inertia_clips', 'wall_time']
-  character(*), parameter :: column_units(n_columns) = [character(3) :: 's', 's', '1', &
-    '1/s', '1', '1', 'm3', '1', '1', 'J', 'J', 'J', 'J', 'J', '1', 'm', '1', '1', '1', &
-    '1', '1', '1', 's']
+  !> A number of a row of results.
+  type :: quantity_t
+    character(23) :: name = ''
+    character(3) :: units = ''
+    real(wp) :: value = 0.0_wp
+  end type quantity_t
 
 contains
 
-  !> The row of this moment. Without fluid its columns are NaN.
-  subroutine make_row(fluid, wall_time, state, report, row)
+  !> The row of this moment, a column of `/series` each. Without fluid its quantities are NaN.
+  function make_row(fluid, wall_time, state, report) result(row)
     type(fluid_t), intent(in) :: fluid            !! its properties
-    real(wp), intent(in) :: wall_time             !! [s]
+    real(wp), intent(in) :: wall_time             !! since the start of the run [s]
     type(run_state_t), intent(in) :: state
     type(step_report_t), intent(in) :: report
-    type(row_t), intent(out) :: row
+    type(quantity_t), allocatable :: row(:)
+    real(wp) :: kinetic, potential
 
-    row%time = state%clock%t
-    row%dt = state%clock%dt
-    row%wall_time = wall_time
-    call add_fluid(state%flow, report, row)
-    row%kinetic_energy_bodies = kinetic_energy(state%blocks)
-    row%potential_energy_bodies = potential_energy(fluid%gravity, state%blocks)
-    row%contact_energy = report%contact_energy
-    row%max_overlap = report%max_overlap
-    row%contact_courant_max = report%contact_courant_max
-    row%substeps = real(report%substeps, wp)
-    row%sleeping = real(count(state%blocks%asleep), wp)
-  end subroutine make_row
+    kinetic = kinetic_energy(state%blocks)
+    potential = potential_energy(fluid%gravity, state%blocks)
+    row = [ &
+      quantity_t('time', 's', state%clock%t), &
+      quantity_t('dt', 's', state%clock%dt), &
+      quantity_t('cfl', '1', wet(report%cfl)), &
+      quantity_t('divergence_max', '1/s', wet(report%divergence_max)), &
+      quantity_t('pressure_passes', '1', wet(real(report%pressure_passes, wp))), &
+      quantity_t('solver_iterations', '1', wet(real(report%solver_iterations, wp))), &
+      quantity_t('liquid_volume', 'm3', wet(report%fluid%liquid_volume)), &
+      quantity_t('liquid_volume_drift', '1', wet(drift())), &
+      quantity_t('volume_excess_max', '1', wet(report%fluid%excess_max)), &
+      quantity_t('kinetic_energy_fluid', 'J', wet(report%fluid%kinetic)), &
+      quantity_t('kinetic_energy_bodies', 'J', kinetic), &
+      quantity_t('potential_energy_fluid', 'J', wet(report%fluid%potential)), &
+      quantity_t('potential_energy_bodies', 'J', potential), &
+      quantity_t('contact_energy', 'J', report%contact_energy), &
+      quantity_t('energy_excess', '1', wet(report%energy_excess)), &
+      quantity_t('max_overlap', 'm', report%max_overlap), &
+      quantity_t('contact_courant_max', '1', report%contact_courant_max), &
+      quantity_t('substeps', '1', real(report%substeps, wp)), &
+      quantity_t('sleeping', '1', real(count(state%blocks%asleep), wp)), &
+      quantity_t('curvature_fallback', '1', wet(real(report%curvature_fallback, wp))), &
+      quantity_t('transport_parts', '1', wet(real(report%transport_parts, wp))), &
+      quantity_t('inertia_clips', '1', wet(real(report%inertia_clips, wp))), &
+      quantity_t('wall_time', 's', wall_time)]
+  contains
+    !> A number that only a flow has.
+    real(wp) function wet(value)
+      real(wp), intent(in) :: value
 
-  !> The columns of the fluid.
-  subroutine add_fluid(flow, report, row)
-    type(flow_t), intent(in) :: flow
-    type(step_report_t), intent(in) :: report
-    type(row_t), intent(inout) :: row
+      wet = value
+      if (.not. allocated(state%flow%u)) wet = ieee_value(value, ieee_quiet_nan)
+    end function wet
 
-    if (.not. allocated(flow%u)) then
-      row%cfl = ieee_value(row%cfl, ieee_quiet_nan)
-      row%divergence_max = row%cfl
-      row%pressure_passes = row%cfl
-      row%solver_iterations = row%cfl
-      row%liquid_volume = row%cfl
-      row%liquid_volume_drift = row%cfl
-      row%volume_excess_max = row%cfl
-      row%kinetic_energy_fluid = row%cfl
-      row%potential_energy_fluid = row%cfl
-      row%energy_excess = row%cfl
-      row%curvature_fallback = row%cfl
-      row%transport_parts = row%cfl
-      row%inertia_clips = row%cfl
-      return
-    end if
-    row%cfl = report%cfl
-    row%divergence_max = report%divergence_max
-    row%pressure_passes = real(report%pressure_passes, wp)
-    row%solver_iterations = real(report%solver_iterations, wp)
-    row%curvature_fallback = real(report%curvature_fallback, wp)
-    row%transport_parts = real(report%transport_parts, wp)
-    row%inertia_clips = real(report%inertia_clips, wp)
-    row%liquid_volume = report%fluid%liquid_volume
-    row%volume_excess_max = report%fluid%excess_max
-    row%kinetic_energy_fluid = report%fluid%kinetic
-    row%potential_energy_fluid = report%fluid%potential
-    row%energy_excess = report%energy_excess
-    if (flow%liquid_initial > 0.0_wp) row%liquid_volume_drift = &
-      (row%liquid_volume - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
-  end subroutine add_fluid
+    !> (volume - initial - inflow)/initial of the liquid.
+    real(wp) function drift()
+      drift = 0.0_wp
+      associate (flow => state%flow)
+        if (flow%liquid_initial > 0.0_wp) drift = (report%fluid%liquid_volume &
+          - flow%liquid_initial - flow%liquid_inflow)/flow%liquid_initial
+      end associate
+    end function drift
+  end function make_row
+
+  !> A number of a row by its name; NaN if there is none.
+  pure real(wp) function value_of(row, name)
+    type(quantity_t), intent(in) :: row(:)
+    character(*), intent(in) :: name
+    integer :: c
+
+    value_of = ieee_value(value_of, ieee_quiet_nan)
+    do c = 1, size(row)
+      if (row(c)%name == name) value_of = row(c)%value
+    end do
+  end function value_of
 
   !> Volume of liquid, energies and largest excess of the fluid. The sums are exact and therefore
   !! the same on any number of threads and processes. All processes call.
@@ -283,21 +259,5 @@ contains
       end do
     end do
   end function excess_of_plane
-
-  !> The columns as an array, in the order of `column_name`.
-  pure function row_values(row) result(v)
-    type(row_t), intent(in) :: row
-    real(wp) :: v(n_columns)
-
-    v = [row%time, row%dt, row%cfl, row%divergence_max, row%pressure_passes, &
-      row%solver_iterations, &
-         row%liquid_volume, row%liquid_volume_drift, row%volume_excess_max, &
-         row%kinetic_energy_fluid, &
-         row%kinetic_energy_bodies, row%potential_energy_fluid, &
-         row%potential_energy_bodies, row%contact_energy, row%energy_excess, row%max_overlap, &
-         row%contact_courant_max, &
-         row%substeps, row%sleeping, row%curvature_fallback, row%transport_parts, &
-         row%inertia_clips, row%wall_time]
-  end function row_values
 
 end module diagnostics_m

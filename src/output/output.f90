@@ -15,7 +15,7 @@ module output_m
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
   use posix_file_m, only: delete_file
-  use diagnostics_m, only: step_report_t, row_t, make_row
+  use diagnostics_m, only: step_report_t, quantity_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
     write_row, close_run_file
   use write_vtkhdf_m, only: field_file_t, create_field_file, reopen_field_file, &
@@ -129,11 +129,11 @@ contains
     type(output_t), intent(inout) :: output
 
     call create_run_file(output%folder//run_name, output%text, output%parameters, state%grid, &
-                         state%blocks, bed, output%run_file)
+      state%blocks, bed, make_row(output%properties, 0.0_wp, state, step_report_t()), &
+      output%run_file)
     if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', 'note', &
       not_resolved)
-    if (output%fields) call create_field_file(output%folder//field_name, state%grid, &
-                                              output%field_file)
+    if (output%fields) call create_field_file(output%folder//field_name, state, output%field_file)
     if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &
       output%block_file)
     call check_files(output)
@@ -170,10 +170,10 @@ contains
     call continue_folder(options%restart, options%output, output%lock, output%folder, &
       output%code, output%message)
     if (output%code /= exit_ok) return
-    call reopen_run_file(output%folder//run_name, state%clock, state%blocks, output%run_file)
+    call reopen_run_file(output%folder//run_name, state%clock, state%blocks, &
+      make_row(output%properties, 0.0_wp, state, step_report_t()), output%run_file)
     if (state%clock%n_frames > 0) then
-      if (output%fluid) call reopen_field_file(output%folder//field_name, state%clock, &
-                                               output%field_file)
+      if (output%fluid) call reopen_field_file(output%folder//field_name, state, output%field_file)
       if (state%blocks%n > 0) call reopen_block_file(output%folder//block_name, state%blocks, &
                                                      state%clock, output%block_file)
     end if
@@ -199,10 +199,10 @@ contains
     type(output_t), intent(inout) :: output
 
     if (state%clock%n_frames > 0) then
-      call continue_field_file(state%grid, output%field_file)
+      call continue_field_file(output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
-      call create_field_file(output%folder//field_name, state%grid, output%field_file)
+      call create_field_file(output%folder//field_name, state, output%field_file)
     end if
   end subroutine continue_fields
 
@@ -246,7 +246,7 @@ contains
     type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
-    type(row_t) :: row
+    type(quantity_t), allocatable :: row(:)
     logical :: row_wanted, frame_wanted, line_wanted
 
     if (output%code /= exit_ok) return
@@ -259,8 +259,8 @@ contains
     line_wanted = line_wanted .or. frame_wanted
     if (.not. (row_wanted .or. frame_wanted)) call share_outcome(output%quiet, line_wanted)
     if (row_wanted .or. line_wanted) then
-      call make_row(output%properties, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, state, report, row)
+      row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, state, report)
     end if
     if (row_wanted) then
       call write_row(output%run_file, state%clock%n_rows, row, state%blocks)
@@ -298,8 +298,7 @@ contains
     type(output_t), intent(inout) :: output
 
     associate (n => state%clock%n_frames, t => state%clock%t)
-      if (output%fields) call write_field_frame(output%field_file, n, t, state%grid, state%flow, &
-                                                state%solid)
+      if (output%fields) call write_field_frame(output%field_file, n, state)
       if (output%surfaces) call write_block_frame(output%block_file, n, t, state%blocks)
     end associate
     output%frame_step = state%clock%step
@@ -332,13 +331,13 @@ contains
     type(run_state_t), intent(inout) :: state
     type(step_report_t), intent(in) :: report
     type(output_t), intent(inout) :: output
-    type(row_t) :: row
+    type(quantity_t), allocatable :: row(:)
     integer :: code
     logical :: row_wanted, frame_wanted
 
     if (output%code == exit_ok) then
-      call make_row(output%properties, output%run_file%wall_time + wall_clock() &
-        - output%progress%began, state, report, row)
+      row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
+        - output%progress%began, state, report)
       row_wanted = output%row_step /= state%clock%step
       frame_wanted = output%frame_step /= state%clock%step
       if (row_wanted) call write_row(output%run_file, state%clock%n_rows, row, state%blocks)

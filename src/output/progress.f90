@@ -9,7 +9,7 @@ module progress_m
   use rigid_body_m, only: blocks_t, let_go
   use case_types_m, only: not_resolved
   use clock_m, only: clock_t
-  use diagnostics_m, only: row_t
+  use diagnostics_m, only: quantity_t, value_of
   implicit none
   private
   public :: progress_t, progress_start, line_due, store_clips, write_line, write_summary
@@ -81,7 +81,7 @@ contains
   subroutine write_line(self, clock, row, blocks)
     type(progress_t), intent(inout) :: self
     type(clock_t), intent(in) :: clock
-    type(row_t), intent(in) :: row
+    type(quantity_t), intent(in) :: row(:)
     type(blocks_t), intent(in) :: blocks
     character(160) :: line
     integer :: released, moving
@@ -94,19 +94,22 @@ contains
     released = count(blocks%status == let_go)
     moving = count_moving(clock%run%rest_speed, blocks)
     if (self%fluid) then
-      write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, row%dt, &
-        row%cfl, &
-        row%divergence_max, nint(row%pressure_passes), nint(row%solver_iterations)
+      write (line, '(i8, f11.5, es10.2, f9.3, es12.2, i8, i12)') clock%step, clock%t, of('dt'), &
+        of('cfl'), of('divergence_max'), nint(of('pressure_passes')), nint(of('solver_iterations'))
     else
-      write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, row%dt, &
-        nint(row%substeps), &
-        row%contact_courant_max
+      write (line, '(i8, f11.5, es10.2, i10, f9.3)') clock%step, clock%t, of('dt'), &
+        nint(of('substeps')), of('contact_courant_max')
     end if
     write (line(len_trim(line) + 1:), '(a11, i8, i8, f13.4)') to_text(released)//'/' &
-      //to_text(blocks%n), moving, count(blocks%asleep), &
-      1.0e3_wp*row%max_overlap
-    if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') row%liquid_volume_drift
+      //to_text(blocks%n), moving, count(blocks%asleep), 1.0e3_wp*of('max_overlap')
+    if (self%fluid) write (line(len_trim(line) + 1:), '(es11.1)') of('liquid_volume_drift')
     call say(trim(line)//time_left(self, clock), self)
+  contains
+    pure real(wp) function of(name)
+      character(*), intent(in) :: name
+
+      of = value_of(row, name)
+    end function of
   end subroutine write_line
 
   !> One line to whoever reads; nothing more once the reader has gone.

@@ -3,7 +3,7 @@
 !! Only the root process writes. Each row is flushed, so that a fault loses nothing already
 !! computed.
 module write_run_m
-  use kinds_m, only: wp, i8, name_length
+  use kinds_m, only: wp, name_length
   use parallel_m, only: is_root, nproc, get_threads
   use timers_m, only: timer_count, timer_name, timer_seconds, timer_calls
   use build_info_m, only: version, git_revision, compiler, flags
@@ -13,33 +13,22 @@ module write_run_m
   use bed_m, only: bed_t
   use errors_m, only: exit_files
   use clock_m, only: clock_t
-  use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_integer32
+  use hdf5_file_m, only: h5_file_t
+  use hdf5_table_m, only: h5_table_t, creating, reopening, appending
   use file_space_m, only: bytes_for_change
-  use diagnostics_m, only: row_t, row_values, column_name, column_units, n_columns
+  use diagnostics_m, only: quantity_t
   implicit none
   private
   public :: run_file_t, create_run_file, reopen_run_file, continue_run_file, write_row, &
     close_run_file
 
-  integer, parameter :: n_vectors = 7       !! columns of three numbers per block
-  character(*), parameter :: vector_name(n_vectors) = [character(16) :: 'position', 'velocity', &
-    'angular_velocity', 'fluid_force', 'fluid_torque', 'contact_force', 'contact_torque']
-  character(*), parameter :: vector_units(n_vectors) = [character(5) :: 'm', 'm/s', 'rad/s', 'N', &
-    'N m', 'N', 'N m']
   character(*), parameter :: once_name(*) = [character(12) :: 'release_time', 'entry_time', &
     'raised']                                !! datasets with a number per block
   character(*), parameter :: once_units(*) = ['s', 's', 'm']
-  integer, parameter :: chunk_bytes = 16384  !! room that a column takes at a time
-  integer, parameter :: running = &
-    -1         !! exit status while the run goes on, or if it was killed
+  integer, parameter :: running = -1         !! exit status until the run ends, or if it was killed
 
-  type :: run_file_t
-    type(h5_file_t) :: file
-    integer :: rows = 0
-    logical :: up_to_date = .false.   !! a run that goes on has a row of its very start
+  type, extends(h5_table_t) :: run_file_t
     real(wp) :: wall_time = 0.0_wp                     !! of the last row when a run goes on [s]
-    type(h5_column_t), private :: series(n_columns)
-    type(h5_column_t), private :: time, vector(n_vectors), quaternion, contacts, on_floor
     real(wp), allocatable, private :: q(:, :)          !! as in the last row
     real(wp), allocatable, private :: once(:, :)       !! (blocks, `once_name`) as in the file
     integer, allocatable, private :: status(:)         !! of the blocks, as in the file
@@ -48,12 +37,13 @@ module write_run_m
 contains
 
   !> Create the file with everything but rows.
-  subroutine create_run_file(path, text, parameters, grid, blocks, bed, self)
+  subroutine create_run_file(path, text, parameters, grid, blocks, bed, row, self)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
     type(grid_t), intent(in) :: grid
     type(blocks_t), intent(in) :: blocks
     type(bed_t), intent(in) :: bed
+    type(quantity_t), intent(in) :: row(:)         !! any: its columns are created
     type(run_file_t), intent(out) :: self
     integer :: c
 
@@ -67,39 +57,39 @@ contains
       if (bed%there) call write_bed(bed, file)
       call write_shapes(blocks, file)
       call write_bodies(blocks, file)
-      call file%new_column('/bodies/time', 's', file_real64, [integer ::], chunk_rows(1), self%time)
-      do c = 1, n_vectors
-        call file%new_column('/bodies/'//trim(vector_name(c)), trim(vector_units(c)), file_real64, &
-                             [3, blocks%n], chunk_rows(3*blocks%n), self%vector(c))
-      end do
-      call file%new_column('/bodies/quaternion', '1', file_real64, [4, blocks%n], &
-        chunk_rows(4*blocks%n), &
-                           self%quaternion)
-      call file%new_column('/bodies/contacts', '1', file_integer32, [blocks%n], &
-        chunk_rows(blocks%n), self%contacts)
-      call file%new_column('/bodies/on_floor', '1', file_integer32, [blocks%n], &
-        chunk_rows(blocks%n), self%on_floor)
       call file%group('/series')
-      do c = 1, n_columns
-        call file%new_column('/series/'//trim(column_name(c)), trim(column_units(c)), file_real64, &
-          [integer ::], &
-                             chunk_rows(1), self%series(c))
-      end do
-      call file%flush()
     end associate
     self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
                         [blocks%n, size(once_name)])
     self%status = blocks%status
     self%q = first_sign(blocks%q)
+    call self%begin(creating)
+    call list_columns(row, blocks, self)
+    call self%file%flush()
   end subroutine create_run_file
 
-  !> Rows of n numbers in a chunk of about `chunk_bytes`.
-  pure function chunk_rows(n) result(rows)
-    integer, intent(in) :: n
-    integer :: rows
+  !> The columns, see `hdf5_table_m`.
+  subroutine list_columns(row, blocks, self)
+    type(quantity_t), intent(in) :: row(:)       !! the time first
+    type(blocks_t), intent(in) :: blocks
+    type(run_file_t), intent(inout) :: self
+    integer :: c
 
-    rows = max(8, chunk_bytes/(8*max(1, n)))
-  end function chunk_rows
+    call self%column('/bodies/time', trim(row(1)%units), row(1)%value)
+    call self%column('/bodies/position', 'm', blocks%x)
+    call self%column('/bodies/velocity', 'm/s', blocks%v)
+    call self%column('/bodies/angular_velocity', 'rad/s', blocks%omega)
+    call self%column('/bodies/fluid_force', 'N', blocks%fluid_force)
+    call self%column('/bodies/fluid_torque', 'N m', blocks%fluid_torque)
+    call self%column('/bodies/contact_force', 'N', blocks%contact_force)
+    call self%column('/bodies/contact_torque', 'N m', blocks%contact_torque)
+    call self%column('/bodies/quaternion', '1', self%q)
+    call self%column('/bodies/contacts', '1', blocks%contacts)
+    call self%column('/bodies/on_floor', '1', blocks%on_floor)
+    do c = 1, size(row)
+      call self%column('/series/'//trim(row(c)%name), trim(row(c)%units), row(c)%value)
+    end do
+  end subroutine list_columns
 
   !> Attitudes with w >= 0.
   pure function first_sign(q) result(signed)
@@ -244,38 +234,30 @@ contains
   end subroutine rewrite_once
 
   !> Open the file of a run that goes on from `clock`; nothing in it is changed yet.
-  subroutine reopen_run_file(path, clock, blocks, self)
+  subroutine reopen_run_file(path, clock, blocks, row, self)
     character(*), intent(in) :: path
     type(clock_t), intent(in) :: clock
     type(blocks_t), intent(in) :: blocks
+    type(quantity_t), intent(in) :: row(:)         !! any: its columns are opened
     type(run_file_t), intent(out) :: self
     integer :: c
     real(wp) :: wall_time(1), q(4*blocks%n)
 
     if (.not. is_root()) return
-    associate (file => self%file)
-      call file%open(path, .false., .true.)
-      call file%open_column('/bodies/time', file_real64, self%time)
-      do c = 1, n_vectors
-        call file%open_column('/bodies/'//trim(vector_name(c)), file_real64, self%vector(c))
-      end do
-      call file%open_column('/bodies/quaternion', file_real64, self%quaternion)
-      call file%open_column('/bodies/contacts', file_integer32, self%contacts)
-      call file%open_column('/bodies/on_floor', file_integer32, self%on_floor)
-      do c = 1, n_columns
-        call file%open_column('/series/'//trim(column_name(c)), file_real64, self%series(c))
-      end do
-      call file%count_rows(self%time, clock%n_rows, clock%t, self%rows, self%up_to_date)
-      wall_time = 0.0_wp
-      q = 0.0_wp
-      call file%read_row(self%quaternion, clock%n_rows, q)   ! the last due one: the next is like it
-      call file%read_row(self%series(n_columns), self%rows, wall_time)
-      self%q = reshape(q, [4, blocks%n])
-      self%wall_time = wall_time(1)
-      self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
-                          [blocks%n, size(once_name)])
-      self%status = blocks%status
-    end associate
+    call self%file%open(path, .false., .true.)
+    self%q = blocks%q
+    call self%begin(reopening)
+    call list_columns(row, blocks, self)
+    call self%find_rows(clock%n_rows, clock%t)
+    wall_time = 0.0_wp
+    q = 0.0_wp
+    call self%read_row_of('/bodies/quaternion', clock%n_rows, q)   ! the next is like the last due
+    call self%read_row_of('/series/wall_time', self%rows, wall_time)
+    self%q = reshape(q, [4, blocks%n])
+    self%wall_time = wall_time(1)
+    self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
+                        [blocks%n, size(once_name)])
+    self%status = blocks%status
   end subroutine reopen_run_file
 
   !> Drop the rows later than the start of a run that goes on, and say that it does.
@@ -287,7 +269,7 @@ contains
     if (.not. is_root()) return
     associate (file => self%file)
       call file%reserve(bytes_for_change + 2*(len(text) + len(parameters)))
-      call resize_all(self)
+      call self%keep(self%rows)
       do c = 1, size(once_name)
         call file%rewrite('/bodies/'//trim(once_name(c)), self%once(:, c))
       end do
@@ -300,79 +282,26 @@ contains
     end associate
   end subroutine continue_run_file
 
-  !> Give all columns `self%rows` rows.
-  subroutine resize_all(self)
-    type(run_file_t), intent(inout) :: self
-    integer :: c
-
-    associate (file => self%file, rows => int(self%rows, i8))
-      call file%resize(self%time, rows)
-      do c = 1, n_vectors
-        call file%resize(self%vector(c), rows)
-      end do
-      call file%resize(self%quaternion, rows)
-      call file%resize(self%contacts, rows)
-      call file%resize(self%on_floor, rows)
-      do c = 1, n_columns
-        call file%resize(self%series(c), rows)
-      end do
-    end associate
-  end subroutine resize_all
-
   !> Write a row as number `rows_before` + 1, in the place of a row that only ended an earlier run.
   subroutine write_row(self, rows_before, row, blocks)
     type(run_file_t), intent(inout) :: self
     integer, intent(in) :: rows_before   !! due rows written so far
-    type(row_t), intent(in) :: row
+    type(quantity_t), intent(in) :: row(:)
     type(blocks_t), intent(in) :: blocks
-    real(wp) :: values(n_columns)
-    integer :: c
 
     if (.not. is_root()) return
     if (self%rows /= rows_before) then
-      self%rows = rows_before
-      call resize_all(self)
+      call self%keep(rows_before)
       call self%file%flush()
     end if
-    call self%file%reserve(bytes_for_row(self))
+    call self%file%reserve(self%bytes_for_table())
     call follow_sign(blocks%q, self%q)
-    values = row_values(row)
-    associate (file => self%file, n => 3*blocks%n)
-      call file%append(self%time, [row%time])
-      call file%append(self%vector(1), reshape(blocks%x, [n]))
-      call file%append(self%vector(2), reshape(blocks%v, [n]))
-      call file%append(self%vector(3), reshape(blocks%omega, [n]))
-      call file%append(self%vector(4), reshape(blocks%fluid_force, [n]))
-      call file%append(self%vector(5), reshape(blocks%fluid_torque, [n]))
-      call file%append(self%vector(6), reshape(blocks%contact_force, [n]))
-      call file%append(self%vector(7), reshape(blocks%contact_torque, [n]))
-      call file%append(self%quaternion, reshape(self%q, [4*blocks%n]))
-      call file%append_integers(self%contacts, blocks%contacts)
-      call file%append_integers(self%on_floor, blocks%on_floor)
-      do c = 1, n_columns
-        call file%append(self%series(c), values(c:c))
-      end do
-      call rewrite_once(blocks, self)
-      call file%flush()
-    end associate
+    call self%begin(appending)
+    call list_columns(row, blocks, self)
+    call rewrite_once(blocks, self)
+    call self%file%flush()
     self%rows = self%rows + 1
   end subroutine write_row
-
-  !> Most that another row takes at the end of the file [bytes].
-  pure function bytes_for_row(self) result(bytes)
-    type(run_file_t), intent(in) :: self
-    integer(i8) :: bytes
-    integer :: c
-
-    bytes = bytes_for_change + self%time%bytes_for(1) + self%quaternion%bytes_for(1) &
-      + self%contacts%bytes_for(1) + self%on_floor%bytes_for(1)
-    do c = 1, n_vectors
-      bytes = bytes + self%vector(c)%bytes_for(1)
-    end do
-    do c = 1, n_columns
-      bytes = bytes + self%series(c)%bytes_for(1)
-    end do
-  end function bytes_for_row
 
   !> Of the two quaternions of each attitude take the one nearer to that of the row before.
   pure subroutine follow_sign(q, followed)

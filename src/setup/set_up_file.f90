@@ -15,7 +15,7 @@ module set_up_file_m
   use rigid_body_m, only: blocks_t, blocks_init, drift
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
-  use diagnostics_m, only: step_report_t, row_t, make_row
+  use diagnostics_m, only: step_report_t, quantity_t, make_row
   use write_run_m, only: run_file_t, create_run_file, write_row, close_run_file
   implicit none
   private
@@ -37,19 +37,20 @@ contains
     type(run_state_t) :: state
     type(step_report_t) :: report
     type(run_file_t) :: file
-    type(row_t) :: row
+    type(quantity_t), allocatable :: row(:)
     integer :: i, n
 
     call grid_init(case%grid, case%boundary, state%grid)
     call clock_init(case%run, state%clock)
     call blocks_init(case, shapes, state%blocks)
-    call create_run_file(path, case%text, parameters, state%grid, state%blocks, bed, file)
+    call create_run_file(path, case%text, parameters, state%grid, state%blocks, bed, &
+      make_row(case%fluid, 0.0_wp, state, report), file)
     call write_places(case, state%blocks, file)
     n = 0
     if (any(moves(state%blocks))) n = n_poses
     state%blocks%present = moves(state%blocks)   ! nothing else is moved below
     do i = 0, n
-      call make_row(case%fluid, 0.0_wp, state, report, row)
+      row = make_row(case%fluid, 0.0_wp, state, report)
       call write_row(file, i, row, state%blocks)
       call drift(case%run%t_end/n_poses, state%blocks)
       state%clock%t = (i + 1)*case%run%t_end/n_poses
