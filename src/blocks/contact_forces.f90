@@ -1,9 +1,9 @@
-!> Forces of all contact points, and the tangential springs that remember them.
+!> Forces of all contact points, and the tangential displacements that remember them.
 module contact_forces_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
-  use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair
   use contact_detection_m, only: contact_detection_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use counterparts_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
@@ -11,8 +11,8 @@ module contact_forces_m
   use contact_load_m, only: give_share
   implicit none
   private
-  public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
-    elastic_energy, energy_in_memory
+  public :: loads_t, contact_report_t, match_displacements, integrate_displacements, sum_forces, &
+    push_group, elastic_energy, energy_in_memory
 
   !> Contact forces and torques on all counterparts: (3, counterparts).
   type :: loads_t
@@ -40,22 +40,23 @@ module contact_forces_m
 
 contains
 
-  !> Give each group its spring: that in memory turned into the present plane, or a new one.
-  subroutine match_springs(detected, before, springs)
+  !> Give each group its tangential displacement: that in memory turned into the present plane, or
+  !! none yet.
+  subroutine match_displacements(detected, before, displacements)
     type(contact_detection_t), intent(inout) :: detected
-    type(springs_t), intent(inout) :: before   !! work: springs of the substep before
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: before   !! work: displacements of the substep before
+    type(displacements_t), intent(inout) :: displacements
     integer :: g, m, t
 
     associate (points => detected%points, groups => detected%groups, old => before, &
-      new => springs)
-      call reserve_springs(new%n, old)
+      new => displacements)
+      call reserve_displacements(new%n, old)
       old%n = new%n
       old%a(:old%n) = new%a(:old%n)
       old%b(:old%n) = new%b(:old%n)
       old%key(:old%n) = new%key(:old%n)
       old%xi(:, :old%n) = new%xi(:, :old%n)
-      call reserve_springs(groups%n, new)
+      call reserve_displacements(groups%n, new)
       new%n = groups%n
       m = 1
       do g = 1, groups%n
@@ -75,7 +76,7 @@ contains
         if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
       end do
     end associate
-  end subroutine match_springs
+  end subroutine match_displacements
 
   !> The vector xi turned into the plane normal to n, its length kept.
   pure function turned_into_plane(xi, n) result(turned)
@@ -88,34 +89,34 @@ contains
     if (length > 0.0_wp) turned = turned*(norm(xi)/length)
   end function turned_into_plane
 
-  !> Let the springs follow the present tangential velocities for a time dt.
-  pure subroutine stretch_springs(dt, detected, springs)
+  !> Let the displacements follow the present tangential velocities for a time dt.
+  pure subroutine integrate_displacements(dt, detected, displacements)
     real(wp), intent(in) :: dt   !! [s]
     type(contact_detection_t), intent(in) :: detected
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: displacements
     type(motion_t) :: motion
     real(wp) :: v(3)
     integer :: g
 
     associate (groups => detected%groups)
       do g = 1, groups%n
-        if (begins_pair(springs, g)) motion = motion_between(detected%counterparts, springs%a(g), &
-                                                             springs%b(g))
+        if (begins_pair(displacements, g)) motion = motion_between(detected%counterparts, &
+                                                             displacements%a(g), displacements%b(g))
         v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
-        springs%xi(:, g) = springs%xi(:, g) &
+        displacements%xi(:, g) = displacements%xi(:, g) &
           + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
       end do
     end associate
-  end subroutine stretch_springs
+  end subroutine integrate_displacements
 
   !> Contact forces and torques of this substep on the walls and the bodies that act.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
-  pure subroutine sum_forces(dt, detected, springs, loads, report)
+  pure subroutine sum_forces(dt, detected, displacements, loads, report)
     real(wp), intent(in) :: dt   !! [s]
     type(contact_detection_t), intent(in) :: detected
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: displacements
     type(loads_t), intent(inout) :: loads
     type(contact_report_t), intent(inout) :: report
     type(motion_t) :: motion
@@ -130,15 +131,15 @@ contains
     end do
     associate (n => detected%groups%n)
       do g = 1, n
-        if (begins_pair(springs, g)) then
-          motion = motion_between(detected%counterparts, springs%a(g), springs%b(g))
+        if (begins_pair(displacements, g)) then
+          motion = motion_between(detected%counterparts, displacements%a(g), displacements%b(g))
           wrench = wrench_t()
         end if
-        call push_group(g, dt, motion, detected, springs, wrench, report)
+        call push_group(g, dt, motion, detected, displacements, wrench, report)
         if (g < n) then
-          if (.not. begins_pair(springs, g + 1)) cycle
+          if (.not. begins_pair(displacements, g + 1)) cycle
         end if
-        associate (a => springs%a(g), b => springs%b(g))
+        associate (a => displacements%a(g), b => displacements%b(g))
           loads%force(:, a) = loads%force(:, a) + wrench%force
           loads%force(:, b) = loads%force(:, b) - wrench%force
           loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
@@ -149,12 +150,12 @@ contains
   end subroutine sum_forces
 
   !> Normal and tangential forces of one group.
-  pure subroutine push_group(g, dt, motion, detected, springs, wrench, report)
+  pure subroutine push_group(g, dt, motion, detected, displacements, wrench, report)
     integer, intent(in) :: g
     real(wp), intent(in) :: dt   !! [s]
     type(motion_t), intent(in) :: motion
     type(contact_detection_t), intent(in) :: detected
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
     type(contact_report_t), intent(inout) :: report
     type(push_t) :: push
@@ -184,7 +185,7 @@ contains
       end do
     end associate
     push%slowing = slowing_of(decay*dt)
-    call rub(g, push, motion, detected, springs, wrench)
+    call rub(g, push, motion, detected, displacements, wrench)
   end subroutine push_group
 
   !> Force of a dashpot at the velocity of the start of a substep over that which acts.
@@ -214,44 +215,45 @@ contains
 
   !> Tangential force of one group, no larger than friction allows.
   !!
-  !! The force of the spring alone is limited too: while it slips, the spring holds what friction
+  !! The force of the spring alone is limited too: while it slips, the displacement is what friction
   !! lets it hold, and the dashpot puts no energy into it.
-  pure subroutine rub(g, push, motion, detected, springs, wrench)
+  pure subroutine rub(g, push, motion, detected, displacements, wrench)
     integer, intent(in) :: g
     type(push_t), intent(in) :: push   !! along the normal
     type(motion_t), intent(in) :: motion
     type(contact_detection_t), intent(in) :: detected
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
-    real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
+    real(wp) :: v(3), f(3), f_elastic(3), k, k_n, eta, bound, size_f
     integer :: t
 
     associate (groups => detected%groups, law => detected%law)
       t = groups%first(g)
       k_n = detected%response%k(t)
       k = law%tangential_constant(k_n, detected%points%item(t)%weight)
-      springs%k(g) = k
+      displacements%k(g) = k
       eta = law%tangential_damping(detected%points%item(t)%weight, push%eta, k, k_n)
-      bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
+      bound = push%force*merge(law%wall_friction, law%friction, displacements%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
-      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/push%slowing
+      f = tangential_force(k, law%gamma_t, eta, displacements%xi(:, g), v)/push%slowing
       size_f = norm(f)
       if (size_f > bound) then
         f = f*(bound/size_f)
-        f_spring = tangential_force(k, law%gamma_t, 0.0_wp, springs%xi(:, g), v)
-        size_f = norm(f_spring)
-        if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
-          f_spring*(bound/size_f), v)
+        f_elastic = tangential_force(k, law%gamma_t, 0.0_wp, displacements%xi(:, g), v)
+        size_f = norm(f_elastic)
+        if (size_f > bound) displacements%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
+          f_elastic*(bound/size_f), v)
       end if
       call act(f, groups%arm_a(:, g), groups%arm_b(:, g), wrench)
     end associate
   end subroutine rub
 
-  !> Energy in the normal springs at the present poses and in the tangential springs [J].
-  pure function elastic_energy(detected, springs, rest) result(energy)
+  !> Energy in the normal springs at the present poses and in the tangential displacements [J].
+  pure function elastic_energy(detected, displacements, rest) result(energy)
     type(contact_detection_t), intent(in) :: detected
-    type(springs_t), intent(in) :: springs, rest   !! of contact points at work, of those at rest
+    type(displacements_t), intent(in) :: displacements, rest
+      !! of contact points at work, of those at rest
     real(wp) :: energy
     integer :: t, g
 
@@ -259,21 +261,22 @@ contains
     do t = 1, detected%points%n
       energy = energy + detected%response%energy(t)
     end do
-    do g = 1, springs%n
-      energy = energy + stored_energy(springs%k(g), detected%law%gamma_t, norm(springs%xi(:, g)))
+    do g = 1, displacements%n
+      energy = energy + stored_energy(displacements%k(g), detected%law%gamma_t, &
+        norm(displacements%xi(:, g)))
     end do
     energy = energy + energy_in_memory(rest)
   end function elastic_energy
 
   !> Energy of contact points whose energy is remembered [J].
-  pure function energy_in_memory(springs) result(energy)
-    type(springs_t), intent(in) :: springs
+  pure function energy_in_memory(displacements) result(energy)
+    type(displacements_t), intent(in) :: displacements
     real(wp) :: energy
     integer :: g
 
     energy = 0.0_wp
-    do g = 1, springs%n
-      energy = energy + springs%energy(g)
+    do g = 1, displacements%n
+      energy = energy + displacements%energy(g)
     end do
   end function energy_in_memory
 

@@ -1,5 +1,5 @@
 !> Contact points of one sphere or point with one counterpart, taken together: they share a
-!! tangential spring.
+!! tangential displacement.
 module contact_groups_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
@@ -9,7 +9,7 @@ module contact_groups_m
   private
   public :: groups_t, form_groups
 
-  !> Contact points with one key and one counterpart act on one tangential spring.
+  !> Contact points with one key and one counterpart act on one tangential displacement.
   type :: groups_t
     integer :: n = 0
     logical, allocatable :: new(:)               !! (n) was not there in the substep before
@@ -38,7 +38,7 @@ contains
       groups%n = g
       groups%first(g) = t
       do last = t, points%n - 1
-        if (.not. same_spring(points%item(t), points%item(last + 1))) exit
+        if (.not. same_displacement(points%item(t), points%item(last + 1))) exit
       end do
       groups%normal(:, g) = points%item(t)%normal
       groups%arm_a(:, g) = points%item(t)%arm_a
@@ -50,13 +50,13 @@ contains
     groups%first(groups%n + 1) = points%n + 1
   end subroutine form_groups
 
-  !> Whether two contact points act on one tangential spring.
-  pure function same_spring(one, two) result(yes)
+  !> Whether two contact points act on one tangential displacement.
+  pure function same_displacement(one, two) result(yes)
     type(contact_point_t), intent(in) :: one, two
     logical :: yes
 
     yes = one%key == two%key .and. one%b == two%b .and. one%a == two%a
-  end function same_spring
+  end function same_displacement
 
   !> Mean normal and point of some contact points, weighted by overlap.
   pure subroutine take_mean(point, normal, arm_a, arm_b)

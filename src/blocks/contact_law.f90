@@ -7,7 +7,7 @@ module contact_law_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: contact_law_t, spring_t, load_t
+  public :: contact_law_t, stiffness_t, load_t
   public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip, power
 
   !> A contact law. Forces are those of springs k d^gamma, along the normal (n) and across (t).
@@ -20,13 +20,13 @@ module contact_law_m
   contains
     procedure(normal_constant_i), deferred :: normal_constant
     procedure(tangential_constant_i), deferred :: tangential_constant
-    procedure(normal_spring_i), deferred :: normal_spring
+    procedure(normal_stiffness_i), deferred :: normal_stiffness
     procedure(damping_i), deferred :: damping
     procedure(tangential_damping_i), deferred :: tangential_damping
   end type contact_law_t
 
-  !> The normal spring of a contact point at work.
-  type :: spring_t
+  !> The elastic part of a contact point at work.
+  type :: stiffness_t
     real(wp) :: force = 0.0_wp             !! elastic, 0 where nothing touches yet [N]
     real(wp) :: energy = 0.0_wp            !! elastic [J]
     !> Stiffness over that where the contact point begins of the linear spring of the same force and
@@ -34,7 +34,7 @@ module contact_law_m
     real(wp) :: hardness = 1.0_wp          !! [-]
     !> dF/dd over w k `hardness`; where nothing touches yet, as where it begins.
     real(wp) :: steepness = 1.0_wp         !! [m^(gamma-1)]
-  end type spring_t
+  end type stiffness_t
 
   !> What a contact point may have to carry.
   type :: load_t
@@ -65,16 +65,16 @@ module contact_law_m
       real(wp) :: k                    !! [N/m^gamma_t]
     end function tangential_constant_i
 
-    !> The spring of a contact point at its depth.
-    elemental subroutine normal_spring_i(law, k, weight, d, hard, spring)
-      import :: contact_law_t, spring_t, wp
+    !> The elastic force of a contact point at its depth.
+    elemental subroutine normal_stiffness_i(law, k, weight, d, hard, elastic)
+      import :: contact_law_t, stiffness_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: k               !! where the spring begins, at weight one [N/m^gamma]
       real(wp), intent(in) :: weight          !! of the contact point [-]
       real(wp), intent(in) :: d, hard         !! overlap, depth d_h at which contacts harden [m]
-      type(spring_t), intent(out) :: spring
-    end subroutine normal_spring_i
+      type(stiffness_t), intent(out) :: elastic
+    end subroutine normal_stiffness_i
 
     !> Normal damping of a contact point.
     elemental subroutine damping_i(law, share, k, total, inverse, eta, decay)
@@ -153,19 +153,19 @@ contains
     end if
   end function tangential_force
 
-  !> Spring way at which the tangential force would be f: the way kept in memory while slipping [m].
+  !> Displacement at which the tangential force would be f: that kept in memory while slipping [m].
   pure function tangential_slip(k, gamma, eta, f, v_t) result(xi)
     real(wp), intent(in) :: k, gamma, eta   !! [N/m^gamma, -, N s/m]
     real(wp), intent(in) :: f(3)            !! [N]
     real(wp), intent(in) :: v_t(3)          !! [m/s]
     real(wp) :: xi(3)
-    real(wp) :: spring(3), length
+    real(wp) :: stretch(3), length
 
     xi = 0.0_wp
     if (k <= 0.0_wp) return
-    spring = (f - eta*v_t)/k
-    length = norm2(spring)
-    if (length > 0.0_wp) xi = spring*length**(1.0_wp/gamma - 1.0_wp)
+    stretch = (f - eta*v_t)/k
+    length = norm2(stretch)
+    if (length > 0.0_wp) xi = stretch*length**(1.0_wp/gamma - 1.0_wp)
   end function tangential_slip
 
   !> d^gamma, quick for the linear spring.

@@ -3,7 +3,7 @@ module contact_load_m
   use kinds_m, only: wp
   use mass_properties_m, only: surface_area
   use tet_mesh_m, only: shape_t
-  use contact_law_m, only: contact_law_t, spring_t, load_t
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t
   implicit none
   private
   public :: load_of, hard_depth, depth_at_rest, give_share
@@ -39,7 +39,7 @@ contains
     real(wp), intent(in) :: force   !! >= 0 [N]
     real(wp) :: depth
     integer, parameter :: halvings = 60
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp) :: low, high
     integer :: i
 
@@ -48,14 +48,14 @@ contains
     low = 0.0_wp
     high = hard
     do   ! ends: the force grows at least as the depth does
-      call law%normal_spring(k, 1.0_wp, high, hard, spring)
-      if (spring%force >= force) exit
+      call law%normal_stiffness(k, 1.0_wp, high, hard, elastic)
+      if (elastic%force >= force) exit
       high = 2*high
     end do
     do i = 1, halvings
       depth = 0.5_wp*(low + high)
-      call law%normal_spring(k, 1.0_wp, depth, hard, spring)
-      if (spring%force < force) then
+      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      if (elastic%force < force) then
         low = depth
       else
         high = depth

@@ -5,8 +5,8 @@ module contact_response_m
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use contact_points_m, only: contact_point_t, contact_points_t
-  use springs_m, only: comes_before
-  use contact_law_m, only: contact_law_t, spring_t, energy_of_force
+  use displacements_m, only: comes_before
+  use contact_law_m, only: contact_law_t, stiffness_t, energy_of_force
   use counterparts_m, only: counterparts_t, inertia_t, motion_t, wrench_t, inertia_of, &
     inverse_effective_mass, motion_between, relative_velocity, largest_speed, act
   implicit none
@@ -22,8 +22,8 @@ module contact_response_m
   !> The law at work at each contact point.
   type :: response_t
     real(wp), allocatable :: k(:)                !! k_n of the contact point [N/m^gamma]
-    real(wp), allocatable :: elastic(:)          !! force of the spring [N]
-    real(wp), allocatable :: energy(:)           !! of the spring [J]
+    real(wp), allocatable :: elastic(:)          !! force [N]
+    real(wp), allocatable :: energy(:)           !! [J]
     real(wp), allocatable :: stiff(:)
       !! k_n times the hardness of the contact point [N/m^gamma]
     real(wp), allocatable :: eta(:)              !! eta_n of the contact point [N s/m]
@@ -101,7 +101,7 @@ contains
     type(counterparts_t), intent(in) :: counterparts
     type(response_t), intent(inout) :: response
     type(couple_t) :: of
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp), parameter :: calm_share = 0.25_wp   !! of the load
     real(wp) :: weights(6), centres(3, 6), nn(6), arm(3)
     real(wp) :: load(3), total, inverse, k, hard, share, highest, steep, calm, speed
@@ -120,13 +120,13 @@ contains
     do t = first, last
       associate (point => points%item(t))
         response%k(t) = point%weight*k
-        call law%normal_spring(k, point%weight, point%depth, hard, spring)
-        response%elastic(t) = spring%force
-        response%energy(t) = spring%energy
-        response%eta(t) = point%weight*spring%hardness
+        call law%normal_stiffness(k, point%weight, point%depth, hard, elastic)
+        response%elastic(t) = elastic%force
+        response%energy(t) = elastic%energy
+        response%eta(t) = point%weight*elastic%hardness
         response%stiff(t) = k*response%eta(t)
-        steep = max(steep, spring%steepness)
-        load = load + spring%force*point%normal
+        steep = max(steep, elastic%steepness)
+        load = load + elastic%force*point%normal
         nn = response%eta(t)*square(point%normal)
         weights = weights + nn
         do i = 1, 6

@@ -4,7 +4,7 @@ module contact_state_m
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_counterpart
-  use springs_m, only: springs_t, reserve_springs
+  use displacements_m, only: displacements_t, reserve_displacements
   use sleep_m, only: sleep_t, sleep_init
   use lubrication_m, only: lubrication_t
   use contact_detection_m, only: contact_detection_t, detection_init
@@ -24,8 +24,8 @@ module contact_state_m
   type :: contacts_t
     type(contact_detection_t) :: detected        !! what touches now
     type(limits_t) :: limits
-    type(springs_t) :: springs                   !! the memory: part of the state of a run
-    type(springs_t) :: before                    !! work: springs of the substep before
+    type(displacements_t) :: displacements       !! the memory: part of the state of a run
+    type(displacements_t) :: before              !! work: displacements of the substep before
     type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
     logical, allocatable :: woken(:)             !! (n) work
     type(lubrication_t) :: lubrication
@@ -64,8 +64,8 @@ contains
       allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
     end associate
     allocate (contacts%share(n), contacts%steady(3, n), contacts%held(6, n), source=0.0_wp)
-    call reserve_springs(1, contacts%springs)
-    call reserve_springs(1, contacts%before)
+    call reserve_displacements(1, contacts%displacements)
+    call reserve_displacements(1, contacts%before)
     call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)
     allocate (contacts%woken(n), source=.false.)
     select case (input%solver)

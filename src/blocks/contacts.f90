@@ -13,8 +13,8 @@ module contacts_m
   use counterparts_m, only: update_counterparts, update_motion
   use acting_bodies_m, only: list_present
   use contact_detection_m, only: detect_contacts
-  use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
-    elastic_energy, energy_in_memory
+  use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
+    sum_forces, elastic_energy, energy_in_memory
   use impulse_step_m, only: move_by_impulses
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
   use counterparts_met_m, only: store_counterparts, count_counterparts
@@ -85,10 +85,11 @@ contains
     call hold_sleepers(gravity, dt, blocks)
     call count_counterparts(contacts%met, blocks)
     if (contacts%by_impulses) then
-      report%energy = energy_in_memory(contacts%springs) + energy_in_memory(contacts%sleep%rest)
+      report%energy = energy_in_memory(contacts%displacements) &
+        + energy_in_memory(contacts%sleep%rest)
     else
       call detect_contacts(walls, blocks, 0.0_wp, contacts%detected)
-      report%energy = elastic_energy(contacts%detected, contacts%springs, contacts%sleep%rest)
+      report%energy = elastic_energy(contacts%detected, contacts%displacements, contacts%sleep%rest)
     end if
   end subroutine move_blocks
 
@@ -151,14 +152,14 @@ contains
 
     if (report%substeps == 0 .or. contacts%lubrication%active) call list_present(blocks, &
       contacts%detected%acting)
-    associate (detected => contacts%detected, springs => contacts%springs, &
+    associate (detected => contacts%detected, displacements => contacts%displacements, &
                loads => contacts%loads, held => contacts%held, &
                acting => contacts%detected%acting%body(:contacts%detected%acting%n))
       associate (point => detected%points%item(:detected%points%n))
         call store_counterparts(point%a, point%b, contacts%met)
       end associate
-      call match_springs(detected, contacts%before, springs)
-      call stretch_springs(0.5_wp*dt_b, detected, springs)
+      call match_displacements(detected, contacts%before, displacements)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
       do k = 1, size(acting)
         associate (b => acting(k))
           call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
@@ -166,7 +167,7 @@ contains
         end associate
       end do
       call update_motion(blocks, acting, detected%counterparts)
-      call sum_forces(dt_b, detected, springs, loads, report)
+      call sum_forces(dt_b, detected, displacements, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
         loads%force)
       if (contacts%sleep%active) call hold_or_wake(acting, gravity, contacts%steady, blocks, &
@@ -183,7 +184,7 @@ contains
       end do
       call stop_sleepers(acting, blocks)
       call update_motion(blocks, acting, detected%counterparts)
-      call stretch_springs(0.5_wp*dt_b, detected, springs)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
     end associate
     call drift(0.5_wp*dt_b, blocks)
     if (contacts%sleep%active .and. any(contacts%woken)) call restore_contacts(blocks, contacts)

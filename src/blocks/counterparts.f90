@@ -80,8 +80,8 @@ contains
 
     counterparts%gravity = norm(gravity)
     counterparts%load = load_t()
-    if (.not. all(blocks%fixed)) counterparts%load = load_of(maxval(blocks%mass, &
-      .not. blocks%fixed), counterparts%gravity)
+    if (.not. all(blocks%fixed)) counterparts%load = &
+      load_of(maxval(blocks%mass, .not. blocks%fixed), counterparts%gravity)
     do w = 1, walls%n
       counterparts%v(:, walls%number(w)) = walls%velocity(:, w)
     end do

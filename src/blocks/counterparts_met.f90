@@ -4,7 +4,7 @@ module counterparts_met_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: floor_wall
   use bed_m, only: bed_counterpart
-  use springs_m, only: comes_before
+  use displacements_m, only: comes_before
   implicit none
   private
   public :: met_t, store_counterparts, count_counterparts

@@ -11,7 +11,7 @@ module impulse_rows_m
   use rigid_body_m, only: blocks_t
   use bed_m, only: bed_counterpart
   use contact_points_m, only: contact_point_t, contact_points_t
-  use springs_m, only: springs_t, reserve_springs, comes_before
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use counterparts_m, only: counterparts_t
   use contact_law_m, only: contact_law_t
   implicit none
@@ -101,7 +101,7 @@ contains
     class(contact_law_t), intent(in) :: law
     type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
-    type(springs_t), intent(in) :: memory
+    type(displacements_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
     integer :: t, m, r
@@ -280,7 +280,7 @@ contains
   pure subroutine recall(point, h, memory, m, row)
     type(contact_point_t), intent(in) :: point
     real(wp), intent(in) :: h                    !! sub-sweep [s]
-    type(springs_t), intent(in) :: memory
+    type(displacements_t), intent(in) :: memory
     integer, intent(inout) :: m
     type(row_t), intent(inout) :: row
 
@@ -393,12 +393,12 @@ contains
     real(wp), intent(in) :: h                    !! sub-sweep [s]
     type(contact_points_t), intent(in) :: points
     type(rows_t), intent(in) :: rows
-    type(springs_t), intent(inout) :: memory
+    type(displacements_t), intent(inout) :: memory
     real(wp), parameter :: sticking = 0.999_wp   !! of the bound of friction: below it nothing slips
     real(wp) :: way(3), p(3)
     integer :: k, r, m
 
-    call reserve_springs(rows%n, memory)
+    call reserve_displacements(rows%n, memory)
     m = 0
     do k = 1, rows%n_pairs
       do r = rows%first(k), rows%first(k + 1) - 1

@@ -176,7 +176,7 @@ contains
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
         loads%film)
       call make_rows(h, contacts%contact_time, detected%points, detected%law, &
-                     detected%counterparts, blocks, contacts%springs, rows)
+                     detected%counterparts, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
         call fall_freely(gravity, step, contacts, blocks, rows)
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
@@ -237,7 +237,7 @@ contains
       loads%impulse = loads%impulse + step*loads%force
       loads%twist = loads%twist + step*loads%torque
       call report_rows(step, contacts, report)
-      call store_memory(h, contacts%detected%points, rows, contacts%springs)
+      call store_memory(h, contacts%detected%points, rows, contacts%displacements)
     end associate
   end subroutine finish_step
 

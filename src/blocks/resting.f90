@@ -1,18 +1,18 @@
-!> Who falls asleep and who wakes, and what becomes of the springs between them.
+!> Who falls asleep and who wakes, and what becomes of the displacements between them.
 module resting_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use springs_m, only: move_springs
+  use displacements_m, only: move_displacements
   use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
   use counterparts_m, only: counterparts_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
   use contact_detection_m, only: detect_contacts
-  use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
+  use contact_forces_m, only: contact_report_t, match_displacements, sum_forces, push_group
   use substep_limits_m, only: substep_limit, equal_part
   use counterparts_met_m, only: store_counterparts
   use contact_state_m, only: contacts_t
@@ -81,11 +81,12 @@ contains
     if (contacts%by_impulses) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      call sum_memory(contacts%springs, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:))
+      call sum_memory(contacts%displacements, contacts%loads%force(:, 1:), &
+        contacts%loads%torque(:, 1:))
     else
-      call match_springs(contacts%detected, contacts%before, contacts%springs)
+      call match_displacements(contacts%detected, contacts%before, contacts%displacements)
       call foresee_motion(gravity, dt_b, blocks, contacts)
-      call sum_forces(dt_b, contacts%detected, contacts%springs, contacts%loads, ignored)
+      call sum_forces(dt_b, contacts%detected, contacts%displacements, contacts%loads, ignored)
     end if
     call update_supported(blocks, contacts)
     changed = .false.
@@ -137,10 +138,10 @@ contains
     logical :: changed
     integer :: g, a, b
 
-    associate (sleep => contacts%sleep, springs => contacts%springs)
-      do g = 1, springs%n
-        a = springs%a(g)
-        b = springs%b(g)
+    associate (sleep => contacts%sleep, displacements => contacts%displacements)
+      do g = 1, displacements%n
+        a = displacements%a(g)
+        b = displacements%b(g)
         if (is_carried(blocks, contacts%detected%counterparts, b)) sleep%candidate(a) = .false.
         if (b < 1) cycle
         if (is_carried(blocks, contacts%detected%counterparts, a)) sleep%candidate(b) = .false.
@@ -149,9 +150,9 @@ contains
       changed = .true.
       do while (changed)
         changed = .false.
-        do g = 1, springs%n
-          a = springs%a(g)
-          b = springs%b(g)
+        do g = 1, displacements%n
+          a = displacements%a(g)
+          b = displacements%b(g)
           if (b < 1) then
             changed = changed .or. .not. sleep%supported(a)
             sleep%supported(a) = .true.
@@ -178,8 +179,8 @@ contains
     end if
   end function is_carried
 
-  !> Move the springs of contact points between what does not move to those at rest, with their
-  !! forces.
+  !> Move the displacements of contact points between what does not move to those at rest, with
+  !! their forces.
   subroutine freeze_contacts(dt_b, blocks, contacts)
     real(wp), intent(in) :: dt_b         !! the substep [s]
     type(blocks_t), intent(in) :: blocks
@@ -188,31 +189,31 @@ contains
     type(wrench_t) :: wrench
     integer :: g, t, a, b
 
-    associate (sleep => contacts%sleep, springs => contacts%springs)
-      call ensure_capacity(springs%n, sleep%chosen)
-      do g = 1, springs%n
-        a = springs%a(g)
-        b = springs%b(g)
+    associate (sleep => contacts%sleep, displacements => contacts%displacements)
+      call ensure_capacity(displacements%n, sleep%chosen)
+      do g = 1, displacements%n
+        a = displacements%a(g)
+        b = displacements%b(g)
         sleep%chosen(g) = at_rest(blocks, a, b)
         if (contacts%by_impulses .or. .not. sleep%chosen(g)) cycle
         wrench = wrench_t()
         call push_group(g, dt_b, motion_between(contacts%detected%counterparts, a, b), &
-          contacts%detected, springs, wrench, ignored)
-        springs%force(:, g) = wrench%force
-        springs%torque_a(:, g) = wrench%torque_a
-        springs%torque_b(:, g) = wrench%torque_b
-        springs%energy(g) = stored_energy(springs%k(g), contacts%detected%law%gamma_t, &
-          norm(springs%xi(:, g)))
+          contacts%detected, displacements, wrench, ignored)
+        displacements%force(:, g) = wrench%force
+        displacements%torque_a(:, g) = wrench%torque_a
+        displacements%torque_b(:, g) = wrench%torque_b
+        displacements%energy(g) = stored_energy(displacements%k(g), contacts%detected%law%gamma_t, &
+          norm(displacements%xi(:, g)))
         do t = contacts%detected%groups%first(g), contacts%detected%groups%first(g + 1) - 1
-          springs%energy(g) = springs%energy(g) + contacts%detected%response%energy(t)
+          displacements%energy(g) = displacements%energy(g) + contacts%detected%response%energy(t)
         end do
       end do
-      call move_springs(sleep%chosen, springs, sleep%rest)
+      call move_displacements(sleep%chosen, displacements, sleep%rest)
       call update_loads(sleep)
     end associate
   end subroutine freeze_contacts
 
-  !> Give the springs of contact points with a body that moves now back to those at work.
+  !> Give the displacements of contact points with a body that moves now back to those at work.
   subroutine restore_contacts(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
@@ -223,7 +224,7 @@ contains
       do i = 1, sleep%rest%n
         sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
       end do
-      call move_springs(sleep%chosen, sleep%rest, contacts%springs)
+      call move_displacements(sleep%chosen, sleep%rest, contacts%displacements)
       call update_loads(sleep)
     end associate
   end subroutine restore_contacts

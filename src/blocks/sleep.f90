@@ -6,13 +6,13 @@
 !! within that share: contact from sleepers, held bodies and walls, which is frozen like the poses,
 !! contact from what moves, the fluid, and weight. So a block wakes in the substep in which it is
 !! hit, when the flow changes, and when a neighbour that it rests on wakes and moves away. Nothing
-!! is lost meanwhile: frozen forces and springs are those of the awake block at the same pose, and a
-!! sleeper is never held by more than that share of its load.
+!! is lost meanwhile: frozen forces and displacements are those of the awake block at the same pose,
+!! and a sleeper is never held by more than that share of its load.
 module sleep_m
   use kinds_m, only: wp
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
-  use springs_m, only: springs_t, reserve_springs
+  use displacements_m, only: displacements_t, reserve_displacements
   implicit none
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
@@ -28,10 +28,11 @@ module sleep_m
     real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
-    type(springs_t) :: rest                    !! contact points at rest, between what does not move
+    type(displacements_t) :: rest              !! contact points at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
-    logical, allocatable :: candidate(:), supported(:), chosen(:)   !! (n), (n), (springs) work
+    logical, allocatable :: candidate(:), supported(:), chosen(:)
+      !! (n), (n), (displacements) work
   end type sleep_t
 
 contains
@@ -47,7 +48,7 @@ contains
     allocate (sleep%quiet(size(reach)), source=0.0_wp)
     allocate (sleep%candidate(size(reach)), sleep%supported(size(reach)), source=.false.)
     allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
-    call reserve_springs(1, sleep%rest)
+    call reserve_displacements(1, sleep%rest)
   end subroutine sleep_init
 
   !> Which bodies do not move: sleepers, and fixed ones without a given velocity that no path moves
@@ -89,19 +90,19 @@ contains
   end subroutine update_loads
 
   !> Add the forces and torques on bodies of contact points that remember them.
-  pure subroutine sum_memory(springs, force, torque)
-    type(springs_t), intent(in) :: springs
+  pure subroutine sum_memory(displacements, force, torque)
+    type(displacements_t), intent(in) :: displacements
     real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) [N], [N m]
     integer :: i, a, b
 
-    do i = 1, springs%n
-      a = springs%a(i)
-      b = springs%b(i)
-      force(:, a) = force(:, a) + springs%force(:, i)
-      torque(:, a) = torque(:, a) + springs%torque_a(:, i)
+    do i = 1, displacements%n
+      a = displacements%a(i)
+      b = displacements%b(i)
+      force(:, a) = force(:, a) + displacements%force(:, i)
+      torque(:, a) = torque(:, a) + displacements%torque_a(:, i)
       if (b < 1) cycle
-      force(:, b) = force(:, b) - springs%force(:, i)
-      torque(:, b) = torque(:, b) + springs%torque_b(:, i)
+      force(:, b) = force(:, b) - displacements%force(:, i)
+      torque(:, b) = torque(:, b) + displacements%torque_b(:, i)
     end do
   end subroutine sum_memory
 

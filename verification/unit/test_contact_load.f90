@@ -5,7 +5,7 @@ program test_contact_load
   use case_types_m, only: contact_input_t, case_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use contact_law_m, only: contact_law_t, load_t, spring_t
+  use contact_law_m, only: contact_law_t, load_t, stiffness_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest
   use rigid_body_m, only: blocks_t, blocks_init
@@ -45,15 +45,15 @@ contains
       1.0e4_wp]
     type(contact_input_t) :: input
     class(contact_law_t), allocatable :: law
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp) :: depth
     integer :: i
 
     call choose_law(input, law)
     do i = 1, 4
       depth = depth_at_rest(law, k, hard, force(i))
-      call law%normal_spring(k, 1.0_wp, depth, hard, spring)
-      call check('the spring holds the force', spring%force, force(i), 1.0e-9_wp*force(i))
+      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      call check('the spring holds the force', elastic%force, force(i), 1.0e-9_wp*force(i))
     end do
     call check('as a linear spring where shallow', depth_at_rest(law, k, hard, 1.0_wp), 1.0e-4_wp, &
       1.0e-7_wp)

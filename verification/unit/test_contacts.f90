@@ -368,8 +368,9 @@ contains
     end do
   end function lowest
 
-  !> A ball at rest on the floor, nudged, swings on its tangential spring: with k_t = 2/7 k_n and
-  !! the mass 2/7 M that a ball sets against a tangential push, half a period is the contact time.
+  !> A ball at rest on the floor, nudged, swings on its tangential displacement: with k_t = 2/7 k_n
+  !! and the mass 2/7 M that a ball sets against a tangential push, half a period is the contact
+  !! time.
   subroutine check_swinging_ball()
     real(wp), parameter :: nudge = 1.0e-4_wp   ! too small to slip [m/s]
     type(world_t) :: world
@@ -533,7 +534,7 @@ contains
     round_off = real(drifts, wp)*0.5_wp*spacing(0.5_wp)*sum(world%blocks%mass)*0.8_wp
     call check('they met', kinetic_energy(world%blocks) &
       < 0.9_wp*sum(world%blocks%mass)*0.5_wp*0.64_wp &
-      .and. world%contacts%springs%n >= 0)
+      .and. world%contacts%displacements%n >= 0)
     call check('momentum', maxval(abs(p - p0)), 0.0_wp, 1.0e-14_wp)
     call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, round_off)
     call check('to round-off', round_off < 1.0e-12_wp)
@@ -682,7 +683,7 @@ contains
   end subroutine check_periodic_image
 
   !> A pile moves the same to the last bit however often the lists are made anew, and from the state
-  !! of a restart: poses, momenta, springs and who sleeps.
+  !! of a restart: poses, momenta, displacements and who sleeps.
   subroutine check_bookkeeping()
     type(world_t) :: one, two
     integer :: b, n
@@ -712,7 +713,7 @@ contains
       call check('same bits with another skin', same(one%blocks, two%blocks))
       call check('touching', sum(one%blocks%contacts) > 5)
       call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
-      two%contacts%springs = one%contacts%springs
+      two%contacts%displacements = one%contacts%displacements
       two%contacts%sleep%quiet = one%contacts%sleep%quiet
       two%contacts%sleep%rest = one%contacts%sleep%rest
       if (n == 1) then
@@ -720,11 +721,11 @@ contains
         call release_body(0.4_wp, 6, two%blocks)
       end if
     end do
-    two%contacts%springs%xi = 0.0_wp
+    two%contacts%displacements%xi = 0.0_wp
     two%contacts%sleep%rest%force = 0.0_wp   ! where they sleep
     call run(one, 1)
     call run(two, 1)
-    call check('the springs matter', .not. same(one%blocks, two%blocks))
+    call check('the displacements matter', .not. same(one%blocks, two%blocks))
   end subroutine check_bookkeeping
 
   !> Whether two states are equal to the last bit.

@@ -1,4 +1,4 @@
-!> Who falls asleep and who wakes at the start of a step, and where the springs of its contact
+!> Who falls asleep and who wakes at the start of a step, and where the displacements of its contact
 !! points go.
 program test_resting
   use kinds_m, only: wp
@@ -31,7 +31,7 @@ program test_resting
   call make_ball()
   call check_balance()
   call check_contact()
-  call check_springs()
+  call check_displacements()
   call check_held()
   call finish_checks()
 
@@ -143,10 +143,10 @@ contains
     end do
   end subroutine check_contact
 
-  !> The spring of a sleeper rests with the force and the energy of its contact, is told as a
+  !> The displacement of a sleeper rests with the force and the energy of its contact, is told as a
   !! counterpart met, and is at work again when the sleeper wakes. What it had of momentum went into
   !! the contact point.
-  subroutine check_springs()
+  subroutine check_displacements()
     type(world_t) :: world
     real(wp), parameter :: slow = 1.0e-6_wp   !! [m/s]
     real(wp) :: energy
@@ -156,7 +156,7 @@ contains
     energy = 0.5_wp*load**2/k_n
     call start_step(world)
     associate (contacts => world%contacts, blocks => world%blocks)
-      call check('at rest', all([contacts%springs%n, contacts%sleep%rest%n] == [0, 1]))
+      call check('at rest', all([contacts%displacements%n, contacts%sleep%rest%n] == [0, 1]))
       call check('its force', contacts%sleep%rest%force(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
       call check('its energy', contacts%sleep%rest%energy(1), energy, 1.0e-9_wp*energy)
@@ -170,11 +170,11 @@ contains
         1.0e-12_wp*blocks%mass(1)*slow)
       contacts%steady(1, 1) = 0.1_wp*load
       call start_step(world)
-      call check('at work again', all([contacts%springs%n, contacts%sleep%rest%n] == [1, 0]))
+      call check('at work again', all([contacts%displacements%n, contacts%sleep%rest%n] == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp, 0.0_wp)
       call check('touches again', contacts%detected%points%n, 1)
     end associate
-  end subroutine check_springs
+  end subroutine check_displacements
 
   !> A ball on one that is held sleeps, and the one held bears it.
   subroutine check_held()

@@ -10,7 +10,7 @@ program test_sleep
   use rigid_body_m, only: blocks_t, blocks_init, release_body, kinetic_energy, potential_energy, &
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
-  use springs_m, only: reserve_springs
+  use displacements_m, only: reserve_displacements
   use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, may_sleep, &
     update_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
@@ -141,7 +141,7 @@ contains
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
 
     call sleep_init(.true., [1.0_wp, 1.0_wp, 1.0_wp], sleep)
-    call reserve_springs(3, sleep%rest)
+    call reserve_displacements(3, sleep%rest)
     sleep%rest%n = 3
     sleep%rest%a(:3) = [1, 2, 3]
     sleep%rest%b(:3) = [-5, 1, 1]
@@ -351,8 +351,8 @@ contains
     world%blocks%fluid_force(2, 1) = 0.02_wp*weight(world)
     call step(world)
     call check('awake on the slope', .not. world%blocks%asleep(1))
-    call check('remembers its springs: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
-    call check('remembers its springs: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
+    call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
+    call check('keeps its displacements: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
   end subroutine check_slope
 
   !> Fluid force on a sleeper grows: it slides once it passes friction, no later than 1 %, and not

@@ -1,10 +1,12 @@
-!> Lists of contact points and springs: order, parting, joining, and the groups that share a spring.
-program test_springs
+!> Lists of contact points and displacements: order, parting, joining, and the groups that share
+!! one.
+program test_displacements
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
   use contact_points_m, only: contact_point_t, contact_points_t, add_point, set_apart
   use contact_groups_m, only: groups_t, form_groups
-  use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair, move_springs
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &
+    move_displacements
   use counterparts_met_m, only: met_t, store_counterparts
   implicit none
 
@@ -24,65 +26,66 @@ contains
     call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
   end subroutine check_order
 
-  !> A list of springs of bodies with counterpart 1; all else of a spring follows from its body.
-  subroutine make(bodies, springs)
+  !> A list of displacements of bodies with counterpart 1; all else follows from its
+  !! body.
+  subroutine make(bodies, displacements)
     integer, intent(in) :: bodies(:)
-    type(springs_t), intent(inout) :: springs
+    type(displacements_t), intent(inout) :: displacements
     integer :: i
 
-    call reserve_springs(size(bodies), springs)
-    springs%n = size(bodies)
-    do i = 1, springs%n
-      springs%a(i) = bodies(i)
-      springs%b(i) = 1
-      springs%key(i) = 2*bodies(i)
-      springs%xi(:, i) = 3.0_wp*bodies(i)
-      springs%k(i) = 4.0_wp*bodies(i)
-      springs%force(:, i) = 5.0_wp*bodies(i)
-      springs%torque_a(:, i) = 6.0_wp*bodies(i)
-      springs%torque_b(:, i) = 7.0_wp*bodies(i)
-      springs%energy(i) = 8.0_wp*bodies(i)
+    call reserve_displacements(size(bodies), displacements)
+    displacements%n = size(bodies)
+    do i = 1, displacements%n
+      displacements%a(i) = bodies(i)
+      displacements%b(i) = 1
+      displacements%key(i) = 2*bodies(i)
+      displacements%xi(:, i) = 3.0_wp*bodies(i)
+      displacements%k(i) = 4.0_wp*bodies(i)
+      displacements%force(:, i) = 5.0_wp*bodies(i)
+      displacements%torque_a(:, i) = 6.0_wp*bodies(i)
+      displacements%torque_b(:, i) = 7.0_wp*bodies(i)
+      displacements%energy(i) = 8.0_wp*bodies(i)
     end do
   end subroutine make
 
   !> Whether a list is that of some bodies.
-  function is(springs, bodies) result(yes)
-    type(springs_t), intent(in) :: springs
+  function is(displacements, bodies) result(yes)
+    type(displacements_t), intent(in) :: displacements
     integer, intent(in) :: bodies(:)
     logical :: yes
-    type(springs_t) :: wanted
+    type(displacements_t) :: wanted
     integer :: n
 
     call make(bodies, wanted)
-    n = springs%n
+    n = displacements%n
     yes = n == wanted%n
     if (.not. yes) return
-    yes = all(springs%a(:n) == bodies) .and. all(springs%b(:n) == 1) &
-      .and. all(springs%key(:n) == wanted%key(:n)) &
-      .and. all(abs(springs%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
-      .and. all(abs(springs%k(:n) - wanted%k(:n)) <= 0.0_wp) &
-      .and. all(abs(springs%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
-      .and. all(abs(springs%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
-      .and. all(abs(springs%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
-      .and. all(abs(springs%energy(:n) - wanted%energy(:n)) <= 0.0_wp)
+    yes = all(displacements%a(:n) == bodies) .and. all(displacements%b(:n) == 1) &
+      .and. all(displacements%key(:n) == wanted%key(:n)) &
+      .and. all(abs(displacements%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
+      .and. all(abs(displacements%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%energy(:n) - wanted%energy(:n)) <= 0.0_wp)
   end function is
 
-  !> Chosen springs go to the other list, whole and in order.
+  !> Chosen displacements go to the other list, whole and in order.
   subroutine check_moving()
-    type(springs_t) :: from, to
+    type(displacements_t) :: from, to
 
     call make([2, 4, 5, 7, 9], from)
     call make([3, 6], to)
     call check('a pair begins', begins_pair(from, 1) .and. begins_pair(from, 2))
-    call move_springs([.false., .true., .false., .true., .true.], from, to)
+    call move_displacements([.false., .true., .false., .true., .true.], from, to)
     call check('those left', is(from, [2, 5]))
     call check('those joined', is(to, [3, 4, 6, 7, 9]))
-    call move_springs([.true., .true.], from, to)
+    call move_displacements([.true., .true.], from, to)
     call check('none left', from%n, 0)
     call check('all joined', is(to, [2, 3, 4, 5, 6, 7, 9]))
     from%a(2) = from%a(1)
     from%n = 2
-    call check('one pair has two springs', .not. begins_pair(from, 2))
+    call check('one pair has two displacements', .not. begins_pair(from, 2))
   end subroutine check_moving
 
   !> Contact points that do not touch yet get a list of their own.
@@ -133,4 +136,4 @@ contains
     call check('with their counterparts', all(met%b(:5) == [1, -1, 1, -5, 1]))
   end subroutine check_met
 
-end program test_springs
+end program test_displacements
