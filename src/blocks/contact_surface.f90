@@ -1,8 +1,8 @@
 !> Contact points of the exact surfaces of the blocks with one another, the plane walls and the bed.
 !!
-!! A probe of one body (see `surface_features_m`) touches where it is inside the other; its depth is
-!! its distance from the surface of the other. A sharp edge touches an edge of the other where the
-!! two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
+!! A vertex of one body (see `surface_features_m`) touches where it is inside the other; its depth
+!! is its distance from the surface of the other. A sharp edge touches an edge of the other where
+!! the two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
 !! points that carry it. Each depth has a fixed weight: the elastic energy is a function of
 !! position. Spheres touch as spheres, at one point.
 !!
@@ -295,9 +295,9 @@ contains
         return
       end if
       do i = 1, surface%n_corners
-        depth = dot_product(n, surface%probe(:, i)) - above
+        depth = dot_product(n, surface%vertex(:, i)) - above
         if (depth <= -gap) cycle
-        arm = matmul(turn, surface%probe(:, i))
+        arm = matmul(turn, surface%vertex(:, i))
         call add_point(contact_point_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
           walls%normal(:, w), depth, surface%weight(i), surface%length), points)
       end do
@@ -367,7 +367,7 @@ contains
     end associate
   end subroutine add_pair_points
 
-  !> Contact points of a pair of bodies, or of body a and the bed: probes of b, probes of a,
+  !> Contact points of a pair of bodies, or of body a and the bed: vertices of b, vertices of a,
   !! crossing edges. They come from the short list of the pair; this and the lists it comes from are
   !! renewed first where they no longer hold.
   subroutine add_feature_points(surface_a, surface_b, search, now, pair, points, bed)
@@ -398,8 +398,8 @@ contains
       call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
       if (n_chosen(pair%close) == 0) return
     end if
-    call add_probe_points(.false., now, surface_b, surface_a, pair, points)
-    call add_probe_points(.true., now, surface_a, surface_b, pair, points)
+    call add_vertex_points(.false., now, surface_b, surface_a, pair, points)
+    call add_vertex_points(.true., now, surface_a, surface_b, pair, points)
     call add_edge_points(now, surface_a, surface_b, pair, points)
   end subroutine add_feature_points
 
@@ -420,9 +420,9 @@ contains
       min(surface_a%length, surface_b%length)), points)
   end subroutine add_ball_point
 
-  !> Contact points of the chosen probes of one body (the guest) with the surface of the other (the
-  !! host).
-  subroutine add_probe_points(guest_is_a, now, guest, host, pair, points)
+  !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
+  !! (the host).
+  subroutine add_vertex_points(guest_is_a, now, guest, host, pair, points)
     logical, intent(in) :: guest_is_a
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: guest, host
@@ -453,8 +453,8 @@ contains
         i = list(m)
         edges = m + 3 + list(m + 1)
         next = edges + list(m + 2)
-        place = view%x + view%turn(:, 1)*guest%probe(1, i) + view%turn(:, 2)*guest%probe(2, i) &
-          + view%turn(:, 3)*guest%probe(3, i)
+        place = view%x + view%turn(:, 1)*guest%vertex(1, i) + view%turn(:, 2)*guest%vertex(2, i) &
+          + view%turn(:, 3)*guest%vertex(3, i)
         call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
           apart, outward)
       end associate
@@ -477,7 +477,7 @@ contains
       if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
       call add_point(point, points)
     end do
-  end subroutine add_probe_points
+  end subroutine add_vertex_points
 
   !> Contact points of the chosen pairs of edges that cross.
   subroutine add_edge_points(now, surface_a, surface_b, pair, points)

@@ -1,35 +1,36 @@
-!> What may touch of two bodies before they have moved against one another by a skin: probes of each
-!! with the facets and edges of the other that may be nearest to them, and edges that may cross.
+!> What may touch of two bodies before they have moved against one another by a skin: vertices of
+!! each with the facets and edges of the other that may be nearest to them, and edges that may
+!! cross.
 module near_features_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
-  use surface_search_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
+  use surface_search_m, only: surface_t, near_list_t, found_t, gather_vertices, gather_edges, &
     gather_facets, search_surface, min_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view
   implicit none
   private
-  public :: near_features_t, probes_near_t, search_t, list_features, list_bed
+  public :: near_features_t, near_vertices_t, search_t, list_features, list_bed
   public :: append_facets, append_edges, edge_in_view, way_to_crossing
 
-  !> Probes of one body near the other, and the features of the other they may touch.
-  type :: probes_near_t
+  !> Vertices of one body near the other, and the features of the other they may touch.
+  type :: near_vertices_t
     integer :: n = 0
-    integer, allocatable :: probe(:)
+    integer, allocatable :: vertex(:)
     real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
     integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
     integer :: n_facets = 0, n_edges = 0
     integer, allocatable :: facet(:), edge(:)
-  end type probes_near_t
+  end type near_vertices_t
 
   !> The lists of a pair of bodies.
   type :: near_features_t
     type(poses_t) :: when                        !! poses at which they were made
     real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
     real(wp) :: ahead = 0.0_wp                   !! largest gap for which they hold [m]
-    type(probes_near_t) :: of_a, of_b
+    type(near_vertices_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
     real(wp), allocatable :: away(:)             !! way before the two may cross [m]
@@ -65,8 +66,8 @@ contains
     skin = skin_for(now%speed, search)
     near%valid = max(apart, skin)
     if (apart > skin) return
-    call list_probes(now%b_in_a, skin, b, a, search, near%of_b)
-    call list_probes(now%a_in_b, skin, a, b, search, near%of_a)
+    call list_vertices(now%b_in_a, skin, b, a, search, near%of_b)
+    call list_vertices(now%a_in_b, skin, a, b, search, near%of_a)
     call list_crossings(now%a_in_b, a, b, search, near)
   end subroutine list_features
 
@@ -86,13 +87,13 @@ contains
     associate (x => now%poses%x_a, reach => surface%reach + margin)
       if (.not. bed_is_near(bed, x - reach, x + reach)) return
     end associate
-    call list_probes(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
+    call list_vertices(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
     call list_crossings(now%a_in_b, surface, bed%surface, search, near)
     near%of_a%n_facets = 0
     near%of_a%n_edges = 0
     margin = margin + surface%ball
     do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
-      place = now%poses%x_a + matmul(now%turn_a, surface%probe(:, i))
+      place = now%poses%x_a + matmul(now%turn_a, surface%vertex(:, i))
       call bed_distance(bed, place, margin, max(margin, surface%reach), search%found, &
         distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
@@ -125,25 +126,25 @@ contains
     skin = min(max(search%skin, speed*search%lasting), max_skin*search%skin)
   end function skin_for
 
-  !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
-  !! may be nearest to it before the bodies have moved by the skin.
-  subroutine list_probes(guest_in_host, skin, guest, host, search, list)
+  !> Vertices of the guest near the surface of the host or inside, each with the facets and edges
+  !! that may be nearest to it before the bodies have moved by the skin.
+  subroutine list_vertices(guest_in_host, skin, guest, host, search, list)
     type(view_t), intent(in) :: guest_in_host
     real(wp), intent(in) :: skin               !! [m]
     type(surface_t), intent(in) :: guest, host
     type(search_t), intent(inout) :: search
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
     real(wp) :: margin, place(3), distance, outward(3), low(3), high(3)
     integer :: m
 
     list%n_facets = 0
     list%n_edges = 0
-    if (host%ball > 0.0_wp) return   ! its own centre is the probe
+    if (host%ball > 0.0_wp) return   ! its own centre is the vertex
     margin = skin + search%ahead + guest%ball
     call box_in_view(inverse_view(guest_in_host), host%low - margin, host%high + margin, low, high)
-    call gather_probes(guest, low, high, search%guests)
+    call gather_vertices(guest, low, high, search%guests)
     do m = 1, search%guests%n
-      place = seen_from(guest_in_host, guest%probe(:, search%guests%item(m)))
+      place = seen_from(guest_in_host, guest%vertex(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
       if (min_distance(host, place) > margin) cycle
       call search_surface(host, place, margin, search%found, distance, outward)
@@ -153,24 +154,24 @@ contains
       list%away(list%n) = distance - guest%ball
     end do
     call end_lists(list)
-  end subroutine list_probes
+  end subroutine list_vertices
 
-  !> Append a probe with the facets and edges of the host within reach; `away` is not set.
-  subroutine append_near(host, probe, place, reach, search, list)
+  !> Append a vertex with the facets and edges of the host within reach; `away` is not set.
+  subroutine append_near(host, vertex, place, reach, search, list)
     type(surface_t), intent(in) :: host
-    integer, intent(in) :: probe
-    real(wp), intent(in) :: place(3), reach      !! of the probe, host axes [m]
+    integer, intent(in) :: vertex
+    real(wp), intent(in) :: place(3), reach      !! of the vertex, host axes [m]
     type(search_t), intent(inout) :: search
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
 
     call gather_facets(host, place - reach, place + reach, search%found%facets)
     call gather_edges(host, place - reach, place + reach, search%found%edges)
     list%n = list%n + 1
-    call ensure_capacity(list%n, list%probe)
+    call ensure_capacity(list%n, list%vertex)
     call ensure_capacity(list%n, list%away)
     call ensure_capacity(list%n, list%facet_first)
     call ensure_capacity(list%n, list%edge_first)
-    list%probe(list%n) = probe
+    list%vertex(list%n) = vertex
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
     associate (facets => search%found%facets, edges => search%found%edges)
@@ -179,9 +180,9 @@ contains
     end associate
   end subroutine append_near
 
-  !> Close the lists of facets and edges of the last probe.
+  !> Close the lists of facets and edges of the last vertex.
   subroutine end_lists(list)
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
 
     call ensure_capacity(list%n + 1, list%facet_first)
     call ensure_capacity(list%n + 1, list%edge_first)

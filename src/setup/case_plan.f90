@@ -566,7 +566,7 @@ contains
     do s = 1, size(shapes)
       if (case%contact%model == 'surface') then
         call surface_init(shapes(s), surface)
-        n_points(s) = size(surface%probe, 2)
+        n_points(s) = size(surface%vertex, 2)
         d_s = min(d_s, surface%length)
       else
         n_points(s) = size(shapes(s)%sphere_radius)

@@ -171,9 +171,9 @@ contains
     ! a place on the edge between two flat facets must not slip between them
     bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
     bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
-    bed%surface%probe = bed%surface%probe(:, :bed%surface%n_corners)
+    bed%surface%vertex = bed%surface%vertex(:, :bed%surface%n_corners)
     bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
-    call bins_build(bed%surface%probe, bed%surface%probe, spacing, bed%surface%probes)
+    call bins_build(bed%surface%vertex, bed%surface%vertex, spacing, bed%surface%vertices)
     low = near_tank(case, low)
     high = near_tank(case, high)
     low(3, :) = 0.0_wp

@@ -62,7 +62,7 @@ contains
     call check('as long as empty lists', short_list_holds(now, cube%reach, cube%reach, short))
   end subroutine check_how_long
 
-  !> As long as it holds, a short list made some time after the lists has every probe that touches
+  !> As long as it holds, a short list made some time after the lists has every vertex that touches
   !! or soon will, with what it touches, and every pair of edges that cross.
   subroutine check_nothing_missing()
     type(near_features_t) :: near
@@ -82,23 +82,23 @@ contains
       now = meeting_at(moved(i, min(short%until - gap, short%left), now%poses))
       now%gap = gap
       call check('holds still', short_list_holds(now, cube%reach, cube%reach, short))
-      call check_probes(now%b_in_a, short%item(:short%of_a - 1), n)
-      call check_probes(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
+      call check_vertices(now%b_in_a, short%item(:short%of_a - 1), n)
+      call check_vertices(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
       call check_crossings(now%a_in_b, short%item(short%edges:short%n), n)
     end do
     call check('many touch', n > 3000)
   end subroutine check_nothing_missing
 
-  !> Every probe of a guest within the gap of the host is in its part of the list.
-  subroutine check_probes(guest_in_host, item, n)
+  !> Every vertex of a guest within the gap of the host is in its part of the list.
+  subroutine check_vertices(guest_in_host, item, n)
     type(view_t), intent(in) :: guest_in_host
     integer, intent(in) :: item(:)
-    integer, intent(inout) :: n                !! probes that touch
+    integer, intent(inout) :: n                !! vertices that touch
     real(wp) :: place(3), wanted, distance, outward(3)
     integer :: p, m
 
     do p = 1, size(cube%weight)
-      place = seen_from(guest_in_host, cube%probe(:, p))
+      place = seen_from(guest_in_host, cube%vertex(:, p))
       wanted = distance_from_cube(place)
       if (wanted > gap) cycle
       n = n + 1
@@ -107,7 +107,7 @@ contains
         if (item(m) == p) exit
         m = m + 3 + item(m + 1) + item(m + 2)
       end do
-      call check('the probe is listed', m <= size(item))
+      call check('the vertex is listed', m <= size(item))
       if (m > size(item)) cycle
       associate (facets => item(m + 3:m + 2 + item(m + 1)), &
         edges => item(m + 3 + item(m + 1):m + 2 + item(m + 1) + item(m + 2)))
@@ -115,7 +115,7 @@ contains
       end associate
       call check('with what is nearest to it', distance, wanted, 1.0e-14_wp)
     end do
-  end subroutine check_probes
+  end subroutine check_vertices
 
   !> Every pair of edges that cross, or are within the gap of it, is in its part of the list.
   subroutine check_crossings(a_in_b, item, n)
