@@ -54,7 +54,7 @@ contains
       old%n = new%n
       old%a(:old%n) = new%a(:old%n)
       old%b(:old%n) = new%b(:old%n)
-      old%key(:old%n) = new%key(:old%n)
+      old%id(:old%n) = new%id(:old%n)
       old%xi(:, :old%n) = new%xi(:, :old%n)
       call reserve_displacements(groups%n, new)
       new%n = groups%n
@@ -63,16 +63,16 @@ contains
         t = groups%first(g)
         new%a(g) = points%item(t)%a
         new%b(g) = points%item(t)%b
-        new%key(g) = points%item(t)%key
+        new%id(g) = points%item(t)%id
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
-          if (.not. comes_before(old%a(m), old%b(m), old%key(m), &
-                                 new%a(g), new%b(g), new%key(g))) exit
+          if (.not. comes_before(old%a(m), old%b(m), old%id(m), &
+                                 new%a(g), new%b(g), new%id(g))) exit
           m = m + 1
         end do
         if (m > old%n) cycle
-        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%key(m) /= new%key(g)
+        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%id(m) /= new%id(g)
         if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
       end do
     end associate

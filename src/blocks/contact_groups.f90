@@ -9,7 +9,7 @@ module contact_groups_m
   private
   public :: groups_t, form_groups
 
-  !> Contact points with one key and one counterpart act on one tangential displacement.
+  !> Contact points with one id and one counterpart act on one tangential displacement.
   type :: groups_t
     integer :: n = 0
     logical, allocatable :: new(:)               !! (n) was not there in the substep before
@@ -20,7 +20,7 @@ module contact_groups_m
 
 contains
 
-  !> Gather the contact points of each key and counterpart.
+  !> Gather the contact points of each id and counterpart.
   pure subroutine form_groups(points, groups)
     type(contact_points_t), intent(in) :: points
     type(groups_t), intent(inout) :: groups
@@ -55,7 +55,7 @@ contains
     type(contact_point_t), intent(in) :: one, two
     logical :: yes
 
-    yes = one%key == two%key .and. one%b == two%b .and. one%a == two%a
+    yes = one%id == two%id .and. one%b == two%b .and. one%a == two%a
   end function same_displacement
 
   !> Mean normal and point of some contact points, weighted by overlap.

@@ -10,7 +10,7 @@ module contact_points_m
   !! (-6..-1, see `walls_m`) or the bed.
   type :: contact_point_t
     integer :: a = 0, b = 0                  !! body and counterpart
-    integer :: key = 0                       !! the sphere or vertex of a in contact; of b: negative
+    integer :: id = 0                        !! the sphere or vertex of a in contact; of b: negative
     real(wp) :: arm_a(3) = 0.0_wp            !! from the centre of a to the contact [m]
     real(wp) :: arm_b(3) = 0.0_wp            !! from the (image of the) centre of b [m]
     real(wp) :: normal(3) = 0.0_wp           !! unit vector from a to b [-]
@@ -19,10 +19,10 @@ module contact_points_m
     real(wp) :: length = 0.0_wp              !! d_s of the contact Courant number, eq. (6) [m]
     !> Relative change of the weight with a shift of a, and with a turn about the contact.
     real(wp) :: weight_shift(3) = 0.0_wp, weight_turn(3) = 0.0_wp   !! [1/m], [1/rad]
-    integer :: other = 0                     !! edge of b that crosses that of the key
+    integer :: other = 0                     !! edge of b that crosses that of the id
   end type contact_point_t
 
-  !> Contact points of one moment, sorted by a, then b, then key.
+  !> Contact points of one moment, sorted by a, then b, then id.
   type :: contact_points_t
     integer :: n = 0
     type(contact_point_t), allocatable :: item(:)

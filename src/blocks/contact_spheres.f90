@@ -386,7 +386,7 @@ contains
       point%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
         + self%radius(s)
       if (point%depth <= -gap) cycle
-      point%key = self%sphere(s)
+      point%id = self%sphere(s)
       point%arm_a = self%centre(:, s) - blocks%x(:, point%a) &
         + (self%radius(s) - point%depth)*walls%normal(:, w)
       point%length = 2*self%radius(s)
@@ -413,7 +413,7 @@ contains
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
         2*self%radius(s) + gap, self%found, distance, outward)
       if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
-      point%key = self%sphere(s)
+      point%id = self%sphere(s)
       point%normal = -outward
       point%arm_a = self%centre(:, s) - blocks%x(:, point%a) - distance*outward
       point%depth = self%radius(s) - distance
@@ -455,7 +455,7 @@ contains
       square = dot_product(d, d)
       if (square >= (reach + gap)**2) cycle
       distance = sqrt(square)
-      point%key = self%sphere(i)
+      point%id = self%sphere(i)
       point%normal = d/max(distance, tiny(1.0_wp))
       point%depth = reach - distance
       d = self%centre(:, i) + (self%radius(i) - 0.5_wp*point%depth)*point%normal

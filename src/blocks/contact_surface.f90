@@ -464,12 +464,12 @@ contains
       outward = matmul(turn_host, outward)
       point%weight = guest%weight(i)
       if (guest_is_a) then
-        point%key = i
+        point%id = i
         point%arm_a = arm + now%to_b
         point%arm_b = arm
         point%normal = -outward
       else
-        point%key = i - size(guest%weight) - 1
+        point%id = i - size(guest%weight) - 1
         point%arm_a = arm
         point%arm_b = arm - now%to_b
         point%normal = outward
@@ -497,7 +497,7 @@ contains
       j = pair%close%item(m + 1)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      point = contact_point_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, other=j, &
+      point = contact_point_t(a=pair%a, b=pair%b, id=size(surface_a%weight) + i, other=j, &
         length=min(surface_a%length, surface_b%length))
       call cross_edges(guest, surface_b%edge(j), -now%gap, point%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle

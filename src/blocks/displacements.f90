@@ -6,14 +6,14 @@ module displacements_m
   private
   public :: displacements_t, reserve_displacements, comes_before, begins_pair, move_displacements
 
-  !> Tangential displacements, one for each sphere or point (key) of a body and the counterpart it
+  !> Tangential displacements, one for each sphere or point (id) of a body and the counterpart it
   !! touches; arrays side by side, as the state of a run is written.
   !!
   !! The paper keeps one for each pair of spheres; one for each counterpart survives when a sphere
   !! slides from a sphere of the counterpart to the next, so that resting blocks do not creep.
   type :: displacements_t
     integer :: n = 0
-    integer, allocatable :: a(:), b(:), key(:)   !! sorted by these, as in `contact_point_t`
+    integer, allocatable :: a(:), b(:), id(:)    !! sorted by these, as in `contact_point_t`
     integer, allocatable :: other(:)
       !! (n) edge of b, of contact points solved for impulses
     real(wp), allocatable :: xi(:, :)            !! (3, n) way of the counterpart past the body [m]
@@ -26,7 +26,7 @@ module displacements_m
 
   !> One of them, to move it.
   type :: displacement_t
-    integer :: a = 0, b = 0, key = 0, other = 0
+    integer :: a = 0, b = 0, id = 0, other = 0
     real(wp) :: xi(3) = 0.0_wp, k = 0.0_wp
     real(wp) :: force(3) = 0.0_wp, torque_a(3) = 0.0_wp, torque_b(3) = 0.0_wp
     real(wp) :: energy = 0.0_wp
@@ -41,7 +41,7 @@ contains
 
     call ensure_capacity(n, displacements%a)
     call ensure_capacity(n, displacements%b)
-    call ensure_capacity(n, displacements%key)
+    call ensure_capacity(n, displacements%id)
     call ensure_capacity(n, displacements%other)
     call ensure_capacity(n, displacements%k)
     call ensure_capacity(n, displacements%xi)
@@ -51,9 +51,9 @@ contains
     call ensure_capacity(n, displacements%energy)
   end subroutine reserve_displacements
 
-  !> Order of displacements and contact points: by body, counterpart, key.
-  pure function comes_before(a1, b1, key1, a2, b2, key2) result(yes)
-    integer, intent(in) :: a1, b1, key1, a2, b2, key2
+  !> Order of displacements and contact points: by body, counterpart, id.
+  pure function comes_before(a1, b1, id1, a2, b2, id2) result(yes)
+    integer, intent(in) :: a1, b1, id1, a2, b2, id2
     logical :: yes
 
     if (a1 /= a2) then
@@ -61,7 +61,7 @@ contains
     else if (b1 /= b2) then
       yes = b1 < b2
     else
-      yes = key1 < key2
+      yes = id1 < id2
     end if
   end function comes_before
 
@@ -95,8 +95,8 @@ contains
         cycle
       end if
       own_is_next = i > 0
-      if (own_is_next) own_is_next = .not. comes_before(to%a(i), to%b(i), to%key(i), from%a(j), &
-                                                        from%b(j), from%key(j))
+      if (own_is_next) own_is_next = .not. comes_before(to%a(i), to%b(i), to%id(i), from%a(j), &
+                                                        from%b(j), from%id(j))
       if (own_is_next) then
         call put_displacement(displacement_at(to, i), m, to)
         i = i - 1
@@ -123,7 +123,7 @@ contains
 
     displacement%a = displacements%a(i)
     displacement%b = displacements%b(i)
-    displacement%key = displacements%key(i)
+    displacement%id = displacements%id(i)
     displacement%other = displacements%other(i)
     displacement%xi = displacements%xi(:, i)
     displacement%k = displacements%k(i)
@@ -141,7 +141,7 @@ contains
 
     displacements%a(i) = displacement%a
     displacements%b(i) = displacement%b
-    displacements%key(i) = displacement%key
+    displacements%id(i) = displacement%id
     displacements%other(i) = displacement%other
     displacements%xi(:, i) = displacement%xi
     displacements%k(i) = displacement%k

@@ -285,15 +285,15 @@ contains
     type(row_t), intent(inout) :: row
 
     do while (m <= memory%n)
-      if (.not. comes_before(memory%a(m), memory%b(m), memory%key(m), &
-                             point%a, point%b, point%key)) then
-        if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%key(m) /= point%key &
+      if (.not. comes_before(memory%a(m), memory%b(m), memory%id(m), &
+                             point%a, point%b, point%id)) then
+        if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%id(m) /= point%id &
             .or. memory%other(m) >= point%other) exit
       end if
       m = m + 1
     end do
     if (m > memory%n) return
-    if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%key(m) /= point%key &
+    if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%id(m) /= point%id &
         .or. memory%other(m) /= point%other) return
     row%impulse(1) = max(0.0_wp, -h*dot_product(memory%force(:, m), row%n))
     row%impulse(2) = -h*dot_product(memory%force(:, m), row%e1)
@@ -407,7 +407,7 @@ contains
           m = m + 1
           memory%a(m) = point%a
           memory%b(m) = point%b
-          memory%key(m) = point%key
+          memory%id(m) = point%id
           memory%other(m) = point%other
           memory%k(m) = 0.0_wp
           way = past(rows%way(:, point%a), rows%way(:, point%b), row)

@@ -210,7 +210,7 @@ contains
     call reserve_displacements(max(1, s%n), s)
     call visitor%integers(name//'a', [s%n], s%a)
     call visitor%integers(name//'b', [s%n], s%b)
-    call visitor%integers(name//'key', [s%n], s%key)
+    call visitor%integers(name//'key', [s%n], s%id)
     call visitor%reals(name//'stretch', 'm', [3, s%n], s%xi)
     call visitor%reals(name//'stiffness', 'N/m^gamma', [s%n], s%k)
     if (with_edge) call visitor%integers(name//'edge', [s%n], s%other)

@@ -260,7 +260,7 @@ contains
     end do
   end subroutine check_new_point
 
-  !> A displacement follows its contact point by body, counterpart and key, lies in the present
+  !> A displacement follows its contact point by body, counterpart and id, lies in the present
   !! plane as long as it was, and grows by the tangential way; others begin anew or are forgotten.
   subroutine check_memory()
     real(wp), parameter :: dt = 0.5_wp
@@ -278,7 +278,7 @@ contains
     call integrate_displacements(dt, detected, displacements)
     call check('tangential way', displacements%xi(:, 1), 3*dt*x, 1.0e-15_wp)
     call check('turning takes part', displacements%xi(:, 3), dt*(3 - 2)*x, 1.0e-15_wp)
-    point(1)%key = 5
+    point(1)%id = 5
     point(3)%normal = [0.6_wp, 0.0_wp, 0.8_wp]
     call detect_again(point, detected, displacements)
     call check('one is new', all(detected%groups%new(:3) .eqv. [.true., .false., .false.]))

@@ -83,7 +83,7 @@ contains
     call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
     call check('one contact point', points%n, 1)
     associate (point => points%item(1))
-      call check('of the second and the first', all([point%a, point%b, point%key] == [2, 1, 1]))
+      call check('of the second and the first', all([point%a, point%b, point%id] == [2, 1, 1]))
       call check('overlap', point%depth, d, 1.0e-15_wp)
       call check('from the second to the first', point%normal, -n, 1.0e-13_wp)
       call check('middle seen from the second', point%arm_a, -(r(2) - 0.5_wp*d)*n, 1.0e-15_wp)

@@ -395,7 +395,7 @@ contains
     n = one%points%n
     same = n == two%points%n
     if (.not. same .or. n == 0) return
-    same = all(one%points%item(:n)%key == two%points%item(:n)%key) &
+    same = all(one%points%item(:n)%id == two%points%item(:n)%id) &
       .and. .not. any(abs(one%points%item(:n)%depth - two%points%item(:n)%depth) > 0.0_wp)
   end function same_points
 

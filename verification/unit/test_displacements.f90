@@ -22,7 +22,7 @@ contains
   subroutine check_order()
     call check('by body', comes_before(1, 9, 9, 2, 0, 0))
     call check('then counterpart', comes_before(2, -7, 9, 2, -1, 0))
-    call check('then key', comes_before(2, 1, 3, 2, 1, 4))
+    call check('then id', comes_before(2, 1, 3, 2, 1, 4))
     call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
   end subroutine check_order
 
@@ -38,7 +38,7 @@ contains
     do i = 1, displacements%n
       displacements%a(i) = bodies(i)
       displacements%b(i) = 1
-      displacements%key(i) = 2*bodies(i)
+      displacements%id(i) = 2*bodies(i)
       displacements%xi(:, i) = 3.0_wp*bodies(i)
       displacements%k(i) = 4.0_wp*bodies(i)
       displacements%force(:, i) = 5.0_wp*bodies(i)
@@ -61,7 +61,7 @@ contains
     yes = n == wanted%n
     if (.not. yes) return
     yes = all(displacements%a(:n) == bodies) .and. all(displacements%b(:n) == 1) &
-      .and. all(displacements%key(:n) == wanted%key(:n)) &
+      .and. all(displacements%id(:n) == wanted%id(:n)) &
       .and. all(abs(displacements%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
       .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
       .and. all(abs(displacements%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
@@ -104,7 +104,7 @@ contains
     call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
   end subroutine check_points
 
-  !> Contact points of one key and counterpart have a mean normal and point, weighted by overlap.
+  !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.
   subroutine check_groups()
     type(contact_points_t) :: points
     type(groups_t) :: groups
@@ -116,7 +116,7 @@ contains
     call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), points)
     call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), points)
     call form_groups(points, groups)
-    call check('keys and bodies', groups%n, 3)
+    call check('ids and bodies', groups%n, 3)
     call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
     call check('one alone', groups%normal(:, 1), x, 0.0_wp)
     call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)

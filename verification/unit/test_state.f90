@@ -102,7 +102,7 @@ contains
     case (25); name = '/blocks/contact_torque'; s%blocks%contact_torque(1, 3) = 1.0_wp
     case (26); name = '/blocks/on_floor'; s%blocks%on_floor(2) = 1
     case (27); name = '/contacts/n'; s%contacts%displacements%n = 3
-    case (28); name = '/contacts/key'; s%contacts%displacements%key(4) = 11
+    case (28); name = '/contacts/key'; s%contacts%displacements%id(4) = 11
     case (29); name = '/contacts/stretch'; call touch(s%contacts%displacements%xi(3, 4))
     case (30); name = '/contacts/quiet'; call touch(s%contacts%sleep%quiet(1))
     case (31); name = '/contacts/rest_stretch'; call touch(s%contacts%sleep%rest%xi(2, 3))
