@@ -191,7 +191,7 @@ contains
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
     call store_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
-    report%transport_parts = sim%transport%liquid%parts
+    report%transport_parts = sim%transport%liquid%subcycles
     report%transport_converged = sim%transport%liquid%small%converged
     report%inertia_clips = report%inertia_clips + count(sim%coupling%bodies%clipped)
     report%sealed_cells = sim%solid%n_sealed

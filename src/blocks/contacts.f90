@@ -16,7 +16,7 @@ module contacts_m
   use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
     sum_forces, elastic_energy, energy_in_memory
   use impulse_step_m, only: move_by_impulses
-  use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
+  use substep_limits_m, only: substep_limit, stiffness_limit, equal_substep
   use counterparts_met_m, only: store_counterparts, count_counterparts
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep, restore_contacts
@@ -117,7 +117,7 @@ contains
     end do
     longest = limit
     do
-      dt_b = equal_part(left, longest)
+      dt_b = equal_substep(left, longest)
       call drift(0.5_wp*dt_b, blocks)
       call detect_contacts(walls, blocks, 0.5_wp*dt_b, contacts%detected)
       allowed = stiffness_limit(contacts%detected)

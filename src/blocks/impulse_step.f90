@@ -14,7 +14,7 @@ module impulse_step_m
   use contact_forces_m, only: contact_report_t
   use contact_load_m, only: give_share
   use contact_state_m, only: contacts_t
-  use substep_limits_m, only: equal_part
+  use substep_limits_m, only: equal_substep
   use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
@@ -55,7 +55,7 @@ contains
         report%info = 1
         return
       end if
-      step = equal_part(left, longest)
+      step = equal_substep(left, longest)
       n = ceiling(step*real(n_sub_sweeps, wp)/contacts%contact_time*(1.0_wp - 1.0e-9_wp))
       h = step/real(n, wp)
       do

@@ -13,7 +13,7 @@ module resting_m
   use acting_bodies_m, only: list_present
   use contact_detection_m, only: detect_contacts
   use contact_forces_m, only: contact_report_t, match_displacements, sum_forces, push_group
-  use substep_limits_m, only: substep_limit, equal_part
+  use substep_limits_m, only: substep_limit, equal_substep
   use counterparts_met_m, only: store_counterparts
   use contact_state_m, only: contacts_t
   implicit none
@@ -53,7 +53,7 @@ contains
       end do
       if (any(contacts%sleep%candidate)) then
         dt_b = dt
-        if (.not. contacts%by_impulses) dt_b = equal_part(dt, substep_limit(walls, &
+        if (.not. contacts%by_impulses) dt_b = equal_substep(dt, substep_limit(walls, &
           contacts%detected, blocks, dt, contacts%limits))
         call let_sleep(gravity, dt_b, contacts, blocks, changed)
       end if

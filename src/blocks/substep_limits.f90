@@ -11,7 +11,7 @@ module substep_limits_m
   use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
-  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_part
+  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_substep
 
   type :: limits_t
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
@@ -152,11 +152,11 @@ contains
   end function stiffness_limit
 
   !> An equal part of the time left, no longer than allowed [s].
-  pure function equal_part(left, longest) result(dt_b)
+  pure function equal_substep(left, longest) result(dt_b)
     real(wp), intent(in) :: left, longest   !! [s]
     real(wp) :: dt_b
 
     dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
-  end function equal_part
+  end function equal_substep
 
 end module substep_limits_m

@@ -190,7 +190,7 @@ contains
     end do
   end subroutine give_small_cells
 
-  !> C^ of what gave and got implicitly in the part before, for the next one; that of cells with
+  !> C^ of what gave and got implicitly in the subcycle before, for the next one; that of cells with
   !! solid stays that of the begin, as in the sweeps.
   subroutine renew_shares(grid, old, self, volumes)
     type(grid_t), intent(in) :: grid

@@ -6,22 +6,22 @@ program test_substep_limits
   use walls_m, only: walls_t
   use contact_detection_m, only: contact_detection_t
   use contact_response_m, only: impact_turn
-  use substep_limits_m, only: limits_t, substep_limit, stiffness_limit, equal_part
+  use substep_limits_m, only: limits_t, substep_limit, stiffness_limit, equal_substep
   implicit none
 
-  call check_equal_parts()
+  call check_equal_substeps()
   call check_limits()
   call finish_checks()
 
 contains
 
-  subroutine check_equal_parts()
-    call check('an equal part', equal_part(1.0_wp, 0.3_wp), 0.25_wp, 0.0_wp)
-    call check('no shorter than has to be', equal_part(1.0_wp, 0.25_wp), 0.25_wp, 0.0_wp)
-    call check('nor for round-off', equal_part(1.0_wp, 0.25_wp*(1.0_wp - 1.0e-12_wp)), 0.25_wp, &
+  subroutine check_equal_substeps()
+    call check('an equal substep', equal_substep(1.0_wp, 0.3_wp), 0.25_wp, 0.0_wp)
+    call check('no shorter than has to be', equal_substep(1.0_wp, 0.25_wp), 0.25_wp, 0.0_wp)
+    call check('nor for round-off', equal_substep(1.0_wp, 0.25_wp*(1.0_wp - 1.0e-12_wp)), 0.25_wp, &
       0.0_wp)
-    call check('all that is left', equal_part(0.2_wp, 1.0_wp), 0.2_wp, 0.0_wp)
-  end subroutine check_equal_parts
+    call check('all that is left', equal_substep(0.2_wp, 1.0_wp), 0.2_wp, 0.0_wp)
+  end subroutine check_equal_substeps
 
   !> A body above a floor, another far up: each of the limits in turn.
   subroutine check_limits()
