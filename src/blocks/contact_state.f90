@@ -66,7 +66,7 @@ contains
     allocate (contacts%share(n), contacts%steady(3, n), contacts%held(6, n), source=0.0_wp)
     call reserve_displacements(1, contacts%displacements)
     call reserve_displacements(1, contacts%before)
-    call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)
+    call sleep_init(input%sleep, contacts%limits%bounding_radius, contacts%sleep)
     allocate (contacts%woken(n), source=.false.)
     select case (input%solver)
     case ('springs'); return

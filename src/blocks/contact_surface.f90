@@ -41,7 +41,7 @@ module contact_surface_m
 
   type :: contact_surface_t
     type(surface_t), allocatable :: surface(:)   !! (shapes)
-    real(wp), allocatable :: reach(:)            !! (bodies) [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
@@ -63,7 +63,8 @@ module contact_surface_m
 
   real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
   integer, parameter :: lasting_substeps = 10    !! that lists of fast bodies last
-  real(wp), parameter :: wide_share = 0.2_wp     !! skin of the pairs over the largest reach
+  real(wp), parameter :: wide_share = 0.2_wp
+    !! skin of the pairs over the largest bounding radius
 
 contains
 
@@ -79,12 +80,12 @@ contains
     do s = 1, size(blocks%shapes)
       call surface_init(blocks%shapes(s), self%surface(s))
     end do
-    allocate (self%reach(blocks%n), self%present(blocks%n))
+    allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
     allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
-      self%reach(b) = self%surface(blocks%shape(b))%reach
+      self%bounding_radius(b) = self%surface(blocks%shape(b))%bounding_radius
       self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
       self%with_bed(b)%b = bed_counterpart
@@ -93,7 +94,7 @@ contains
     self%search%skin = skin_share*self%smallest
     self%search%lasting = real(lasting_substeps, wp)*longest_substep
     self%search%min_ahead = courant_max*self%smallest
-    call cover_way(max(0.5_wp*wide_share*maxval(self%reach), self%search%min_ahead), self)
+    call cover_way(max(0.5_wp*wide_share*maxval(self%bounding_radius), self%search%min_ahead), self)
   end subroutine contact_surface_init
 
   !> Let the list of pairs hold all that may meet before any two bodies have come nearer by a way.
@@ -102,7 +103,7 @@ contains
     type(contact_surface_t), intent(inout) :: self
 
     self%clear = way
-    self%wide_skin = max(wide_share*maxval(self%reach), 2*way)
+    self%wide_skin = max(wide_share*maxval(self%bounding_radius), 2*way)
   end subroutine cover_way
 
   !> All contact points at the present poses, but for those between bodies that are still, and those
@@ -128,7 +129,7 @@ contains
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
-        speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
+        speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%bounding_radius(a)
         gap = ahead*speed + self%search%margin
         if (walls%bed%there) call add_bed_points(walls%bed, blocks, a, speed, ahead, self, points)
         do w = 1, walls%n
@@ -190,7 +191,8 @@ contains
       self%old_a(:n_old) = self%near%a(:n_old)
       self%old_b(:n_old) = self%near%b(:n_old)
     end if
-    call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%wide_skin, self%near)
+    call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%wide_skin, &
+      self%near)
     call ensure_capacity(self%near%n, self%slot)
     call keep_slots(n_old, self)
     call take_slots(self)
@@ -286,7 +288,7 @@ contains
 
     above = walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, a))
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
-      if (above > self%reach(a) + gap) return
+      if (above > self%bounding_radius(a) + gap) return
       n = matmul(walls%normal(:, w), turn)
       if (surface%ball > 0.0_wp) then
         arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
@@ -352,11 +354,12 @@ contains
     now%v = blocks%v(:, a) - blocks%v(:, b)
     now%omega_a = blocks%omega(:, a)
     now%omega_b = blocks%omega(:, b)
-    now%speed = norm(now%v) + norm(now%omega_a)*self%reach(a) + norm(now%omega_b)*self%reach(b)
+    now%speed = norm(now%v) + norm(now%omega_a)*self%bounding_radius(a) &
+      + norm(now%omega_b)*self%bounding_radius(b)
     now%gap = ahead*now%speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    if (norm(now%to_b) > self%reach(a) + self%reach(b) + now%gap) return
+    if (norm(now%to_b) > self%bounding_radius(a) + self%bounding_radius(b) + now%gap) return
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
@@ -381,11 +384,12 @@ contains
     real(wp) :: way
     logical :: holds
 
-    holds = short_list_holds(now, surface_a%reach, surface_b%reach, pair%close)
+    holds = short_list_holds(now, surface_a%bounding_radius, surface_b%bounding_radius, pair%close)
     if (holds .and. n_chosen(pair%close) == 0) return
     call update_views(now)
     if (.not. holds) then
-      way = way_between(pair%near%when, now%poses, surface_a%reach, surface_b%reach)
+      way = way_between(pair%near%when, now%poses, surface_a%bounding_radius, &
+        surface_b%bounding_radius)
       if (way > pair%near%valid .or. now%gap > pair%near%ahead) then
         search%ahead = max(search%min_ahead, wider*now%gap)
         if (present(bed)) then

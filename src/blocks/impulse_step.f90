@@ -31,7 +31,8 @@ module impulse_step_m
   real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
   real(wp), parameter :: margin = 5.0e-3_wp       !! of a contact point to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
-  real(wp), parameter :: free_way = 0.5_wp        !! covered by the list of pairs, over a reach [-]
+  real(wp), parameter :: free_way = 0.5_wp
+    !! covered by the list of pairs, over a bounding radius [-]
   real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
   real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
@@ -97,7 +98,7 @@ contains
       end if
       contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
                                blocks%fixed(b))*left &
-        + haste(blocks, b, contacts%detected%surface%reach(b))
+        + haste(blocks, b, contacts%detected%surface%bounding_radius(b))
       speed = fastest(b)
       if (.not. speed <= two(2)) two(2) = speed
       if (.not. two(2) <= two(1)) two = two([2, 1])
@@ -109,8 +110,8 @@ contains
       edge = contacts%smallest_edge
       longest = left
       if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
-      if (most*longest > free_way*maxval(s%reach)) longest = min(longest, &
-        max(contacts%contact_time, free_way*maxval(s%reach)/most))
+      if (most*longest > free_way*maxval(s%bounding_radius)) longest = min(longest, &
+        max(contacts%contact_time, free_way*maxval(s%bounding_radius)/most))
       call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
       call renew_pairs(walls, blocks, s)
       do b = 1, blocks%n
@@ -118,10 +119,11 @@ contains
         speed = fastest(b)
         do w = 1, walls%n
           call limit_by(walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, b)) &
-                        - s%reach(b), speed)
+                        - s%bounding_radius(b), speed)
         end do
         if (walls%bed%there) then
-          associate (place => bed_place(walls%bed, blocks%x(:, b)), far => s%reach(b) + left*speed)
+          associate (place => bed_place(walls%bed, blocks%x(:, b)), far => s%bounding_radius(b) &
+            + left*speed)
             if (bed_is_near(walls%bed, place - far, place + far)) call limit_by(0.0_wp, speed)
           end associate
         end if
@@ -129,10 +131,11 @@ contains
       do p = 1, s%near%n
         associate (a => s%near%a(p), c => s%near%b(p))
           if (blocks%still(a) .and. blocks%still(c)) cycle
-          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, a))*s%reach(a) &
-            + norm(blocks%omega(:, c))*s%reach(c) + contacts%gain(a) + contacts%gain(c)
+          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, &
+            a))*s%bounding_radius(a) + norm(blocks%omega(:, c))*s%bounding_radius(c) &
+            + contacts%gain(a) + contacts%gain(c)
           call limit_by(distance(blocks%x(:, a), blocks%x(:, c) + s%near%shift(:, p)) &
-                        - s%reach(a) - s%reach(c), speed)
+                        - s%bounding_radius(a) - s%bounding_radius(c), speed)
         end associate
       end do
     end associate
@@ -141,8 +144,8 @@ contains
     pure real(wp) function fastest(b)
       integer, intent(in) :: b
 
-      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%detected%surface%reach(b) &
-        + contacts%gain(b)
+      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, &
+        b))*contacts%detected%surface%bounding_radius(b) + contacts%gain(b)
     end function fastest
 
     !> What a gap allows that closes at a speed.

@@ -15,7 +15,7 @@ module lubrication_m
   public :: lubrication_t, lubrication_init, lubricate, film_resistance, film_impulse, film_pull
 
   real(wp), parameter :: roughness = 1.0e-3_wp   !! thinnest film over the radius of the sphere [-]
-  real(wp), parameter :: reach = 4.0_wp   !! of films: the grid misses 2 % of thicker ones [cells]
+  real(wp), parameter :: cutoff = 4.0_wp   !! of films: the grid misses 2 % of thicker ones [cells]
   real(wp), parameter :: atmosphere = 101325.0_wp   !! [Pa]
 
   type :: lubrication_t
@@ -65,7 +65,7 @@ contains
     active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
     associate (near => lubrication%near)
       call near_pairs(blocks%x(:, :blocks%n), lubrication%radius, active, walls%period, &
-                      (1.0_wp + round_off)*reach*maxval(lubrication%h), near)
+                      (1.0_wp + round_off)*cutoff*maxval(lubrication%h), near)
       p = 1
       do a = 1, blocks%n
         if (.not. active(a)) cycle
@@ -143,7 +143,7 @@ contains
 
     cell = norm(n*lubrication%h)
     f = 0.0_wp
-    if (gap >= reach*cell) return
+    if (gap >= cutoff*cell) return
     a = sqrt(2.0_wp)*cell
     half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*roughness*radius)
     associate (mu => lubrication%viscosity)

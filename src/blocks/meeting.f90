@@ -77,14 +77,14 @@ contains
 
   !> Largest way that points of two bodies move against one another from one pair of poses to
   !! another [m].
-  pure function way_between(before, now, reach_a, reach_b) result(way)
+  pure function way_between(before, now, radius_a, radius_b) result(way)
     type(poses_t), intent(in) :: before, now
-    real(wp), intent(in) :: reach_a, reach_b   !! of the bodies [m]
+    real(wp), intent(in) :: radius_a, radius_b   !! of the bodies [m]
     real(wp) :: way
 
     ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
     way = norm((now%x_a - before%x_a) - (now%x_b - before%x_b)) &
-      + 2*reach_a*norm(now%q_a - before%q_a) + 2*reach_b*norm(now%q_b - before%q_b)
+      + 2*radius_a*norm(now%q_a - before%q_a) + 2*radius_b*norm(now%q_b - before%q_b)
   end function way_between
 
   !> Whether two places touch, or come as near as the margin in the time ahead. Where there is one,

@@ -95,7 +95,7 @@ contains
         if (.not. (sleep%candidate(b) .and. sleep%supported(b))) cycle
         if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
-                           blocks%fluid_torque(:, b), sleep%reach(b))) cycle
+                           blocks%fluid_torque(:, b), sleep%bounding_radius(b))) cycle
         ! should it wake before the step ends, contact has taken this
         loads%impulse(:, b) = loads%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
         loads%twist(:, b) = loads%twist(:, b) - blocks%l(:, b)

@@ -36,14 +36,14 @@ contains
   end function n_chosen
 
   !> Whether a short list still holds.
-  pure function short_list_holds(now, reach_a, reach_b, short) result(yes)
+  pure function short_list_holds(now, radius_a, radius_b, short) result(yes)
     type(meeting_t), intent(in) :: now
-    real(wp), intent(in) :: reach_a, reach_b  !! of the bodies [m]
+    real(wp), intent(in) :: radius_a, radius_b  !! of the bodies [m]
     type(short_list_t), intent(in) :: short
     logical :: yes
     real(wp) :: way
 
-    way = way_between(short%when, now%poses, reach_a, reach_b)
+    way = way_between(short%when, now%poses, radius_a, radius_b)
     yes = way <= short%left .and. way + now%gap <= short%until .and. now%gap <= short%ahead
   end function short_list_holds
 
@@ -84,7 +84,7 @@ contains
     type(near_vertices_t), intent(in) :: list
     type(short_list_t), intent(inout) :: short
     integer, intent(out) :: n_vertices         !! appended
-    real(wp) :: margin, place(3), distance, outward(3), reach
+    real(wp) :: margin, place(3), distance, outward(3), cutoff
     integer :: m, at
 
     n_vertices = 0
@@ -96,14 +96,14 @@ contains
         place = seen_from(guest_in_host, guest%vertex(:, list%vertex(m)))
         call nearest_on_surface(host, place, facets, edges, distance, outward)
         if (distance - guest%ball > margin .and. distance < nowhere) cycle
-        reach = abs(distance) + 2*margin
+        cutoff = abs(distance) + 2*margin
         at = short%n + 1
         short%n = short%n + 3
         call ensure_capacity(short%n, short%item)
         short%item(at) = list%vertex(m)
-        call append_facets(host, facets, place, reach, short%n, short%item)
+        call append_facets(host, facets, place, cutoff, short%n, short%item)
         short%item(at + 1) = short%n - at - 2
-        call append_edges(host, edges, place, reach, short%n, short%item)
+        call append_edges(host, edges, place, cutoff, short%n, short%item)
         short%item(at + 2) = short%n - at - 2 - short%item(at + 1)
         n_vertices = n_vertices + 1
       end associate
@@ -130,7 +130,7 @@ contains
       last = near%edge_a(m)
       if (way_to_crossing(guest, surface_b%edge(near%edge_b(m)), margin, &
         margin + min(surface_a%length, surface_b%length), &
-        min(surface_a%reach, surface_b%reach)) > margin) cycle
+        min(surface_a%bounding_radius, surface_b%bounding_radius)) > margin) cycle
       call ensure_capacity(short%n + 2, short%item)
       short%item(short%n + 1:short%n + 2) = [near%edge_a(m), near%edge_b(m)]
       short%n = short%n + 2

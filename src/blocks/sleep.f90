@@ -19,13 +19,13 @@ module sleep_m
   public :: store_quiet, may_sleep
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
-  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g reach)
-  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
+  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g radius)
+  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(radius/g)
   real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
 
   type :: sleep_t
     logical :: active = .false.
-    real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
     type(displacements_t) :: rest              !! contact points at rest, between what does not move
@@ -38,16 +38,16 @@ module sleep_m
 contains
 
   !> Nobody sleeps yet.
-  subroutine sleep_init(active, reach, sleep)
+  subroutine sleep_init(active, radius, sleep)
     logical, intent(in) :: active
-    real(wp), intent(in) :: reach(:)           !! (n) [m]
+    real(wp), intent(in) :: radius(:)           !! (n) [m]
     type(sleep_t), intent(out) :: sleep
 
     sleep%active = active
-    sleep%reach = reach
-    allocate (sleep%quiet(size(reach)), source=0.0_wp)
-    allocate (sleep%candidate(size(reach)), sleep%supported(size(reach)), source=.false.)
-    allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
+    sleep%bounding_radius = radius
+    allocate (sleep%quiet(size(radius)), source=0.0_wp)
+    allocate (sleep%candidate(size(radius)), sleep%supported(size(radius)), source=.false.)
+    allocate (sleep%load(3, size(radius)), sleep%load_torque(3, size(radius)), source=0.0_wp)
     call reserve_displacements(1, sleep%rest)
   end subroutine sleep_init
 
@@ -129,9 +129,9 @@ contains
 
     do b = 1, blocks%n
       way = distance(blocks%x(:, b), sleep%x(:, b)) &
-        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%reach(b)
+        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%bounding_radius(b)
       if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
-          way <= slow*sqrt(norm(gravity)*sleep%reach(b))*dt) then
+          way <= slow*sqrt(norm(gravity)*sleep%bounding_radius(b))*dt) then
         sleep%quiet(b) = sleep%quiet(b) + dt
       else
         sleep%quiet(b) = 0.0_wp
@@ -148,21 +148,21 @@ contains
     logical :: yes
 
     yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
-    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%reach(b)
+    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%bounding_radius(b)
   end function may_sleep
 
   !> Whether contact forces balance weight and fluid within a share of the tolerance.
-  pure function balanced(share, force, torque, steady, steady_torque, reach) result(yes)
+  pure function balanced(share, force, torque, steady, steady_torque, radius) result(yes)
     real(wp), intent(in) :: share              !! of the tolerance [-]
     real(wp), intent(in) :: force(3), torque(3)               !! of contact [N], [N m]
     real(wp), intent(in) :: steady(3), steady_torque(3)       !! all else [N], [N m]
-    real(wp), intent(in) :: reach              !! of the body [m]
+    real(wp), intent(in) :: radius              !! of the body [m]
     logical :: yes
     real(wp) :: bound
 
     bound = share*tolerance*norm(steady)
     yes = norm(force + steady) <= bound
-    if (yes) yes = norm(torque + steady_torque) <= bound*reach
+    if (yes) yes = norm(torque + steady_torque) <= bound*radius
   end function balanced
 
   !> Let body b sleep at its pose.
@@ -224,7 +224,7 @@ contains
       if (.not. blocks%asleep(b)) cycle
       other = steady(:, b) + blocks%mass(b)*gravity
       woken(b) = .not. balanced(1.0_wp, force(:, b), torque(:, b), other, &
-        blocks%fluid_torque(:, b), sleep%reach(b))
+        blocks%fluid_torque(:, b), sleep%bounding_radius(b))
       if (woken(b)) then
         call wake(b, blocks)
       else

@@ -17,7 +17,7 @@ module substep_limits_m
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
     real(wp) :: longest_substep = 0.0_wp         !! [s]
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
-    real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
   end type limits_t
@@ -34,11 +34,11 @@ contains
     limits%longest_substep = longest_substep_of(input)
     limits%courant_max = input%courant_max
     if (detected%exact) then
-      limits%reach = detected%surface%reach
+      limits%bounding_radius = detected%surface%bounding_radius
       limits%smallest = detected%surface%smallest
       limits%clear = detected%surface%clear
     else
-      limits%reach = detected%spheres%reach
+      limits%bounding_radius = detected%spheres%bounding_radius
       limits%smallest = detected%spheres%smallest
       limits%clear = detected%spheres%clear
     end if
@@ -76,12 +76,12 @@ contains
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%still(b)) cycle
-      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b) &
-        + haste(blocks, b, limits%reach(b))
+      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%bounding_radius(b) &
+        + haste(blocks, b, limits%bounding_radius(b))
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
       if (.not. speed <= near) then
-        if (near_wall(walls, blocks%x(:, b), limits%reach(b) + limits%clear)) near = speed
+        if (near_wall(walls, blocks%x(:, b), limits%bounding_radius(b) + limits%clear)) near = speed
       end if
     end do
     if (.not. near*limit <= limits%courant_max*limits%smallest) then
@@ -103,34 +103,34 @@ contains
 
     fastest = 0.0_wp
     do p = 1, near%n
-      associate (a => near%a(p), b => near%b(p), reach => limits%reach)
+      associate (a => near%a(p), b => near%b(p), radius => limits%bounding_radius)
         if (blocks%still(a) .and. blocks%still(b)) cycle
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
-            > reach(a) + reach(b) + limits%clear) cycle
-        speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
-          + norm(blocks%omega(:, b))*reach(b) + haste(blocks, a, reach(a)) &
-          + haste(blocks, b, reach(b))
+            > radius(a) + radius(b) + limits%clear) cycle
+        speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*radius(a) &
+          + norm(blocks%omega(:, b))*radius(b) + haste(blocks, a, radius(a)) &
+          + haste(blocks, b, radius(b))
       end associate
       if (.not. speed <= fastest) fastest = speed
     end do
   end function fastest_near
 
-  !> Whether a wall or the bed is within reach of a place.
-  pure function near_wall(walls, x, reach) result(yes)
+  !> Whether a wall or the bed is within a radius of a place.
+  pure function near_wall(walls, x, radius) result(yes)
     type(walls_t), intent(in) :: walls
-    real(wp), intent(in) :: x(3), reach   !! [m]
+    real(wp), intent(in) :: x(3), radius   !! [m]
     logical :: yes
     real(wp) :: place(3)
     integer :: w
 
     yes = .true.
     do w = 1, walls%n
-      if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
+      if (dot_product(walls%normal(:, w), x) + radius > walls%offset(w)) return
     end do
     yes = walls%bed%there
     if (.not. yes) return
     place = bed_place(walls%bed, x)
-    yes = bed_is_near(walls%bed, place - reach, place + reach)
+    yes = bed_is_near(walls%bed, place - radius, place + radius)
   end function near_wall
 
   !> Longest substep the present contacts allow [s].

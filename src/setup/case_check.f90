@@ -10,7 +10,7 @@ module case_check_m
   use boundary_kinds_m, only: side_code, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
-  use tet_mesh_m, only: shape_t, is_called, reach_along
+  use tet_mesh_m, only: shape_t, is_called, extent_along
   use shapes_builtin_m, only: make_shape, given_size
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
@@ -325,9 +325,9 @@ contains
     height = case%grid%origin(3) + case%grid%length(3)
     associate (shape => scene%blocks%shapes(scene%blocks%shape(b)))
       if (is_wall(side_code(case%boundary%kind(2, 3)))) then
-        height = height - reach_along(shape, turn(3, :))
+        height = height - extent_along(shape, turn(3, :))
       else
-        height = height + reach_along(shape, -turn(3, :))
+        height = height + extent_along(shape, -turn(3, :))
       end if
     end associate
   end function highest_place

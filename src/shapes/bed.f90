@@ -526,23 +526,23 @@ contains
     real(wp), intent(out) :: distance     !! [m]
     real(wp), intent(out) :: outward(3)   !! 0 where the distance is not exact
     real(wp), parameter :: least = 0.02_wp   !! share of `far` to begin with
-    real(wp) :: reach
+    real(wp) :: cutoff
 
-    reach = near
+    cutoff = near
     do
-      call gather_facets(bed%surface, x - reach, x + reach, found%facets)
-      call gather_edges(bed%surface, x - reach, x + reach, found%edges)
+      call gather_facets(bed%surface, x - cutoff, x + cutoff, found%facets)
+      call gather_edges(bed%surface, x - cutoff, x + cutoff, found%edges)
       call nearest_on_surface(bed%surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
-      if (abs(distance) <= reach) return
+      if (abs(distance) <= cutoff) return
       outward = 0.0_wp
-      if (reach <= near) then
+      if (cutoff <= near) then
         distance = nowhere
         if (.not. bed_covers(bed, x)) return
       end if
       distance = -far
-      if (reach >= far) return
-      reach = min(max(2*reach, least*far), far)
+      if (cutoff >= far) return
+      cutoff = min(max(2*cutoff, least*far), far)
     end do
   end subroutine bed_distance
 

@@ -165,17 +165,17 @@ contains
     real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     integer, intent(in) :: cells(3)   !! from `sort_bodies`
     type(pair_list_t), intent(inout) :: pairs
-    integer :: b, i, j, k, c(3), reach(2, 3), begin
+    integer :: b, i, j, k, c(3), offset(2, 3), begin
     real(wp) :: d(3), shift(3)
 
     begin = pairs%n + 1
-    reach(1, :) = -1
-    reach(2, :) = 1
-    where (period > 0.0_wp .and. cells < 3) reach(1, :) = 1 - cells
-    where (period > 0.0_wp .and. cells < 3) reach(2, :) = 0
-    do k = reach(1, 3), reach(2, 3)
-      do j = reach(1, 2), reach(2, 2)
-        do i = reach(1, 1), reach(2, 1)
+    offset(1, :) = -1
+    offset(2, :) = 1
+    where (period > 0.0_wp .and. cells < 3) offset(1, :) = 1 - cells
+    where (period > 0.0_wp .and. cells < 3) offset(2, :) = 0
+    do k = offset(1, 3), offset(2, 3)
+      do j = offset(1, 2), offset(2, 2)
+        do i = offset(1, 1), offset(2, 1)
           c = pairs%cell(:, a) + [i, j, k]
           where (period > 0.0_wp) c = modulo(c, cells)
           if (any(c < 0) .or. any(c >= cells)) cycle
@@ -210,13 +210,13 @@ contains
     end do
   end function nearest_shift
 
-  !> Put the bodies into cells no smaller than the reach of the largest pair.
+  !> Put the bodies into cells no smaller than the cutoff of the largest pair.
   subroutine sort_bodies(x, radius, active, period, skin, cells, pairs)
     real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     logical, intent(in) :: active(:)
     integer, intent(out) :: cells(3)   !! cells in each direction
     type(pair_list_t), intent(inout) :: pairs
-    real(wp) :: low(3), high(3), edge(3), reach
+    real(wp) :: low(3), high(3), edge(3), cutoff
     integer :: a, c, d, most
 
     low = huge(1.0_wp)
@@ -230,10 +230,10 @@ contains
       low = 0.0_wp
       high = period
     end where
-    reach = 2*maxval(radius, active) + skin
+    cutoff = 2*maxval(radius, active) + skin
     most = max(1, nint((8.0_wp*size(radius))**(1.0_wp/3.0_wp)))
     do d = 1, 3
-      cells(d) = min(max(1, int(min((high(d) - low(d))/reach, real(most, wp)))), most)
+      cells(d) = min(max(1, int(min((high(d) - low(d))/cutoff, real(most, wp)))), most)
     end do
     edge = max((high - low)/real(cells, wp), tiny(1.0_wp))
     if (.not. allocated(pairs%chain)) then

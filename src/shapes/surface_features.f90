@@ -34,7 +34,7 @@ contains
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
-      surface%reach = surface%ball
+      surface%bounding_radius = surface%ball
       surface%length = 2*surface%ball
       allocate (surface%vertex(3, 1), source=0.0_wp)
       allocate (surface%weight(1), source=1.0_wp)
@@ -302,7 +302,7 @@ contains
     end do
   end subroutine make_vertices
 
-  !> Bounding box, reach and bins.
+  !> Bounding box and radius, bins.
   subroutine sort_into_bins(shape, surface)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(inout) :: surface
@@ -317,7 +317,7 @@ contains
     end do
     surface%low = minval(low, 2)
     surface%high = maxval(high, 2)
-    surface%reach = maxval(norm2(shape%point(:, shape%facet_point), 1))
+    surface%bounding_radius = maxval(norm2(shape%point(:, shape%facet_point), 1))
     call bins_build(low, high, 2*surface%length, surface%facets)
     call bins_build(surface%vertex, surface%vertex, 2*surface%length, surface%vertices)
     n = size(surface%edge)

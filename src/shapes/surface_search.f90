@@ -15,7 +15,7 @@ module surface_search_m
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
-    real(wp) :: reach = 0.0_wp                   !! of the sphere about the origin around it [m]
+    real(wp) :: bounding_radius = 0.0_wp         !! of the sphere about the origin around it [m]
     real(wp) :: length = 0.0_wp                  !! d_s of the contact Courant number, eq. (6) [m]
     real(wp) :: low(3) = 0.0_wp, high(3) = 0.0_wp    !! bounding box [m]
     real(wp), allocatable :: vertex(:, :)        !! (3, n) points that touch; sphere: its centre [m]
@@ -216,16 +216,16 @@ contains
     real(wp), intent(in) :: x(3), begin              !! body axes; half the first box [m]
     type(found_t), intent(inout) :: found            !! work
     real(wp), intent(out) :: distance, outward(3)    !! [m], see `nearest_on_surface`
-    real(wp) :: reach
+    real(wp) :: cutoff
 
-    reach = begin
+    cutoff = begin
     do
-      call gather_facets(surface, x - reach, x + reach, found%facets)
-      call gather_edges(surface, x - reach, x + reach, found%edges)
+      call gather_facets(surface, x - cutoff, x + cutoff, found%facets)
+      call gather_edges(surface, x - cutoff, x + cutoff, found%edges)
       call nearest_on_surface(surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
-      if (abs(distance) <= reach .or. reach > 2*surface%reach) return
-      reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
+      if (abs(distance) <= cutoff .or. cutoff > 2*surface%bounding_radius) return
+      cutoff = merge(abs(distance), 2*cutoff, abs(distance) < 2*cutoff)
     end do
   end subroutine search_surface
 

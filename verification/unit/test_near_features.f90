@@ -101,7 +101,7 @@ contains
       now = meeting_at(random_poses(i, 0.9_wp, 1.4_wp))
       call list_features(now, cube, cube, search, near)
       now = meeting_at(moved(i, near%valid, now%poses))
-      way = way_between(near%when, now%poses, cube%reach, cube%reach)
+      way = way_between(near%when, now%poses, cube%bounding_radius, cube%bounding_radius)
       call check('moved far enough', way <= near%valid .and. way > 0.8_wp*near%valid)
       call check_vertices(now%b_in_a, way, near%of_b, n)
       call check_vertices(now%a_in_b, way, near%of_a, n)
@@ -110,7 +110,7 @@ contains
     call check('many touch', n > 3000)
   end subroutine check_nothing_missing
 
-  !> Every vertex of a guest within reach of the host is listed.
+  !> Every vertex of a guest within the cutoff of the host is listed.
   subroutine check_vertices(guest_in_host, way, list, n)
     type(view_t), intent(in) :: guest_in_host
     real(wp), intent(in) :: way                !! since the lists were made [m]

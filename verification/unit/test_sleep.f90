@@ -70,21 +70,21 @@ contains
   end subroutine make_shapes
 
   !> Contact balances all else within a share of one per cent of it, torques within that at the
-  !! reach of the body; without any load only in full.
+  !! radius of the body; without any load only in full.
   subroutine check_balanced()
-    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, reach = 0.3_wp
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, radius = 0.3_wp
     real(wp), parameter :: load(3) = [0.0_wp, 6.0_wp, -8.0_wp]   !! of size 10
     real(wp), parameter :: off(2) = [0.0999_wp, 0.1001_wp]
 
-    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, reach), &
-      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, reach)]))
+    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, radius), &
+      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, radius)]))
     call check('half of it', all([ &
-      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, reach), &
-      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, reach)]))
-    call check('torque', all([balanced(1.0_wp, -load, off(1)*reach*x - 3*x, load, 3*x, reach), &
-      .not. balanced(1.0_wp, -load, off(2)*reach*x - 3*x, load, 3*x, reach)]))
-    call check('no load', all([balanced(1.0_wp, none, none, none, none, reach), &
-      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, reach)]))
+      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, radius), &
+      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, radius)]))
+    call check('torque', all([balanced(1.0_wp, -load, off(1)*radius*x - 3*x, load, 3*x, radius), &
+      .not. balanced(1.0_wp, -load, off(2)*radius*x - 3*x, load, 3*x, radius)]))
+    call check('no load', all([balanced(1.0_wp, none, none, none, none, radius), &
+      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, radius)]))
   end subroutine check_balanced
 
   !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) on end;
@@ -94,13 +94,13 @@ contains
     type(sleep_t) :: sleep
     real(wp) :: way, fall
     integer :: b, n
-    real(wp), parameter :: reach = 0.3_wp
+    real(wp), parameter :: radius = 0.3_wp
 
     call new_world(.true., 4, world)
     call start(world)
-    call sleep_init(.true., spread(reach, 1, 4), sleep)
-    fall = sqrt(reach/g)
-    way = 5.0e-4_wp*sqrt(g*reach)*0.101_wp*fall
+    call sleep_init(.true., spread(radius, 1, 4), sleep)
+    fall = sqrt(radius/g)
+    way = 5.0e-4_wp*sqrt(g*radius)*0.101_wp*fall
     associate (blocks => world%blocks)
       blocks%v = 1.0_wp   ! does not count, but how far it comes
       blocks%fixed(3) = .true.
@@ -130,8 +130,8 @@ contains
       call store_poses(blocks, sleep)
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
-        turn*way/sleep%reach(2)), blocks%q(:, 2))
-      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
+        turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))
+      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
     end associate
   end subroutine creep
 

@@ -41,7 +41,7 @@ contains
     limits%substep_ratio = 0.5_wp
     limits%longest_substep = 0.01_wp
     limits%courant_max = 0.1_wp
-    limits%reach = [0.1_wp, 0.1_wp]
+    limits%bounding_radius = [0.1_wp, 0.1_wp]
     limits%smallest = 0.02_wp
     limits%clear = 0.05_wp
     call check('a share of the step', substep_limit(walls, detected, blocks, 0.01_wp, limits), &
