@@ -226,7 +226,7 @@ contains
     call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
   end subroutine reserve
 
-  !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
+  !> A block that has just appeared gets the force of a fluid at rest when it is let go; after
   !! each step the fluid force of that step takes over.
   subroutine first_force(sim)
     type(simulation_t), intent(inout) :: sim
@@ -261,7 +261,7 @@ contains
   end subroutine begin
 
   !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which
-  !! nobody asks for the links and the free share.
+  !! nobody reads the links and the effective aperture.
   subroutine voxelise(sim)
     type(simulation_t), intent(inout) :: sim
     type(solid_geometry_t), allocatable :: keep
