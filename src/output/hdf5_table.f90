@@ -99,7 +99,8 @@ contains
     real(wp), intent(in) :: x(:, :)   !! (components, blocks)
 
     call self%next_column(name, units, file_real64, shape(x))
-    if (self%mode == appending) call self%file%append(self%list(self%at)%column, reshape(x, [size(x)]))
+    if (self%mode == appending) call self%file%append(self%list(self%at)%column, reshape(x, &
+      [size(x)]))
   end subroutine vectors
 
   !> Integers, one of each block.
@@ -150,7 +151,8 @@ contains
     integer, intent(in) :: n(:)
 
     call self%next_column(name, units, file_integer32, [integer ::], size(n))
-    if (self%mode == appending) call self%file%append_integers(self%list(self%at)%column, n, size(n))
+    if (self%mode == appending) call self%file%append_integers(self%list(self%at)%column, n, &
+      size(n))
   end subroutine cells
 
   !> Numbers of the cells of a grid in single precision, of which this process gives a block;
@@ -165,10 +167,12 @@ contains
 
     layers = max(1, field_bytes/(4*product(whole(:size(whole) - 1))))
     call self%next_column(name, units, file_real32, whole, 1, layers)
-    if (self%mode == appending) call self%file%append_block(self%list(self%at)%column, first, extent, a)
+    if (self%mode == appending) call self%file%append_block(self%list(self%at)%column, first, &
+      extent, a)
   end subroutine field
 
-  !> Rows that a run keeps which goes on, see `count_rows`; later ones stay in the file until `keep`.
+  !> Rows that a run keeps which goes on, see `count_rows`; later ones stay in the file until
+  !! `keep`.
   subroutine find_rows(self, counted, time)
     class(h5_table_t), intent(inout) :: self
     integer, intent(in) :: counted   !! by the run

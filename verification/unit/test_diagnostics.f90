@@ -7,7 +7,8 @@ program test_diagnostics
   use fields_m, only: flow_init
   use solid_geometry_m, only: solid_geometry_init
   use run_state_m, only: run_state_t
-  use diagnostics_m, only: step_report_t, quantity_t, make_row, value_of, measure_fluid, energy_of_level
+  use diagnostics_m, only: step_report_t, quantity_t, make_row, value_of, measure_fluid, &
+    energy_of_level
   use check_m, only: check, finish_checks
   implicit none
   real(wp), parameter :: volume = 0.1_wp*0.2_wp*0.25_wp   !! of a cell [m3]
@@ -39,26 +40,30 @@ program test_diagnostics
   state%flow%u(2, 2, 2, :) = [1.0_wp, -2.0_wp, 2.0_wp]   ! a cell of liquid
   call look()
   mass = case%fluid%liquid_density*volume
-  call check('liquid that moves', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*9, 1.0e-12_wp*mass)
+  call check('liquid that moves', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*9, &
+    1.0e-12_wp*mass)
 
   state%flow%u = 0.0_wp
   state%solid%alpha(3, 2, 3) = 0.75_wp                   ! gas in a cut cell under water
   state%flow%u(3, 2, 3, :) = [0.0_wp, 0.0_wp, 80.0_wp]
   call look()
   mass = case%fluid%gas_density*0.25_wp*volume
-  call check('gas in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, 1.0e-9_wp*mass)
+  call check('gas in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, &
+    1.0e-9_wp*mass)
 
   state%flow%liquid(3, 2, 3) = 0.2_wp*volume             ! and with some liquid
   call look()
   mass = (case%fluid%gas_density*0.05_wp + case%fluid%liquid_density*0.2_wp)*volume
-  call check('both in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, 1.0e-9_wp*mass)
+  call check('both in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, &
+    1.0e-9_wp*mass)
 
   state%flow%fluid_volume(3, 2, 3) = 0.25_wp*volume              ! just its open volume
   state%flow%fluid_volume(1, 4, 4) = (1.0_wp + 2.0e-6_wp)*volume
   state%flow%fluid_volume(4, 1, 1) = (1.0_wp - 3.0e-6_wp)*volume
   state%flow%fluid_volume(0, 1, 1) = 2.0_wp*volume               ! of the halo
   call look()
-  call check('the largest excess, of either sign', value_of(row, 'volume_excess_max'), 3.0e-6_wp, 1.0e-15_wp)
+  call check('the largest excess, of either sign', value_of(row, 'volume_excess_max'), 3.0e-6_wp, &
+    1.0e-15_wp)
   state%flow%fluid_volume(3, 2, 3) = 0.4_wp*volume
   call look()
   call check('excess of a cut cell', value_of(row, 'volume_excess_max'), 0.15_wp, 1.0e-15_wp)
@@ -89,12 +94,13 @@ contains
       call look()
       expected = 0.5_wp*g*area*(case%fluid%liquid_density*depth**2 &
                                 + case%fluid%gas_density*(1.0_wp - depth**2))
-      call check('potential energy of level liquid', value_of(row, 'potential_energy_fluid'), expected, &
-                 1.0e-12_wp*expected)
+      call check('potential energy of level liquid', value_of(row, 'potential_energy_fluid'), &
+                 expected, 1.0e-12_wp*expected)
       call check('and of its level', energy_of_level(case%fluid, state%grid, state%flow%c), &
                  expected, 1.0e-12_wp*expected)
     end do
-    expected = value_of(row, 'potential_energy_fluid') - case%fluid%liquid_density*0.5_wp*volume*g*0.125_wp
+    expected = value_of(row, 'potential_energy_fluid') &
+      - case%fluid%liquid_density*0.5_wp*volume*g*0.125_wp
     state%solid%alpha(2, 2, 1) = 0.5_wp
     state%flow%liquid(2, 2, 1) = 0.5_wp*volume
     call look()
