@@ -6,6 +6,7 @@ module parallel_m
   use, intrinsic :: iso_c_binding, only: c_int
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use kinds_m, only: wp, sp, i8
+  use c_library_m, only: c_usleep
   implicit none
   private
   public :: parallel_init, parallel_final, parallel_abort, parallel_pause
@@ -158,14 +159,6 @@ module parallel_m
       logical, intent(inout) :: failed     !! of this process; then of any
       logical, intent(out) :: answered      !! all have answered
     end subroutine share_failure
-  end interface
-
-  interface
-    integer(c_int) function c_usleep(microseconds) bind(c, name='usleep')
-      import :: c_int
-      implicit none
-      integer(c_int), value :: microseconds
-    end function c_usleep
   end interface
 
 contains

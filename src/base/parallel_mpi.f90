@@ -1,6 +1,6 @@
 !> The parallel layer of a run on many processes, the only file that knows MPI.
 submodule (parallel_m) parallel_mpi_m
-  use, intrinsic :: iso_c_binding, only: c_int8_t, c_ptr, c_f_pointer, c_char, c_null_char
+  use, intrinsic :: iso_c_binding, only: c_int8_t, c_ptr, c_f_pointer, c_null_char
   use, intrinsic :: iso_fortran_env, only: error_unit
   use mpi_f08, only: MPI_Init_thread, MPI_Finalize, MPI_Abort, MPI_Comm_size, MPI_Comm_rank
   use mpi_f08, only: MPI_Type_contiguous, MPI_Type_commit, MPI_Type_free, MPI_Op_create, MPI_Op_free
@@ -12,6 +12,7 @@ submodule (parallel_m) parallel_mpi_m
   use mpi_f08, only: MPI_INFO_NULL, MPI_Iallreduce, MPI_Test, MPI_Wtime, MPI_STATUS_IGNORE
   use mpi_f08, only: MPI_BYTE, MPI_CHARACTER, MPI_MAX, MPI_MIN, MPI_SUM, MPI_THREAD_FUNNELED
   use hdf5, only: h5pset_fapl_mpio_f, h5pset_dxpl_mpio_f, H5FD_MPIO_COLLECTIVE_F
+  use c_library_m, only: c_setenv
   use decomposition_m, only: best_pieces, last_cell, min_cells
   use exact_accumulator_m, only: accumulator_size, merge_accumulators
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
@@ -49,15 +50,6 @@ contains
   !! this variable of the environment when it begins.
   subroutine yield_while_waiting()
     integer(c_int) :: status
-    interface
-      integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
-        import :: c_int, c_char
-        implicit none
-        character(kind=c_char), intent(in) :: name(*), value(*)
-        integer(c_int), value :: overwrite
-      end function c_setenv
-    end interface
-
     status = c_setenv('OMPI_MCA_mpi_yield_when_idle'//c_null_char, '1'//c_null_char, 0_c_int)
   end subroutine yield_while_waiting
 

@@ -1,17 +1,10 @@
 !> The parallel layer of a run on one process: nothing to send, periodic halos wrap.
 submodule (parallel_m) parallel_serial_m
+  use c_library_m, only: c_exit
   use halo_copy_m, only: wrap_wp, wrap_sp, wrap_integer
   implicit none
 
   logical :: wraps(3) = .false.   !! periodic directions of the last `decompose`
-
-  interface
-    subroutine c_exit(code) bind(c, name='exit')
-      import :: c_int
-      implicit none
-      integer(c_int), value :: code
-    end subroutine c_exit
-  end interface
 
 contains
 

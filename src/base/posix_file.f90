@@ -3,9 +3,12 @@
 !! The first error sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.
 module posix_file_m
-  use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_long, &
-    c_null_char, c_null_ptr, c_ptr, c_size_t, c_associated
+  use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_long, c_null_char, c_null_ptr, c_ptr, &
+    c_size_t, c_associated
   use kinds_m, only: i8
+  use c_library_m, only: c_close, c_errno, c_fclose, c_ferror, c_fflush, c_fileno, c_flock, &
+    c_fopen, c_fread, c_fsync, c_ftruncate, c_fwrite, c_lseek, c_open, c_strerror, c_truncate, &
+    c_unlink, text_at
   implicit none
   private
   public :: posix_file_t, cut_file, delete_file, is_pipe, store_file
@@ -29,124 +32,6 @@ module posix_file_m
     procedure, private :: check
   end type posix_file_t
 
-  interface
-    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
-      import :: c_char, c_ptr
-      implicit none
-      character(kind=c_char), intent(in) :: path(*), mode(*)
-    end function c_fopen
-
-    integer(c_size_t) function c_fread(buffer, size, count, stream) bind(c, name='fread')
-      import :: c_char, c_ptr, c_size_t
-      implicit none
-      type(c_ptr), value :: buffer
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-    end function c_fread
-
-    integer(c_size_t) function c_fwrite(buffer, size, count, stream) bind(c, name='fwrite')
-      import :: c_char, c_ptr, c_size_t
-      implicit none
-      character(kind=c_char), intent(in) :: buffer(*)
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-    end function c_fwrite
-
-    integer(c_int) function c_ferror(stream) bind(c, name='ferror')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_ferror
-
-    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_fflush
-
-    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_fclose
-
-    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-    end function c_fileno
-
-    integer(c_int) function c_flock(fd, operation) bind(c, name='flock')
-      import :: c_int
-      implicit none
-      integer(c_int), value :: fd, operation
-    end function c_flock
-
-    integer(c_int) function c_ftruncate(fd, length) bind(c, name='ftruncate')
-      import :: c_int, c_long
-      implicit none
-      integer(c_int), value :: fd
-      integer(c_long), value :: length   ! off_t
-    end function c_ftruncate
-
-    integer(c_int) function c_fsync(fd) bind(c, name='fsync')
-      import :: c_int
-      implicit none
-      integer(c_int), value :: fd
-    end function c_fsync
-
-    integer(c_int) function c_unlink(path) bind(c, name='unlink')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_unlink
-
-    integer(c_int) function c_open(path, flags) bind(c, name='open')
-      import :: c_char, c_int
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: flags
-    end function c_open
-
-    integer(c_long) function c_lseek(fd, offset, whence) bind(c, name='lseek')
-      import :: c_int, c_long
-      implicit none
-      integer(c_int), value :: fd, whence
-      integer(c_long), value :: offset   ! off_t
-    end function c_lseek
-
-    integer(c_int) function c_close(fd) bind(c, name='close')
-      import :: c_int
-      implicit none
-      integer(c_int), value :: fd
-    end function c_close
-
-    integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
-      import :: c_char, c_int, c_long
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_long), value :: length   ! off_t
-    end function c_truncate
-
-    !> The number of the last error, C's `errno`, which is a macro.
-    integer(c_int) function c_errno() bind(c, name='_gfortran_ierrno_i4')
-      import :: c_int
-      implicit none
-    end function c_errno
-
-    type(c_ptr) function c_strerror(number) bind(c, name='strerror')
-      import :: c_int, c_ptr
-      implicit none
-      integer(c_int), value :: number
-    end function c_strerror
-
-    integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
-      import :: c_ptr, c_size_t
-      implicit none
-      type(c_ptr), value :: text
-    end function c_strlen
-  end interface
-
 contains
 
   !> Keep an error of `what`, if there is one, in the words of the system.
@@ -154,30 +39,13 @@ contains
     class(posix_file_t), intent(inout) :: self
     logical, intent(in) :: well
     character(*), intent(in) :: what   !! like 'write'
-    integer(c_int) :: number
+    type(c_ptr) :: reason
 
     if (well .or. self%info /= 0) return
-    number = c_errno()
+    reason = c_strerror(c_errno())
     self%info = 1
-    self%message = self%path//': cannot '//what//': '//reason_of(number)
+    self%message = self%path//': cannot '//what//': '//text_at(reason)
   end subroutine check
-
-  !> What the system says of an error number.
-  function reason_of(number) result(reason)
-    integer(c_int), intent(in) :: number
-    character(:), allocatable :: reason
-    character(kind=c_char), pointer :: letter(:)
-    type(c_ptr) :: text
-    integer :: i, n
-
-    text = c_strerror(number)
-    n = int(c_strlen(text))
-    call c_f_pointer(text, letter, [n])
-    allocate (character(n) :: reason)
-    do i = 1, n
-      reason(i:i) = letter(i)
-    end do
-  end function reason_of
 
   !> Open a file; `mode` as in C: 'r' to read, 'w' to write anew, 'a' to write at the end.
   subroutine file_open(self, path, mode)

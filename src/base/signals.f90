@@ -7,6 +7,7 @@
 module signals_m
   use, intrinsic :: iso_c_binding, only: c_int, c_funptr, c_funloc
   use kinds_m, only: wp
+  use c_library_m, only: c_signal
   use build_info_m, only: signal_user
   use parallel_m, only: global_max
   implicit none
@@ -25,16 +26,6 @@ module signals_m
     signal_pipe, signal_terminate, signal_cpu_time]
 
   integer(c_int), volatile :: caught = 0
-
-  interface
-    function c_signal(number, handler) bind(c, name='signal') result(previous)
-      import :: c_int, c_funptr
-      implicit none
-      integer(c_int), value :: number
-      type(c_funptr), value :: handler
-      type(c_funptr) :: previous
-    end function c_signal
-  end interface
 
 contains
 

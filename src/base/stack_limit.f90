@@ -5,6 +5,7 @@
 module stack_limit_m
   use, intrinsic :: iso_c_binding, only: c_int, c_long
   use kinds_m, only: wp, i8
+  use c_library_m, only: c_getrlimit
   use errors_m, only: problems_t, to_text
   use value_text_m, only: lower_case, quoted_text, parse_integer, value_ok
   implicit none
@@ -13,15 +14,6 @@ module stack_limit_m
 
   integer(i8), parameter :: kilobyte = 1024_i8
   integer(i8), parameter :: min_stack = 64*kilobyte    !! of the process or a thread [B]
-
-  interface
-    integer(c_int) function c_getrlimit(resource, limit) bind(c, name='getrlimit')
-      import :: c_int, c_long
-      implicit none
-      integer(c_int), value :: resource
-      integer(c_long), intent(out) :: limit(2)   !! now, at most; -1: none [B]
-    end function c_getrlimit
-  end interface
 
 contains
 

@@ -32,6 +32,7 @@ module impulse_rows_m
     real(wp) :: soft = 1.0_wp, keep = 0.0_wp          !! share of the mass, of the impulse [-]
     real(wp) :: stretch(2) = 0.0_wp                   !! tangential way remembered [m]
     real(wp) :: impulse(3) = 0.0_wp                   !! of a sub-sweep along n, e1, e2 [N s]
+    real(wp) :: way(3) = 0.0_wp                       !! of b past a since the step began [m]
   end type row_t
 
   type :: rows_t

@@ -51,6 +51,7 @@ contains
           rows%way(:, b) = rows%way(:, b) + h*rows%v(:, b)
         end associate
       end do
+      call follow_way(rows)
       call sweep(h, push_max, .false., mod(s, 2) == 0, rows, largest)
       change = max(change, largest)
       do k = 1, rows%n_active
@@ -69,6 +70,18 @@ contains
       end if
     end do
   end subroutine solve_rows
+
+  !> Let the rows follow the bodies.
+  pure subroutine follow_way(rows)
+    type(rows_t), intent(inout) :: rows
+    integer :: k, r
+
+    do k = 1, rows%n_pairs
+      do r = rows%first(k), rows%first(k + 1) - 1
+        rows%row(r)%way = past(rows%way(:, rows%a(k)), rows%way(:, rows%b(k)), rows%row(r))
+      end do
+    end do
+  end subroutine follow_way
 
   !> Change of the velocities by the impulses remembered.
   pure subroutine apply_remembered(rows)
@@ -175,7 +188,7 @@ contains
     integer, intent(in) :: k
     type(rows_t), intent(inout) :: rows
     real(wp), intent(inout) :: change
-    real(wp) :: va(6), vb(6), wa(6), wb(6), p(3), total(3), mass
+    real(wp) :: va(6), vb(6), p(3), total(3), mass
     integer :: r, from, to, way
 
     associate (a => rows%a(k), b => rows%b(k))
@@ -184,14 +197,13 @@ contains
       way = merge(-1, 1, backward)
       va = rows%v(:, a)
       vb = rows%v(:, b)
-      wa = rows%way(:, a)
-      wb = rows%way(:, b)
       mass = rows%inverse_mass(a) + rows%inverse_mass(b)
       total = 0.0_wp
       do r = from, to, way
         associate (row => rows%row(r))
-          call correct(h, push_max, bias, past(wa, wb, row), past(va, vb, row), row, p)
+          call correct(h, push_max, bias, past(va, vb, row), row, p)
           rows%largest(r) = max(rows%largest(r), row%impulse(1))
+          if (.not. any(abs(p) > 0.0_wp)) cycle
           call add_impulse(rows%inverse_mass(a), rows%inverse_inertia(:, :, a), row%arm_a, -p, va)
           call add_impulse(rows%inverse_mass(b), rows%inverse_inertia(:, :, b), row%arm_b, p, vb)
         end associate
@@ -206,15 +218,15 @@ contains
   end subroutine solve_pair
 
   !> Correct the impulse of one row: along the normal, then friction with the velocity after that.
-  pure subroutine correct(h, push_max, bias, way, v, row, p)
+  pure subroutine correct(h, push_max, bias, v, row, p)
     real(wp), intent(in) :: h, push_max   !! [s], [m/s]
     logical, intent(in) :: bias
-    real(wp), intent(in) :: way(3), v(3)  !! of b past a: in this step [m], now [m/s]
+    real(wp), intent(in) :: v(3)          !! of b past a [m/s]
     type(row_t), intent(inout) :: row
     real(wp), intent(out) :: p(3)         !! change of the impulse on b [N s]
     real(wp) :: gap, v_n, rate, normal, slip(3), before(3)
 
-    gap = row%gap + dot_product(row%n, way)
+    gap = row%gap + dot_product(row%n, row%way)
     v_n = dot_product(row%n, v)
     rate = 0.0_wp
     if (gap > 0.0_wp) then
@@ -231,7 +243,7 @@ contains
     before = row%impulse
     row%impulse(1) = normal
     if (normal > 0.0_wp .or. any(abs(before(2:3)) > 0.0_wp)) then
-      slip = v + rate*way + (normal - before(1))*row%response
+      slip = v + rate*row%way + (normal - before(1))*row%response
       call rub(row, dot_product(row%e1, slip) + rate*row%stretch(1), &
                dot_product(row%e2, slip) + rate*row%stretch(2), row%impulse)
       p = p + (row%impulse(2) - before(2))*row%e1 + (row%impulse(3) - before(3))*row%e2

@@ -5,6 +5,7 @@
 module case_file_m
   use, intrinsic :: iso_c_binding, only: c_int, c_size_t, c_char, c_ptr, c_null_char, &
     c_associated, c_loc
+  use c_library_m, only: c_fclose, c_fdopen, c_ferror, c_fopen, c_fread, c_isatty
   use errors_m, only: problems_t
   use posix_file_m, only: is_pipe
   implicit none
@@ -12,48 +13,6 @@ module case_file_m
   public :: read_text, is_utf8, utf8_of_latin1
 
   integer, parameter :: longest_text = 2**24   !! bytes of a case file
-
-  interface
-    function c_fopen(path, mode) bind(c, name='fopen') result(stream)
-      import :: c_char, c_ptr
-      implicit none
-      character(kind=c_char), intent(in) :: path(*), mode(*)
-      type(c_ptr) :: stream
-    end function c_fopen
-    function c_fdopen(fd, mode) bind(c, name='fdopen') result(stream)
-      import :: c_char, c_int, c_ptr
-      implicit none
-      integer(c_int), value :: fd
-      character(kind=c_char), intent(in) :: mode(*)
-      type(c_ptr) :: stream
-    end function c_fdopen
-    function c_fread(buffer, size, count, stream) bind(c, name='fread') result(n)
-      import :: c_size_t, c_ptr
-      implicit none
-      type(c_ptr), value :: buffer
-      integer(c_size_t), value :: size, count
-      type(c_ptr), value :: stream
-      integer(c_size_t) :: n
-    end function c_fread
-    function c_ferror(stream) bind(c, name='ferror') result(status)
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-      integer(c_int) :: status
-    end function c_ferror
-    function c_fclose(stream) bind(c, name='fclose') result(status)
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: stream
-      integer(c_int) :: status
-    end function c_fclose
-    function c_isatty(fd) bind(c, name='isatty') result(yes)
-      import :: c_int
-      implicit none
-      integer(c_int), value :: fd
-      integer(c_int) :: yes
-    end function c_isatty
-  end interface
 
 contains
 

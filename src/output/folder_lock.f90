@@ -6,9 +6,9 @@
 !! lock, so it must start none.
 module folder_lock_m
   use, intrinsic :: iso_fortran_env, only: error_unit
-  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_null_char, c_ptr, &
-    c_size_t
+  use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char, c_size_t
   use kinds_m, only: wp
+  use c_library_m, only: c_gethostname, c_getpid, text_of_letters
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: parallel_pause
   use posix_file_m, only: posix_file_t, delete_file, lock_taken, lock_refused, lock_unknown
@@ -26,20 +26,6 @@ module folder_lock_m
     procedure :: take => take_lock
     procedure :: release => release_lock
   end type folder_lock_t
-
-  interface
-    integer(c_int) function c_getpid() bind(c, name='getpid')
-      import :: c_int
-      implicit none
-    end function c_getpid
-
-    integer(c_int) function c_gethostname(name, length) bind(c, name='gethostname')
-      import :: c_int, c_ptr, c_size_t
-      implicit none
-      type(c_ptr), value :: name
-      integer(c_size_t), value :: length
-    end function c_gethostname
-  end interface
 
 contains
 
@@ -146,15 +132,10 @@ contains
     character(:), allocatable :: text
     integer, parameter :: longest = 256
     character(kind=c_char), target :: name(longest)
-    integer :: i
 
     name = c_null_char
     if (c_gethostname(c_loc(name), int(longest - 1, c_size_t)) /= 0) name = c_null_char
-    text = 'pid '//to_text(int(c_getpid()))//' on '
-    do i = 1, longest
-      if (name(i) == c_null_char) exit
-      text = text//name(i)
-    end do
+    text = 'pid '//to_text(int(c_getpid()))//' on '//text_of_letters(name)
   end function who_we_are
 
 end module folder_lock_m

@@ -6,6 +6,7 @@ module hdf5_attributes_m
   use hdf5, only: h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, h5tcopy_f
   use hdf5, only: h5tset_cset_f, h5tset_size_f, H5S_SCALAR_F, H5T_CSET_UTF8_F, H5T_FORTRAN_S1
   use hdf5, only: H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_STD_I64LE, H5T_STRING
+  use c_library_m, only: text_at
   use kinds_m, only: wp, i8
   use hdf5_kinds_m, only: file_integer64, memory_type
   use hdf5_handle_m, only: h5_handle_t
@@ -217,27 +218,6 @@ contains
     call h5tclose_f(text_type, status)
     call h5aclose_f(attribute, status)
   end subroutine read_text_attribute
-
-  !> The text that begins at a C address, up to its null character.
-  function text_at(start) result(text)
-    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_size_t
-    type(c_ptr), intent(in) :: start
-    character(:), allocatable :: text
-    character(kind=c_char), pointer :: letter(:)
-    integer(c_size_t) :: n
-    interface
-      integer(c_size_t) function c_strlen(s) bind(c, name='strlen')
-        import :: c_ptr, c_size_t
-        implicit none
-        type(c_ptr), value :: s
-      end function c_strlen
-    end interface
-
-    n = c_strlen(start)
-    allocate (character(n) :: text)
-    call c_f_pointer(start, letter, [n])
-    text = transfer(letter, text)
-  end function text_at
 
   subroutine read_integer_attribute(self, object, name, value)
     class(h5_attributes_t), intent(inout) :: self

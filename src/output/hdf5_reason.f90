@@ -2,6 +2,7 @@
 module hdf5_reason_m
   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_char, c_null_char, c_funptr, &
     c_funloc, c_loc, c_f_pointer, c_null_ptr, c_associated
+  use c_library_m, only: c_setenv
   use hdf5, only: h5open_f, h5eset_auto_f, h5dont_atexit_f
   implicit none
   private
@@ -19,13 +20,6 @@ module hdf5_reason_m
   end type record_t
 
   interface
-    integer(c_int) function c_setenv(name, value, overwrite) bind(c, name='setenv')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: name(*), value(*)
-      integer(c_int), value :: overwrite
-    end function c_setenv
-
     !> Walk the stack of errors; `upward` begins at the innermost.
     integer(c_int) function h5e_walk(stack, direction, visit, data) bind(c, name='H5Ewalk2')
       import :: c_int, c_int64_t, c_funptr, c_ptr

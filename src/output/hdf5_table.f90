@@ -99,8 +99,8 @@ contains
     real(wp), intent(in) :: x(:, :)   !! (components, blocks)
 
     call self%next_column(name, units, file_real64, shape(x))
-    if (self%mode == appending) call self%file%append(self%list(self%at)%column, reshape(x, &
-      [size(x)]))
+    if (self%mode == appending) call self%file%append(self%list(self%at)%column, &
+      reshape(x, [size(x)]))
   end subroutine vectors
 
   !> Integers, one of each block.
@@ -140,8 +140,8 @@ contains
     real(wp), intent(in) :: x(:, :)   !! (3, points)
 
     call self%next_column(name, units, kind, [3], size(x, 2), 3)
-    if (self%mode == appending) call self%file%append_rows(self%list(self%at)%column, size(x, 2), &
-      reshape(x, [size(x)]))
+    if (self%mode == appending) call self%file%append_rows(self%list(self%at)%column, &
+      size(x, 2), reshape(x, [size(x)]))
   end subroutine points
 
   !> Integers of cells, which follow one another in the file.
@@ -151,8 +151,8 @@ contains
     integer, intent(in) :: n(:)
 
     call self%next_column(name, units, file_integer32, [integer ::], size(n))
-    if (self%mode == appending) call self%file%append_integers(self%list(self%at)%column, n, &
-      size(n))
+    if (self%mode == appending) call self%file%append_integers(self%list(self%at)%column, &
+      n, size(n))
   end subroutine cells
 
   !> Numbers of the cells of a grid in single precision, of which this process gives a block;
@@ -171,8 +171,7 @@ contains
       extent, a)
   end subroutine field
 
-  !> Rows that a run keeps which goes on, see `count_rows`; later ones stay in the file until
-  !! `keep`.
+  !> Rows that a run keeps which goes on, see `count_rows`; later ones stay until `keep`.
   subroutine find_rows(self, counted, time)
     class(h5_table_t), intent(inout) :: self
     integer, intent(in) :: counted   !! by the run

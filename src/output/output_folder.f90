@@ -6,6 +6,8 @@
 module output_folder_m
   use, intrinsic :: iso_c_binding, only: c_int, c_char, c_ptr, c_null_char, c_associated
   use, intrinsic :: iso_fortran_env, only: error_unit
+  use c_library_m, only: c_access, c_closedir, c_mkdir, c_opendir, c_readdir, c_realpath, &
+    c_rename, max_path, text_of_letters
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
   use posix_file_m, only: posix_file_t, delete_file
@@ -20,53 +22,6 @@ module output_folder_m
 
   character(*), &
     parameter :: refused = 'no permission, no room, or a part of the path is not a folder'
-
-  interface
-    integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: mode   ! mode_t is passed like an int
-    end function c_mkdir
-
-    integer(c_int) function c_access(path, mode) bind(c, name='access')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      integer(c_int), value :: mode
-    end function c_access
-
-    integer(c_int) function c_rename(from, to) bind(c, name='rename')
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: from(*), to(*)
-    end function c_rename
-
-    type(c_ptr) function c_opendir(path) bind(c, name='opendir')
-      import :: c_ptr, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-    end function c_opendir
-
-    type(c_ptr) function c_realpath(path, found) bind(c, name='realpath')
-      import :: c_ptr, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: path(*)
-      character(kind=c_char), intent(out) :: found(4096)   !! PATH_MAX of Linux
-    end function c_realpath
-
-    type(c_ptr) function c_readdir(folder) bind(c, name='readdir')
-      import :: c_ptr
-      implicit none
-      type(c_ptr), value :: folder
-    end function c_readdir
-
-    integer(c_int) function c_closedir(folder) bind(c, name='closedir')
-      import :: c_int, c_ptr
-      implicit none
-      type(c_ptr), value :: folder
-    end function c_closedir
-  end interface
 
 contains
 
@@ -268,16 +223,10 @@ contains
   function whole_path(path) result(whole)
     character(*), intent(in) :: path
     character(:), allocatable :: whole
-    character(kind=c_char), target :: found(4096)
-    integer :: i
+    character(kind=c_char) :: found(max_path)
 
     whole = path
-    if (.not. c_associated(c_realpath(path//c_null_char, found))) return
-    whole = ''
-    do i = 1, size(found)
-      if (found(i) == c_null_char) exit
-      whole = whole//found(i)
-    end do
+    if (c_associated(c_realpath(path//c_null_char, found))) whole = text_of_letters(found)
   end function whole_path
 
   function exists(path) result(yes)

@@ -33,44 +33,47 @@ program test_diagnostics
   state%flow%liquid(1:4, 1:4, 1:2) = volume
   state%flow%fluid_volume = volume
   call look()
-  call check('liquid', value_of(row, 'liquid_volume'), 32*volume, 1.0e-15_wp)
-  call check('no excess', value_of(row, 'volume_excess_max'), 0.0_wp, 1.0e-15_wp)
-  call check('at rest', value_of(row, 'kinetic_energy_fluid'), 0.0_wp, 0.0_wp)
+  call check('liquid', of('liquid_volume'), 32*volume, 1.0e-15_wp)
+  call check('no excess', of('volume_excess_max'), 0.0_wp, 1.0e-15_wp)
+  call check('at rest', of('kinetic_energy_fluid'), 0.0_wp, 0.0_wp)
 
   state%flow%u(2, 2, 2, :) = [1.0_wp, -2.0_wp, 2.0_wp]   ! a cell of liquid
   call look()
   mass = case%fluid%liquid_density*volume
-  call check('liquid that moves', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*9, &
-    1.0e-12_wp*mass)
+  call check('liquid that moves', of('kinetic_energy_fluid'), 0.5_wp*mass*9, 1.0e-12_wp*mass)
 
   state%flow%u = 0.0_wp
   state%solid%alpha(3, 2, 3) = 0.75_wp                   ! gas in a cut cell under water
   state%flow%u(3, 2, 3, :) = [0.0_wp, 0.0_wp, 80.0_wp]
   call look()
   mass = case%fluid%gas_density*0.25_wp*volume
-  call check('gas in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, &
-    1.0e-9_wp*mass)
+  call check('gas in a cut cell', of('kinetic_energy_fluid'), 0.5_wp*mass*6400, 1.0e-9_wp*mass)
 
   state%flow%liquid(3, 2, 3) = 0.2_wp*volume             ! and with some liquid
   call look()
   mass = (case%fluid%gas_density*0.05_wp + case%fluid%liquid_density*0.2_wp)*volume
-  call check('both in a cut cell', value_of(row, 'kinetic_energy_fluid'), 0.5_wp*mass*6400, &
-    1.0e-9_wp*mass)
+  call check('both in a cut cell', of('kinetic_energy_fluid'), 0.5_wp*mass*6400, 1.0e-9_wp*mass)
 
   state%flow%fluid_volume(3, 2, 3) = 0.25_wp*volume              ! just its open volume
   state%flow%fluid_volume(1, 4, 4) = (1.0_wp + 2.0e-6_wp)*volume
   state%flow%fluid_volume(4, 1, 1) = (1.0_wp - 3.0e-6_wp)*volume
   state%flow%fluid_volume(0, 1, 1) = 2.0_wp*volume               ! of the halo
   call look()
-  call check('the largest excess, of either sign', value_of(row, 'volume_excess_max'), 3.0e-6_wp, &
-    1.0e-15_wp)
+  call check('the largest excess, of either sign', of('volume_excess_max'), 3.0e-6_wp, 1.0e-15_wp)
   state%flow%fluid_volume(3, 2, 3) = 0.4_wp*volume
   call look()
-  call check('excess of a cut cell', value_of(row, 'volume_excess_max'), 0.15_wp, 1.0e-15_wp)
+  call check('excess of a cut cell', of('volume_excess_max'), 0.15_wp, 1.0e-15_wp)
   call potential()
   call finish_checks()
 
 contains
+
+  !> A number of the row.
+  pure real(wp) function of(name)
+    character(*), intent(in) :: name
+
+    of = value_of(row, name)
+  end function of
 
   subroutine look()
     report%fluid = measure_fluid(case%fluid, state%grid, state%flow, state%solid)
@@ -94,17 +97,16 @@ contains
       call look()
       expected = 0.5_wp*g*area*(case%fluid%liquid_density*depth**2 &
                                 + case%fluid%gas_density*(1.0_wp - depth**2))
-      call check('potential energy of level liquid', value_of(row, 'potential_energy_fluid'), &
-                 expected, 1.0e-12_wp*expected)
+      call check('potential energy of level liquid', of('potential_energy_fluid'), expected, &
+                 1.0e-12_wp*expected)
       call check('and of its level', energy_of_level(case%fluid, state%grid, state%flow%c), &
                  expected, 1.0e-12_wp*expected)
     end do
-    expected = value_of(row, 'potential_energy_fluid') &
-      - case%fluid%liquid_density*0.5_wp*volume*g*0.125_wp
+    expected = of('potential_energy_fluid') - case%fluid%liquid_density*0.5_wp*volume*g*0.125_wp
     state%solid%alpha(2, 2, 1) = 0.5_wp
     state%flow%liquid(2, 2, 1) = 0.5_wp*volume
     call look()
-    call check('less what a block displaces', value_of(row, 'potential_energy_fluid'), expected, &
+    call check('less what a block displaces', of('potential_energy_fluid'), expected, &
                1.0e-12_wp*expected)
   end subroutine potential
 end program test_diagnostics
