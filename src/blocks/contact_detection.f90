@@ -48,7 +48,7 @@ contains
     select case (input%model)
     case ('surface'); self%exact = .true.
     case ('spheres'); self%exact = .false.
-    case default; error stop 'touching_init: no such model'
+    case default; error stop 'detection_init: no such model'
     end select
     if (self%exact) then
       call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)

@@ -314,8 +314,8 @@ contains
     end do
   end subroutine add_frequencies
 
-  !> Square of the highest frequency of a pair of bodies in contact, or of all pairs of two touching
-  !! bodies together with a share; a little above [1/s2].
+  !> Square of the highest frequency of a pair of bodies in contact, or of all pairs together with a
+  !! share; a little above [1/s2].
   !!
   !! A pile swings no faster than all the pairs of two bodies in contact taken together. It only has
   !! to be stable, so it may turn further in a substep than a single pair.
