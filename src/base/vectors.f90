@@ -3,7 +3,7 @@ module vectors_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: cross, norm, distance, normalised
+  public :: cross, wrench, norm, distance, normalised
   public :: quaternion_product, quaternion_from_axis, quaternion_exp, quaternion_log
   public :: rotation_matrix, inverse3
 
@@ -18,6 +18,15 @@ contains
     c(2) = a(3)*b(1) - a(1)*b(3)
     c(3) = a(1)*b(2) - a(2)*b(1)
   end function cross
+
+  !> Force at a point and its torque about the centre of mass, as one vector of six.
+  pure function wrench(f, arm) result(w)
+    real(wp), intent(in) :: f(3), arm(3)
+    real(wp) :: w(6)
+
+    w(1:3) = f
+    w(4:6) = cross(arm, f)
+  end function wrench
 
   !> Euclidean length of a vector of any length.
   pure function norm(a) result(length)

@@ -12,27 +12,25 @@ module monolithic_m
   use scratch_m, only: scratch_t, take, give, take_faces, give_faces
   use fields_m, only: flow_t, add_product
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia, wall_velocity
-  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, arm_to_cell
+  use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, set_inertia
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces, all_fluid_of_faces, velocity_in_cell
   use viscous_system_m, only: take_arrays, give_arrays
   use viscous_links_m, only: build_viscous
-  use wall_shear_m, only: find_wall_speeds
   use pressure_system_m, only: set_pressure_system
   use pressure_m, only: solve_pressure, pressure_report_t
   use pressure_extension_m, only: extend_pressure
-  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, hold_in_cells, &
-                             predict_face_velocity
+  use face_velocity_m, only: face_acceleration, cell_mean_of_faces, predict_face_velocity
+  use effective_aperture_m, only: hold_in_cells
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use old_time_correction_m, only: store_correction
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
-                         add_second_half, add_whole
+                         add_second_half, add_whole, force_of_half_kick
   use buoyancy_m, only: displaced_force, mass_defect
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
-  use wall_layer_m, only: find_slip
-  use centre_velocity_m, only: find_centres, to_centres, to_means
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
-                            store_velocity, force_of_walls, force_of_half_kick
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
+  use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
+  use wall_layer_m, only: find_slip, find_centres, to_centres, find_wall_speeds
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
+                            store_velocity, force_of_walls
   use surface_stress_m, only: surface_stress
   use surface_tension_m, only: add_tension, force_from_tension
   use coupling_m, only: coupling_t, coupling_report_t, coupling_init, push_bodies, &
@@ -54,7 +52,7 @@ module monolithic_m
     type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
-    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_shear_m`) [m/s]
+    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_layer_m`) [m/s]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
@@ -180,9 +178,8 @@ contains
     end associate
     self%unforced_motion = self%bodies%motion
     call find_merged_cells(grid, solid, self%merged)
-    call begin_balance(case%fluid, self%merged, flow, self%balance)
-    call find_inertia(grid, self%merged, self%balance%mass, flow, self%rho)
-    call match_densities(grid, self%rho, self%merged)
+    call copy_density(flow%rho, self%rho)
+    call begin_balance(grid, case%fluid, solid, self%merged, flow, self%rho, self%balance)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
@@ -196,29 +193,18 @@ contains
   end subroutine merge_cells
 
   !> Density with which the fluid resists an acceleration. Weight has that of the level at which a
-  !! cell lies, bodies thought away, so that still water stays still; inertia in a cut cell that of
-  !! the fluid in its open part.
-  subroutine find_inertia(grid, merged, mass, flow, rho)
-    type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: merged
-    real(wp), intent(in) :: mass(:)   !! of the fluid in the cells at walls [kg]
-    type(flow_t), intent(in) :: flow
-    real(wp), intent(inout), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), parameter :: min_volume = 1.0e-3_wp   !! of a cell with a density of its own
-    integer :: k, m
+  !! cell lies, bodies thought away, so that still water stays still; inertia has it, too, but in
+  !! the cells at walls, for which `begin_balance` finds it.
+  subroutine copy_density(level, rho)
+    real(wp), intent(in), contiguous :: level(:, :, :)   !! [kg/m3]
+    real(wp), intent(inout), contiguous :: rho(:, :, :)
+    integer :: k
 
     !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      rho(:, :, k) = flow%rho(:, :, k)
+    do k = 1, size(rho, 3)
+      rho(:, :, k) = level(:, :, k)
     end do
-    do m = 1, merged%n
-      associate (c => merged%cell(:, m))
-        associate (fluid_volume => flow%fluid_volume(c(1), c(2), c(3)))
-          if (fluid_volume > min_volume*grid%volume) rho(c(1), c(2), c(3)) = mass(m)/fluid_volume
-        end associate
-      end associate
-    end do
-  end subroutine find_inertia
+  end subroutine copy_density
 
   !> Stage 10: weight, old pressure, surface tension and surface stress, on cells and bodies. Cells
   !! at the surface and in gas get the first three after the faces.
@@ -268,10 +254,10 @@ contains
     associate (a => self%acceleration, balance => self%balance)
       call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
       call hold_in_cells(grid, solid, self%bodies, change/dt, a%face, a%cell)
-      call store_change(grid, self%merged, dt, a%cell, balance%pushed)
+      call add_push(grid, self%merged, dt, a%cell, balance)
       call halo_exchange(a%cell, n_halo)
       call share_acceleration(grid, solid%aperture, self%rho, self%merged, a%cell)
-      call store_change(grid, self%merged, dt, a%cell, balance%gained)
+      call add_push(grid, self%merged, dt, a%cell, balance, taken=.true.)
     end associate
   end subroutine accelerations_of_groups
 
@@ -318,7 +304,7 @@ contains
       call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged, &
                          self%wall_speed)
       call predict_velocity(grid, self%rho, flow, self)
-      call to_means(grid, merged, self%at_start, flow%u)
+      call to_centres(grid, merged, self%at_start, flow%u, back=.true.)
       call fill_velocity_halo(grid, flow%u, layers=1)
       call follow_targets(grid, merged, balance%mass, balance%before, flow%u, balance%to_wall)
       ! To round-off the motion that the forces give, not that of the solver.
@@ -353,10 +339,9 @@ contains
       else
         call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction, given, in_liquid)
         call give(scratch, self%correction)
-        call shorten_at_walls(grid, dt, self%bodies, merged%cell(:, :merged%n), merged%body, &
-                              merged%number, in_liquid, self%rho, a, flow)
+        call shorten_at_walls(grid, dt, self%bodies, merged, in_liquid, self%rho, a, flow)
       end if
-      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged%slip, dt, &
+      call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged, dt, &
                                   self%implicit_momentum, given, in_liquid, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)
@@ -392,8 +377,7 @@ contains
         call force_from_faces(grid, bodies, pressure%system%operator%flux, pressure%phi_total, &
                               from_faces)
         self%total = self%total + from_faces
-        call force_of_walls(grid, solid, merged, bodies, self%at_start, dt, self%rho, balance, &
-                            from_walls)
+        call force_of_walls(grid, merged, bodies, self%at_start, dt, balance, from_walls)
         if (solve == 1) then
           self%lagged = from_walls
           if (.not. any(bodies%free)) exit
@@ -559,17 +543,15 @@ contains
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: i, j, k, b
-    real(wp) :: arm(3)
 
-    !$omp parallel do private(i, j, b, arm) schedule(static)
+    !$omp parallel do private(i, j, b) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         if (maxval(solid%inside(grid%lo(1):grid%hi(1), j, k)) == 0) cycle
         do i = grid%lo(1), grid%hi(1)
           b = solid%inside(i, j, k)
           if (b == 0 .or. merged%number(i, j, k) > 0) cycle
-          arm = arm_to_cell(grid, [i, j, k], bodies%x(:, b))
-          u(i, j, k, :) = wall_velocity(bodies%motion(:, b), arm)
+          u(i, j, k, :) = velocity_in_cell(grid, bodies, b, [i, j, k])
         end do
       end do
     end do

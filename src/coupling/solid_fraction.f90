@@ -22,8 +22,7 @@ module solid_fraction_m
   use voxels_m, only: voxels_t, voxels_init, find_images, ensure_lists, place_bodies, &
     voxelise_cells, voxelise_faces, voxelise_links
   use finish_solid_m, only: make_way, finish_faces, finish_cells, guard_links, tets_of_cut_cells
-  use wall_edges_m, only: find_edges
-  use held_fluid_m, only: hold_fluid
+  use effective_aperture_m, only: find_effective_apertures
   use pockets_m, only: pockets_t, pockets_init, close_pockets
   implicit none
   private
@@ -115,8 +114,7 @@ contains
     call guard_links(self%voxels, solid)
     !$omp end parallel sections
     call close_pockets(grid, self%pockets, solid)
-    call find_edges(grid, solid)
-    call hold_fluid(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
+    call find_effective_apertures(grid, size(self%body) - merge(1, 0, self%has_bed), solid)
   end subroutine update_solid
 
   !> Give the poses of the bodies another number if they are others than at the last call.

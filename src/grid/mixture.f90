@@ -5,7 +5,7 @@ module mixture_m
   use fields_m, only: flow_t
   implicit none
   private
-  public :: mix_fluid, face_mean, harmonic_mean, pure_share
+  public :: mix_fluid, mass_through, face_mean, harmonic_mean, pure_share
 
   !> Liquid shares this close to 0 or 1 are those of one phase: the transport leaves shares off by
   !! its round-off and by what it clips, some 1e-7 of a cell, all through water and air, and a
@@ -34,6 +34,15 @@ contains
                          + (fluid%liquid_viscosity - fluid%gas_viscosity)*flow%c(:, :, k)
     end do
   end subroutine mix_fluid
+
+  !> Mass of a volume of which a part is liquid [kg].
+  elemental function mass_through(fluid, volume, liquid) result(mass)
+    type(fluid_t), intent(in) :: fluid
+    real(wp), intent(in) :: volume, liquid   !! [m3]
+    real(wp) :: mass
+
+    mass = fluid%liquid_density*liquid + fluid%gas_density*(volume - liquid)
+  end function mass_through
 
   !> Density on a face: arithmetic mean, which makes 1/rho the harmonic mean of the paper's C-HSMAC.
   elemental function face_mean(a, b) result(m)

@@ -11,15 +11,14 @@ module rigid_flux_m
   use boundary_kinds_m, only: no_side, gives_pressure
   use outflow_m, only: outflow_t, pressure_outside
   use solid_geometry_m, only: solid_geometry_t
-  use rigid_motion_m, only: rigid_motion_t
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
   use exact_sum_m, only: accumulator_size, no_terms, exact_add_columns, exact_totals, &
     terms_at_once
   implicit none
   private
   public :: rigid_flux_t, rigid_flux_init, build_rigid_flux, solid_face_flux, all_fluid_of_faces
   public :: force_from_faces, force_from_cells, add_cell_flux, closed_side
-  public :: nearest_arm, arm_to_cell
-  public :: middle_of_face
+  public :: nearest_arm, arm_to_cell, velocity_in_cell, middle_of_face
 
   integer, parameter :: worth_threads = 1000   !! fewer faces or cells are looked at by one thread
 
@@ -76,6 +75,16 @@ contains
     arm = nearest_arm(grid, [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)], &
                       centre)
   end function arm_to_cell
+
+  !> Velocity of body b at the centre of cell c [m/s].
+  pure function velocity_in_cell(grid, bodies, b, c) result(u)
+    type(grid_t), intent(in) :: grid
+    type(rigid_motion_t), intent(in) :: bodies
+    integer, intent(in) :: b, c(3)
+    real(wp) :: u(3)
+
+    u = wall_velocity(bodies%motion(:, b), arm_to_cell(grid, c, bodies%x(:, b)))
+  end function velocity_in_cell
 
   !> Unit fluxes through the faces, and those of free bodies net for the cells that hold fluid.
   subroutine build_rigid_flux(grid, solid, bodies, active, self)

@@ -7,7 +7,8 @@ module solid_geometry_m
   use grid_m, only: grid_t, unit_step
   implicit none
   private
-  public :: solid_geometry_t, solid_geometry_init, set_faces, apertures, wall_area, edge_in
+  public :: solid_geometry_t, solid_geometry_init, set_faces, apertures, mean_apertures
+  public :: wall_area, edge_in, centre_in_fluid
   public :: link_to_wall, bounded_link
   public :: clear_cells, clear_faces, clear_links, hand_over_faces
 
@@ -28,7 +29,7 @@ module solid_geometry_m
     real(wp), allocatable :: alpha(:, :, :)     !! solid share of the cell, all bodies, 0..1 [-]
     real(wp), allocatable :: aperture(:, :, :, :)   !! open share w of the lower face area, 0..1 [-]
     !> Effective aperture, through which pressure moves fluid; what it lacks of `aperture` moves
-    !! with a body (`held_fluid_m`).
+    !! with a body (`effective_aperture_m`).
     real(wp), allocatable :: effective(:, :, :, :)
     integer, allocatable :: inside(:, :, :)     !! body whose solid holds the cell centre, 0: fluid
     !> Links between the centres of the two cells of a lower face d: `link_number(i,j,k,d)` is the
@@ -47,9 +48,7 @@ module solid_geometry_m
     integer, allocatable :: cut(:, :, :)
     integer, allocatable :: cut_cell(:, :)      !! (3, n_cut)
     real(wp), allocatable :: edge(:)
-      !! (n_cut) 0: the wall in the cell is nearly plane, 1: it has an edge (`wall_edges_m`)
-    real(wp), allocatable :: behind_plane(:, :)
-      !! (3, n_cut) open share of both faces together, were the wall plane
+      !! (n_cut) 0: the wall in the cell is nearly plane, 1: it has an edge (`effective_aperture_m`)
 
     !> Per body b: cells `body_cell(b):body_cell(b+1)-1` with its own share and its centroid there.
     integer, allocatable :: body_cell(:)        !! (n_bodies + 1)
@@ -100,7 +99,7 @@ contains
     allocate (solid%first_held, source=solid%body_face)
     allocate (solid%cell(3, 0), solid%cell_alpha(0), solid%cell_centroid(3, 0))
     allocate (solid%face(4, 0), solid%face_beta(0), solid%face_centroid(3, 0))
-    allocate (solid%edge(0), solid%behind_plane(3, 0), solid%cut_cell(3, 0))
+    allocate (solid%edge(0), solid%cut_cell(3, 0))
     allocate (solid%closed_cell(3, 0))
   end subroutine solid_geometry_init
 
@@ -118,6 +117,28 @@ contains
       w(d, 2) = aperture(f(1), f(2), f(3), d)
     end do
   end function apertures
+
+  !> Mean aperture of the two faces of each direction: share of the cell's mass that moves with that
+  !! component of the velocity.
+  pure function mean_apertures(grid, aperture, c) result(w)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer, intent(in) :: c(3)
+    real(wp) :: w(3)
+
+    w = 0.5_wp*sum(apertures(grid, aperture, c), 2)
+  end function mean_apertures
+
+  !> Is c a cell of the domain with its centre in the fluid?
+  pure function centre_in_fluid(grid, solid, c) result(yes)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    logical :: yes
+
+    yes = .not. grid%outside(c)
+    if (yes) yes = solid%inside(c(1), c(2), c(3)) == 0
+  end function centre_in_fluid
 
   !> Area of the wall in cell c as a vector into the fluid: what its open faces lack to close [m2].
   pure function wall_area(grid, solid, c) result(area)

@@ -17,24 +17,26 @@
 !! (docs/decisions/surface.md). Cells at an outflow do not take part either: the drag of the
 !! side, half of which they take (`predict_face_velocity`), is no part of it.
 module half_kick_m
-  use kinds_m, only: wp
+  use kinds_m, only: wp, i8
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use boundary_m, only: fill_velocity_halo
-  use momentum_conservative_m, only: mass_through
   use merged_cells_m, only: merged_cells_t
-  use group_momentum_m, only: share_acceleration
+  use merged_momentum_m, only: share_acceleration
+  use effective_aperture_m, only: hold_in_cells
+  use wall_balance_m, only: add_to_bodies
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces, hold_in_cells
+  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces
   use advected_pressure_m, only: advect_pressure
-  use mixture_m, only: pure_share
+  use mixture_m, only: pure_share, mass_through
+  use exact_sum_m, only: exact_totals, accumulator_size, no_terms
   use parallel_m, only: halo_exchange
   implicit none
   private
   public :: half_kick_t, half_kick_init, add_first_half, find_liquid
-  public :: add_second_half, add_whole
+  public :: add_second_half, add_whole, force_of_half_kick
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
 
@@ -186,5 +188,58 @@ contains
       end do
     end do
   end subroutine find_liquid
+
+  !> Force and torque on each body by which the impulses of the old pressure on the surface of the
+  !! start (`self%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
+  !! surface of the end, of groups.
+  subroutine force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, self, force)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
+    type(merged_cells_t), intent(in) :: before, merged   !! of the start and of the end
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: dt   !! [s]
+    type(flow_t), intent(in) :: flow
+    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    type(half_kick_t), intent(in) :: self
+    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
+    real(wp) :: total(6*bodies%n), owed(3, max(before%n, merged%n))
+    integer :: m
+
+    accumulator = spread(no_terms, 2, 6*bodies%n)
+    !$omp parallel do schedule(static)
+    do m = 1, merged%n
+      owed(:, m) = of_cell(merged%cell(:, m))
+    end do
+    call add_to_bodies(grid, merged, bodies, owed, accumulator)
+    !$omp parallel do schedule(static)
+    do m = 1, before%n
+      owed(:, m) = 0.0_wp   ! what is a wall cell at the end is there already
+      associate (c => before%cell(:, m))
+        if (merged%number(c(1), c(2), c(3)) == 0) owed(:, m) = of_cell(c)
+      end associate
+    end do
+    call add_to_bodies(grid, before, bodies, owed, accumulator)
+    call exact_totals(accumulator, total)
+    force(:, :bodies%n) = reshape(total, [6, bodies%n])
+  contains
+    !> Force that own cell c owes the body of its wall [N].
+    pure function of_cell(c) result(f)
+      integer, intent(in) :: c(3)
+      real(wp) :: f(3)
+      real(wp) :: mass
+
+      f = 0.0_wp
+      if (.not. grid%owns(c)) return
+      f = -self%given(c(1), c(2), c(3), :)
+      if (self%takes_part(c(1), c(2), c(3))) then
+        mass = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
+                            flow%liquid(c(1), c(2), c(3)))
+        f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
+      end if
+      f = f/dt
+    end function of_cell
+  end subroutine force_of_half_kick
 
 end module half_kick_m

@@ -26,12 +26,13 @@
 !! any Courant number in one direction from 0.70 on.
 module momentum_c_ismac_m
   use kinds_m, only: wp
+  use vectors_m, only: wrench
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: side_inflow
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
   use tvd_m, only: face_values, scheme_of, mp_scheme
-  use viscous_system_m, only: viscous_t, wrench
+  use viscous_system_m, only: viscous_t
   use viscous_m, only: apply_viscous, force_of_links, velocity_scale, inertial_momentum
   use linear_operator_m, only: linear_operator_t, identity_t
   use solve_control_m, only: solve_control_t, solve_report_t, solved

@@ -17,15 +17,14 @@ module momentum_conservative_m
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t
   use boundary_m, only: fill_velocity_halo
-  use mixture_m, only: pure_share
+  use mixture_m, only: pure_share, mass_through
   use tvd_m, only: face_row, scheme_of, mp_scheme
   use carried_volumes_m, only: carried_volumes_t
   use liquid_transport_m, only: liquid_transport_t, sweep, small_cells
   use small_cells_m, only: implicit_values, move_implicit
   implicit none
   private
-  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_implicit, &
-            mass_through
+  public :: momentum_t, momentum_init, momentum_begin, momentum_sweep, momentum_implicit
 
   type :: momentum_t
     integer :: scheme = mp_scheme                   !! of the carried velocity
@@ -58,15 +57,6 @@ contains
     allocate (self%implicit_flux(0), self%implicit_mass(0))
     allocate (self%mixed_near(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
   end subroutine momentum_init
-
-  !> Mass of a volume of which a part is liquid [kg].
-  elemental function mass_through(fluid, volume, liquid) result(mass)
-    type(fluid_t), intent(in) :: fluid
-    real(wp), intent(in) :: volume, liquid   !! [m3]
-    real(wp) :: mass
-
-    mass = fluid%liquid_density*liquid + fluid%gas_density*(volume - liquid)
-  end function mass_through
 
   !> Momentum of every cell, and the cells where the first-order value is taken.
   subroutine momentum_begin(grid, fluid, liquid, fluid_volume, c, u, self)

@@ -9,10 +9,11 @@
 module viscous_m
   use omp_lib, only: omp_get_num_threads, omp_get_thread_num
   use kinds_m, only: wp, i8
+  use vectors_m, only: wrench
   use grid_m, only: grid_t, n_halo
   use fields_m, only: flow_t
   use rigid_motion_m, only: rigid_motion_t, wall_velocity, inverse_of
-  use viscous_system_m, only: viscous_t, wall_links_t, wrench
+  use viscous_system_m, only: viscous_t, wall_links_t
   use exact_sum_m, only: exact_dot, exact_add_columns, exact_totals, accumulator_size, no_terms, &
     terms_at_once
   use parallel_m, only: halo_exchange, global_max, nproc

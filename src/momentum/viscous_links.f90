@@ -5,7 +5,7 @@
 !! Shortley-Weller links, Gibou et al. 2002), which is exact for shear past any plane. Its mass is
 !! that of its group (`merged_cells_m`). A small cell without a target keeps its velocity.
 !! Where the cells are too coarse for the boundary layer, wall links pull with the stress of a rough
-!! one instead (`wall_shear_m`).
+!! one instead (`wall_layer_m`).
 module viscous_links_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
@@ -15,8 +15,9 @@ module viscous_links_m
   use rigid_flux_m, only: nearest_arm
   use mixture_m, only: harmonic_mean
   use viscous_system_m, only: viscous_t, wall_links_t, bytes_for_walls, set_wall, add_side
-  use wall_shear_m, only: distance_of_links, rough_viscosity
-  use merged_cells_m, only: merged_cells_t, is_unmerged, along_share
+  use merged_cells_m, only: merged_cells_t, is_unmerged
+  use wall_plane_m, only: distance_of_links
+  use wall_layer_m, only: along_share, rough_viscosity
   use exact_sum_m, only: exact_add_columns, exact_totals, accumulator_size, no_terms, terms_at_once
   use parallel_m, only: global_max
   implicit none
@@ -113,9 +114,9 @@ contains
     end do
   end subroutine unknown_masses
 
-  !> The small cells' mass goes to their targets, as the lever has it (`group_momentum_m`); those
+  !> The small cells' mass goes to their targets, as the lever has it (`merged_momentum_m`); those
   !! without one are unknowns themselves. Of cut cells the unknown is the velocity at the centre
-  !! (`centre_velocity_m`).
+  !! (`wall_layer_m`).
   subroutine masses_of_groups(grid, solid, rho, dt, merged, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid

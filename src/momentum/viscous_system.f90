@@ -3,14 +3,13 @@
 !! `viscous_links_m` fills it, `viscous_m` and `momentum_c_ismac_m` solve it.
 module viscous_system_m
   use kinds_m, only: wp
-  use vectors_m, only: cross
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t
   use scratch_m, only: scratch_t, take, give
   implicit none
   private
   public :: viscous_t, wall_links_t, viscous_init, add_wall, bytes_for_walls, set_wall, add_side
-  public :: wrench, take_arrays, give_arrays
+  public :: take_arrays, give_arrays
 
   !> Links between cells and bodies, grouped by body.
   type :: wall_links_t
@@ -165,14 +164,5 @@ contains
     self%sides%cell(:, self%sides%n) = c
     self%sides%pull(:, self%sides%n) = k*velocity
   end subroutine add_side
-
-  !> Force at a point and its torque about the centre of mass, as one vector of six.
-  pure function wrench(f, arm) result(w)
-    real(wp), intent(in) :: f(3), arm(3)
-    real(wp) :: w(6)
-
-    w(1:3) = f
-    w(4:6) = cross(arm, f)
-  end function wrench
 
 end module viscous_system_m

@@ -6,14 +6,10 @@ module face_velocity_m
   use boundary_kinds_m, only: gives_pressure
   use boundary_m, only: set_side_velocity
   use outflow_m, only: outflow_t, side_distance, pressure_outside, mean_velocity
-  use solid_geometry_m, only: solid_geometry_t, apertures
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm, middle_of_face
   use mixture_m, only: face_mean
   implicit none
   private
   public :: acceleration_t, acceleration_init, face_acceleration, push_faces, cell_mean_of_faces
-  public :: hold_in_cells
   public :: predict_face_velocity, rhie_chow_time, face_step
 
   real(wp), parameter :: rhie_chow_courant = 0.125_wp   !! Courant number up to dt
@@ -180,36 +176,6 @@ contains
       end do
     end do
   end subroutine cell_mean_of_faces
-
-  !> In the mean of the cells, fluid that a block holds in a face accelerates with the block.
-  subroutine hold_in_cells(grid, solid, bodies, a_body, a_face, a_cell)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: solid
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: a_body(:, :)   !! (6, bodies) rate of their motion [m/s2, rad/s2]
-    real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s2]
-    real(wp) :: arm(3), a_wall(3), w(3, 2), missing
-    integer :: b, d, m, s, c(3)
-
-    do b = 1, bodies%n
-      do m = solid%first_held(b), solid%first_held(b + 1) - 1
-        associate (f => solid%held_face(1:3, m))
-          d = solid%held_face(4, m)
-          arm = nearest_arm(grid, middle_of_face(grid, solid%held_face(:, m)), bodies%x(:, b))
-          a_wall = wall_velocity(a_body(:, b), arm)
-          missing = solid%held_share(m)*(a_wall(d) - a_face(f(1), f(2), f(3), d))
-          do s = 0, 1
-            c = f - s*unit_step(:, d)
-            if (.not. grid%owns(c)) cycle
-            w = apertures(grid, solid%aperture, c)
-            a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing/sum(w(d, :))
-          end do
-        end associate
-      end do
-    end do
-  end subroutine hold_in_cells
 
   !> Face velocity before the pressure stage, interpolated from the cells:
   !! $$ u_f = \overline{u} + \Delta t' (a_f - \overline{a}), \quad \Delta t' = \Delta t/(1 + 2 \nu

@@ -3,7 +3,7 @@ program test_centre_velocity
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
-  use centre_velocity_m, only: find_centres, to_centres, to_means
+  use wall_layer_m, only: find_centres, to_centres
   use one_body_m, only: one_body_t, describe, place, wall_at, layer
   use check_m, only: check, finish_checks
   implicit none
@@ -51,7 +51,7 @@ contains
     call check('at the centre', u(4, 5, top, 2), wall(2) + shear*at_centre, 1.0e-5_wp)
     call check('whole cells keep theirs', maxval(abs(u(:, :, top + 1:, :) &
                                                      - means(:, :, top + 1:, :))), 0.0_wp, 0.0_wp)
-    call to_means(box%grid, merged, box%bodies, u)
+    call to_centres(box%grid, merged, box%bodies, u, back=.true.)
     call check('there and back', maxval(abs(u - means)), 0.0_wp, 1.0e-13_wp)
   end subroutine there_and_back
 

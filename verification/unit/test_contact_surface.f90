@@ -184,7 +184,7 @@ contains
   end subroutine check_faces_on_one_another
 
   !> A cube a gap above another: with a margin, as for impulses, it may touch soon if it comes down,
-  !! by its fall or its spin, not if it goes sideways. Without one all within reach may.
+  !! by its fall or its spin, not if it goes sideways. Without one all that are near may.
   subroutine check_points_to_come()
     real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
     type(world_t) :: world
@@ -206,7 +206,7 @@ contains
         minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
       world%surface%search%margin = 0.0_wp
       call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
-      call check('within reach', world%points%n > 0)
+      call check('near enough', world%points%n > 0)
     end do
   end subroutine check_points_to_come
 

@@ -67,8 +67,7 @@ contains
     in_liquid(7, 4, 5) = .false.
     call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
     before = box%flow%uf
-    call shorten_at_walls(box%grid, dt, box%bodies, merged%cell(:, :merged%n), merged%body, &
-                          merged%number, in_liquid, box%flow%rho, a, box%flow)
+    call shorten_at_walls(box%grid, dt, box%bodies, merged, in_liquid, box%flow%rho, a, box%flow)
     do d = 1, 3
       do k = 2, cells(3)
         do j = 2, cells(2)
@@ -207,7 +206,7 @@ contains
   end subroutine along_the_wall
 
   subroutine at_walls()
-    call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, merged%slip, dt, &
+    call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, merged, dt, &
                                 .false., given, in_liquid, box%flow%rho, a, box%flow)
   end subroutine at_walls
 

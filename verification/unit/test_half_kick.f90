@@ -4,8 +4,7 @@ program test_half_kick
   use kinds_m, only: wp
   use grid_m, only: n_halo
   use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, add_second_half, add_whole
-  use mixture_m, only: mix_fluid
-  use momentum_conservative_m, only: mass_through
+  use mixture_m, only: mix_fluid, mass_through
   use face_velocity_m, only: acceleration_t, acceleration_init
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use one_body_m, only: one_body_t, describe, place, random_numbers

@@ -4,9 +4,8 @@
 program test_merged_cells
   use kinds_m, only: wp
   use grid_m, only: n_halo
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities, &
-    is_unmerged
-  use group_momentum_m, only: share_momentum, share_acceleration, follow_targets
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, is_unmerged
+  use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use rigid_motion_m, only: wall_velocity
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
@@ -42,7 +41,6 @@ program test_merged_cells
   call the_shares()
   call the_accelerations()
   call the_rest()
-  call heavy_small()
   call closing_face()
   call finish_checks()
 
@@ -192,20 +190,6 @@ contains
                mass(small)*t*change + to_wall(:, small), mass(small)*t**2*change, 1.0e-13_wp)
     call check('a target of one small', count(merged%target(:, :merged%n_small) == n), 1)
   end subroutine the_rest
-
-  !> A small cell of water under gas is not extrapolated to the gas.
-  subroutine heavy_small()
-    integer :: small
-
-    small = merged%number(4, 5, top)
-    box%flow%rho(4, 5, top) = 1000.0_wp
-    box%flow%rho(4, 5, top + 1) = 1.0_wp
-    call match_densities(box%grid, box%flow%rho, merged)
-    call check('a heavy small moves with its target', merged%nearer(3, small), &
-               1.0e-3_wp*(1.0_wp - r), 1.0e-12_wp)
-    call check('others keep their profile', merged%nearer(3, merged%number(5, 5, top)), &
-               1.0_wp - r, 1.0e-12_wp)
-  end subroutine heavy_small
 
   !> The share of a target goes with the open part of the face to it.
   subroutine closing_face()

@@ -12,8 +12,9 @@ program test_momentum
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
     begin_subcycle, finish_transport
   use liquid_fill_m, only: fill_liquid
+  use mixture_m, only: mass_through
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
-    momentum_implicit, mass_through
+    momentum_implicit
   use box_solid_m, only: set_boxes, simple_grid
   use check_m, only: check, finish_checks
   implicit none

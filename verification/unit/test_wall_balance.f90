@@ -6,16 +6,17 @@ program test_wall_balance
   use grid_m, only: n_halo
   use boundary_m, only: fill_scalar_halo
   use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
-    cell_mean_of_faces, hold_in_cells
+    cell_mean_of_faces
+  use effective_aperture_m, only: hold_in_cells
+  use solid_geometry_m, only: mean_apertures
   use rigid_motion_m, only: rigid_motion_t, rigid_motion_init, wall_velocity
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, build_rigid_flux
   use buoyancy_m, only: mass_defect
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body, &
-    mean_apertures
-  use group_momentum_m, only: share_acceleration
-  use half_kick_m, only: half_kick_t, half_kick_init
-  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, store_change, &
-    force_of_walls, force_of_half_kick
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
+  use merged_momentum_m, only: share_acceleration
+  use half_kick_m, only: half_kick_t, half_kick_init, force_of_half_kick
+  use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
+    force_of_walls
   use one_body_m, only: one_body_t, describe, place, random_numbers
   use check_m, only: check, finish_checks
   implicit none
@@ -55,7 +56,8 @@ program test_wall_balance
 contains
 
   subroutine begin()
-    call begin_balance(box%case%fluid, merged, box%flow, balance)
+    call begin_balance(box%grid, box%case%fluid, box%solid, merged, box%flow, box%flow%rho, &
+                       balance)
   end subroutine begin
 
   !> Force on the box whose motion changes by `change` in the step [N, N m].
@@ -63,8 +65,7 @@ contains
     real(wp), intent(in) :: change(6)
 
     box%bodies%motion(:, 1) = at_start%motion(:, 1) + change
-    call force_of_walls(box%grid, box%solid, merged, box%bodies, at_start, dt, box%flow%rho, &
-                        balance, force)
+    call force_of_walls(box%grid, merged, box%bodies, at_start, dt, balance, force)
     box%bodies%motion = at_start%motion
   end subroutine find
 
@@ -82,9 +83,9 @@ contains
       call begin()
       call check('mass of the fluid that is there', balance%mass(merged%number(4, 4, 7)), &
                  0.85_wp*fluid%liquid_density*grid%volume, 1.0e-9_wp)
-      call store_change(grid, merged, dt, a%cell, balance%pushed)
+      call add_push(grid, merged, dt, a%cell, balance)
       call share_acceleration(grid, box%solid%aperture, box%flow%rho, merged, a%cell)
-      call store_change(grid, merged, dt, a%cell, balance%gained)
+      call add_push(grid, merged, dt, a%cell, balance, taken=.true.)
       call find(spread(0.0_wp, 1, 6))
       call check('still water: no force', norm2(force), 0.0_wp, &
                  1.0e-12_wp*fluid%liquid_density*norm2(fluid%gravity)*product(tank))
@@ -93,31 +94,37 @@ contains
 
   !> Faces and masses agree in one direction, or all moves as the box does.
   subroutine agreement()
-    real(wp) :: w(3), velocity(3)
-
     call begin()
+    a%cell = 0.0_wp
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        w = mean_apertures(box%grid, box%solid%aperture, c)
-        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume*w(3)
-        balance%pushed(3, m) = 0.1_wp*sum(c)
-        balance%gained(3, m) = 0.1_wp*sum(c)
+        balance%mass(m) = box%case%fluid%liquid_density*box%grid%volume &
+                          *sum([0.0_wp, 0.0_wp, 1.0_wp] &
+                               *mean_apertures(box%grid, box%solid%aperture, c))
+        a%cell(c(1), c(2), c(3), 3) = 0.1_wp*sum(c)/dt
       end associate
     end do
+    call push_and_gain()
     call find([0.0_wp, 0.0_wp, -0.7_wp, 0.0_wp, 0.0_wp, 0.0_wp])
     call check('equal masses: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
 
     call begin()
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
-        velocity = wall_velocity(gained, box%grid%centre(c, [1, 2, 3]) - middle)
-        balance%pushed(:, m) = velocity
-        balance%gained(:, m) = velocity
+        a%cell(c(1), c(2), c(3), :) = wall_velocity(gained, box%grid%centre(c, [1, 2, 3]) &
+                                                            - middle)/dt
       end associate
     end do
+    call push_and_gain()
     call find(gained)
     call check('what gains as the box: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
   end subroutine agreement
+
+  !> Faces and fluid of the cells at walls get the same.
+  subroutine push_and_gain()
+    call add_push(box%grid, merged, dt, a%cell, balance)
+    call add_push(box%grid, merged, dt, a%cell, balance, taken=.true.)
+  end subroutine push_and_gain
 
   !> A small cell at the side of the box, which takes 0.7 of it, and known changes of velocity.
   subroutine one_small()
@@ -129,9 +136,11 @@ contains
     call begin()
     call check('its open shares', mean_apertures(box%grid, box%solid%aperture, c), &
                [0.5_wp, 0.3_wp, 0.3_wp], 1.0e-12_wp)
-    m = merged%number(c(1), c(2), c(3))
-    balance%pushed(:, m) = pushed
-    balance%gained(:, m) = taken
+    a%cell = 0.0_wp
+    a%cell(c(1), c(2), c(3), :) = pushed/dt
+    call add_push(box%grid, merged, dt, a%cell, balance)
+    a%cell(c(1), c(2), c(3), :) = taken/dt
+    call add_push(box%grid, merged, dt, a%cell, balance, taken=.true.)
     call find(spread(0.0_wp, 1, 6))
     f = box%case%fluid%liquid_density*box%grid%volume &
         *([0.5_wp, 0.3_wp, 0.3_wp]*pushed - 0.3_wp*taken)/dt
@@ -161,7 +170,7 @@ contains
       a%cell = 0.0_wp
       call hold_in_cells(box%grid, box%solid, box%bodies, reshape(change/dt, [6, 1]), a%face, &
                          a%cell)
-      call store_change(box%grid, merged, dt, a%cell, balance%pushed)
+      call add_push(box%grid, merged, dt, a%cell, balance)
       call find(change)
       call check('the part of the wall is the uncounted fluid', force(1:3, 1), &
                  -defect(1:3, d, 1)*gained(d)/dt, 1.0e-9_wp)
@@ -177,7 +186,7 @@ contains
 
     call begin()
     call fill(a%cell)
-    call store_change(box%grid, merged, dt, a%cell, balance%pushed)
+    call add_push(box%grid, merged, dt, a%cell, balance)
     from_faces = 0.0_wp
     do m = 1, merged%n
       associate (c => merged%cell(:, m))
@@ -188,11 +197,16 @@ contains
     end do
     call order_by_body(2, merged)
     call share_acceleration(box%grid, box%solid%aperture, box%flow%rho, merged, a%cell)
-    call store_change(box%grid, merged, dt, a%cell, balance%gained)
-    of_fluid = matmul(balance%gained(:, :merged%n), balance%mass(:merged%n))
+    call add_push(box%grid, merged, dt, a%cell, balance, taken=.true.)
+    of_fluid = 0.0_wp
+    do m = 1, merged%n
+      associate (c => merged%cell(:, m))
+        of_fluid = of_fluid + dt*balance%mass(m)*a%cell(c(1), c(2), c(3), :)
+      end associate
+    end do
     call rigid_motion_init(2, two)
     two%x = spread(middle, 2, 2)
-    call force_of_walls(box%grid, box%solid, merged, two, two, dt, box%flow%rho, balance, forces)
+    call force_of_walls(box%grid, merged, two, two, dt, balance, forces)
     call check('momentum: fluid and bodies get what the faces give', &
                of_fluid + dt*sum(forces(1:3, :), 2), from_faces, 1.0e-12_wp*sum(balance%mass))
     call check('momentum: both bodies get some', all(norm2(forces(1:3, :), 1) > 1.0_wp))

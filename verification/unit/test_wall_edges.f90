@@ -2,8 +2,8 @@
 !! the edges of an upright box, and none of a sphere.
 program test_wall_edges
   use kinds_m, only: wp
-  use wall_edges_m, only: openings_of_plane
-  use held_fluid_m, only: more_inertia
+  use wall_plane_m, only: apertures_of_plane
+  use effective_aperture_m, only: more_inertia
   use one_body_m, only: one_body_t, describe, place
   use check_m, only: check, finish_checks
   implicit none
@@ -21,12 +21,12 @@ contains
 
   !> A triangle of solid with links of a half, one that reaches past the next faces, a flat wall.
   subroutine behind_planes()
-    call check('small triangle', openings_of_plane([1.0_wp, 1.0_wp, 0.0_wp], 0.125_wp), &
+    call check('small triangle', apertures_of_plane([1.0_wp, 1.0_wp, 0.0_wp], 0.125_wp), &
                [1.5_wp, 1.5_wp, 1.75_wp], 1.0e-12_wp)
     call check('large triangle, from the other side', &
-               openings_of_plane([0.0_wp, -3.0_wp, 3.0_wp], 0.5625_wp), &
+               apertures_of_plane([0.0_wp, -3.0_wp, 3.0_wp], 0.5625_wp), &
                [2.0_wp - 2.0_wp*0.5625_wp, sqrt(0.875_wp), sqrt(0.875_wp)], 1.0e-12_wp)
-    call check('flat wall', openings_of_plane([0.0_wp, 0.0_wp, 0.2_wp], 0.7_wp), &
+    call check('flat wall', apertures_of_plane([0.0_wp, 0.0_wp, 0.2_wp], 0.7_wp), &
                [0.6_wp, 0.6_wp, 2.0_wp], 1.0e-12_wp)
   end subroutine behind_planes
 
@@ -75,11 +75,11 @@ contains
 
     w(:, 1) = [0.6_wp, 0.99_wp, 0.96_wp]
     w(:, 2) = [1.0_wp, 1.0_wp, 0.96_wp]
-    more = more_inertia(w, openings_of_plane(w(:, 2) - w(:, 1), 0.04_wp), 0.04_wp)
+    more = more_inertia(w, apertures_of_plane(w(:, 2) - w(:, 1), 0.04_wp), 0.04_wp)
     call check('tip', more(1), 0.16_wp/1.35_wp, 1.0e-12_wp)
     w(:, 1) = [0.1_wp, 0.1_wp, 0.19_wp]
     w(:, 2) = [1.0_wp, 1.0_wp, 0.19_wp]
-    more = more_inertia(w, openings_of_plane(w(:, 2) - w(:, 1), 0.81_wp), 0.81_wp)
+    more = more_inertia(w, apertures_of_plane(w(:, 2) - w(:, 1), 0.81_wp), 0.81_wp)
     layer = min(0.81_wp/0.15_wp, (1.0_wp/plane)**3.5_wp - 1.0_wp)
     call check('layer', more, [layer, layer, 0.0_wp], 1.0e-10_wp)
   end subroutine tip_and_layer

@@ -1,7 +1,8 @@
 !> Stress of the rough layer: the logarithmic law, where it acts, what it leaves alone.
 program test_wall_shear
   use kinds_m, only: wp, pi
-  use wall_shear_m, only: find_wall_speeds, distance_of_links, rough_viscosity
+  use wall_plane_m, only: distance_of_links
+  use wall_layer_m, only: find_wall_speeds, rough_viscosity
   use viscous_links_m, only: build_viscous
   use viscous_system_m, only: viscous_t, viscous_init
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells

@@ -1,23 +1,17 @@
-!> One momentum for each group of linked cells (`merged_cells_m`): what its cells were given is
-!! summed, and every small cell moves with its targets.
+!> One momentum for each group of merged cells: what its cells were given is summed, every small
+!! cell moves with its targets, and the wall bears the rest (docs/theory.md, section 17).
 !!
-!! Normal to the wall the velocity of a small cell is linear from its target to the wall; along the
-!! wall it has more of the target's, by the slip s at r (`wall_profile_m`),
-!! $$ u_{small} = T u + (1 - T) U_w, \qquad T = 1 - (1 - r) (1 - s + s\, n\, n^T) $$
-!! with r the distance of the middle of the small cell from the wall over that of the target, from
-!! the plane of the cut cell. A force on a small cell along the wall bends the layer: target and
-!! wall bear it like the ends of a lever, T_t of it the target, with T_t = r + (1 - r) s the share
-!! of its velocity that the small cell has there, and the rest the wall. What the group cannot give
-!! to a small cell so that it keeps this profile is the same kind of force. Derivation and trials:
-!! docs/decisions/cut_cells.md.
-module group_momentum_m
+!! Along the wall target and wall bear a force on a small cell like the ends of a lever, T_t of it
+!! the target. What the group cannot give to a small cell so that it keeps the profile of the layer
+!! is the same kind of force.
+module merged_momentum_m
   use kinds_m, only: wp
   use vectors_m, only: inverse3
   use grid_m, only: grid_t
+  use solid_geometry_m, only: mean_apertures
   use rigid_motion_m, only: rigid_motion_t
-  use merged_cells_m, only: merged_cells_t, targets_at_most, is_unmerged, along_share, &
-                            mean_apertures, velocity_at_wall
-  use wall_profile_m, only: slip_at
+  use merged_cells_m, only: merged_cells_t, max_targets, is_unmerged, velocity_at_wall
+  use wall_layer_m, only: along_share, scaled_to_wall
   implicit none
   private
   public :: share_momentum, share_acceleration, follow_targets
@@ -43,37 +37,30 @@ contains
       !! [m/s]
     real(wp), intent(inout) :: to_wall(:, :)
       !! (3, wall cells) momentum that the wall bears at own small cells, added to [kg m/s]
-    real(wp) :: matrix(3, 3), given(3), part
+    real(wp), parameter :: unit(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+                                                 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+    real(wp) :: matrix(3, 3), given(3), part, t
     real(wp) :: excess(3, self%n_small)   !! of a small cell over the mean that its targets make it
-    real(wp) :: t(3, 3, targets_at_most, self%n_small), wall(3, targets_at_most, self%n_small)
-      !! T and (1 - T) U_w of the parts of small cells
     integer :: g, m, d, n
 
-    !$omp parallel do private(n, given) schedule(static)
+    !$omp parallel do schedule(static)
     do m = 1, self%n_small
       if (is_unmerged(self, m)) cycle
-      do n = 1, targets_at_most
-        if (self%target(n, m) == 0) cycle
-        call profile(grid, self, [m, n], bodies, t(:, :, n, m), wall(:, n, m))
-      end do
-      given = small_velocity(grid, self, m, t(:, :, :, m), wall(:, :, m), u)
-      excess(:, m) = before(:, m) - given
+      excess(:, m) = before(:, m) - small_velocity(grid, self, m, bodies, u)
     end do
-    !$omp parallel do private(matrix, given, part, m, d) schedule(static)
+    !$omp parallel do private(matrix, given, part, t, m, d) schedule(static)
     do g = 1, self%n_groups
       associate (leader => self%leader(g), c => self%cell(:, self%leader(g)))
-        matrix = 0.0_wp
-        do d = 1, 3
-          matrix(d, d) = mass(leader)
-        end do
+        matrix = mass(leader)*unit
         given = 0.0_wp
         do m = self%first(g), self%first(g + 1) - 1
           associate (small => self%part(1, m), which => self%part(2, m))
             part = self%share(which, small)*mass(small)
-            given = given + part*to_target(self, self%part(:, m), excess(:, small))
-            do d = 1, 3
-              matrix(:, d) = matrix(:, d) &
-                             + part*to_target(self, self%part(:, m), t(:, d, which, small))
+            t = along_share(self, small, which)
+            given = given + part*scaled_to_wall(excess(:, small), self%normal(:, small), t, 1.0_wp)
+            do d = 1, 3   ! L T
+              matrix(:, d) = matrix(:, d) + part*scaled_to_wall( &
+                unit(:, d), self%normal(:, small), t**2, 1.0_wp - self%nearer(which, small))
             end do
           end associate
         end do
@@ -82,82 +69,48 @@ contains
         end if
       end associate
     end do
-    !$omp parallel do private(given, n) schedule(static)
+    !$omp parallel do private(given, n, t) schedule(static)
     do m = 1, self%n_small
       if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      given = small_velocity(grid, self, m, t(:, :, :, m), wall(:, :, m), u)
+      given = small_velocity(grid, self, m, bodies, u)
       associate (f => self%cell(:, m))
         u(f(1), f(2), f(3), :) = given
       end associate
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         if (self%target(n, m) == 0) cycle
-        associate (c => self%cell(:, self%target(n, m)))
+        t = along_share(self, m, n)
+        associate (c => self%cell(:, self%target(n, m)), normal => self%normal(:, m))
           given = u(c(1), c(2), c(3), :) - before(:, self%target(n, m))
-          given = excess(:, m) - matmul(t(:, :, n, m), given)
+          given = excess(:, m) - scaled_to_wall(given, normal, t, 1.0_wp - self%nearer(n, m))
+          to_wall(:, m) = to_wall(:, m) &
+            + self%share(n, m)*mass(m)*scaled_to_wall(given, normal, 1.0_wp - t, 0.0_wp)
         end associate
-        to_wall(:, m) = to_wall(:, m) &
-                        + self%share(n, m)*mass(m)*(given - to_target(self, [m, n], given))
       end do
     end do
   end subroutine share_momentum
 
-  !> L e: what the target bears of a force on a part of a small cell.
-  pure function to_target(self, part, e) result(borne)
-    type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: part(2)   !! small cell, which of its targets
-    real(wp), intent(in) :: e(3)
-    real(wp) :: borne(3)
-
-    associate (n => self%normal(:, part(1)))
-      borne = e - (1.0_wp - along_share(self, part(1), part(2)))*(e - n*dot_product(n, e))
-    end associate
-  end function to_target
-
-  !> Velocity of a small cell by those of its targets [m/s].
-  pure function small_velocity(grid, self, small, t, wall, u) result(velocity)
+  !> Velocity of a small cell by those of its targets, sum of s (U_w + T (u - U_w)) [m/s].
+  pure function small_velocity(grid, self, small, bodies, u) result(velocity)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: small
-    real(wp), intent(in) :: t(:, :, :), wall(:, :)   !! T and (1 - T) U_w of its parts
+    type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     real(wp) :: velocity(3)
+    real(wp) :: wall(3)
     integer :: n
 
+    wall = velocity_at_wall(grid, self, small, bodies)
     velocity = 0.0_wp
-    do n = 1, targets_at_most
+    do n = 1, max_targets
       if (self%target(n, small) == 0) cycle
       associate (c => self%cell(:, self%target(n, small)))
-        velocity = velocity + self%share(n, small)*(matmul(t(:, :, n), u(c(1), c(2), c(3), :)) &
-                                                   + wall(:, n))
+        velocity = velocity + self%share(n, small)*(wall + scaled_to_wall( &
+          u(c(1), c(2), c(3), :) - wall, self%normal(:, small), along_share(self, small, n), &
+          1.0_wp - self%nearer(n, small)))
       end associate
     end do
   end function small_velocity
-
-  !> T and (1 - T) U_w of a part of a small cell.
-  pure subroutine profile(grid, self, part, bodies, t, wall)
-    type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: part(2)   !! small cell, which of its targets
-    type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(out) :: t(3, 3), wall(3)
-    real(wp) :: v(3), less(3, 3), slip
-    integer :: d
-
-    associate (m => part(1), n => self%normal(:, part(1)), c => self%cell(:, part(1)))
-      slip = slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - self%nearer(part(2), m))
-      v = velocity_at_wall(grid, self, m, bodies)
-      do d = 1, 3
-        less(:, d) = slip*n*n(d)
-        less(d, d) = less(d, d) + 1.0_wp - slip
-      end do
-      less = self%nearer(part(2), m)*less
-    end associate
-    wall = matmul(less, v)
-    t = -less
-    do d = 1, 3
-      t(d, d) = t(d, d) + 1.0_wp
-    end do
-  end subroutine profile
 
   !> Acceleration of each group: the mean over its cells by the mass that the faces move, component
   !! by component. Halo filled on entry.
@@ -218,7 +171,7 @@ contains
     integer :: n
 
     mean = 0.0_wp
-    do n = 1, targets_at_most
+    do n = 1, max_targets
       if (self%target(n, small) == 0) cycle
       associate (c => self%cell(:, self%target(n, small)))
         mean = mean + self%share(n, small)*a(c(1), c(2), c(3), :)
@@ -245,7 +198,7 @@ contains
     do m = 1, self%n_small
       if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
       changed = before(:, m)
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         if (self%target(n, m) == 0) cycle
         t = along_share(self, m, n)
         associate (c => self%cell(:, self%target(n, m)))
@@ -260,4 +213,4 @@ contains
     end do
   end subroutine follow_targets
 
-end module group_momentum_m
+end module merged_momentum_m

@@ -1,36 +1,35 @@
-!> Fluid that a block holds in a face, where the flow would have to turn in what little fluid an
-!! edge of the block leaves in a cut cell.
+!> Edges of blocks in cut cells, and the effective apertures beside them: where the flow would have
+!! to turn in what little fluid an edge leaves in a cell, the block holds part of it
+!! (docs/theory.md, section 17).
 !!
-!! Measure is a plane wall that leaves the cell as much fluid. Where the faces of a direction are
-!! open R times as wide as behind that, beyond what the face of a round block makes,
-!! $$ R = 1 + \max (0, w_{low} + w_{high} - w_{plane} - 0.1)/w_{plane} $$
-!! the inertia of the half of the face in the cell is m times as large,
-!! $$ m = \min (R^{7/2}, 1 + \tfrac23 S^2/a), \qquad
-!! \frac{w}{w_{free}} = \tfrac12 (m_{low} + m_{high}) $$
-!! with w the open share. A layer of depth a before a wall that is seen through the share S of the
-!! face, fed from one end, has to move so much faster along the wall than across the face. Pressure
-!! moves the free share; the rest moves with the block, as if it were a part of it. Volume and
-!! transport know the open share only. 7/2 is measured (docs/decisions/sharp_edges.md).
-module held_fluid_m
+!! Measure is a plane wall that leaves the cell as much fluid: an edge leaves its faces open more
+!! than that by 0.2 of a face and more where it takes the centre of the cell, a sphere eight cells
+!! wide by less than 0.1. Pressure moves the fluid through the effective aperture; what it lacks of
+!! the aperture moves with the block. Volume and transport know the aperture only.
+module effective_aperture_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, unit_step
   use solid_geometry_m, only: solid_geometry_t, apertures
-  use rigid_flux_m, only: closed_side
-  use wall_edges_m, only: min_normal, round_edge
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use rigid_flux_m, only: closed_side, nearest_arm, middle_of_face
+  use wall_plane_m, only: apertures_of_plane, min_normal
   implicit none
   private
-  public :: hold_fluid, more_inertia
+  public :: find_effective_apertures, more_inertia, hold_in_cells
 
-  real(wp), parameter :: power = 3.5_wp        !! of R
+  real(wp), parameter :: round_edge = 0.1_wp, sharp_edge = 0.2_wp
+    !! excess of apertures up to which a wall counts as plane, and from which it has an edge [faces]
+  real(wp), parameter :: power = 3.5_wp        !! of R, measured (docs/decisions/sharp_edges.md)
   real(wp), parameter :: thinnest = 0.01_wp    !! layer [cells]
   real(wp), parameter :: least = 1.0e-6_wp     !! opening, or excess of inertia, that counts
   integer, parameter :: several = -1           !! bodies in a cell
 
 contains
 
-  !> Free shares of the faces, and the list of those with held fluid.
-  subroutine hold_fluid(grid, n_blocks, solid)
+  !> Edges of the cut cells (`solid%edge`; 0 behind a wall that is nearly plane, none if the centre
+  !! lies in fluid), effective apertures, and the list of the faces in which bodies hold fluid.
+  subroutine find_effective_apertures(grid, n_blocks, solid)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: n_blocks   !! bodies of `solid` without the bed, which comes last
     type(solid_geometry_t), intent(inout) :: solid
@@ -38,6 +37,7 @@ contains
     integer :: owner(solid%n_cut)      ! the body that cuts them, or `several`
     integer :: k, m
 
+    call ensure_capacity(solid%n_cut, solid%edge)
     call find_owners(solid, owner)
     !$omp parallel
     !$omp do schedule(static)
@@ -47,13 +47,9 @@ contains
     !$omp end do nowait
     !$omp do schedule(dynamic, 64)
     do m = 1, solid%n_cut
-      associate (c => solid%cut_cell(:, m))
-        more(:, m) = 0.0_wp
-        if (all(c < grid%last)) more(:, m) = more_inertia(apertures(grid, solid%aperture, c), &
-          solid%behind_plane(:, m), solid%alpha(c(1), c(2), c(3)))
-        if (maxval(more(:, m)) < least) cycle
-        if (others_around(grid, solid, owner, owner(m), c)) more(:, m) = 0.0_wp
-      end associate
+      call compare_with_plane(grid, solid, solid%cut_cell(:, m), solid%edge(m), more(:, m))
+      if (maxval(more(:, m)) < least) cycle
+      if (others_around(grid, solid, owner, owner(m), solid%cut_cell(:, m))) more(:, m) = 0.0_wp
     end do
     !$omp end parallel
     call narrow_faces(grid, n_blocks, more, solid)
@@ -63,19 +59,37 @@ contains
                               - solid%effective(f(1), f(2), f(3), f(4))
       end associate
     end do
-  end subroutine hold_fluid
+  end subroutine find_effective_apertures
+
+  !> How much of an edge cut cell c has, and by how much the inertia of its faces is larger.
+  pure subroutine compare_with_plane(grid, solid, c, edge, more)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp), intent(out) :: edge, more(3)
+    real(wp) :: w(3, 2), plane(3), excess
+
+    edge = 0.0_wp
+    more = 0.0_wp
+    if (any(c >= grid%last)) return
+    w = apertures(grid, solid%aperture, c)
+    if (maxval(abs(w(:, 2) - w(:, 1))) < min_normal) return
+    plane = apertures_of_plane(w(:, 2) - w(:, 1), solid%alpha(c(1), c(2), c(3)))
+    more = more_inertia(w, plane, solid%alpha(c(1), c(2), c(3)))
+    if (solid%inside(c(1), c(2), c(3)) == 0) return
+    excess = maxval(sum(w, 2) - plane)
+    edge = max(0.0_wp, min(1.0_wp, (excess - round_edge)/(sharp_edge - round_edge)))
+  end subroutine compare_with_plane
 
   !> By how much the inertia of each direction of a cell is larger, m - 1.
   pure function more_inertia(w, plane, alpha) result(more)
-    real(wp), intent(in) :: w(3, 2)    !! open shares of the lower and upper faces
+    real(wp), intent(in) :: w(3, 2)    !! apertures of the lower and upper faces
     real(wp), intent(in) :: plane(3)   !! those of both together behind a plane wall
     real(wp), intent(in) :: alpha      !! solid share of the cell
     real(wp) :: more(3)
     real(wp) :: normal(3), r(3), depth(3)
 
-    more = 0.0_wp
     normal = w(:, 2) - w(:, 1)
-    if (maxval(abs(normal)) < min_normal) return
     r = 1.0_wp + max(0.0_wp, sum(w, 2) - plane - round_edge)/max(plane, least)
     depth = 1.0_wp - alpha/max(abs(normal), least)
     more = min(r**power - 1.0_wp, normal**2/(1.5_wp*max(depth, thinnest)))
@@ -173,4 +187,34 @@ contains
     end do
   end function others_around
 
-end module held_fluid_m
+  !> In the mean of the cells, fluid that a block holds in a face accelerates with the block.
+  subroutine hold_in_cells(grid, solid, bodies, a_body, a_face, a_cell)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: a_body(:, :)   !! (6, bodies) rate of their motion [m/s2, rad/s2]
+    real(wp), intent(in), contiguous :: a_face(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    real(wp), intent(inout), contiguous :: a_cell(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m/s2]
+    real(wp) :: arm(3), a_wall(3), w(3, 2), missing
+    integer :: b, d, m, s, c(3)
+
+    do b = 1, bodies%n
+      do m = solid%first_held(b), solid%first_held(b + 1) - 1
+        associate (f => solid%held_face(1:3, m))
+          d = solid%held_face(4, m)
+          arm = nearest_arm(grid, middle_of_face(grid, solid%held_face(:, m)), bodies%x(:, b))
+          a_wall = wall_velocity(a_body(:, b), arm)
+          missing = solid%held_share(m)*(a_wall(d) - a_face(f(1), f(2), f(3), d))
+          do s = 0, 1
+            c = f - s*unit_step(:, d)
+            if (.not. grid%owns(c)) cycle
+            w = apertures(grid, solid%aperture, c)
+            a_cell(c(1), c(2), c(3), d) = a_cell(c(1), c(2), c(3), d) + missing/sum(w(d, :))
+          end do
+        end associate
+      end do
+    end do
+  end subroutine hold_in_cells
+
+end module effective_aperture_m

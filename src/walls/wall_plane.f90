@@ -1,12 +1,16 @@
-!> How far the fluid and the centre of a cell are from the wall in a cut cell, taken as a plane.
-module wall_distance_m
+!> The wall in a cut cell taken as a plane: its normal, how far from it fluid and centre of a cell
+!! are, and the apertures behind it (docs/theory.md, section 17).
+module wall_plane_m
   use kinds_m, only: wp
   use grid_m, only: grid_t
   use solid_geometry_m, only: solid_geometry_t, wall_area, link_to_wall
-  use plic_m, only: unit_constant
+  use plic_m, only: unit_constant, unit_volume
   implicit none
   private
   public :: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
+  public :: distance_of_links, apertures_of_plane, min_normal
+
+  real(wp), parameter :: min_normal = 1.0e-6_wp   !! of a normal or its parts that count [faces]
 
 contains
 
@@ -17,18 +21,16 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp) :: n(3)
-    real(wp), parameter :: min_wall = 1.0e-6_wp   !! area of a wall that has a normal, in faces
 
     n = wall_area(grid, solid, c)
-    if (norm2(n) > min_wall*minval(grid%area)) then
+    if (norm2(n) > min_normal*minval(grid%area)) then
       n = n/norm2(n)
     else
       n = 0.0_wp
     end if
   end function wall_normal
 
-  !> Distance of the middle of the fluid of a cell from the wall in a cut cell c, taken as a plane
-  !! [m].
+  !> Distance of the middle of the fluid of a cell from the wall in cut cell c [m].
   pure function distance_to_fluid(grid, solid, c, step, n) result(distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -42,8 +44,7 @@ contains
                + level_of(grid, n, 0.5_wp*(1.0_wp + solid%alpha(o(1), o(2), o(3))))
   end function distance_to_fluid
 
-  !> Distance of the centre of a cut cell c from its wall, taken as a plane; below zero in a small
-  !! cell [m].
+  !> Distance of the centre of cut cell c from its wall; below zero in a small cell [m].
   pure function distance_to_centre(grid, solid, c, n) result(distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
@@ -63,15 +64,15 @@ contains
     level = unit_constant(n*grid%h, share) - 0.5_wp*sum(n*grid%h)
   end function level_of
 
-  !> Distance of the centre of cell c from a plane wall of normal n that pulls as its wall links do
-  !! together; 0 if it has none [m].
+  !> Distance of the centre of cell c from a wall of normal n that drags as the face coefficients of
+  !! the cell to walls do together, sum A_d |n_d|/sum A_d/l_d; 0 if it has none [m].
   pure function distance_by_links(grid, solid, c, n) result(y)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(in) :: n(3)
     real(wp) :: y
-    real(wp) :: length, seen, pull   !! cells; area of the wall along the links, area over length
+    real(wp) :: length, seen, pull   !! cells; area of the wall along the lines, area over length
     integer :: d
 
     seen = 0.0_wp
@@ -85,4 +86,44 @@ contains
     y = seen/max(pull, tiny(pull))
   end function distance_by_links
 
-end module wall_distance_m
+  !> The same without a normal, of the plane on which the lines from the centre end,
+  !! 1/y^2 = sum 1/l^2 [m]; huge without walls.
+  pure function distance_of_links(grid, solid, c) result(y)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: c(3)
+    real(wp) :: y
+    real(wp) :: inverse, length
+    integer :: d, sense
+
+    inverse = 0.0_wp
+    do d = 1, 3
+      do sense = -1, 1, 2
+        length = link_to_wall(solid, c, d, sense)*grid%h(d)
+        if (length > 0.0_wp) inverse = inverse + 1.0_wp/length**2
+      end do
+    end do
+    y = 1.0_wp/sqrt(max(inverse, tiny(inverse)))
+  end function distance_of_links
+
+  !> Apertures of both faces of each direction together behind a plane wall in the unit cube; 2
+  !! where the wall lies along these faces, since to round-off it is on either side of them.
+  pure function apertures_of_plane(normal, alpha) result(both)
+    real(wp), intent(in) :: normal(3)   !! of the wall, into the fluid, of any length
+    real(wp), intent(in) :: alpha       !! solid share of the cell
+    real(wp) :: both(3)
+    real(wp) :: n(3), across(3), at
+    integer :: d
+
+    n = normal/sum(abs(normal))
+    at = unit_constant(n, alpha)
+    both = 2.0_wp
+    do d = 1, 3
+      across = n
+      across(d) = 0.0_wp
+      if (sum(abs(across)) < min_normal) cycle
+      both(d) = 2.0_wp - unit_volume(across, at) - unit_volume(across, at - n(d))
+    end do
+  end function apertures_of_plane
+
+end module wall_plane_m

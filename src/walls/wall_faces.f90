@@ -7,9 +7,10 @@ module wall_faces_m
   use boundary_kinds_m, only: no_side
   use solid_geometry_m, only: solid_geometry_t, wall_area, edge_in
   use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: nearest_arm, arm_to_cell
+  use rigid_flux_m, only: nearest_arm, velocity_in_cell
   use mixture_m, only: face_mean
-  use wall_profile_m, only: slip_at
+  use merged_cells_m, only: merged_cells_t
+  use wall_layer_m, only: scaled_to_wall, share_along
   use face_velocity_m, only: acceleration_t, rhie_chow_time, face_step
   implicit none
   private
@@ -20,30 +21,27 @@ contains
   !> Faces of the cells at walls: their Rhie-Chow acceleration counts for `rhie_chow_time` by the
   !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
   !! all of its damping and has no drag worth the name.
-  subroutine shorten_at_walls(grid, dt, bodies, wall_cell, body, number, in_liquid, rho, a, flow)
+  subroutine shorten_at_walls(grid, dt, bodies, merged, in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt                   !! [s]
     type(rigid_motion_t), intent(in) :: bodies
-    integer, intent(in) :: wall_cell(:, :)       !! (3, *) those cells, of the halo too
-    integer, intent(in) :: body(:)               !! (*) whose wall it is
-    integer, intent(in), contiguous :: number(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of a wall cell in that list, 0: none
+    type(merged_cells_t), intent(in) :: merged
     logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
-    real(wp) :: reach
+    real(wp) :: inverse_h2
     integer :: m, d, c(3)
 
-    reach = sum(1.0_wp/grid%h**2)
+    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(d, c) schedule(dynamic, 64)
-    do m = 1, size(wall_cell, 2)
+    do m = 1, merged%n
       do d = 1, 3
-        call shorten(wall_cell(:, m), d, body(m))
-        c = wall_cell(:, m) + unit_step(:, d)
+        call shorten(merged%cell(:, m), d, merged%body(m))
+        c = merged%cell(:, m) + unit_step(:, d)
         if (c(d) > grid%hi(d) + 1) cycle
-        if (number(c(1), c(2), c(3)) == 0) call shorten(c, d, body(m))
+        if (merged%number(c(1), c(2), c(3)) == 0) call shorten(c, d, merged%body(m))
       end do
     end do
   contains
@@ -59,42 +57,36 @@ contains
       if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
-          - wall_velocity(bodies%motion(:, b), arm_to_cell(grid, f, bodies%x(:, b)))
+          - velocity_in_cell(grid, bodies, b, f)
         time = rhie_chow_time(dt, dt*sum(abs(past)/grid%h))
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
-          - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
+          - (face_step(dt, nu, inverse_h2) - face_step(time, nu, inverse_h2))*(a%face(i, j, k, d) &
               - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
       end associate
     end subroutine shorten
   end subroutine shorten_at_walls
 
-  !> Faces beside a moving surface: what of the velocity is normal to the wall goes linearly from
-  !! that of the cell to that of the wall, where the link through the face ends; the rest by the
-  !! layer along the wall, as with the small cell on the other side of the face.
-  !! A wide open face before a cell with an edge keeps the mean of its cells instead, as
-  !! `solid%edge` goes to 1: the stream leaves the edge straight.
+  !> Faces beside a moving surface: between the velocity of the cell and that of the wall, where the
+  !! line through the face ends, as the layer along the wall has it. A wide open face before a cell
+  !! with an edge keeps the mean of its cells instead, as `solid%edge` goes to 1: the stream leaves
+  !! the edge straight.
   !!
   !! A face that opens or closes under a flat side then does so with the velocity of the wall. With
-  !! the mean of the two cells instead, each layer of faces that the side crosses takes an impulse
-  !! of about rho A h (U - u) from the body, which neither a finer grid nor a shorter step makes
-  !! smaller (measured: docs/decisions/coupling.md). Without viscosity the fluid slips past the
-  !! wall: taking the wall's whole velocity there makes the added mass wrong by some per cent. With
-  !! it the cell's whole velocity carries up to twice what flows along the wall, and friction is too
-  !! large (docs/decisions/cut_cells.md).
+  !! the mean of the two cells each layer of faces that the side crosses takes an impulse of about
+  !! rho A h (U - u) from the body, whatever grid and step (docs/decisions/coupling.md).
   !!
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
   !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
-  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, slip, dt, c_ismac, given, &
+  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, merged, dt, c_ismac, given, &
                                     in_liquid, rho, a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
     type(rigid_motion_t), intent(in) :: predicted   !! motion as far as the old pressure makes it
-    real(wp), intent(in), contiguous :: slip(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of the layer along the wall, in cells with their centre in a body, 0 to 1
+    type(merged_cells_t), intent(in) :: merged     !! with the slip of the layer at small cells
     real(wp), intent(in) :: dt                   !! [s]
     logical, intent(in) :: c_ismac
       !! all cells are given their acceleration, and the compact one counts for dt
@@ -156,7 +148,8 @@ contains
       integer, intent(in) :: c(3), sense, body, f(3), d
       real(wp), intent(in) :: theta   !! [cells]
       real(wp) :: velocity
-      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), near, along, gain
+      integer :: o(3)
+      real(wp) :: x_wall(3), arm(3), wall(3), u(3), n(3), r, along, gain
 
       x_wall = [grid%centre(c(1), 1), grid%centre(c(2), 2), grid%centre(c(3), 3)]
       x_wall(d) = x_wall(d) + real(sense, wp)*theta*grid%h(d)
@@ -173,10 +166,12 @@ contains
         gain = dt*a%face(f(1), f(2), f(3), d)
         if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
-      near = near_wall(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
-      along = 1.0_wp - slip_beyond(c + sense*unit_step(:, d), 1.0_wp - near)
-      velocity = u(d) + near*(along*(wall(d) - u(d)) &
-                              + (1.0_wp - along)*n(d)*dot_product(n, wall - u)) + gain
+      r = middle_of_face(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
+      o = c + sense*unit_step(:, d)
+      along = 1.0_wp   ! free slip where there is fluid beyond the wall again
+      if (solid%inside(o(1), o(2), o(3)) /= 0) along = share_along(r, merged%slip(o(1), o(2), o(3)))
+      u = wall + scaled_to_wall(u - wall, n, along, r)
+      velocity = u(d) + gain
     end function seen_from
 
     !> Time for which the Rhie-Chow acceleration at a wall counts in liquid [s].
@@ -190,23 +185,12 @@ contains
       time = face_step(time, flow%mu(c(1), c(2), c(3))/rho(c(1), c(2), c(3)), sum(1.0_wp/grid%h**2))
     end function time_in_liquid
 
-    !> Slip along the wall at r times the distance of the cell, by the layer at the small cell o
-    !! beyond the face; free slip where there is fluid again.
-    pure function slip_beyond(o, r) result(s)
-      integer, intent(in) :: o(3)
-      real(wp), intent(in) :: r
-      real(wp) :: s
-
-      s = 1.0_wp
-      if (solid%inside(o(1), o(2), o(3)) /= 0) s = slip_at(slip(o(1), o(2), o(3)), r)
-    end function slip_beyond
-
-    !> How near to the wall the middle of the open part of the face is: 1 at the wall, 0 where the
-    !! centre of the cell is.
-    pure function near_wall(theta, n, d, aperture) result(b)
+    !> r of the middle of the open part of the face: 0 at the wall, 1 as far as the centre of the
+    !! cell.
+    pure function middle_of_face(theta, n, d, aperture) result(r)
       real(wp), intent(in) :: theta, n(3), aperture   !! link [cells], normal, open share
       integer, intent(in) :: d                    !! direction of the link
-      real(wp) :: b
+      real(wp) :: r
       real(wp) :: cell, face   !! distances from the wall [spacings along the link]
 
       cell = theta*abs(n(d))
@@ -215,8 +199,8 @@ contains
       else
         face = 0.5_wp*aperture*spacing_across(n, d)*sqrt(max(1.0_wp - n(d)**2, 0.0_wp))
       end if
-      b = 1.0_wp - max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
-    end function near_wall
+      r = max(min(1.0_wp, face/max(cell, tiny(1.0_wp))), 0.0_wp)
+    end function middle_of_face
 
     !> Spacing of the cells across direction d towards the wall, over that along d: 1 for cubes.
     pure function spacing_across(n, d) result(ratio)

@@ -1,27 +1,25 @@
-!> One owner for the fluid in cut cells: small cells belong to the cells beside them.
+!> Small cut cells and the cells with which they are merged (docs/theory.md, section 17).
 !!
-!! A small cell is a cut cell whose centre lies in a body. What fluid it holds has no velocity of
-!! its own: it belongs to its targets, the cells with their centre in the fluid across its open
-!! faces, by shares that close with the face. A target and its parts of small cells are a group with
-!! one momentum (`group_momentum_m`). A small cell without such a neighbour (a gap narrower than a
-!! cell) is a group of its own. Derivation and trials: docs/decisions/cut_cells.md.
+!! A small cut cell has its centre in a body. The fluid in it has no velocity of its own: it is
+!! merged with up to three target cells, with their centre in the fluid across its open faces, by
+!! shares that close with the face. A target and its parts of small cells are a group with one
+!! momentum (`merged_momentum_m`). A small cell without a target (a gap narrower than a cell) is
+!! unmerged.
 module merged_cells_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
-  use solid_geometry_m, only: solid_geometry_t, apertures, edge_in
-  use rigid_motion_m, only: rigid_motion_t, wall_velocity
-  use rigid_flux_m, only: arm_to_cell
-  use wall_distance_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
-  use wall_profile_m, only: slip_at
+  use solid_geometry_m, only: solid_geometry_t, edge_in, centre_in_fluid
+  use rigid_motion_m, only: rigid_motion_t
+  use rigid_flux_m, only: velocity_in_cell
+  use wall_plane_m, only: wall_normal, distance_to_fluid, distance_to_centre, distance_by_links
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: targets_at_most, is_unmerged, along_share, match_densities, mean_apertures
-  public :: velocity_at_wall
+  public :: max_targets, is_unmerged, velocity_at_wall
 
-  integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
-  integer, parameter :: targets_at_most = 3  !! of a small cell
+  integer, parameter :: halo_layers = 2      !! layers of the halo with small cells that are needed
+  integer, parameter :: max_targets = 3  !! of a small cell
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a target.
   type :: merged_cells_t
@@ -34,11 +32,9 @@ module merged_cells_m
     !> Wall cells of body b: `by_body(first_of_body(b):first_of_body(b+1)-1)`.
     integer, allocatable :: by_body(:), first_of_body(:)
     real(wp), allocatable :: normal(:, :)        !! (3, *) of the wall, into the fluid
-    integer, allocatable :: step(:, :)           !! (3*targets_at_most, n_small) to the targets
-    integer, allocatable :: target(:, :)         !! (targets_at_most, n_small) numbers, 0: none
+    integer, allocatable :: target(:, :)         !! (max_targets, n_small) numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the small cell, sum 1
-    real(wp), allocatable :: by_wall(:, :)       !! likewise: 1 - r
-    real(wp), allocatable :: nearer(:, :)        !! likewise, less under heavy small cells
+    real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the small cell in a cell, 0 to 1
     !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
@@ -50,7 +46,6 @@ module merged_cells_m
     integer, allocatable :: leader(:)            !! (groups) number of the target
     integer, allocatable :: first(:)             !! (groups + 1) of its parts in `part`
     integer, allocatable :: part(:, :)           !! (2, *) small cell, which of its targets
-    integer, allocatable :: group(:)             !! of each target while the groups are found
   end type merged_cells_t
 
 contains
@@ -66,9 +61,8 @@ contains
     allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%middle(0), self%ratio(0), self%centre(0))
-    allocate (self%step(3*targets_at_most, 0), self%target(targets_at_most, 0))
-    allocate (self%share(targets_at_most, 0), self%by_wall(targets_at_most, 0))
-    allocate (self%nearer(targets_at_most, 0), self%distance(targets_at_most, 0))
+    allocate (self%target(max_targets, 0), self%share(max_targets, 0))
+    allocate (self%nearer(max_targets, 0), self%distance(max_targets, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -111,7 +105,7 @@ contains
     logical :: yes
     integer :: d, e(3)
 
-    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, reach)
+    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, halo_layers)
     if (.not. yes) return
     yes = any(solid%aperture(c(1), c(2), c(3), :) > 0.0_wp)
     do d = 1, 3
@@ -157,7 +151,7 @@ contains
     do b = 1, size(solid%body_cell) - 1
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         c = solid%cell(:, m)
-        if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, reach)) cycle
+        if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, halo_layers)) cycle
         n = self%number(c(1), c(2), c(3))
         if (n == 0) then
           call add_cell(c, b, self)
@@ -184,7 +178,7 @@ contains
     subroutine add_beside(c)
       integer, intent(in) :: c(3)
 
-      if (.not. is_near(grid, c, reach)) return
+      if (.not. is_near(grid, c, halo_layers)) return
       if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell(c, b, self)
     end subroutine add_beside
   end subroutine add_cut_cells
@@ -219,25 +213,23 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, o(3), body
+    integer :: step(3, max_targets, self%n_small)   ! from the small cells to their targets
 
     call ensure_capacity(self%n_small, self%normal)
-    call ensure_capacity(self%n_small, self%step)
     call ensure_capacity(self%n_small, self%target)
     call ensure_capacity(self%n_small, self%share)
-    call ensure_capacity(self%n_small, self%by_wall)
     call ensure_capacity(self%n_small, self%nearer)
     call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
-      call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), self%step(:, m), &
-                     self%share(:, m), self%by_wall(:, m), self%distance(:, m))
-      self%nearer(:, m) = self%by_wall(:, m)
+      call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), step(:, :, m), &
+                     self%share(:, m), self%nearer(:, m), self%distance(:, m))
     end do
     do m = 1, self%n_small
       body = self%body(m)
       self%target(:, m) = 0
-      do n = 1, targets_at_most
-        o = self%cell(:, m) + self%step(3*n - 2:3*n, m)
+      do n = 1, max_targets
+        o = self%cell(:, m) + step(:, n, m)
         if (self%share(n, m) <= 0.0_wp .or. .not. is_near(grid, o, n_halo)) cycle
         call add_cell(o, body, self)
         self%target(n, m) = self%number(o(1), o(2), o(3))
@@ -253,8 +245,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(out) :: normal(3)
-    integer, intent(out) :: steps(3, targets_at_most)
-    real(wp), intent(out), dimension(targets_at_most) :: share, nearer, distance
+    integer, intent(out) :: steps(3, max_targets)
+    real(wp), intent(out), dimension(max_targets) :: share, nearer, distance
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: n
@@ -265,7 +257,7 @@ contains
     call to_targets(grid, solid, c, normal, steps, share)
     if (all(abs(normal) <= 0.0_wp)) return
     own = distance_to_fluid(grid, solid, c, here, normal)
-    do n = 1, targets_at_most
+    do n = 1, max_targets
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
       distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
       nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
@@ -311,8 +303,8 @@ contains
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(in) :: normal(3)   !! of the wall
-    integer, intent(out) :: steps(3, targets_at_most)
-    real(wp), intent(out) :: share(targets_at_most)
+    integer, intent(out) :: steps(3, max_targets)
+    real(wp), intent(out) :: share(max_targets)
     integer :: d, f(3), i, j, k
     real(wp) :: along, way(3)
 
@@ -320,8 +312,8 @@ contains
       steps(:, d) = nint(sign(1.0_wp, normal(d)))*unit_step(:, d)
       f = c + max(steps(:, d), 0)
       share(d) = 0.0_wp
-      if (is_fluid(steps(:, d))) share(d) = solid%aperture(f(1), f(2), f(3), d) &
-        *(grid%area(d)/grid%area(1))*abs(normal(d))
+      if (.not. centre_in_fluid(grid, solid, c + steps(:, d))) cycle
+      share(d) = solid%aperture(f(1), f(2), f(3), d)*(grid%area(d)/grid%area(1))*abs(normal(d))
     end do
     if (any(share > 0.0_wp)) then
       share = share/sum(share)
@@ -331,7 +323,7 @@ contains
     do k = -1, 1
       do j = -1, 1
         do i = -1, 1
-          if (.not. is_fluid([i, j, k])) cycle
+          if (.not. centre_in_fluid(grid, solid, c + [i, j, k])) cycle
           way = real([i, j, k], wp)*(grid%h/grid%h(1))
           if (dot_product(normal, way)/norm2(way) <= along) cycle
           along = dot_product(normal, way)/norm2(way)
@@ -340,15 +332,6 @@ contains
         end do
       end do
     end do
-  contains
-    pure logical function is_fluid(step)
-      integer, intent(in) :: step(3)
-      integer :: o(3)
-
-      o = c + step
-      is_fluid = .not. grid%outside(o)
-      if (is_fluid) is_fluid = solid%inside(o(1), o(2), o(3)) == 0
-    end function is_fluid
   end subroutine to_targets
 
   !> The parts of small cells of each target beside an own cell, in the order of their places around
@@ -357,24 +340,24 @@ contains
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(inout) :: self
     integer :: m, n, f, g, n_parts
+    integer :: group(self%n)   ! of each target; first the number of its parts
 
-    call ensure_capacity(self%n, self%group)
-    self%group(:self%n) = 0
+    group = 0
     do f = 1, self%n_small   ! count the parts of each target
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         m = self%target(n, f)
-        if (m > 0) self%group(m) = self%group(m) + 1
+        if (m > 0) group(m) = group(m) + 1
       end do
     end do
     self%n_groups = 0
     n_parts = 0
     do m = self%n_small + 1, self%n
-      if (self%group(m) == 0) cycle
-      n = self%group(m)
-      self%group(m) = 0
+      if (group(m) == 0) cycle
+      n = group(m)
+      group(m) = 0
       if (any(self%cell(:, m) < grid%lo - 1) .or. any(self%cell(:, m) > grid%hi + 1)) cycle
       self%n_groups = self%n_groups + 1
-      self%group(m) = self%n_groups
+      group(m) = self%n_groups
       call ensure_capacity(self%n_groups, self%leader)
       call ensure_capacity(self%n_groups + 1, self%first)
       self%leader(self%n_groups) = m
@@ -384,10 +367,10 @@ contains
     self%first(self%n_groups + 1) = n_parts + 1
     call ensure_capacity(n_parts, self%part, rows=2)
     do f = 1, self%n_small
-      do n = 1, targets_at_most
+      do n = 1, max_targets
         m = self%target(n, f)
         if (m == 0) cycle
-        g = self%group(m)
+        g = group(m)
         if (g == 0) cycle
         self%first(g) = self%first(g) - 1
         self%part(:, self%first(g)) = [f, n]
@@ -431,64 +414,15 @@ contains
     yes = all(self%target(:, small) == 0)
   end function is_unmerged
 
-  !> Share of the velocity of its target number n along the wall, seen from the wall, that a small
-  !! cell has.
-  pure function along_share(self, small, n) result(share)
-    type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: small, n
-    real(wp) :: share
-
-    associate (c => self%cell(:, small), nearer => self%nearer(n, small))
-      share = 1.0_wp - nearer*(1.0_wp - slip_at(self%slip(c(1), c(2), c(3)), 1.0_wp - nearer))
-    end associate
-  end function along_share
-
-  !> Flatten the profile of small cells that are heavier than their target.
-  !!
-  !! What a heavy small cell does would else be extrapolated to the light cell beside it, which
-  !! amplifies it by up to 1/r. With 1 - r times the ratio of the densities a group of water under
-  !! gas is as well conditioned as one of gas alone.
-  subroutine match_densities(grid, rho, self)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! of the fluid [kg/m3]
-    type(merged_cells_t), intent(inout) :: self
-    integer :: m, n
-
-    !$omp parallel do private(n) schedule(static)
-    do m = 1, self%n_small
-      self%nearer(:, m) = self%by_wall(:, m)
-      do n = 1, targets_at_most
-        if (self%target(n, m) == 0) cycle
-        associate (c => self%cell(:, m), p => self%cell(:, self%target(n, m)))
-          self%nearer(n, m) = self%by_wall(n, m) &
-                              *min(1.0_wp, rho(p(1), p(2), p(3))/rho(c(1), c(2), c(3)))
-        end associate
-      end do
-    end do
-  end subroutine match_densities
-
-  !> Velocity of the wall of a small cell [m/s].
-  pure function velocity_at_wall(grid, self, small, bodies) result(v)
+  !> Velocity of the wall of a wall cell at its centre [m/s].
+  pure function velocity_at_wall(grid, self, m, bodies) result(v)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: self
-    integer, intent(in) :: small
+    integer, intent(in) :: m
     type(rigid_motion_t), intent(in) :: bodies
     real(wp) :: v(3)
 
-    associate (b => self%body(small), c => self%cell(:, small))
-      v = wall_velocity(bodies%motion(:, b), arm_to_cell(grid, c, bodies%x(:, b)))
-    end associate
+    v = velocity_in_cell(grid, bodies, self%body(m), self%cell(:, m))
   end function velocity_at_wall
-
-  !> Share of the cell's mass that moves with each velocity component: mean of its two open faces.
-  pure function mean_apertures(grid, aperture, c) result(w)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in), contiguous :: aperture(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    integer, intent(in) :: c(3)
-    real(wp) :: w(3)
-
-    w = 0.5_wp*sum(apertures(grid, aperture, c), 2)
-  end function mean_apertures
 
 end module merged_cells_m
