@@ -1,4 +1,4 @@
-!> Bodies with their images in other periods, voxelised in the cells kept here: shares, links,
+!> Bodies with their images in other periods, voxelised into the cells kept here: shares, links,
 !! lists.
 module voxels_m
   use kinds_m, only: wp

@@ -49,12 +49,14 @@ def _of_block(run: Run, k: int) -> BlockNumbers:
 
 
 def impact_speed(run: Run, k: int) -> float:
-    """Speed [m/s] of a block (from 0) in the row before its first touch; nan without one."""
+    """Speed [m/s] of a block (from 0) in the row before its first touch; nan without one.
+
+    A touch of a block that has not moved yet is none: it may lie on what will let it go.
+    """
     b = run.bodies
-    touched = np.flatnonzero(b.contacts[:, k] > 0)
-    if not touched.size or touched[0] == 0:
-        return float("nan")
-    return float(np.linalg.norm(b.velocity[touched[0] - 1, k]))
+    speed = np.linalg.norm(b.velocity[:-1, k], axis=1)
+    begins = (b.contacts[1:, k] > 0) & (b.contacts[:-1, k] <= 0) & (speed > 0)
+    return float(speed[np.argmax(begins)]) if begins.any() else float("nan")
 
 
 def _largest(force: np.ndarray) -> float:
