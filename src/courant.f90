@@ -3,7 +3,7 @@
 !!
 !! The step follows liquid and blocks. Gas that a closing hole presses out, or that a jet drags
 !! along, is ten times as fast and has a thousandth of the mass: it does not shorten the step, its
-!! transport takes more parts (`fluid_transport_m`), unless it is faster still. Measured choice:
+!! transport takes more subcycles (`fluid_transport_m`), unless it is faster still. Measured choice:
 !! docs/decisions/time_step.md.
 module courant_m
   use kinds_m, only: wp

@@ -41,7 +41,7 @@ module step_m
   use rigid_body_m, only: fastest_point, follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: store_touches, forget_overlaps, warn_of_overlaps, reported_share
+  use deep_overlaps_m, only: store_points, forget_overlaps, warn_of_overlaps, reported_share
   use release_m, only: release_due_blocks, let_go_lowered, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
@@ -57,7 +57,8 @@ module step_m
   public :: take_step, measure_overlap
 
   real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
-  real(wp), parameter :: worth_measuring = 0.5_wp   !! depth of a touch over the reported one [-]
+  real(wp), parameter :: worth_measuring = 0.5_wp
+    !! depth of a contact point over the reported one [-]
 
 contains
 
@@ -126,14 +127,14 @@ contains
     report%overlap_known = .false.
     if (sim%clock%row_due() .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
-    else if (sim%contacts%touching%exact &
+    else if (sim%contacts%detected%exact &
              .and. contact%deepest > worth_measuring*reported_share) then
       call look_for_overlaps(.true., sim, report)
     else
       call forget_overlaps(sim%deep)
     end if
-    associate (touching => sim%contacts%touching)
-      if (.not. touching%exact) call store_touches(touching%touches, sim%deep)
+    associate (detected => sim%contacts%detected)
+      if (.not. detected%exact) call store_points(detected%points, sim%deep)
     end associate
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
@@ -148,7 +149,7 @@ contains
     report%overlap_known = .true.
   end subroutine measure_overlap
 
-  !> The same of all bodies, or of those that move and what these touch: where touches are deep.
+  !> The same of all bodies, or of those that move and what these touch: where contacts are deep.
   subroutine look_for_overlaps(moving, sim, report)
     logical, intent(in) :: moving
     type(simulation_t), intent(inout) :: sim
@@ -190,7 +191,7 @@ contains
     report%fluid = measure_fluid(sim%case%fluid, sim%grid, sim%flow, sim%solid)
     call store_energy(energies(sim, report%fluid, report%contact_energy), sim%energy)
     report%energy_excess = energy_excess(sim%energy)
-    report%transport_parts = sim%transport%liquid%parts
+    report%transport_parts = sim%transport%liquid%subcycles
     report%transport_converged = sim%transport%liquid%small%converged
     report%inertia_clips = report%inertia_clips + count(sim%coupling%bodies%clipped)
     report%sealed_cells = sim%solid%n_sealed
@@ -225,7 +226,7 @@ contains
     call store_release(energies(sim, fluid, sim%energy%parts%contact), sim%energy)
   end subroutine reserve
 
-  !> A block that has just appeared feels what a fluid at rest does to it when it is let go; after
+  !> A block that has just appeared gets the force of a fluid at rest when it is let go; after
   !! each step the fluid force of that step takes over.
   subroutine first_force(sim)
     type(simulation_t), intent(inout) :: sim
@@ -260,7 +261,7 @@ contains
   end subroutine begin
 
   !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which
-  !! nobody asks for the links and the free share.
+  !! nobody reads the links and the effective aperture.
   subroutine voxelise(sim)
     type(simulation_t), intent(inout) :: sim
     type(solid_geometry_t), allocatable :: keep

@@ -6,5 +6,5 @@ status=0
 $bin/fortitude check --output-format concise src verification || status=1
 $bin/ruff check --quiet --output-format concise || status=1
 $bin/ruff format --check --quiet || { $bin/ruff format --check; status=1; }
-$bin/mypy --strict -p micstools -p measures -m rooms || status=1
+$bin/mypy --strict -p micstools -p measures -m packages || status=1
 exit $status

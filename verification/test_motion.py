@@ -108,7 +108,7 @@ def test_fluid_of_a_door(coupling: str, tmp_path: Path) -> None:
     case += f"&numerics coupling = '{coupling}' /\n"
     with run(tmp_path, case, DOOR) as h5:
         assert np.abs(h5["series/liquid_volume_drift"][:]).max() < 1e-12
-        if coupling == "monolithic":  # the other one paints bodies over the flow
+        if coupling == "monolithic":  # the other one overlays bodies on the flow
             assert h5["series/divergence_max"][:].max() < 1e-5
         assert h5["series/cfl"][:].max() <= 0.5 * (1 + 1e-9)
         b = h5["bodies"]

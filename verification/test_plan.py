@@ -142,7 +142,7 @@ def speed(plan: str, start: str) -> float:
     return float(found[1])
 
 
-def test_falls_are_foreseen(tmp_path: Path) -> None:
+def test_falls_are_predicted(tmp_path: Path) -> None:
     """Height, depth and cells; free fall in air; under water the estimate of the plan."""
     plan = plan_of(tmp_path, f"{CUBE} 2, 2, 6.5  velocity = 0, 0, -1 /")
     assert (

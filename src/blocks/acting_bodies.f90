@@ -2,7 +2,7 @@
 !! What nothing touches costs nothing in a substep.
 module acting_bodies_m
   use rigid_body_m, only: blocks_t
-  use touches_m, only: touches_t
+  use contact_points_m, only: contact_points_t
   implicit none
   private
   public :: acting_t, acting_init, list_acting, list_present
@@ -24,26 +24,26 @@ contains
     allocate (acting%listed(n), source=.false.)
   end subroutine acting_init
 
-  !> Those awake, and those of the touches that are or may soon be.
-  pure subroutine list_acting(blocks, touches, soon, acting)
+  !> Those awake, and those of the contact points that are or may soon be.
+  pure subroutine list_acting(blocks, points, soon, acting)
     type(blocks_t), intent(in) :: blocks
-    type(touches_t), intent(in) :: touches, soon
+    type(contact_points_t), intent(in) :: points, soon
     type(acting_t), intent(inout) :: acting
 
     acting%listed = blocks%present .and. .not. blocks%asleep
-    call add(touches, acting)
+    call add(points, acting)
     call add(soon, acting)
     call pack_listed(acting)
   end subroutine list_acting
 
-  pure subroutine add(touches, acting)
-    type(touches_t), intent(in) :: touches
+  pure subroutine add(points, acting)
+    type(contact_points_t), intent(in) :: points
     type(acting_t), intent(inout) :: acting
     integer :: t
 
-    do t = 1, touches%n
-      acting%listed(touches%item(t)%a) = .true.
-      if (touches%item(t)%b > 0) acting%listed(touches%item(t)%b) = .true.
+    do t = 1, points%n
+      acting%listed(points%item(t)%a) = .true.
+      if (points%item(t)%b > 0) acting%listed(points%item(t)%b) = .true.
     end do
   end subroutine add
 

@@ -1,20 +1,20 @@
-!> Forces of all touches on their partners, and the tangential springs that remember them.
+!> Forces of all contact points, and the tangential displacements that remember them.
 module contact_forces_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
-  use springs_m, only: springs_t, reserve_springs, comes_before, begins_pair
-  use touching_m, only: touching_t
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair
+  use contact_detection_m, only: contact_detection_t
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
-  use contact_partners_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
+  use counterparts_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_apart
   use contact_load_m, only: give_share
   implicit none
   private
-  public :: loads_t, contact_report_t, match_springs, stretch_springs, sum_forces, push_group, &
-    elastic_energy, energy_in_memory
+  public :: loads_t, contact_report_t, match_displacements, integrate_displacements, sum_forces, &
+    push_group, elastic_energy, energy_in_memory
 
-  !> Contact forces and torques on all partners: (3, partners).
+  !> Contact forces and torques on all counterparts: (3, counterparts).
   type :: loads_t
     real(wp), allocatable :: force(:, :), torque(:, :)   !! of this substep [N], [N m]
     real(wp), allocatable :: impulse(:, :), twist(:, :)  !! of the step [N s], [N m s]
@@ -26,12 +26,12 @@ module contact_forces_m
     integer :: substeps = 0
     integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
-    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a touch [-]
-    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a touch [m],
+    real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a contact point [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m],
     real(wp) :: deepest = 0.0_wp        !! and over the smallest edge of the smaller block [-]
   end type contact_report_t
 
-  !> What the touches of one group do along their normals.
+  !> What the contact points of one group do along their normals.
   type :: push_t
     real(wp) :: force = 0.0_wp          !! sum [N]
     real(wp) :: eta = 0.0_wp            !! largest damping [N s/m]
@@ -40,42 +40,43 @@ module contact_forces_m
 
 contains
 
-  !> Give each group its spring: that in memory turned into the present plane, or a new one.
-  subroutine match_springs(touching, before, springs)
-    type(touching_t), intent(inout) :: touching
-    type(springs_t), intent(inout) :: before   !! work: springs of the substep before
-    type(springs_t), intent(inout) :: springs
+  !> Give each group its tangential displacement: that in memory turned into the present plane, or
+  !! none yet.
+  subroutine match_displacements(detected, before, displacements)
+    type(contact_detection_t), intent(inout) :: detected
+    type(displacements_t), intent(inout) :: before   !! work: displacements of the substep before
+    type(displacements_t), intent(inout) :: displacements
     integer :: g, m, t
 
-    associate (touches => touching%touches, groups => touching%groups, old => before, &
-      new => springs)
-      call reserve_springs(new%n, old)
+    associate (points => detected%points, groups => detected%groups, old => before, &
+      new => displacements)
+      call reserve_displacements(new%n, old)
       old%n = new%n
       old%a(:old%n) = new%a(:old%n)
       old%b(:old%n) = new%b(:old%n)
-      old%key(:old%n) = new%key(:old%n)
+      old%id(:old%n) = new%id(:old%n)
       old%xi(:, :old%n) = new%xi(:, :old%n)
-      call reserve_springs(groups%n, new)
+      call reserve_displacements(groups%n, new)
       new%n = groups%n
       m = 1
       do g = 1, groups%n
         t = groups%first(g)
-        new%a(g) = touches%item(t)%a
-        new%b(g) = touches%item(t)%b
-        new%key(g) = touches%item(t)%key
+        new%a(g) = points%item(t)%a
+        new%b(g) = points%item(t)%b
+        new%id(g) = points%item(t)%id
         new%xi(:, g) = 0.0_wp
         groups%new(g) = .true.
         do while (m <= old%n)
-          if (.not. comes_before(old%a(m), old%b(m), old%key(m), &
-                                 new%a(g), new%b(g), new%key(g))) exit
+          if (.not. comes_before(old%a(m), old%b(m), old%id(m), &
+                                 new%a(g), new%b(g), new%id(g))) exit
           m = m + 1
         end do
         if (m > old%n) cycle
-        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%key(m) /= new%key(g)
+        groups%new(g) = old%a(m) /= new%a(g) .or. old%b(m) /= new%b(g) .or. old%id(m) /= new%id(g)
         if (.not. groups%new(g)) new%xi(:, g) = turned_into_plane(old%xi(:, m), groups%normal(:, g))
       end do
     end associate
-  end subroutine match_springs
+  end subroutine match_displacements
 
   !> The vector xi turned into the plane normal to n, its length kept.
   pure function turned_into_plane(xi, n) result(turned)
@@ -88,34 +89,34 @@ contains
     if (length > 0.0_wp) turned = turned*(norm(xi)/length)
   end function turned_into_plane
 
-  !> Let the springs follow the present tangential velocities for a time dt.
-  pure subroutine stretch_springs(dt, touching, springs)
+  !> Let the displacements follow the present tangential velocities for a time dt.
+  pure subroutine integrate_displacements(dt, detected, displacements)
     real(wp), intent(in) :: dt   !! [s]
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(inout) :: springs
+    type(contact_detection_t), intent(in) :: detected
+    type(displacements_t), intent(inout) :: displacements
     type(motion_t) :: motion
     real(wp) :: v(3)
     integer :: g
 
-    associate (groups => touching%groups)
+    associate (groups => detected%groups)
       do g = 1, groups%n
-        if (begins_pair(springs, g)) motion = motion_between(touching%partners, springs%a(g), &
-                                                             springs%b(g))
+        if (begins_pair(displacements, g)) motion = motion_between(detected%counterparts, &
+                                                             displacements%a(g), displacements%b(g))
         v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
-        springs%xi(:, g) = springs%xi(:, g) &
+        displacements%xi(:, g) = displacements%xi(:, g) &
           + dt*(v - dot_product(v, groups%normal(:, g))*groups%normal(:, g))
       end do
     end associate
-  end subroutine stretch_springs
+  end subroutine integrate_displacements
 
   !> Contact forces and torques of this substep on the walls and the bodies that act.
   !!
   !! The damping acts on the velocity in the middle of the substep, which the force itself changes:
   !! F = (k d - eta v_n)/s, see `slowing_of`.
-  pure subroutine sum_forces(dt, touching, springs, loads, report)
+  pure subroutine sum_forces(dt, detected, displacements, loads, report)
     real(wp), intent(in) :: dt   !! [s]
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(inout) :: springs
+    type(contact_detection_t), intent(in) :: detected
+    type(displacements_t), intent(inout) :: displacements
     type(loads_t), intent(inout) :: loads
     type(contact_report_t), intent(inout) :: report
     type(motion_t) :: motion
@@ -124,21 +125,21 @@ contains
 
     loads%force(:, :0) = 0.0_wp
     loads%torque(:, :0) = 0.0_wp
-    do g = 1, touching%acting%n
-      loads%force(:, touching%acting%body(g)) = 0.0_wp
-      loads%torque(:, touching%acting%body(g)) = 0.0_wp
+    do g = 1, detected%acting%n
+      loads%force(:, detected%acting%body(g)) = 0.0_wp
+      loads%torque(:, detected%acting%body(g)) = 0.0_wp
     end do
-    associate (n => touching%groups%n)
+    associate (n => detected%groups%n)
       do g = 1, n
-        if (begins_pair(springs, g)) then
-          motion = motion_between(touching%partners, springs%a(g), springs%b(g))
+        if (begins_pair(displacements, g)) then
+          motion = motion_between(detected%counterparts, displacements%a(g), displacements%b(g))
           wrench = wrench_t()
         end if
-        call push_group(g, dt, motion, touching, springs, wrench, report)
+        call push_group(g, dt, motion, detected, displacements, wrench, report)
         if (g < n) then
-          if (.not. begins_pair(springs, g + 1)) cycle
+          if (.not. begins_pair(displacements, g + 1)) cycle
         end if
-        associate (a => springs%a(g), b => springs%b(g))
+        associate (a => displacements%a(g), b => displacements%b(g))
           loads%force(:, a) = loads%force(:, a) + wrench%force
           loads%force(:, b) = loads%force(:, b) - wrench%force
           loads%torque(:, a) = loads%torque(:, a) + wrench%torque_a
@@ -149,34 +150,34 @@ contains
   end subroutine sum_forces
 
   !> Normal and tangential forces of one group.
-  pure subroutine push_group(g, dt, motion, touching, springs, wrench, report)
+  pure subroutine push_group(g, dt, motion, detected, displacements, wrench, report)
     integer, intent(in) :: g
     real(wp), intent(in) :: dt   !! [s]
     type(motion_t), intent(in) :: motion
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(inout) :: springs
+    type(contact_detection_t), intent(in) :: detected
+    type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
     type(contact_report_t), intent(inout) :: report
     type(push_t) :: push
     real(wp) :: v_n, opening, part, force_n, decay
     integer :: t
 
-    associate (touches => touching%touches, groups => touching%groups, r => touching%response, &
-      law => touching%law)
+    associate (points => detected%points, groups => detected%groups, r => detected%response, &
+      law => detected%law)
       decay = 0.0_wp
       do t = groups%first(g), groups%first(g + 1) - 1
-        associate (touch => touches%item(t))
-          v_n = dot_product(relative_velocity(motion, touch%arm_a, touch%arm_b), touch%normal)
+        associate (point => points%item(t))
+          v_n = dot_product(relative_velocity(motion, point%arm_a, point%arm_b), point%normal)
           part = 1.0_wp
-          if (groups%new(g)) part = damped_part(touch%depth, v_n, dt)
-          opening = opening_speed(touch, law%gamma_n, motion)
+          if (groups%new(g)) part = damped_part(point%depth, v_n, dt)
+          opening = opening_speed(point, law%gamma_n, motion)
           force_n = normal_force(r%elastic(t), part*r%eta(t), opening) &
             /slowing_of(part*r%decay(t)*dt)
-          call push_apart(touch, law%gamma_n, force_n, wrench)
-          report%courant_max = max(report%courant_max, abs(v_n)*dt/touch%length)
-          report%overlap_max = max(report%overlap_max, touch%depth)
-          report%deepest = max(report%deepest, give_share*touch%depth &
-            /min(touching%partners%give(touch%a), touching%partners%give(touch%b)))
+          call push_apart(point, law%gamma_n, force_n, wrench)
+          report%courant_max = max(report%courant_max, abs(v_n)*dt/point%length)
+          report%overlap_max = max(report%overlap_max, point%depth)
+          report%deepest = max(report%deepest, give_share*point%depth &
+            /min(detected%counterparts%give(point%a), detected%counterparts%give(point%b)))
         end associate
         push%force = push%force + force_n
         decay = max(decay, r%decay(t))
@@ -184,7 +185,7 @@ contains
       end do
     end associate
     push%slowing = slowing_of(decay*dt)
-    call rub(g, push, motion, touching, springs, wrench)
+    call rub(g, push, motion, detected, displacements, wrench)
   end subroutine push_group
 
   !> Force of a dashpot at the velocity of the start of a substep over that which acts.
@@ -199,9 +200,10 @@ contains
     s = max(1.0_wp + d, 2*d)
   end function slowing_of
 
-  !> Time since a new touch began up to the end of the substep, over the substep: 1/2 to 3/2.
+  !> Time since a new contact point began up to the end of the substep, over the substep: 1/2 to
+  !! 3/2.
   !!
-  !! Damping sets in with a jump. A touch is seen first when bodies touch in the middle of a
+  !! Damping sets in with a jump. A contact point is seen first when bodies touch in the middle of a
   !! substep, and may have begun up to a substep before.
   pure function damped_part(depth, v_n, dt) result(part)
     real(wp), intent(in) :: depth, v_n, dt   !! [m, m/s, s]
@@ -213,66 +215,68 @@ contains
 
   !> Tangential force of one group, no larger than friction allows.
   !!
-  !! The force of the spring alone is limited too: while it slips, the spring holds what friction
+  !! The force of the spring alone is limited too: while it slips, the displacement is what friction
   !! lets it hold, and the dashpot puts no energy into it.
-  pure subroutine rub(g, push, motion, touching, springs, wrench)
+  pure subroutine rub(g, push, motion, detected, displacements, wrench)
     integer, intent(in) :: g
     type(push_t), intent(in) :: push   !! along the normal
     type(motion_t), intent(in) :: motion
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(inout) :: springs
+    type(contact_detection_t), intent(in) :: detected
+    type(displacements_t), intent(inout) :: displacements
     type(wrench_t), intent(inout) :: wrench
-    real(wp) :: v(3), f(3), f_spring(3), k, k_n, eta, bound, size_f
+    real(wp) :: v(3), f(3), f_elastic(3), k, k_n, eta, bound, size_f
     integer :: t
 
-    associate (groups => touching%groups, law => touching%law)
+    associate (groups => detected%groups, law => detected%law)
       t = groups%first(g)
-      k_n = touching%response%k(t)
-      k = law%tangential_constant(k_n, touching%touches%item(t)%weight)
-      springs%k(g) = k
-      eta = law%tangential_damping(touching%touches%item(t)%weight, push%eta, k, k_n)
-      bound = push%force*merge(law%wall_friction, law%friction, springs%b(g) < 0)
+      k_n = detected%response%k(t)
+      k = law%tangential_constant(k_n, detected%points%item(t)%weight)
+      displacements%k(g) = k
+      eta = law%tangential_damping(detected%points%item(t)%weight, push%eta, k, k_n)
+      bound = push%force*merge(law%wall_friction, law%friction, displacements%b(g) < 0)
       v = relative_velocity(motion, groups%arm_a(:, g), groups%arm_b(:, g))
       v = v - dot_product(v, groups%normal(:, g))*groups%normal(:, g)
-      f = tangential_force(k, law%gamma_t, eta, springs%xi(:, g), v)/push%slowing
+      f = tangential_force(k, law%gamma_t, eta, displacements%xi(:, g), v)/push%slowing
       size_f = norm(f)
       if (size_f > bound) then
         f = f*(bound/size_f)
-        f_spring = tangential_force(k, law%gamma_t, 0.0_wp, springs%xi(:, g), v)
-        size_f = norm(f_spring)
-        if (size_f > bound) springs%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
-          f_spring*(bound/size_f), v)
+        f_elastic = tangential_force(k, law%gamma_t, 0.0_wp, displacements%xi(:, g), v)
+        size_f = norm(f_elastic)
+        if (size_f > bound) displacements%xi(:, g) = tangential_slip(k, law%gamma_t, 0.0_wp, &
+          f_elastic*(bound/size_f), v)
       end if
       call act(f, groups%arm_a(:, g), groups%arm_b(:, g), wrench)
     end associate
   end subroutine rub
 
-  !> Energy in the normal springs at the present poses and in the tangential springs [J].
-  pure function elastic_energy(touching, springs, rest) result(energy)
-    type(touching_t), intent(in) :: touching
-    type(springs_t), intent(in) :: springs, rest   !! of touches at work, of those at rest
+  !> Energy in the normal springs at the present poses and in the tangential displacements [J].
+  pure function elastic_energy(detected, displacements, rest) result(energy)
+    type(contact_detection_t), intent(in) :: detected
+    type(displacements_t), intent(in) :: displacements, rest
+      !! of contact points at work, of those at rest
     real(wp) :: energy
     integer :: t, g
 
     energy = 0.0_wp
-    do t = 1, touching%touches%n
-      energy = energy + touching%response%energy(t)
+    do t = 1, detected%points%n
+      energy = energy + detected%response%energy(t)
     end do
-    do g = 1, springs%n
-      energy = energy + stored_energy(springs%k(g), touching%law%gamma_t, norm(springs%xi(:, g)))
+    do g = 1, displacements%n
+      energy = energy + stored_energy(displacements%k(g), detected%law%gamma_t, &
+        norm(displacements%xi(:, g)))
     end do
     energy = energy + energy_in_memory(rest)
   end function elastic_energy
 
-  !> Energy of touches whose energy is remembered [J].
-  pure function energy_in_memory(springs) result(energy)
-    type(springs_t), intent(in) :: springs
+  !> Energy of contact points whose energy is remembered [J].
+  pure function energy_in_memory(displacements) result(energy)
+    type(displacements_t), intent(in) :: displacements
     real(wp) :: energy
     integer :: g
 
     energy = 0.0_wp
-    do g = 1, springs%n
-      energy = energy + springs%energy(g)
+    do g = 1, displacements%n
+      energy = energy + displacements%energy(g)
     end do
   end function energy_in_memory
 

@@ -1,4 +1,4 @@
-!> What a contact law provides for a touch, and what all laws have in common.
+!> What a contact law provides for a contact point, and what all laws have in common.
 !!
 !! Source: Yoshikawa et al. (2008), eqs. (1) and (2). The paper gives no constants; the law
 !! 'restitution' (`law_restitution_m`) finds them from what can be measured, 'constants'
@@ -7,94 +7,97 @@ module contact_law_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: contact_law_t, spring_t, load_t
+  public :: contact_law_t, stiffness_t, load_t
   public :: energy_of_force, stored_energy, normal_force, tangential_force, tangential_slip, power
 
   !> A contact law. Forces are those of springs k d^gamma, along the normal (n) and across (t).
   type, abstract :: contact_law_t
     real(wp) :: gamma_n = 1.0_wp, gamma_t = 1.0_wp   !! powers of the springs [-]
-    real(wp) :: damping_ratio = 0.0_wp     !! zeta of a pair on all its touches; 0: each by itself
+    real(wp) :: damping_ratio = 0.0_wp
+      !! zeta of a pair on all its contact points; 0: each by itself
     real(wp) :: friction = 0.0_wp          !! Coulomb, body on body [-]
     real(wp) :: wall_friction = 0.0_wp     !! Coulomb, body on wall [-]
   contains
     procedure(normal_constant_i), deferred :: normal_constant
     procedure(tangential_constant_i), deferred :: tangential_constant
-    procedure(normal_spring_i), deferred :: normal_spring
+    procedure(normal_stiffness_i), deferred :: normal_stiffness
     procedure(damping_i), deferred :: damping
     procedure(tangential_damping_i), deferred :: tangential_damping
   end type contact_law_t
 
-  !> The normal spring of a touch at work.
-  type :: spring_t
+  !> The elastic part of a contact point at work.
+  type :: stiffness_t
     real(wp) :: force = 0.0_wp             !! elastic, 0 where nothing touches yet [N]
     real(wp) :: energy = 0.0_wp            !! elastic [J]
-    !> Stiffness over that where the touch begins of the linear spring of the same force and energy.
+    !> Stiffness over that where the contact point begins of the linear spring of the same force and
+    !! energy.
     real(wp) :: hardness = 1.0_wp          !! [-]
     !> dF/dd over w k `hardness`; where nothing touches yet, as where it begins.
     real(wp) :: steepness = 1.0_wp         !! [m^(gamma-1)]
-  end type spring_t
+  end type stiffness_t
 
-  !> What a touch may have to carry.
+  !> What a contact point may have to carry.
   type :: load_t
     real(wp) :: mass = 0.0_wp              !! [kg]
     real(wp) :: weight = 0.0_wp            !! of that mass [N]
   end type load_t
 
   abstract interface
-    !> Constant k_n of a touch of weight one: the same whatever else touches, so that the elastic
-    !! energy is a function of position only.
+    !> Constant k_n of a contact point of weight one: the same whatever else touches, so that the
+    !! elastic energy is a function of position only.
     elemental function normal_constant_i(law, reduced_mass, load, give) result(k)
       import :: contact_law_t, load_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: reduced_mass   !! of the two bodies, 1/(1/M_a + 1/M_b) [kg]
-      type(load_t), intent(in) :: load       !! on the touch
+      type(load_t), intent(in) :: load       !! on the contact point
       real(wp), intent(in) :: give           !! overlap that it may make at rest, > 0 [m]
       real(wp) :: k                          !! [N/m^gamma_n]
     end function normal_constant_i
 
-    !> Constant k_t of a touch whose normal constant is k_n.
+    !> Constant k_t of a contact point whose normal constant is k_n.
     elemental function tangential_constant_i(law, k_n, weight) result(k)
       import :: contact_law_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: k_n      !! of the touch [N/m^gamma_n]
-      real(wp), intent(in) :: weight   !! of the touch [-]
+      real(wp), intent(in) :: k_n      !! of the contact point [N/m^gamma_n]
+      real(wp), intent(in) :: weight   !! of the contact point [-]
       real(wp) :: k                    !! [N/m^gamma_t]
     end function tangential_constant_i
 
-    !> The spring of a touch at its depth.
-    elemental subroutine normal_spring_i(law, k, weight, d, hard, spring)
-      import :: contact_law_t, spring_t, wp
+    !> The elastic force of a contact point at its depth.
+    elemental subroutine normal_stiffness_i(law, k, weight, d, hard, elastic)
+      import :: contact_law_t, stiffness_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
       real(wp), intent(in) :: k               !! where the spring begins, at weight one [N/m^gamma]
-      real(wp), intent(in) :: weight          !! of the touch [-]
-      real(wp), intent(in) :: d, hard         !! overlap, depth d_h at which touches harden [m]
-      type(spring_t), intent(out) :: spring
-    end subroutine normal_spring_i
+      real(wp), intent(in) :: weight          !! of the contact point [-]
+      real(wp), intent(in) :: d, hard         !! overlap, depth d_h at which contacts harden [m]
+      type(stiffness_t), intent(out) :: elastic
+    end subroutine normal_stiffness_i
 
-    !> Normal damping of a touch.
+    !> Normal damping of a contact point.
     elemental subroutine damping_i(law, share, k, total, inverse, eta, decay)
       import :: contact_law_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: share     !! stiffness of the touch over k: weight times hardness [-]
+      real(wp), intent(in) :: share
+        !! stiffness of the contact point over k: weight times hardness [-]
       real(wp), intent(in) :: k         !! of weight one [N/m^gamma_n]
       real(wp), intent(in) :: total     !! sum of the shares of the pair along the normal [-]
       real(wp), intent(in) :: inverse   !! of the mass of the pair there [1/kg]
-      real(wp), intent(out) :: eta      !! of the touch [N s/m]
+      real(wp), intent(out) :: eta      !! of the contact point [N s/m]
       real(wp), intent(out) :: decay    !! eta of the pair over twice its mass [1/s]
     end subroutine damping_i
 
-    !> Tangential damping of a touch [N s/m].
+    !> Tangential damping of a contact point [N s/m].
     elemental function tangential_damping_i(law, weight, eta_n, k_t, k_n) result(eta)
       import :: contact_law_t, wp
       implicit none
       class(contact_law_t), intent(in) :: law
-      real(wp), intent(in) :: weight    !! of the touch [-]
+      real(wp), intent(in) :: weight    !! of the contact point [-]
       real(wp), intent(in) :: eta_n     !! along the normal [N s/m]
-      real(wp), intent(in) :: k_t, k_n  !! of the touch [N/m^gamma]
+      real(wp), intent(in) :: k_t, k_n  !! of the contact point [N/m^gamma]
       real(wp) :: eta
     end function tangential_damping_i
   end interface
@@ -121,8 +124,8 @@ contains
   !!
   !! $$ F_n = k_n d_n^{\gamma_n} - \eta_n (v_r \cdot n) $$
   !!
-  !! The paper leaves the sense of v_r open; here it is partner minus self, so that v_r.n < 0 while
-  !! closing and the damping dissipates.
+  !! The paper leaves the sense of v_r open; here it is counterpart minus self, so that v_r.n < 0
+  !! while closing and the damping dissipates.
   elemental function normal_force(elastic, eta, v_n) result(f)
     real(wp), intent(in) :: elastic   !! k_n d_n^gamma_n of the spring [N]
     real(wp), intent(in) :: eta       !! [N s/m]
@@ -137,7 +140,8 @@ contains
   !! $$ F_t = k_t |\xi|^{\gamma_t - 1} \xi + \eta_t v_t $$
   pure function tangential_force(k, gamma, eta, xi, v_t) result(f)
     real(wp), intent(in) :: k, gamma, eta   !! [N/m^gamma, -, N s/m]
-    real(wp), intent(in) :: xi(3)           !! way of the partner past the body since they touch [m]
+    real(wp), intent(in) :: xi(3)
+      !! way of the counterpart past the body since they touch [m]
     real(wp), intent(in) :: v_t(3)          !! tangential part of v_r [m/s]
     real(wp) :: f(3)
 
@@ -149,19 +153,19 @@ contains
     end if
   end function tangential_force
 
-  !> Spring way at which the tangential force would be f: the way kept in memory while slipping [m].
+  !> Displacement at which the tangential force would be f: that kept in memory while slipping [m].
   pure function tangential_slip(k, gamma, eta, f, v_t) result(xi)
     real(wp), intent(in) :: k, gamma, eta   !! [N/m^gamma, -, N s/m]
     real(wp), intent(in) :: f(3)            !! [N]
     real(wp), intent(in) :: v_t(3)          !! [m/s]
     real(wp) :: xi(3)
-    real(wp) :: spring(3), length
+    real(wp) :: stretch(3), length
 
     xi = 0.0_wp
     if (k <= 0.0_wp) return
-    spring = (f - eta*v_t)/k
-    length = norm2(spring)
-    if (length > 0.0_wp) xi = spring*length**(1.0_wp/gamma - 1.0_wp)
+    stretch = (f - eta*v_t)/k
+    length = norm2(stretch)
+    if (length > 0.0_wp) xi = stretch*length**(1.0_wp/gamma - 1.0_wp)
   end function tangential_slip
 
   !> d^gamma, quick for the linear spring.

@@ -1,9 +1,9 @@
-!> What touches have to carry at rest, and how far they give way.
+!> Load of contact points at rest, and how far they give way.
 module contact_load_m
   use kinds_m, only: wp
   use mass_properties_m, only: surface_area
   use tet_mesh_m, only: shape_t
-  use contact_law_m, only: contact_law_t, spring_t, load_t
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t
   implicit none
   private
   public :: load_of, hard_depth, depth_at_rest, give_share
@@ -12,7 +12,7 @@ module contact_load_m
 
 contains
 
-  !> Load of a touch that carries a block.
+  !> Load of a contact point that carries a block.
   elemental function load_of(mass, gravity) result(load)
     real(wp), intent(in) :: mass      !! of the block [kg]
     real(wp), intent(in) :: gravity   !! >= 0 [m/s2]
@@ -22,8 +22,8 @@ contains
     load%weight = mass*gravity
   end function load_of
 
-  !> Depth at which touches of a block harden: a quarter of its mean thickness, twice the volume
-  !! over the surface [m].
+  !> Depth at which contact points of a block harden: a quarter of its mean thickness, twice the
+  !! volume over the surface [m].
   pure function hard_depth(shape) result(hard)
     type(shape_t), intent(in) :: shape
     real(wp) :: hard
@@ -31,15 +31,15 @@ contains
     hard = 0.5_wp*shape%volume/surface_area(shape%point, shape%triangle)
   end function hard_depth
 
-  !> Depth at which the spring of a touch of weight one holds a force, by bisection [m].
+  !> Depth at which the spring of a contact point of weight one holds a force, by bisection [m].
   pure function depth_at_rest(law, k, hard, force) result(depth)
     class(contact_law_t), intent(in) :: law
     real(wp), intent(in) :: k       !! of the law, `normal_constant` [N/m^gamma]
-    real(wp), intent(in) :: hard    !! depth d_h where touches harden, > 0 [m]
+    real(wp), intent(in) :: hard    !! depth d_h where contacts harden, > 0 [m]
     real(wp), intent(in) :: force   !! >= 0 [N]
     real(wp) :: depth
     integer, parameter :: halvings = 60
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp) :: low, high
     integer :: i
 
@@ -48,14 +48,14 @@ contains
     low = 0.0_wp
     high = hard
     do   ! ends: the force grows at least as the depth does
-      call law%normal_spring(k, 1.0_wp, high, hard, spring)
-      if (spring%force >= force) exit
+      call law%normal_stiffness(k, 1.0_wp, high, hard, elastic)
+      if (elastic%force >= force) exit
       high = 2*high
     end do
     do i = 1, halvings
       depth = 0.5_wp*(low + high)
-      call law%normal_spring(k, 1.0_wp, depth, hard, spring)
-      if (spring%force < force) then
+      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      if (elastic%force < force) then
         low = depth
       else
         high = depth

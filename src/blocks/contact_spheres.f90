@@ -1,4 +1,5 @@
-!> Touches of the contact spheres of the T-type model with one another, the plane walls and the bed.
+!> Contact points of the contact spheres of the T-type model with one another, the plane walls and
+!! the bed.
 !!
 !! Sphere pairs closer than a skin are listed, and the list is kept until a body has moved so far
 !! that others may touch. What comes out, and its order, do not depend on when the list was made.
@@ -9,18 +10,19 @@ module contact_spheres_m
   use tet_mesh_m, only: shape_t
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_t, bed_partner, bed_place, bed_is_near, bed_distance
+  use bed_m, only: bed_t, bed_counterpart, bed_place, bed_is_near, bed_distance
   use surface_search_m, only: found_t
   use neighbours_m, only: bins_t, bins_build, pair_list_t, near_pairs
-  use touches_m, only: touch_t, touches_t, add_touch
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
   implicit none
   private
-  public :: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  public :: contact_spheres_t, contact_spheres_init, find_sphere_points
 
   !> The spheres of a shape in bins, to find those near a point.
   type :: sphere_set_t
     type(bins_t) :: bins
-    real(wp) :: reach = 0.0_wp     !! of the sphere about the centre of mass that holds them all [m]
+    real(wp) :: bounding_radius = 0.0_wp
+      !! of the sphere about the centre of mass that holds them all [m]
     real(wp) :: largest = 0.0_wp   !! largest radius [m]
   end type sphere_set_t
 
@@ -39,7 +41,7 @@ module contact_spheres_m
     real(wp) :: free_way = 0.0_wp              !! by which bodies may move before the next list [m]
     real(wp) :: smallest = 0.0_wp              !! smallest d_s of eq. (6): limits the substep [m]
     type(sphere_set_t), allocatable :: set(:)  !! (shapes)
-    real(wp), allocatable :: reach(:)          !! (bodies) [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
     !> Spheres that may touch before the list is made anew, body by body.
     integer, allocatable :: slot_of(:)         !! slot of a sphere of all bodies; 0: not listed
     integer, allocatable :: offset(:)          !! (bodies) number of spheres of the bodies before
@@ -71,12 +73,12 @@ contains
     do s = 1, size(blocks%shapes)
       associate (shape => blocks%shapes(s))
         self%set(s)%largest = maxval(shape%sphere_radius)
-        self%set(s)%reach = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
+        self%set(s)%bounding_radius = maxval(norm2(shape%sphere_centre, 1) + shape%sphere_radius)
         call bins_build(shape%sphere_centre, shape%sphere_centre, 2*self%set(s)%largest, &
           self%set(s)%bins)
       end associate
     end do
-    allocate (self%reach(blocks%n), self%offset(blocks%n), self%present(blocks%n))
+    allocate (self%bounding_radius(blocks%n), self%offset(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%q(4, blocks%n), self%turn(3, 3, blocks%n), source=0.0_wp)
     self%smallest = huge(1.0_wp)
     s = 0
@@ -84,7 +86,7 @@ contains
       self%smallest = min(self%smallest, 2*minval(blocks%shapes(blocks%shape(b))%sphere_radius))
       self%offset(b) = s
       s = s + size(blocks%shapes(blocks%shape(b))%sphere_radius)
-      self%reach(b) = self%set(blocks%shape(b))%reach
+      self%bounding_radius(b) = self%set(blocks%shape(b))%bounding_radius
     end do
     allocate (self%slot_of(s), source=0)
     if (blocks%n == 0) return
@@ -93,14 +95,14 @@ contains
     self%skin = 2*self%free_way + self%clear
   end subroutine contact_spheres_init
 
-  !> All touches at the present poses, but for those between bodies that are still, and those
+  !> All contact points at the present poses, but for those between bodies that are still, and those
   !! (depth <= 0) that may come within a time `ahead`.
-  subroutine find_sphere_touches(walls, blocks, ahead, self, touches)
+  subroutine find_sphere_points(walls, blocks, ahead, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_spheres_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     integer :: p, s, b
 
     do b = 1, blocks%n
@@ -114,21 +116,21 @@ contains
         self%centre(:, s) = blocks%x(:, b) + r(:, 1)*c(1) + r(:, 2)*c(2) + r(:, 3)*c(3)
       end associate
     end do
-    touches%n = 0
+    points%n = 0
     do p = 1, self%list%n_pairs
       if (blocks%still(self%list%a(p))) then
         if (self%list%b(p) < 0) cycle
         if (blocks%still(self%list%b(p))) cycle
       end if
-      if (self%list%b(p) == bed_partner) then
-        call touch_bed(walls%bed, blocks, self, p, way(self, blocks, p, ahead), touches)
+      if (self%list%b(p) == bed_counterpart) then
+        call add_bed_points(walls%bed, blocks, self, p, way(self, blocks, p, ahead), points)
       else if (self%list%b(p) < 0) then
-        call touch_wall(walls, blocks, self, p, way(self, blocks, p, ahead), touches)
+        call add_wall_points(walls, blocks, self, p, way(self, blocks, p, ahead), points)
       else
-        call touch_body(blocks, self, p, way(self, blocks, p, ahead), touches)
+        call add_body_points(blocks, self, p, way(self, blocks, p, ahead), points)
       end if
     end do
-  end subroutine find_sphere_touches
+  end subroutine find_sphere_points
 
   !> The way by which two points of pair p may come nearer within a time [m].
   pure function way(self, blocks, p, time)
@@ -143,10 +145,10 @@ contains
     a = self%list%a(p)
     b = self%list%b(p)
     v = blocks%v(:, a)
-    way = norm2(blocks%omega(:, a))*self%reach(a)
+    way = norm2(blocks%omega(:, a))*self%bounding_radius(a)
     if (b > 0) then
       v = v - blocks%v(:, b)
-      way = way + norm2(blocks%omega(:, b))*self%reach(b)
+      way = way + norm2(blocks%omega(:, b))*self%bounding_radius(b)
     end if
     way = time*(way + norm2(v))
   end function way
@@ -167,7 +169,7 @@ contains
       dx = blocks%x(:, b) - self%x(:, b)
       dq = blocks%q(:, b) - self%q(:, b)
       ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
-      if (norm2(dx) + 2*self%reach(b)*norm2(dq) > self%free_way) return
+      if (norm2(dx) + 2*self%bounding_radius(b)*norm2(dq) > self%free_way) return
     end do
     yes = .false.
   end function moved_too_far
@@ -185,7 +187,8 @@ contains
     self%n_slots = 0
     self%list%n_pairs = 0
     self%list%n = 0
-    call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%skin, self%near)
+    call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%skin, &
+      self%near)
     p = 1
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
@@ -271,7 +274,7 @@ contains
     integer :: i, slot
 
     beyond = dot_product(walls%normal(:, w), blocks%x(:, a)) - walls%offset(w) + self%skin
-    if (beyond + self%reach(a) <= 0.0_wp) return
+    if (beyond + self%bounding_radius(a) <= 0.0_wp) return
     n = matmul(walls%normal(:, w), self%turn(:, :, a))
     call add_pair(a, walls%number(w), [0.0_wp, 0.0_wp, 0.0_wp], self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
@@ -290,19 +293,20 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     type(contact_spheres_t), intent(inout) :: self
-    real(wp) :: x(3), c(3), reach, distance, outward(3)
+    real(wp) :: x(3), c(3), cutoff, distance, outward(3)
     integer :: i, slot
 
     x = bed_place(bed, blocks%x(:, a))
-    reach = self%reach(a) + self%skin
-    if (.not. bed_is_near(bed, x - reach, x + reach)) return
-    call add_pair(a, bed_partner, [0.0_wp, 0.0_wp, 0.0_wp], self%list)
+    cutoff = self%bounding_radius(a) + self%skin
+    if (.not. bed_is_near(bed, x - cutoff, x + cutoff)) return
+    call add_pair(a, bed_counterpart, [0.0_wp, 0.0_wp, 0.0_wp], self%list)
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         c = x + matmul(self%turn(:, :, a), shape%sphere_centre(:, i))
-        reach = shape%sphere_radius(i) + self%skin
-        call bed_distance(bed, c, reach, reach + self%reach(a), self%found, distance, outward)
-        if (distance > reach) cycle
+        cutoff = shape%sphere_radius(i) + self%skin
+        call bed_distance(bed, c, cutoff, cutoff + self%bounding_radius(a), self%found, distance, &
+          outward)
+        if (distance > cutoff) cycle
         call take_slot(blocks, a, i, self, slot)
         call add_candidate(slot, 0, self%list)
       end do
@@ -326,7 +330,8 @@ contains
     associate (shape => blocks%shapes(blocks%shape(a)))
       do i = 1, size(shape%sphere_radius)
         c = shape%sphere_centre(:, i) - d_a
-        if (dot_product(c, c) >= (self%reach(b) + shape%sphere_radius(i) + self%skin)**2) cycle
+        if (dot_product(c, c) >= (self%bounding_radius(b) + shape%sphere_radius(i) &
+          + self%skin)**2) cycle
         call list_sphere(blocks, a, i, b, matmul(turn, c), self)
       end do
     end associate
@@ -338,15 +343,15 @@ contains
     integer, intent(in) :: a, i, b
     real(wp), intent(in) :: c(3)   !! [m]
     type(contact_spheres_t), intent(inout) :: self
-    real(wp) :: reach, d(3)
+    real(wp) :: cutoff, d(3)
     integer :: low(3), high(3), kx, ky, kz, bin, m, j, slot_i, slot_j
 
     associate (set => self%set(blocks%shape(b)), shape => blocks%shapes(blocks%shape(b)))
-      reach = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
-      if (any(c + reach + set%largest < set%bins%low) &
-        .or. any(c - reach - set%largest > set%bins%high)) return
-      low = set%bins%place(c - reach - set%largest)
-      high = set%bins%place(c + reach + set%largest)
+      cutoff = blocks%shapes(blocks%shape(a))%sphere_radius(i) + self%skin
+      if (any(c + cutoff + set%largest < set%bins%low) &
+        .or. any(c - cutoff - set%largest > set%bins%high)) return
+      low = set%bins%place(c - cutoff - set%largest)
+      high = set%bins%place(c + cutoff + set%largest)
       do kz = low(3), high(3)
         do ky = low(2), high(2)
           do kx = low(1), high(1)
@@ -354,7 +359,7 @@ contains
             do m = set%bins%first(bin), set%bins%first(bin + 1) - 1
               j = set%bins%item(m)
               d = shape%sphere_centre(:, j) - c
-              if (dot_product(d, d) >= (reach + shape%sphere_radius(j))**2) cycle
+              if (dot_product(d, d) >= (cutoff + shape%sphere_radius(j))**2) cycle
               call take_slot(blocks, a, i, self, slot_i)
               call take_slot(blocks, b, j, self, slot_j)
               call add_candidate(slot_i, slot_j, self%list)
@@ -365,61 +370,61 @@ contains
     end associate
   end subroutine list_sphere
 
-  !> Touches of pair p, a body and a wall. The contact lies on the wall.
-  subroutine touch_wall(walls, blocks, self, p, gap, touches)
+  !> Contact points of pair p, a body and a wall. The contact lies on the wall.
+  subroutine add_wall_points(walls, blocks, self, p, gap, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
     integer :: c, s, w
 
     w = findloc_wall(walls, self%list%b(p))
-    touch%a = self%list%a(p)
-    touch%b = self%list%b(p)
-    touch%normal = walls%normal(:, w)
+    point%a = self%list%a(p)
+    point%b = self%list%b(p)
+    point%normal = walls%normal(:, w)
     do c = self%list%first(p), self%list%first(p + 1) - 1
       s = self%list%i(c)
-      touch%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
+      point%depth = dot_product(walls%normal(:, w), self%centre(:, s)) - walls%offset(w) &
         + self%radius(s)
-      if (touch%depth <= -gap) cycle
-      touch%key = self%sphere(s)
-      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) &
-        + (self%radius(s) - touch%depth)*walls%normal(:, w)
-      touch%length = 2*self%radius(s)
-      call add_touch(touch, touches)
+      if (point%depth <= -gap) cycle
+      point%id = self%sphere(s)
+      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) &
+        + (self%radius(s) - point%depth)*walls%normal(:, w)
+      point%length = 2*self%radius(s)
+      call add_point(point, points)
     end do
-  end subroutine touch_wall
+  end subroutine add_wall_points
 
-  !> Touches of pair p, a body and the bed, each sphere at the nearest place of the bed.
-  subroutine touch_bed(bed, blocks, self, p, gap, touches)
+  !> Contact points of pair p, a body and the bed, each sphere at the nearest place of the bed.
+  subroutine add_bed_points(bed, blocks, self, p, gap, points)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(inout) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
     real(wp) :: distance, outward(3)
     integer :: c, s
 
-    touch%a = self%list%a(p)
-    touch%b = bed_partner
+    point%a = self%list%a(p)
+    point%b = bed_counterpart
     do c = self%list%first(p), self%list%first(p + 1) - 1
       s = self%list%i(c)
       call bed_distance(bed, bed_place(bed, self%centre(:, s)), self%radius(s) + gap, &
         2*self%radius(s) + gap, self%found, distance, outward)
       if (distance >= self%radius(s) + gap .or. all(abs(outward) <= 0.0_wp)) cycle
-      touch%key = self%sphere(s)
-      touch%normal = -outward
-      touch%arm_a = self%centre(:, s) - blocks%x(:, touch%a) - distance*outward
-      touch%depth = self%radius(s) - distance
-      touch%length = 2*self%radius(s)
-      call add_touch(touch, touches)
+      point%id = self%sphere(s)
+      point%normal = -outward
+      point%arm_a = self%centre(:, s) - blocks%x(:, point%a) - distance*outward
+      point%depth = self%radius(s) - distance
+      point%length = 2*self%radius(s)
+      call add_point(point, points)
     end do
-  end subroutine touch_bed
+  end subroutine add_bed_points
 
   !> Place of a wall in the list of walls.
   pure function findloc_wall(walls, number) result(w)
@@ -432,37 +437,37 @@ contains
     end do
   end function findloc_wall
 
-  !> Touches of pair p of bodies. The contact lies in the middle of the overlap.
-  subroutine touch_body(blocks, self, p, gap, touches)
+  !> Contact points of pair p of bodies. The contact lies in the middle of the overlap.
+  subroutine add_body_points(blocks, self, p, gap, points)
     type(blocks_t), intent(in) :: blocks
     type(contact_spheres_t), intent(in) :: self
     integer, intent(in) :: p
-    real(wp), intent(in) :: gap   !! still taken as a touch [m]
-    type(touches_t), intent(inout) :: touches
-    type(touch_t) :: touch
-    real(wp) :: d(3), shift(3), square, distance, reach
+    real(wp), intent(in) :: gap   !! still taken as a contact point [m]
+    type(contact_points_t), intent(inout) :: points
+    type(contact_point_t) :: point
+    real(wp) :: d(3), shift(3), square, distance, sum_of_radii
     integer :: c, i, j
 
-    touch%a = self%list%a(p)
-    touch%b = self%list%b(p)
+    point%a = self%list%a(p)
+    point%b = self%list%b(p)
     shift = self%list%shift(:, p)
     do c = self%list%first(p), self%list%first(p + 1) - 1
       i = self%list%i(c)
       j = self%list%j(c)
-      reach = self%radius(i) + self%radius(j)
+      sum_of_radii = self%radius(i) + self%radius(j)
       d = self%centre(:, j) + shift - self%centre(:, i)
       square = dot_product(d, d)
-      if (square >= (reach + gap)**2) cycle
+      if (square >= (sum_of_radii + gap)**2) cycle
       distance = sqrt(square)
-      touch%key = self%sphere(i)
-      touch%normal = d/max(distance, tiny(1.0_wp))
-      touch%depth = reach - distance
-      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*touch%depth)*touch%normal
-      touch%arm_a = d - blocks%x(:, touch%a)
-      touch%arm_b = d - (blocks%x(:, touch%b) + shift)
-      touch%length = 2*min(self%radius(i), self%radius(j))
-      call add_touch(touch, touches)
+      point%id = self%sphere(i)
+      point%normal = d/max(distance, tiny(1.0_wp))
+      point%depth = sum_of_radii - distance
+      d = self%centre(:, i) + (self%radius(i) - 0.5_wp*point%depth)*point%normal
+      point%arm_a = d - blocks%x(:, point%a)
+      point%arm_b = d - (blocks%x(:, point%b) + shift)
+      point%length = 2*min(self%radius(i), self%radius(j))
+      call add_point(point, points)
     end do
-  end subroutine touch_body
+  end subroutine add_body_points
 
 end module contact_spheres_m

@@ -3,14 +3,14 @@ module contact_state_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
   use rigid_body_m, only: blocks_t
-  use bed_m, only: bed_partner
-  use springs_m, only: springs_t, reserve_springs
+  use bed_m, only: bed_counterpart
+  use displacements_m, only: displacements_t, reserve_displacements
   use sleep_m, only: sleep_t, sleep_init
   use lubrication_m, only: lubrication_t
-  use touching_m, only: touching_t, touching_init
+  use contact_detection_m, only: contact_detection_t, detection_init
   use contact_forces_m, only: loads_t
   use substep_limits_m, only: limits_t, limits_init, longest_substep_of
-  use partners_met_m, only: met_t
+  use counterparts_met_m, only: met_t
   use impulse_rows_m, only: rows_t, rows_init
   implicit none
   private
@@ -22,10 +22,10 @@ module contact_state_m
   end type start_t
 
   type :: contacts_t
-    type(touching_t) :: touching                 !! what touches now
+    type(contact_detection_t) :: detected        !! what touches now
     type(limits_t) :: limits
-    type(springs_t) :: springs                   !! the memory: part of the state of a run
-    type(springs_t) :: before                    !! work: springs of the substep before
+    type(displacements_t) :: displacements       !! the memory: part of the state of a run
+    type(displacements_t) :: before              !! work: displacements of the substep before
     type(sleep_t) :: sleep                       !! blocks at rest: part of the state too
     logical, allocatable :: woken(:)             !! (n) work
     type(lubrication_t) :: lubrication
@@ -45,26 +45,28 @@ module contact_state_m
 
 contains
 
-  !> The contacts of a case, without any touch yet.
+  !> The contacts of a case, without any contact point yet.
   subroutine contacts_init(input, blocks, contacts)
     type(contact_input_t), intent(in) :: input
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(out) :: contacts
     integer :: n, b
 
-    call touching_init(input, longest_substep_of(input), blocks, contacts%touching)
-    call limits_init(input, contacts%touching, contacts%limits)
+    call detection_init(input, longest_substep_of(input), blocks, contacts%detected)
+    call limits_init(input, contacts%detected, contacts%limits)
     n = blocks%n
     associate (loads => contacts%loads, start => contacts%start)
-      allocate (loads%force(3, bed_partner:n), loads%torque(3, bed_partner:n), source=0.0_wp)
-      allocate (loads%impulse(3, bed_partner:n), loads%twist(3, bed_partner:n), source=0.0_wp)
-      allocate (loads%film(3, bed_partner:n), source=0.0_wp)
+      allocate (loads%force(3, bed_counterpart:n), loads%torque(3, bed_counterpart:n), &
+        source=0.0_wp)
+      allocate (loads%impulse(3, bed_counterpart:n), loads%twist(3, bed_counterpart:n), &
+        source=0.0_wp)
+      allocate (loads%film(3, bed_counterpart:n), source=0.0_wp)
       allocate (start%x(3, n), start%q(4, n), start%l(3, n), start%omega(3, n))
     end associate
     allocate (contacts%share(n), contacts%steady(3, n), contacts%held(6, n), source=0.0_wp)
-    call reserve_springs(1, contacts%springs)
-    call reserve_springs(1, contacts%before)
-    call sleep_init(input%sleep, contacts%limits%reach, contacts%sleep)
+    call reserve_displacements(1, contacts%displacements)
+    call reserve_displacements(1, contacts%before)
+    call sleep_init(input%sleep, contacts%limits%bounding_radius, contacts%sleep)
     allocate (contacts%woken(n), source=.false.)
     select case (input%solver)
     case ('springs'); return
@@ -76,7 +78,7 @@ contains
     contacts%smallest_edge = minval([(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, n)])
     call rows_init(n, contacts%rows)
     allocate (contacts%gain(n), source=0.0_wp)
-    associate (search => contacts%touching%surface%search)
+    associate (search => contacts%detected%surface%search)
       search%lasting = 2*input%contact_time   ! lists of fast bodies: two steps
       search%lasting_gaps = 1.0_wp
     end associate

@@ -1,8 +1,8 @@
-!> Touches of the exact surfaces of the blocks with one another, the plane walls and the bed.
+!> Contact points of the exact surfaces of the blocks with one another, the plane walls and the bed.
 !!
-!! A probe of one body (see `surface_features_m`) touches where it is inside the other; its depth is
-!! its distance from the surface of the other. A sharp edge touches an edge of the other where the
-!! two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
+!! A vertex of one body (see `surface_features_m`) touches where it is inside the other; its depth
+!! is its distance from the surface of the other. A sharp edge touches an edge of the other where
+!! the two cross; the depth is the distance of the two lines. Both ways, so that a pair has all the
 !! points that carry it. Each depth has a fixed weight: the elastic energy is a function of
 !! position. Spheres touch as spheres, at one point.
 !!
@@ -10,16 +10,17 @@
 !! another by a skin (`near_features_m`), and a short one of those that may touch soon
 !! (`short_list_m`). What comes out, and its order, do not depend on when the lists were made.
 !!
-!! With a margin (impulses) only what comes near by its own motion counts as a touch to come.
+!! With a margin (impulses) only what comes near by its own motion counts as a contact point to
+!! come.
 module contact_surface_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: distance, norm, rotation_matrix
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_t, bed_partner, bed_place
+  use bed_m, only: bed_t, bed_counterpart, bed_place
   use neighbours_m, only: pair_list_t, near_pairs
-  use touches_m, only: touch_t, touches_t, add_touch
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use surface_features_m, only: surface_init
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges, weight_slope
@@ -28,7 +29,7 @@ module contact_surface_m
   use short_list_m, only: short_list_t, short_list_holds, choose_features, n_chosen
   implicit none
   private
-  public :: contact_surface_t, contact_surface_init, find_surface_touches, cover_way, renew_pairs
+  public :: contact_surface_t, contact_surface_init, find_surface_points, cover_way, renew_pairs
 
   !> What may touch of a pair of bodies a > b, or of body a and the bed.
   type :: pair_t
@@ -40,7 +41,7 @@ module contact_surface_m
 
   type :: contact_surface_t
     type(surface_t), allocatable :: surface(:)   !! (shapes)
-    real(wp), allocatable :: reach(:)            !! (bodies) [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (bodies) [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6): limits the substep [m]
     type(search_t) :: search
     real(wp) :: wide_skin = 0.0_wp               !! the same for the list of pairs [m]
@@ -62,7 +63,8 @@ module contact_surface_m
 
   real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
   integer, parameter :: lasting_substeps = 10    !! that lists of fast bodies last
-  real(wp), parameter :: wide_share = 0.2_wp     !! skin of the pairs over the largest reach
+  real(wp), parameter :: wide_share = 0.2_wp
+    !! skin of the pairs over the largest bounding radius
 
 contains
 
@@ -78,21 +80,21 @@ contains
     do s = 1, size(blocks%shapes)
       call surface_init(blocks%shapes(s), self%surface(s))
     end do
-    allocate (self%reach(blocks%n), self%present(blocks%n))
+    allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
     allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
-      self%reach(b) = self%surface(blocks%shape(b))%reach
+      self%bounding_radius(b) = self%surface(blocks%shape(b))%bounding_radius
       self%smallest = min(self%smallest, self%surface(blocks%shape(b))%length)
       self%with_bed(b)%a = b
-      self%with_bed(b)%b = bed_partner
+      self%with_bed(b)%b = bed_counterpart
     end do
     if (blocks%n == 0) return
     self%search%skin = skin_share*self%smallest
     self%search%lasting = real(lasting_substeps, wp)*longest_substep
     self%search%min_ahead = courant_max*self%smallest
-    call cover_way(max(0.5_wp*wide_share*maxval(self%reach), self%search%min_ahead), self)
+    call cover_way(max(0.5_wp*wide_share*maxval(self%bounding_radius), self%search%min_ahead), self)
   end subroutine contact_surface_init
 
   !> Let the list of pairs hold all that may meet before any two bodies have come nearer by a way.
@@ -101,17 +103,17 @@ contains
     type(contact_surface_t), intent(inout) :: self
 
     self%clear = way
-    self%wide_skin = max(wide_share*maxval(self%reach), 2*way)
+    self%wide_skin = max(wide_share*maxval(self%bounding_radius), 2*way)
   end subroutine cover_way
 
-  !> All touches at the present poses, but for those between bodies that are still, and those
+  !> All contact points at the present poses, but for those between bodies that are still, and those
   !! (depth <= 0) that may come within a time `ahead`.
-  subroutine find_surface_touches(walls, blocks, ahead, self, touches)
+  subroutine find_surface_points(walls, blocks, ahead, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: speed, gap
     integer :: a, b, p, w
 
@@ -122,16 +124,16 @@ contains
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
-    touches%n = 0
+    points%n = 0
     p = 1
     do a = 1, blocks%n
       if (.not. blocks%present(a)) cycle
       if (.not. (blocks%fixed(a) .or. blocks%still(a))) then
-        speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%reach(a)
+        speed = norm(blocks%v(:, a)) + norm(blocks%omega(:, a))*self%bounding_radius(a)
         gap = ahead*speed + self%search%margin
-        if (walls%bed%there) call touch_bed(walls%bed, blocks, a, speed, ahead, self, touches)
+        if (walls%bed%there) call add_bed_points(walls%bed, blocks, a, speed, ahead, self, points)
         do w = 1, walls%n
-          call touch_wall(walls, blocks, a, w, gap, self, touches)
+          call add_wall_points(walls, blocks, a, w, gap, self, points)
         end do
       end if
       do while (p <= self%near%n)
@@ -139,12 +141,12 @@ contains
         b = self%near%b(p)
         if (.not. ((blocks%fixed(a) .and. blocks%fixed(b)) &
                    .or. (blocks%still(a) .and. blocks%still(b)))) then
-          call touch_pair(blocks, ahead, self%slot(p), self, touches)
+          call add_pair_points(blocks, ahead, self%slot(p), self, points)
         end if
         p = p + 1
       end do
     end do
-  end subroutine find_surface_touches
+  end subroutine find_surface_points
 
   !> Renew the list of pairs where it no longer holds.
   subroutine renew_pairs(walls, blocks, self)
@@ -189,7 +191,8 @@ contains
       self%old_a(:n_old) = self%near%a(:n_old)
       self%old_b(:n_old) = self%near%b(:n_old)
     end if
-    call near_pairs(blocks%x, self%reach, blocks%present, walls%period, self%wide_skin, self%near)
+    call near_pairs(blocks%x, self%bounding_radius, blocks%present, walls%period, self%wide_skin, &
+      self%near)
     call ensure_capacity(self%near%n, self%slot)
     call keep_slots(n_old, self)
     call take_slots(self)
@@ -272,47 +275,47 @@ contains
     self%taken(m + 1:) = .false.
   end subroutine ensure_pairs
 
-  !> Touches of body a and wall w: its corners, or its lowest point where it is a sphere.
-  subroutine touch_wall(walls, blocks, a, w, gap, self, touches)
+  !> Contact points of body a and wall w: its corners, or its lowest point where it is a sphere.
+  subroutine add_wall_points(walls, blocks, a, w, gap, self, points)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, w
-    real(wp), intent(in) :: gap     !! still taken as a touch [m]
+    real(wp), intent(in) :: gap     !! still taken as a contact point [m]
     type(contact_surface_t), intent(in) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: above, n(3), depth, arm(3)
     integer :: i
 
     above = walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, a))
     associate (surface => self%surface(blocks%shape(a)), turn => self%turn(:, :, a))
-      if (above > self%reach(a) + gap) return
+      if (above > self%bounding_radius(a) + gap) return
       n = matmul(walls%normal(:, w), turn)
       if (surface%ball > 0.0_wp) then
         arm = (surface%ball - 0.5_wp*(surface%ball - above))*walls%normal(:, w)
-        call add_touch(touch_t(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
-          walls%normal(:, w), surface%ball - above, 1.0_wp, surface%length), touches)
+        call add_point(contact_point_t(a, walls%number(w), 1, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), surface%ball - above, 1.0_wp, surface%length), points)
         return
       end if
       do i = 1, surface%n_corners
-        depth = dot_product(n, surface%probe(:, i)) - above
+        depth = dot_product(n, surface%vertex(:, i)) - above
         if (depth <= -gap) cycle
-        arm = matmul(turn, surface%probe(:, i))
-        call add_touch(touch_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
-          walls%normal(:, w), depth, surface%weight(i), surface%length), touches)
+        arm = matmul(turn, surface%vertex(:, i))
+        call add_point(contact_point_t(a, walls%number(w), i, arm, [0.0_wp, 0.0_wp, 0.0_wp], &
+          walls%normal(:, w), depth, surface%weight(i), surface%length), points)
       end do
     end associate
-  end subroutine touch_wall
+  end subroutine add_wall_points
 
-  !> Touches of body a and the bed: corners of the bed, corners of the body, crossing edges. The
-  !! points inside the faces of a body do not touch it: as on a wall, some corner always does.
-  subroutine touch_bed(bed, blocks, a, speed, ahead, self, touches)
+  !> Contact points of body a and the bed: corners of the bed, corners of the body, crossing edges.
+  !! The points inside the faces of a body do not touch it: as on a wall, some corner always does.
+  subroutine add_bed_points(bed, blocks, a, speed, ahead, self, points)
     type(bed_t), intent(in) :: bed
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
     real(wp), intent(in) :: speed   !! of its points, at most [m/s]
     real(wp), intent(in) :: ahead   !! [s]
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp), parameter :: no_turn(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, &
       0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
     type(meeting_t) :: now
@@ -328,17 +331,17 @@ contains
     now%gap = ahead*speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    call touch_features(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
-      self%with_bed(a), touches, bed)
-  end subroutine touch_bed
+    call add_feature_points(self%surface(blocks%shape(a)), bed%surface, self%search, now, &
+      self%with_bed(a), points, bed)
+  end subroutine add_bed_points
 
-  !> Touches of a listed pair of bodies.
-  subroutine touch_pair(blocks, ahead, slot, self, touches)
+  !> Contact points of a listed pair of bodies.
+  subroutine add_pair_points(blocks, ahead, slot, self, points)
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: ahead                !! [s]
     integer, intent(in) :: slot                  !! place of the pair
     type(contact_surface_t), intent(inout) :: self
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(meeting_t) :: now
     integer :: a, b
 
@@ -351,40 +354,42 @@ contains
     now%v = blocks%v(:, a) - blocks%v(:, b)
     now%omega_a = blocks%omega(:, a)
     now%omega_b = blocks%omega(:, b)
-    now%speed = norm(now%v) + norm(now%omega_a)*self%reach(a) + norm(now%omega_b)*self%reach(b)
+    now%speed = norm(now%v) + norm(now%omega_a)*self%bounding_radius(a) &
+      + norm(now%omega_b)*self%bounding_radius(b)
     now%gap = ahead*now%speed + self%search%margin
     now%ahead = ahead
     now%margin = self%search%margin
-    if (norm(now%to_b) > self%reach(a) + self%reach(b) + now%gap) return
+    if (norm(now%to_b) > self%bounding_radius(a) + self%bounding_radius(b) + now%gap) return
     associate (surface_a => self%surface(blocks%shape(a)), &
       surface_b => self%surface(blocks%shape(b)))
       if (surface_a%ball > 0.0_wp .and. surface_b%ball > 0.0_wp) then
-        call touch_balls(now, surface_a, surface_b, self%pairs(slot), touches)
+        call add_ball_point(now, surface_a, surface_b, self%pairs(slot), points)
       else
-        call touch_features(surface_a, surface_b, self%search, now, self%pairs(slot), touches)
+        call add_feature_points(surface_a, surface_b, self%search, now, self%pairs(slot), points)
       end if
     end associate
-  end subroutine touch_pair
+  end subroutine add_pair_points
 
-  !> Touches of a pair of bodies, or of body a and the bed: probes of b, probes of a, crossing
-  !! edges. They come from the short list of the pair; this and the lists it comes from are renewed
-  !! first where they no longer hold.
-  subroutine touch_features(surface_a, surface_b, search, now, pair, touches, bed)
+  !> Contact points of a pair of bodies, or of body a and the bed: vertices of b, vertices of a,
+  !! crossing edges. They come from the short list of the pair; this and the lists it comes from are
+  !! renewed first where they no longer hold.
+  subroutine add_feature_points(surface_a, surface_b, search, now, pair, points, bed)
     type(surface_t), intent(in) :: surface_a, surface_b
     type(search_t), intent(inout) :: search
     type(meeting_t), intent(inout) :: now
     type(pair_t), intent(inout) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(bed_t), intent(in), optional :: bed  !! where it is b
     real(wp), parameter :: wider = 1.5_wp     !! lists hold for such a multiple of the gap
     real(wp) :: way
     logical :: holds
 
-    holds = short_list_holds(now, surface_a%reach, surface_b%reach, pair%close)
+    holds = short_list_holds(now, surface_a%bounding_radius, surface_b%bounding_radius, pair%close)
     if (holds .and. n_chosen(pair%close) == 0) return
     call update_views(now)
     if (.not. holds) then
-      way = way_between(pair%near%when, now%poses, surface_a%reach, surface_b%reach)
+      way = way_between(pair%near%when, now%poses, surface_a%bounding_radius, &
+        surface_b%bounding_radius)
       if (way > pair%near%valid .or. now%gap > pair%near%ahead) then
         search%ahead = max(search%min_ahead, wider*now%gap)
         if (present(bed)) then
@@ -397,17 +402,17 @@ contains
       call choose_features(now, way, search, surface_a, surface_b, pair%near, pair%close)
       if (n_chosen(pair%close) == 0) return
     end if
-    call touch_probes(.false., now, surface_b, surface_a, pair, touches)
-    call touch_probes(.true., now, surface_a, surface_b, pair, touches)
-    call touch_edges(now, surface_a, surface_b, pair, touches)
-  end subroutine touch_features
+    call add_vertex_points(.false., now, surface_b, surface_a, pair, points)
+    call add_vertex_points(.true., now, surface_a, surface_b, pair, points)
+    call add_edge_points(now, surface_a, surface_b, pair, points)
+  end subroutine add_feature_points
 
-  !> The one touch of two spheres.
-  subroutine touch_balls(now, surface_a, surface_b, pair, touches)
+  !> The one contact point of two spheres.
+  subroutine add_ball_point(now, surface_a, surface_b, pair, points)
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     real(wp) :: apart, depth, normal(3), arm(3)
 
     apart = norm(now%to_b)
@@ -415,25 +420,26 @@ contains
     if (depth <= -now%gap) return
     normal = now%to_b/max(apart, tiny(1.0_wp))
     arm = (surface_a%ball - 0.5_wp*depth)*normal
-    call add_touch(touch_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
-      min(surface_a%length, surface_b%length)), touches)
-  end subroutine touch_balls
+    call add_point(contact_point_t(pair%a, pair%b, 1, arm, arm - now%to_b, normal, depth, 1.0_wp, &
+      min(surface_a%length, surface_b%length)), points)
+  end subroutine add_ball_point
 
-  !> Touches of the chosen probes of one body (the guest) with the surface of the other (the host).
-  subroutine touch_probes(guest_is_a, now, guest, host, pair, touches)
+  !> Contact points of the chosen vertices of one body (the guest) with the surface of the other
+  !! (the host).
+  subroutine add_vertex_points(guest_is_a, now, guest, host, pair, points)
     logical, intent(in) :: guest_is_a
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: guest, host
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(view_t) :: view                      ! of the guest, host axes
-    type(touch_t) :: touch
+    type(contact_point_t) :: point
     real(wp) :: turn_host(3, 3), place(3), apart, outward(3), arm(3)
     integer :: c, m, n, i, edges, next
 
-    touch%a = pair%a
-    touch%b = pair%b
-    touch%length = min(guest%length, host%length)
+    point%a = pair%a
+    point%b = pair%b
+    point%length = min(guest%length, host%length)
     if (guest_is_a) then
       view = now%a_in_b
       turn_host = now%turn_b
@@ -451,41 +457,41 @@ contains
         i = list(m)
         edges = m + 3 + list(m + 1)
         next = edges + list(m + 2)
-        place = view%x + view%turn(:, 1)*guest%probe(1, i) + view%turn(:, 2)*guest%probe(2, i) &
-          + view%turn(:, 3)*guest%probe(3, i)
+        place = view%x + view%turn(:, 1)*guest%vertex(1, i) + view%turn(:, 2)*guest%vertex(2, i) &
+          + view%turn(:, 3)*guest%vertex(3, i)
         call nearest_on_surface(host, place, list(m + 3:edges - 1), list(edges:next - 1), &
           apart, outward)
       end associate
-      touch%depth = guest%ball - apart
-      if (touch%depth <= -now%gap) cycle
-      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*touch%depth)*outward)
+      point%depth = guest%ball - apart
+      if (point%depth <= -now%gap) cycle
+      arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
       outward = matmul(turn_host, outward)
-      touch%weight = guest%weight(i)
+      point%weight = guest%weight(i)
       if (guest_is_a) then
-        touch%key = i
-        touch%arm_a = arm + now%to_b
-        touch%arm_b = arm
-        touch%normal = -outward
+        point%id = i
+        point%arm_a = arm + now%to_b
+        point%arm_b = arm
+        point%normal = -outward
       else
-        touch%key = i - size(guest%weight) - 1
-        touch%arm_a = arm
-        touch%arm_b = arm - now%to_b
-        touch%normal = outward
+        point%id = i - size(guest%weight) - 1
+        point%arm_a = arm
+        point%arm_b = arm - now%to_b
+        point%normal = outward
       end if
-      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
-      call add_touch(touch, touches)
+      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
+      call add_point(point, points)
     end do
-  end subroutine touch_probes
+  end subroutine add_vertex_points
 
-  !> Touches of the chosen pairs of edges that cross.
-  subroutine touch_edges(now, surface_a, surface_b, pair, touches)
+  !> Contact points of the chosen pairs of edges that cross.
+  subroutine add_edge_points(now, surface_a, surface_b, pair, points)
     type(meeting_t), intent(in) :: now
     type(surface_t), intent(in) :: surface_a, surface_b
     type(pair_t), intent(in) :: pair
-    type(touches_t), intent(inout) :: touches
+    type(contact_points_t), intent(inout) :: points
     type(edge_t) :: guest
     type(crossing_t) :: crossing
-    type(touch_t) :: touch
+    type(contact_point_t) :: point
     real(wp) :: arm(3), with_shift(3), with_turn(3)
     integer :: m, i, j, last
 
@@ -495,24 +501,24 @@ contains
       j = pair%close%item(m + 1)
       if (i /= last) guest = edge_in_view(now%a_in_b, surface_a%edge(i))
       last = i
-      touch = touch_t(a=pair%a, b=pair%b, key=size(surface_a%weight) + i, other=j, &
+      point = contact_point_t(a=pair%a, b=pair%b, id=size(surface_a%weight) + i, other=j, &
         length=min(surface_a%length, surface_b%length))
-      call cross_edges(guest, surface_b%edge(j), -now%gap, touch%length, crossing)
+      call cross_edges(guest, surface_b%edge(j), -now%gap, point%length, crossing)
       if (crossing%weight <= 0.0_wp) cycle
       arm = matmul(now%turn_b, crossing%place)
-      touch%arm_a = arm + now%to_b
-      touch%arm_b = arm
-      touch%normal = matmul(now%turn_b, crossing%normal)
-      touch%depth = crossing%depth
-      touch%weight = crossing%weight
-      if (.not. closes(now, touch%arm_a, touch%arm_b, touch%normal, touch%depth)) cycle
+      point%arm_a = arm + now%to_b
+      point%arm_b = arm
+      point%normal = matmul(now%turn_b, crossing%normal)
+      point%depth = crossing%depth
+      point%weight = crossing%weight
+      if (.not. closes(now, point%arm_a, point%arm_b, point%normal, point%depth)) cycle
       if (crossing%weight < 1.0_wp .and. crossing%depth > 0.0_wp) then
         call weight_slope(guest, surface_b%edge(j), crossing, with_shift, with_turn)
-        touch%weight_shift = matmul(now%turn_b, with_shift)
-        touch%weight_turn = matmul(now%turn_b, with_turn)
+        point%weight_shift = matmul(now%turn_b, with_shift)
+        point%weight_turn = matmul(now%turn_b, with_turn)
       end if
-      call add_touch(touch, touches)
+      call add_point(point, points)
     end do
-  end subroutine touch_edges
+  end subroutine add_edge_points
 
 end module contact_surface_m

@@ -10,16 +10,16 @@ module contacts_m
   use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
                      all_still
   use lubrication_m, only: lubricate
-  use contact_partners_m, only: update_partners, update_motion
+  use counterparts_m, only: update_counterparts, update_motion
   use acting_bodies_m, only: list_present
-  use touching_m, only: find_touches
-  use contact_forces_m, only: contact_report_t, match_springs, stretch_springs, sum_forces, &
-    elastic_energy, energy_in_memory
+  use contact_detection_m, only: detect_contacts
+  use contact_forces_m, only: contact_report_t, match_displacements, integrate_displacements, &
+    sum_forces, elastic_energy, energy_in_memory
   use impulse_step_m, only: move_by_impulses
-  use substep_limits_m, only: substep_limit, stiffness_limit, equal_part
-  use partners_met_m, only: store_partners, count_partners
+  use substep_limits_m, only: substep_limit, stiffness_limit, equal_substep
+  use counterparts_met_m, only: store_counterparts, count_counterparts
   use contact_state_m, only: contacts_t, contacts_init
-  use resting_m, only: wake_or_sleep, wake_touching
+  use resting_m, only: wake_or_sleep, restore_contacts
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
@@ -50,12 +50,12 @@ contains
     contacts%loads%impulse = 0.0_wp
     contacts%loads%twist = 0.0_wp
     contacts%met%n = 0
-    call update_partners(walls, gravity, blocks, contacts%touching%partners)
+    call update_counterparts(walls, gravity, blocks, contacts%detected%counterparts)
     if (contacts%sleep%active) then
       call update_stillness(blocks, changed)
-      if (changed) call wake_touching(blocks, contacts)
+      if (changed) call restore_contacts(blocks, contacts)
     end if
-    if (.not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, contacts%touching)
+    if (.not. contacts%by_impulses) call detect_contacts(walls, blocks, 0.0_wp, contacts%detected)
     if (contacts%sleep%active) call wake_or_sleep(walls, gravity, dt, contacts, blocks)
     left = dt
     if (all_still(blocks)) then
@@ -68,7 +68,7 @@ contains
     end if
     if (left > 0.0_wp) call hold_for_step(gravity, dt, contacts, blocks)
     do while (left > 0.0_wp)
-      limit = substep_limit(walls, contacts%touching, blocks, dt, contacts%limits)
+      limit = substep_limit(walls, contacts%detected, blocks, dt, contacts%limits)
       if (.not. left < limit*real(max_substeps, wp)) then
         report%info = 1
         return
@@ -83,19 +83,20 @@ contains
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)
     call hold_sleepers(gravity, dt, blocks)
-    call count_partners(contacts%met, blocks)
+    call count_counterparts(contacts%met, blocks)
     if (contacts%by_impulses) then
-      report%energy = energy_in_memory(contacts%springs) + energy_in_memory(contacts%sleep%rest)
+      report%energy = energy_in_memory(contacts%displacements) &
+        + energy_in_memory(contacts%sleep%rest)
     else
-      call find_touches(walls, blocks, 0.0_wp, contacts%touching)
-      report%energy = elastic_energy(contacts%touching, contacts%springs, contacts%sleep%rest)
+      call detect_contacts(walls, blocks, 0.0_wp, contacts%detected)
+      report%energy = elastic_energy(contacts%detected, contacts%displacements, contacts%sleep%rest)
     end if
   end subroutine move_blocks
 
   !> Begin a substep: drift for half of it and find what touches then.
   !!
-  !! The step is an equal part of the time left. Where the bodies come down on more touches than the
-  !! step is short enough for, now or before its end, they go back and take a shorter one.
+  !! The step is an equal part of the time left. Where the bodies come down on more contact points
+  !! than the step is short enough for, now or before its end, they go back and take a shorter one.
   subroutine go_half_way(walls, left, limit, contacts, blocks, dt_b)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: left, limit   !! time left, longest substep allowed [s]
@@ -116,10 +117,10 @@ contains
     end do
     longest = limit
     do
-      dt_b = equal_part(left, longest)
+      dt_b = equal_substep(left, longest)
       call drift(0.5_wp*dt_b, blocks)
-      call find_touches(walls, blocks, 0.5_wp*dt_b, contacts%touching)
-      allowed = stiffness_limit(contacts%touching)
+      call detect_contacts(walls, blocks, 0.5_wp*dt_b, contacts%detected)
+      allowed = stiffness_limit(contacts%detected)
       if (.not. dt_b > bearable*min(allowed, longest)) exit
       do b = 1, blocks%n
         if (.not. moves(b)) cycle
@@ -150,23 +151,23 @@ contains
     integer :: k
 
     if (report%substeps == 0 .or. contacts%lubrication%active) call list_present(blocks, &
-      contacts%touching%acting)
-    associate (touching => contacts%touching, springs => contacts%springs, &
+      contacts%detected%acting)
+    associate (detected => contacts%detected, displacements => contacts%displacements, &
                loads => contacts%loads, held => contacts%held, &
-               acting => contacts%touching%acting%body(:contacts%touching%acting%n))
-      associate (touch => touching%touches%item(:touching%touches%n))
-        call store_partners(touch%a, touch%b, contacts%met)
+               acting => contacts%detected%acting%body(:contacts%detected%acting%n))
+      associate (point => detected%points%item(:detected%points%n))
+        call store_counterparts(point%a, point%b, contacts%met)
       end associate
-      call match_springs(touching, contacts%before, springs)
-      call stretch_springs(0.5_wp*dt_b, touching, springs)
+      call match_displacements(detected, contacts%before, displacements)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
       do k = 1, size(acting)
         associate (b => acting(k))
           call kick_body(gravity, 0.5_wp*dt_b, contacts%steady(:, b), blocks%fluid_torque(:, b), &
                          b, blocks)
         end associate
       end do
-      call update_motion(blocks, acting, touching%partners)
-      call sum_forces(dt_b, touching, springs, loads, report)
+      call update_motion(blocks, acting, detected%counterparts)
+      call sum_forces(dt_b, detected, displacements, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
         loads%force)
       if (contacts%sleep%active) call hold_or_wake(acting, gravity, contacts%steady, blocks, &
@@ -182,11 +183,11 @@ contains
         end associate
       end do
       call stop_sleepers(acting, blocks)
-      call update_motion(blocks, acting, touching%partners)
-      call stretch_springs(0.5_wp*dt_b, touching, springs)
+      call update_motion(blocks, acting, detected%counterparts)
+      call integrate_displacements(0.5_wp*dt_b, detected, displacements)
     end associate
     call drift(0.5_wp*dt_b, blocks)
-    if (contacts%sleep%active .and. any(contacts%woken)) call wake_touching(blocks, contacts)
+    if (contacts%sleep%active .and. any(contacts%woken)) call restore_contacts(blocks, contacts)
   end subroutine finish_substep
 
   !> Hold those asleep for the whole step: a substep adds by how much the force on them differs. All

@@ -5,11 +5,11 @@ module deep_overlaps_m
   use kinds_m, only: wp
   use errors_m, only: to_text, brief
   use parallel_m, only: is_root
-  use touches_m, only: touches_t
+  use contact_points_m, only: contact_points_t
   use rigid_body_m, only: blocks_t
   implicit none
   private
-  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_touches
+  public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_points
   public :: size_of_pair, warn_of_overlaps, overlap_fault, reported_share
 
   real(wp), parameter :: reported_share = 0.05_wp   !! overlap over size to report a body
@@ -20,7 +20,7 @@ module deep_overlaps_m
     real(wp), allocatable :: size(:)     !! smallest edge [m]
     real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
     real(wp), allocatable :: share(:)    !! of the size of the smaller of the two [-]
-    integer, allocatable :: partner(:)   !! body, or below 1: wall or bed
+    integer, allocatable :: counterpart(:)   !! body, or below 1: wall or bed
     logical, allocatable :: warned(:)    !! has been warned of
   end type deep_overlaps_t
 
@@ -33,7 +33,7 @@ contains
     integer :: b
 
     allocate (deep%depth(blocks%n), deep%share(blocks%n), source=0.0_wp)
-    allocate (deep%partner(blocks%n), source=0)
+    allocate (deep%counterpart(blocks%n), source=0)
     allocate (deep%warned(blocks%n), source=.false.)
     deep%size = [(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)]
   end subroutine deep_overlaps_init
@@ -46,7 +46,7 @@ contains
     deep%share = 0.0_wp
   end subroutine forget_overlaps
 
-  !> Size of the smaller of a body and its partner; walls and the bed have none [m].
+  !> Size of the smaller of a body and its counterpart; walls and the bed have none [m].
   pure function size_of_pair(a, b, deep) result(size)
     integer, intent(in) :: a, b   !! body; body, or below 1: wall or bed
     type(deep_overlaps_t), intent(in) :: deep
@@ -56,7 +56,7 @@ contains
     if (b > 0) size = min(size, deep%size(b))
   end function size_of_pair
 
-  !> Note an overlap of body a and its partner b with both, where it is the deepest of either.
+  !> Note an overlap of body a and its counterpart b with both, where it is the deepest of either.
   pure subroutine store_overlap(a, b, depth, deep)
     integer, intent(in) :: a, b         !! body; body, or below 1: wall or bed
     real(wp), intent(in) :: depth       !! [m]
@@ -70,28 +70,28 @@ contains
   end subroutine store_overlap
 
   !> Note an overlap with one body, where it is its deepest.
-  pure subroutine keep_deepest(body, partner, depth, share, deep)
-    integer, intent(in) :: body, partner
+  pure subroutine keep_deepest(body, counterpart, depth, share, deep)
+    integer, intent(in) :: body, counterpart
     real(wp), intent(in) :: depth, share   !! [m], of the size of the smaller [-]
     type(deep_overlaps_t), intent(inout) :: deep
 
     if (share <= deep%share(body)) return
     deep%share(body) = share
     deep%depth(body) = depth
-    deep%partner(body) = partner
+    deep%counterpart(body) = counterpart
   end subroutine keep_deepest
 
-  !> Note the overlaps of touches: of contact spheres, where the true shapes overlap at rest.
-  pure subroutine store_touches(touches, deep)
-    type(touches_t), intent(in) :: touches
+  !> Note the overlaps of contact points: of contact spheres, where the true shapes overlap at rest.
+  pure subroutine store_points(points, deep)
+    type(contact_points_t), intent(in) :: points
     type(deep_overlaps_t), intent(inout) :: deep
     integer :: t
 
     call forget_overlaps(deep)
-    do t = 1, touches%n
-      call store_overlap(touches%item(t)%a, touches%item(t)%b, touches%item(t)%depth, deep)
+    do t = 1, points%n
+      call store_overlap(points%item(t)%a, points%item(t)%b, points%item(t)%depth, deep)
     end do
-  end subroutine store_touches
+  end subroutine store_points
 
   !> Warn once of each body that reaches deep into another one, a wall or the bed, or into which one
   !! reaches.
@@ -104,7 +104,7 @@ contains
     do b = 1, size(deep%warned)
       if (.not. deep%share(b) > 0.0_wp .or. deep%warned(b)) cycle
       deep%warned(b) = .true.
-      if (deep%partner(b) > 0) deep%warned(deep%partner(b)) = .true.
+      if (deep%counterpart(b) > 0) deep%warned(deep%counterpart(b)) = .true.
       warnings = warnings + 1
       if (.not. is_root()) cycle
       write (error_unit, '(5a)') 'mics: warning: ', overlap_text(b, deep), ', t = ', &
@@ -136,8 +136,8 @@ contains
     character(:), allocatable :: text
 
     text = 'body '//to_text(b)//' and '
-    if (deep%partner(b) > 0) then
-      text = text//'body '//to_text(deep%partner(b))
+    if (deep%counterpart(b) > 0) then
+      text = text//'body '//to_text(deep%counterpart(b))
     else
       text = text//'a wall or the bed'
     end if

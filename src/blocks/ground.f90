@@ -7,7 +7,7 @@
 module ground_m
   use kinds_m, only: wp
   use vectors_m, only: cross, rotation_matrix
-  use tet_mesh_m, only: reach_along
+  use tet_mesh_m, only: extent_along
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t, floor_wall
   use bed_m, only: bed_place
@@ -92,7 +92,7 @@ contains
     associate (x => blocks%x(:, c), turn => rotation_matrix(blocks%q(:, c)))
       do w = 1, walls%n
         if (walls%number(w) == floor_wall) call lower_to(x(3) + walls%offset(w) &
-          - reach_along(blocks%shapes(blocks%shape(c)), -turn(3, :)), least, gap)
+          - extent_along(blocks%shapes(blocks%shape(c)), -turn(3, :)), least, gap)
       end do
       call set_lower_side(overlap%solid(blocks%shape(c)), turn, own)
       if (walls%bed%there) call lower_on_bed(own, walls, x, least, gap)

@@ -1,24 +1,24 @@
-!> The touches of one contact step as constraints: what is solved for the impulses, and what is
-!! remembered of them.
+!> The contact points of one contact step as constraints: what is solved for the impulses, and what
+!! is remembered of them.
 !!
-!! A row is a touch that is there or may come in the step. Rows of one pair of partners stand
-!! together. Pairs have colours: those of one colour share no body that moves, so that the order of
-!! their solution does not matter, nor the number of threads.
+!! A row is a contact point that is there or may come in the step. Rows of one pair of counterparts
+!! stand together. Pairs have colours: those of one colour share no body that moves, so that the
+!! order of their solution does not matter, nor the number of threads.
 module impulse_rows_m
   use kinds_m, only: wp, i8, pi
   use growing_m, only: ensure_capacity
   use vectors_m, only: cross, norm
   use rigid_body_m, only: blocks_t
-  use bed_m, only: bed_partner
-  use touches_m, only: touch_t, touches_t
-  use springs_m, only: springs_t, reserve_springs, comes_before
-  use contact_partners_m, only: partners_t
+  use bed_m, only: bed_counterpart
+  use contact_points_m, only: contact_point_t, contact_points_t
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before
+  use counterparts_m, only: counterparts_t
   use contact_law_m, only: contact_law_t
   implicit none
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
 
-  !> One touch: its frame, the masses it works on, and its impulse, on partner b.
+  !> One contact point: its frame, the masses it works on, and its impulse, on counterpart b.
   type :: row_t
     real(wp) :: n(3) = 0.0_wp, e1(3) = 0.0_wp, e2(3) = 0.0_wp  !! normal from a to b, tangents [-]
     real(wp) :: arm_a(3) = 0.0_wp, arm_b(3) = 0.0_wp  !! from the centres to the contact [m]
@@ -38,7 +38,7 @@ module impulse_rows_m
   type :: rows_t
     integer :: n = 0
     type(row_t), allocatable :: row(:)
-    integer, allocatable :: touch(:)              !! (n) number in the list of touches
+    integer, allocatable :: point(:)              !! (n) number in the list of contact points
     real(wp), allocatable :: closing(:)           !! (n) normal velocity at the start [m/s]
     real(wp), allocatable :: largest(:)           !! (n) largest normal impulse of the step [N s]
     real(wp), allocatable :: total(:, :)          !! (3, n) impulse of the whole step [N s]
@@ -55,77 +55,82 @@ module impulse_rows_m
     integer(i8), allocatable :: used(:)           !! (n) work: colours of each body
     integer :: n_active = 0
     integer, allocatable :: active(:)             !! bodies that move and have rows
-    logical, allocatable :: busy(:), struck(:)    !! (partners) has rows; was hit
-    real(wp), allocatable :: v(:, :)              !! (6, partners) velocity and spin [m/s], [rad/s]
-    real(wp), allocatable :: v_start(:, :)        !! (6, partners) at the start of the step
-    real(wp), allocatable :: way(:, :)            !! (6, partners) since the step began [m], [rad]
-    real(wp), allocatable :: a_free(:, :)         !! (6, partners) without contact [m/s2], [rad/s2]
-    real(wp), allocatable :: by_contact(:, :)     !! (6, partners) change of v in a sub-sweep
-    real(wp), allocatable :: inverse_mass(:)      !! (partners) 0: does not yield [1/kg]
-    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, partners) [1/(kg m2)]
+    logical, allocatable :: busy(:), struck(:)    !! (counterparts) has rows; was hit
+    real(wp), allocatable :: v(:, :)
+      !! (6, counterparts) velocity and spin [m/s], [rad/s]
+    real(wp), allocatable :: v_start(:, :)        !! (6, counterparts) at the start of the step
+    real(wp), allocatable :: way(:, :)
+      !! (6, counterparts) since the step began [m], [rad]
+    real(wp), allocatable :: a_free(:, :)
+      !! (6, counterparts) without contact [m/s2], [rad/s2]
+    real(wp), allocatable :: by_contact(:, :)     !! (6, counterparts) change of v in a sub-sweep
+    real(wp), allocatable :: inverse_mass(:)      !! (counterparts) 0: does not yield [1/kg]
+    real(wp), allocatable :: inverse_inertia(:, :, :)   !! (3, 3, counterparts) [1/(kg m2)]
   end type rows_t
 
-  real(wp), parameter :: damping_ratio = 5.0_wp   !! of the soft touches: they do not swing [-]
-  real(wp), parameter :: min_weight = 0.02_wp     !! of a touch that counts [-]
+  real(wp), parameter :: damping_ratio = 5.0_wp
+    !! of the soft contact points: they do not swing [-]
+  real(wp), parameter :: min_weight = 0.02_wp     !! of a contact point that counts [-]
   integer, parameter :: max_colours = 64          !! pairs of the last one are solved one by one
 
 contains
 
-  !> Room for the partners of a case.
+  !> Room for the counterparts of a case.
   subroutine rows_init(n, rows)
     integer, intent(in) :: n                      !! bodies
     type(rows_t), intent(out) :: rows
 
-    allocate (rows%v(6, bed_partner:n), rows%v_start(6, bed_partner:n), source=0.0_wp)
-    allocate (rows%way(6, bed_partner:n), rows%a_free(6, bed_partner:n), &
-      rows%by_contact(6, bed_partner:n), rows%inverse_mass(bed_partner:n), &
-      rows%inverse_inertia(3, 3, bed_partner:n), source=0.0_wp)
+    allocate (rows%v(6, bed_counterpart:n), rows%v_start(6, bed_counterpart:n), source=0.0_wp)
+    allocate (rows%way(6, bed_counterpart:n), rows%a_free(6, bed_counterpart:n), &
+      rows%by_contact(6, bed_counterpart:n), rows%inverse_mass(bed_counterpart:n), &
+      rows%inverse_inertia(3, 3, bed_counterpart:n), source=0.0_wp)
     allocate (rows%used(n), source=0_i8)
-    allocate (rows%active(n + 1 - bed_partner), source=0)
-    allocate (rows%busy(bed_partner:n), rows%struck(bed_partner:n), source=.false.)
+    allocate (rows%active(n + 1 - bed_counterpart), source=0)
+    allocate (rows%busy(bed_counterpart:n), rows%struck(bed_counterpart:n), source=.false.)
     allocate (rows%begin(max_colours + 1), source=1)
   end subroutine rows_init
 
-  !> Rows of all touches of a contact step, with the impulses and stretches remembered.
+  !> Rows of all contact points of a contact step, with the impulses and stretches remembered.
   !!
-  !! The soft touch is a spring of the frequency 1/contact_time of what it pushes, damped so much
-  !! that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D (2024).
-  subroutine make_rows(h, contact_time, touches, law, partners, blocks, memory, rows)
+  !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, damped so
+  !! much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D
+  !! (2024).
+  subroutine make_rows(h, contact_time, points, law, counterparts, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
     real(wp), intent(in) :: contact_time          !! [s]
-    type(touches_t), intent(in) :: touches
+    type(contact_points_t), intent(in) :: points
     class(contact_law_t), intent(in) :: law
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
-    type(springs_t), intent(in) :: memory
+    type(displacements_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
     integer :: t, m, r
 
-    call copy_partners(partners, blocks, rows)
-    call reserve_rows(touches%n, rows)
+    call copy_counterparts(counterparts, blocks, rows)
+    call reserve_rows(points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
     m = 1
-    do t = 1, touches%n
-      associate (touch => touches%item(t))
-        if (touch%weight < min_weight) cycle
+    do t = 1, points%n
+      associate (point => points%item(t))
+        if (point%weight < min_weight) cycle
         r = rows%n + 1
         rows%n = r
-        rows%touch(r) = t
-        call begin_pair(touch%a, touch%b, rows)
-        w = 2*pi*sqrt(touch%weight)/contact_time
+        rows%point(r) = t
+        call begin_pair(point%a, point%b, rows)
+        w = 2*pi*sqrt(point%weight)/contact_time
         a1 = 2*damping_ratio + h*w
         a2 = h*w*a1
-        rows%row(r) = row_t(n=touch%normal, arm_a=touch%arm_a, arm_b=touch%arm_b, &
-          gap=-touch%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
-          friction=merge(law%wall_friction, law%friction, touch%b < 0))
-        call weigh(touch%a, touch%b, rows, rows%row(r))
-        rows%closing(r) = dot_product(past(rows%v(:, touch%a), rows%v(:, touch%b), rows%row(r)), &
-                                      touch%normal)
+        rows%row(r) = row_t(n=point%normal, arm_a=point%arm_a, arm_b=point%arm_b, &
+          gap=-point%depth, rate=w/a1, soft=a2/(1.0_wp + a2), keep=1.0_wp/(1.0_wp + a2), &
+          friction=merge(law%wall_friction, law%friction, point%b < 0))
+        call weigh(point%a, point%b, rows, rows%row(r))
+        rows%closing(r) = dot_product(past(rows%v(:, point%a), rows%v(:, point%b), rows%row(r)), &
+                                      point%normal)
         rows%largest(r) = 0.0_wp
         rows%total(:, r) = 0.0_wp
-        call recall(touch, h, memory, m, rows%row(r))
+        call recall(point, h, memory, m, rows%row(r))
       end associate
     end do
     rows%first(rows%n_pairs + 1) = rows%n + 1
@@ -133,29 +138,29 @@ contains
     call colour_pairs(rows)
   end subroutine make_rows
 
-  !> Velocities and inverse inertia of the partners; what is held, sleeps or is moved at a given
+  !> Velocities and inverse inertia of the counterparts; what is held, sleeps or is moved at a given
   !! rate does not yield.
-  pure subroutine copy_partners(partners, blocks, rows)
-    type(partners_t), intent(in) :: partners
+  pure subroutine copy_counterparts(counterparts, blocks, rows)
+    type(counterparts_t), intent(in) :: counterparts
     type(blocks_t), intent(in) :: blocks
     type(rows_t), intent(inout) :: rows
     integer :: b
 
-    do b = bed_partner, blocks%n
-      rows%v(1:3, b) = partners%v(:, b)
-      rows%v(4:6, b) = partners%omega(:, b)
+    do b = bed_counterpart, blocks%n
+      rows%v(1:3, b) = counterparts%v(:, b)
+      rows%v(4:6, b) = counterparts%omega(:, b)
       rows%v_start(:, b) = rows%v(:, b)
       rows%way(:, b) = 0.0_wp
       rows%by_contact(:, b) = 0.0_wp
       rows%busy(b) = .false.
-      rows%inverse_mass(b) = partners%inverse_mass(b)
-      rows%inverse_inertia(:, :, b) = partners%inverse_inertia(:, :, b)
+      rows%inverse_mass(b) = counterparts%inverse_mass(b)
+      rows%inverse_inertia(:, :, b) = counterparts%inverse_inertia(:, :, b)
       if (b < 1) cycle
       if (.not. blocks%fixed(b) .and. .not. blocks%asleep(b)) cycle
       rows%inverse_mass(b) = 0.0_wp
       rows%inverse_inertia(:, :, b) = 0.0_wp
     end do
-  end subroutine copy_partners
+  end subroutine copy_counterparts
 
   !> Make room for n rows and pairs.
   subroutine reserve_rows(n, rows)
@@ -166,7 +171,7 @@ contains
       if (n > size(rows%row)) deallocate (rows%row)
     end if
     if (.not. allocated(rows%row)) allocate (rows%row(2*n + 16))
-    call ensure_capacity(n, rows%touch)
+    call ensure_capacity(n, rows%point)
     call ensure_capacity(n, rows%closing)
     call ensure_capacity(n, rows%largest)
     call ensure_capacity(n, rows%total)
@@ -198,7 +203,7 @@ contains
     rows%busy([a, b]) = .true.
   end subroutine begin_pair
 
-  !> Tangents of a row and the masses that two partners set against an impulse at it,
+  !> Tangents of a row and the masses that two counterparts set against an impulse at it,
   !! K = J M^-1 J^T.
   pure subroutine weigh(a, b, rows, row)
     integer, intent(in) :: a, b
@@ -231,7 +236,7 @@ contains
     row%mass_slip = 1.0_wp/(0.5_wp*(k_11 + k_22) + sqrt(0.25_wp*(k_11 - k_22)**2 + k_12**2))
   end subroutine weigh
 
-  !> Add what a partner yields at its arm to a unit impulse: 1/m - [r] I^-1 [r].
+  !> Add what a counterpart yields at its arm to a unit impulse: 1/m - [r] I^-1 [r].
   pure subroutine add_response(inverse_mass, inverse_inertia, arm, k)
     real(wp), intent(in) :: inverse_mass, inverse_inertia(3, 3), arm(3)   !! [1/kg], [1/(kg m2)]
     real(wp), intent(inout) :: k(3, 3)           !! [1/kg]
@@ -271,26 +276,26 @@ contains
     p = part(1)*row%n + part(2)*row%e1 + part(3)*row%e2
   end function in_space
 
-  !> What is remembered of a touch: the force that it bore, and its tangential way. Both lists are
-  !! sorted; m is the place in the memory.
-  pure subroutine recall(touch, h, memory, m, row)
-    type(touch_t), intent(in) :: touch
+  !> What is remembered of a contact point: the force that it bore, and its tangential way. Both
+  !! lists are sorted; m is the place in the memory.
+  pure subroutine recall(point, h, memory, m, row)
+    type(contact_point_t), intent(in) :: point
     real(wp), intent(in) :: h                    !! sub-sweep [s]
-    type(springs_t), intent(in) :: memory
+    type(displacements_t), intent(in) :: memory
     integer, intent(inout) :: m
     type(row_t), intent(inout) :: row
 
     do while (m <= memory%n)
-      if (.not. comes_before(memory%a(m), memory%b(m), memory%key(m), &
-                             touch%a, touch%b, touch%key)) then
-        if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
-            .or. memory%other(m) >= touch%other) exit
+      if (.not. comes_before(memory%a(m), memory%b(m), memory%id(m), &
+                             point%a, point%b, point%id)) then
+        if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%id(m) /= point%id &
+            .or. memory%other(m) >= point%other) exit
       end if
       m = m + 1
     end do
     if (m > memory%n) return
-    if (memory%a(m) /= touch%a .or. memory%b(m) /= touch%b .or. memory%key(m) /= touch%key &
-        .or. memory%other(m) /= touch%other) return
+    if (memory%a(m) /= point%a .or. memory%b(m) /= point%b .or. memory%id(m) /= point%id &
+        .or. memory%other(m) /= point%other) return
     row%impulse(1) = max(0.0_wp, -h*dot_product(memory%force(:, m), row%n))
     row%impulse(2) = -h*dot_product(memory%force(:, m), row%e1)
     row%impulse(3) = -h*dot_product(memory%force(:, m), row%e2)
@@ -298,14 +303,14 @@ contains
     row%stretch(2) = dot_product(memory%xi(:, m), row%e2)
   end subroutine recall
 
-  !> List the partners that have rows and move.
+  !> List the counterparts that have rows and move.
   pure subroutine list_active(n, rows)
     integer, intent(in) :: n                     !! bodies
     type(rows_t), intent(inout) :: rows
     integer :: b
 
     rows%n_active = 0
-    do b = bed_partner, n
+    do b = bed_counterpart, n
       if (.not. rows%busy(b)) cycle
       if (rows%inverse_mass(b) <= 0.0_wp .and. all(abs(rows%v(:, b)) <= 0.0_wp)) cycle
       rows%n_active = rows%n_active + 1
@@ -345,7 +350,7 @@ contains
     end do
   end subroutine colour_pairs
 
-  !> Whether a partner is a body that yields to impulses.
+  !> Whether a counterpart is a body that yields to impulses.
   pure function yields(rows, b) result(yes)
     type(rows_t), intent(in) :: rows
     integer, intent(in) :: b
@@ -355,12 +360,12 @@ contains
     if (yes) yes = rows%inverse_mass(b) > 0.0_wp
   end function yields
 
-  !> Mean forces and torques of the step on all partners.
+  !> Mean forces and torques of the step on all counterparts.
   pure subroutine sum_loads(step, rows, force, torque)
     real(wp), intent(in) :: step                                   !! [s]
     type(rows_t), intent(in) :: rows
-    real(wp), intent(inout) :: force(:, bed_partner:), torque(:, bed_partner:)
-      !! (3, partners) [N], [N m]
+    real(wp), intent(inout) :: force(:, bed_counterpart:), torque(:, bed_counterpart:)
+      !! (3, counterparts) [N], [N m]
     real(wp) :: p(3)
     integer :: k, r
 
@@ -385,28 +390,28 @@ contains
 
   !> Remember the rows that bear something: force and torques of the last sub-sweep, and the
   !! tangential way where friction holds. They store no energy: overlaps open without speed.
-  subroutine store_memory(h, touches, rows, memory)
+  subroutine store_memory(h, points, rows, memory)
     real(wp), intent(in) :: h                    !! sub-sweep [s]
-    type(touches_t), intent(in) :: touches
+    type(contact_points_t), intent(in) :: points
     type(rows_t), intent(in) :: rows
-    type(springs_t), intent(inout) :: memory
+    type(displacements_t), intent(inout) :: memory
     real(wp), parameter :: sticking = 0.999_wp   !! of the bound of friction: below it nothing slips
     real(wp) :: way(3), p(3)
     integer :: k, r, m
 
-    call reserve_springs(rows%n, memory)
+    call reserve_displacements(rows%n, memory)
     m = 0
     do k = 1, rows%n_pairs
       do r = rows%first(k), rows%first(k + 1) - 1
-        associate (row => rows%row(r), touch => touches%item(rows%touch(r)))
+        associate (row => rows%row(r), point => points%item(rows%point(r)))
           if (.not. row%impulse(1) > 0.0_wp) cycle
           m = m + 1
-          memory%a(m) = touch%a
-          memory%b(m) = touch%b
-          memory%key(m) = touch%key
-          memory%other(m) = touch%other
+          memory%a(m) = point%a
+          memory%b(m) = point%b
+          memory%id(m) = point%id
+          memory%other(m) = point%other
           memory%k(m) = 0.0_wp
-          way = past(rows%way(:, touch%a), rows%way(:, touch%b), row)
+          way = past(rows%way(:, point%a), rows%way(:, point%b), row)
           memory%xi(:, m) = 0.0_wp
           if (norm2(row%impulse(2:3)) < sticking*row%friction*row%impulse(1)) then
             memory%xi(:, m) = row%stretch(1)*row%e1 + row%stretch(2)*row%e2 &

@@ -1,5 +1,5 @@
 !> Contact by impulses: few long steps within a fluid step, each of which finds what touches or may
-!! come to touch once, and solves for the impulses of all touches together.
+!! come to touch once, and solves for the impulses of all contact points together.
 !!
 !! A step is as long as the fastest motion of what can meet in it allows; what is far from all
 !! others falls in one step.
@@ -9,19 +9,19 @@ module impulse_step_m
   use rigid_body_m, only: blocks_t, drift_body, kick_body, place_body, haste, change_by_motion
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
-  use contact_surface_m, only: contact_surface_t, find_surface_touches, cover_way, renew_pairs
-  use contact_partners_m, only: update_motion, update_inertia
+  use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
+  use counterparts_m, only: update_motion, update_inertia
   use contact_forces_m, only: contact_report_t
   use contact_load_m, only: give_share
   use contact_state_m, only: contacts_t
-  use substep_limits_m, only: equal_part
+  use substep_limits_m, only: equal_substep
   use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
   use sleep_m, only: hold_or_wake
   use acting_bodies_m, only: list_present
-  use resting_m, only: wake_touching
-  use partners_met_m, only: store_partners
+  use resting_m, only: restore_contacts
+  use counterparts_met_m, only: store_counterparts
   implicit none
   private
   public :: move_by_impulses
@@ -29,9 +29,10 @@ module impulse_step_m
   integer, parameter :: max_steps = 1000000       !! of a fluid step; beyond, something went wrong
   integer, parameter :: n_sub_sweeps = 8          !! of a contact time; fewer let stacks creep
   real(wp), parameter :: max_way = 0.3_wp         !! of a step, over the smallest edge [-]
-  real(wp), parameter :: margin = 5.0e-3_wp       !! of a touch to come, over that edge [-]
+  real(wp), parameter :: margin = 5.0e-3_wp       !! of a contact point to come, over that edge [-]
   real(wp), parameter :: max_opening = 0.05_wp    !! of an overlap in a contact time, likewise [-]
-  real(wp), parameter :: free_way = 0.5_wp        !! covered by the list of pairs, over a reach [-]
+  real(wp), parameter :: free_way = 0.5_wp
+    !! covered by the list of pairs, over a bounding radius [-]
   real(wp), parameter :: film_steps = 20.0_wp     !! of a contact time, where films are computed
   real(wp), parameter :: slow_hit = 2.0_wp        !! speed below which no impact bounces, over g dt
 
@@ -55,19 +56,19 @@ contains
         report%info = 1
         return
       end if
-      step = equal_part(left, longest)
+      step = equal_substep(left, longest)
       n = ceiling(step*real(n_sub_sweeps, wp)/contacts%contact_time*(1.0_wp - 1.0e-9_wp))
       h = step/real(n, wp)
       do
         call solve_step(walls, gravity, step, h, n, contacts, blocks)
         if (.not. contacts%sleep%active) exit
-        associate (acting => contacts%touching%acting)
+        associate (acting => contacts%detected%acting)
           call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
             contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
             contacts%woken)
         end associate
         if (.not. any(contacts%woken)) exit
-        call wake_touching(blocks, contacts)   ! what wakes takes part: once more
+        call restore_contacts(blocks, contacts)   ! what wakes takes part: once more
       end do
       call finish_step(gravity, step, h, contacts, blocks, report)
       left = merge(left - step, 0.0_wp, step < left)
@@ -97,7 +98,7 @@ contains
       end if
       contacts%gain(b) = merge(0.0_wp, norm(gravity + contacts%steady(:, b)/blocks%mass(b)), &
                                blocks%fixed(b))*left &
-        + haste(blocks, b, contacts%touching%surface%reach(b))
+        + haste(blocks, b, contacts%detected%surface%bounding_radius(b))
       speed = fastest(b)
       if (.not. speed <= two(2)) two(2) = speed
       if (.not. two(2) <= two(1)) two = two([2, 1])
@@ -105,12 +106,12 @@ contains
     most = sum(two)
     longest = 0.0_wp
     if (.not. most <= huge(most)) return   ! not a number
-    associate (s => contacts%touching%surface)
+    associate (s => contacts%detected%surface)
       edge = contacts%smallest_edge
       longest = left
       if (contacts%lubrication%active) longest = min(left, contacts%contact_time/film_steps)
-      if (most*longest > free_way*maxval(s%reach)) longest = min(longest, &
-        max(contacts%contact_time, free_way*maxval(s%reach)/most))
+      if (most*longest > free_way*maxval(s%bounding_radius)) longest = min(longest, &
+        max(contacts%contact_time, free_way*maxval(s%bounding_radius)/most))
       call cover_way(most*longest + margin*edge + norm(gravity)*longest**2, s)
       call renew_pairs(walls, blocks, s)
       do b = 1, blocks%n
@@ -118,10 +119,11 @@ contains
         speed = fastest(b)
         do w = 1, walls%n
           call limit_by(walls%offset(w) - dot_product(walls%normal(:, w), blocks%x(:, b)) &
-                        - s%reach(b), speed)
+                        - s%bounding_radius(b), speed)
         end do
         if (walls%bed%there) then
-          associate (place => bed_place(walls%bed, blocks%x(:, b)), far => s%reach(b) + left*speed)
+          associate (place => bed_place(walls%bed, blocks%x(:, b)), far => s%bounding_radius(b) &
+            + left*speed)
             if (bed_is_near(walls%bed, place - far, place + far)) call limit_by(0.0_wp, speed)
           end associate
         end if
@@ -129,10 +131,11 @@ contains
       do p = 1, s%near%n
         associate (a => s%near%a(p), c => s%near%b(p))
           if (blocks%still(a) .and. blocks%still(c)) cycle
-          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, a))*s%reach(a) &
-            + norm(blocks%omega(:, c))*s%reach(c) + contacts%gain(a) + contacts%gain(c)
+          speed = distance(blocks%v(:, a), blocks%v(:, c)) + norm(blocks%omega(:, &
+            a))*s%bounding_radius(a) + norm(blocks%omega(:, c))*s%bounding_radius(c) &
+            + contacts%gain(a) + contacts%gain(c)
           call limit_by(distance(blocks%x(:, a), blocks%x(:, c) + s%near%shift(:, p)) &
-                        - s%reach(a) - s%reach(c), speed)
+                        - s%bounding_radius(a) - s%bounding_radius(c), speed)
         end associate
       end do
     end associate
@@ -141,8 +144,8 @@ contains
     pure real(wp) function fastest(b)
       integer, intent(in) :: b
 
-      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*contacts%touching%surface%reach(b) &
-        + contacts%gain(b)
+      fastest = norm(blocks%v(:, b)) + norm(blocks%omega(:, &
+        b))*contacts%detected%surface%bounding_radius(b) + contacts%gain(b)
     end function fastest
 
     !> What a gap allows that closes at a speed.
@@ -155,7 +158,7 @@ contains
     end subroutine limit_by
   end subroutine longest_step
 
-  !> Find the touches of a contact step and their impulses; the bodies stay where they are.
+  !> Find the contact points of a contact step and their impulses; the bodies stay where they are.
   subroutine solve_step(walls, gravity, step, h, n, contacts, blocks)
     type(walls_t), intent(in) :: walls
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
@@ -164,19 +167,19 @@ contains
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(in) :: blocks
 
-    associate (touching => contacts%touching, rows => contacts%rows, loads => contacts%loads)
-      touching%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
-      call find_surface_touches(walls, blocks, step, touching%surface, touching%touches)
-      call list_present(blocks, touching%acting)
-      associate (there => touching%acting%body(:touching%acting%n))
-        call update_motion(blocks, there, touching%partners)
-        call update_inertia(blocks, there, touching%partners)
+    associate (detected => contacts%detected, rows => contacts%rows, loads => contacts%loads)
+      detected%surface%search%margin = margin*contacts%smallest_edge + norm(gravity)*step**2
+      call find_surface_points(walls, blocks, step, detected%surface, detected%points)
+      call list_present(blocks, detected%acting)
+      associate (there => detected%acting%body(:detected%acting%n))
+        call update_motion(blocks, there, detected%counterparts)
+        call update_inertia(blocks, there, detected%counterparts)
       end associate
       loads%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
         loads%film)
-      call make_rows(h, contacts%contact_time, touching%touches, touching%law, touching%partners, &
-                     blocks, contacts%springs, rows)
+      call make_rows(h, contacts%contact_time, detected%points, detected%law, &
+                     detected%counterparts, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
         call fall_freely(gravity, step, contacts, blocks, rows)
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)
@@ -210,7 +213,7 @@ contains
     end do
   end subroutine fall_freely
 
-  !> Move the bodies by what was found, book the impulses, remember the touches.
+  !> Move the bodies by what was found, book the impulses, remember the contact points.
   subroutine finish_step(gravity, step, h, contacts, blocks, report)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: step, h      !! [s]
@@ -237,11 +240,11 @@ contains
       loads%impulse = loads%impulse + step*loads%force
       loads%twist = loads%twist + step*loads%torque
       call report_rows(step, contacts, report)
-      call store_memory(h, contacts%touching%touches, rows, contacts%springs)
+      call store_memory(h, contacts%detected%points, rows, contacts%displacements)
     end associate
   end subroutine finish_step
 
-  !> Partners that touched, how deep at the start of the step, and how far they came in it.
+  !> Counterparts that touched, how deep at the start of the step, and how far they came in it.
   subroutine report_rows(step, contacts, report)
     real(wp), intent(in) :: step   !! [s]
     type(contacts_t), intent(inout) :: contacts
@@ -249,7 +252,7 @@ contains
     logical :: touched(contacts%rows%n_pairs)
     integer :: k, r
 
-    associate (rows => contacts%rows, give => contacts%touching%partners%give)
+    associate (rows => contacts%rows, give => contacts%detected%counterparts%give)
       do k = 1, rows%n_pairs
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
@@ -258,11 +261,11 @@ contains
             report%deepest = max(report%deepest, -give_share*rows%row(r)%gap &
               /min(give(rows%a(k)), give(rows%b(k))))
             if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
-              abs(rows%closing(r))*step/contacts%touching%touches%item(rows%touch(r))%length)
+              abs(rows%closing(r))*step/contacts%detected%points%item(rows%point(r))%length)
           end do
         end associate
       end do
-      call store_partners(pack(rows%a(:rows%n_pairs), touched), &
+      call store_counterparts(pack(rows%a(:rows%n_pairs), touched), &
                           pack(rows%b(:rows%n_pairs), touched), contacts%met)
     end associate
   end subroutine report_rows

@@ -13,7 +13,7 @@
 module impulse_sweeps_m
   use kinds_m, only: wp
   use vectors_m, only: cross
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use impulse_rows_m, only: row_t, rows_t, past, in_space
   implicit none
   private
@@ -327,9 +327,9 @@ contains
     end do
   end subroutine go_on
 
-  !> Restitution after Newton: where a body was hit faster than `slowest`, all its touches leave
-  !! with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of the
-  !! whole step would pull. So no energy is made: that of impulses P is the sum of
+  !> Restitution after Newton: where a body was hit faster than `slowest`, all its contact points
+  !! leave with e times the speed at which they came, v_n = -e v_n(start), unless their impulse of
+  !! the whole step would pull. So no energy is made: that of impulses P is the sum of
   !! P (v_n + v_n(start))/2. The arms are those of where the bodies are now.
   pure subroutine restore(e, slowest, rows)
     real(wp), intent(in) :: e         !! [-]

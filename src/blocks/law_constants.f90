@@ -2,7 +2,7 @@
 module law_constants_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t, load_t, energy_of_force, power
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t, energy_of_force, power
   implicit none
   private
   public :: law_constants_t, law_constants
@@ -13,7 +13,7 @@ module law_constants_m
   contains
     procedure :: normal_constant
     procedure :: tangential_constant
-    procedure :: normal_spring
+    procedure :: normal_stiffness
     procedure :: damping
     procedure :: tangential_damping
   end type law_constants_t
@@ -56,22 +56,22 @@ contains
   end function tangential_constant
 
   !> F = w k d^gamma of eq. (1) for the weight w.
-  elemental subroutine normal_spring(law, k, weight, d, hard, spring)
+  elemental subroutine normal_stiffness(law, k, weight, d, hard, elastic)
     class(law_constants_t), intent(in) :: law
     real(wp), intent(in) :: k, weight, d, hard
-    type(spring_t), intent(out) :: spring
+    type(stiffness_t), intent(out) :: elastic
 
     associate (unused => hard)   ! these springs do not harden
     end associate
     if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) then
-      spring%steepness = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
+      elastic%steepness = law%gamma_n*max(0.0_wp, d)**(law%gamma_n - 1.0_wp)
     end if
     if (.not. d > 0.0_wp) return
-    spring%force = weight*k*power(d, law%gamma_n)
-    spring%energy = energy_of_force(spring%force, law%gamma_n, d)
-  end subroutine normal_spring
+    elastic%force = weight*k*power(d, law%gamma_n)
+    elastic%energy = energy_of_force(elastic%force, law%gamma_n, d)
+  end subroutine normal_stiffness
 
-  !> Each touch damps by itself.
+  !> Each contact point damps by itself.
   elemental subroutine damping(law, share, k, total, inverse, eta, decay)
     class(law_constants_t), intent(in) :: law
     real(wp), intent(in) :: share, k, total, inverse

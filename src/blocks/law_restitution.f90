@@ -3,7 +3,7 @@
 module law_restitution_m
   use kinds_m, only: wp
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t, load_t
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t
   implicit none
   private
   public :: law_restitution_t, law_restitution, restitution_of, impact_duration, damping_ratio_of
@@ -18,7 +18,7 @@ module law_restitution_m
   contains
     procedure :: normal_constant
     procedure :: tangential_constant
-    procedure :: normal_spring
+    procedure :: normal_stiffness
     procedure :: damping
     procedure :: tangential_damping
   end type law_restitution_t
@@ -128,23 +128,23 @@ contains
   !! and so hard beyond that no block comes out of another one on the wrong side. With the damping
   !! eta ds/dd an impact is that of the linear spring in the variable s and the time t ds/dd: it
   !! returns the restitution asked for at every speed.
-  elemental subroutine normal_spring(law, k, weight, d, hard, spring)
+  elemental subroutine normal_stiffness(law, k, weight, d, hard, elastic)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: k, weight, d, hard
-    type(spring_t), intent(out) :: spring
+    type(stiffness_t), intent(out) :: elastic
     real(wp) :: h
 
     associate (unused => law)
     end associate
     h = beyond(weight, d, hard)
-    spring%hardness = (1.0_wp + h)**2   ! the square of ds/du
-    spring%steepness = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
+    elastic%hardness = (1.0_wp + h)**2   ! the square of ds/du
+    elastic%steepness = 1.0_wp + 4*h*(1.0_wp + 0.2_wp*h)/(1.0_wp + h)**2
     if (.not. d > 0.0_wp) return
-    spring%force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
-    spring%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
-  end subroutine normal_spring
+    elastic%force = weight*k*d*(1.0_wp + 0.2_wp*h)*(1.0_wp + h)
+    elastic%energy = 0.5_wp*weight*k*(d*(1.0_wp + 0.2_wp*h))**2
+  end subroutine normal_stiffness
 
-  !> How far a touch is into the range where it hardens: (u/d_h)^4 [-].
+  !> How far a contact point is into the range where it hardens: (u/d_h)^4 [-].
   elemental function beyond(weight, d, hard) result(h)
     real(wp), intent(in) :: weight    !! [-]
     real(wp), intent(in) :: d, hard   !! overlap, depth d_h [m]
@@ -153,7 +153,7 @@ contains
     h = (weight*(max(0.0_wp, d)/hard)**2)**2
   end function beyond
 
-  !> The share of a touch in the damping of the pair, whose ratio is that of the impact.
+  !> The share of a contact point in the damping of the pair, whose ratio is that of the impact.
   elemental subroutine damping(law, share, k, total, inverse, eta, decay)
     class(law_restitution_t), intent(in) :: law
     real(wp), intent(in) :: share, k, total, inverse

@@ -8,14 +8,14 @@ module lubrication_m
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift
   implicit none
   private
   public :: lubrication_t, lubrication_init, lubricate, film_resistance, film_impulse, film_pull
 
   real(wp), parameter :: roughness = 1.0e-3_wp   !! thinnest film over the radius of the sphere [-]
-  real(wp), parameter :: reach = 4.0_wp   !! of films: the grid misses 2 % of thicker ones [cells]
+  real(wp), parameter :: cutoff = 4.0_wp   !! of films: the grid misses 2 % of thicker ones [cells]
   real(wp), parameter :: atmosphere = 101325.0_wp   !! [Pa]
 
   type :: lubrication_t
@@ -56,7 +56,8 @@ contains
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
     type(lubrication_t), intent(inout) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! (3, partners) of all partners [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:)
+      !! (3, counterparts) of all counterparts [N]
     real(wp), parameter :: round_off = 1.0e-9_wp
     logical :: active(blocks%n)
     integer :: a, p
@@ -64,7 +65,7 @@ contains
     active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
     associate (near => lubrication%near)
       call near_pairs(blocks%x(:, :blocks%n), lubrication%radius, active, walls%period, &
-                      (1.0_wp + round_off)*reach*maxval(lubrication%h), near)
+                      (1.0_wp + round_off)*cutoff*maxval(lubrication%h), near)
       p = 1
       do a = 1, blocks%n
         if (.not. active(a)) cycle
@@ -86,7 +87,7 @@ contains
     integer, intent(in) :: a
     real(wp), intent(in) :: dt                        !! [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
     real(wp) :: n(3), f(3), gap, sides
     integer :: w
 
@@ -108,7 +109,7 @@ contains
     integer, intent(in) :: a, b
     real(wp), intent(in) :: dt                        !! [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_partner:) !! [N]
+    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
     real(wp) :: d(3), n(3), f(3), gap, distance, radius
 
     d = blocks%x(:, b) - blocks%x(:, a)
@@ -142,7 +143,7 @@ contains
 
     cell = norm(n*lubrication%h)
     f = 0.0_wp
-    if (gap >= reach*cell) return
+    if (gap >= cutoff*cell) return
     a = sqrt(2.0_wp)*cell
     half = max(0.5_wp*dt*abs(opening), 1.0e-3_wp*roughness*radius)
     associate (mu => lubrication%viscosity)
@@ -175,7 +176,7 @@ contains
 
   !> What a film takes from the momentum between the two sides while it opens from nothing to a gap:
   !! the integral of `film_resistance` down to the roughness, and below that of the roughness; none
-  !! while the sides touch, for the touch lasts longer than it does in truth [N s].
+  !! while the sides touch, for the contact lasts longer than it does in truth [N s].
   pure function film_impulse(viscosity, radius, a, gap) result(impulse)
     real(wp), intent(in) :: viscosity        !! of the liquid [Pa s]
     real(wp), intent(in) :: radius, a, gap   !! [m]

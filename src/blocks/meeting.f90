@@ -24,9 +24,9 @@ module meeting_m
     real(wp) :: turn_a(3, 3) = 0.0_wp, turn_b(3, 3) = 0.0_wp   !! body axes to space
     real(wp) :: to_b(3) = 0.0_wp       !! from the centre of a to that of b, space [m]
     real(wp) :: speed = 0.0_wp         !! of any two points against one another, at most [m/s]
-    real(wp) :: gap = 0.0_wp           !! still taken as a touch [m]
+    real(wp) :: gap = 0.0_wp           !! still taken as a contact point [m]
     real(wp) :: margin = 0.0_wp        !! part of it whatever the speed [m]
-    real(wp) :: ahead = 0.0_wp         !! time in which touches may come [s]
+    real(wp) :: ahead = 0.0_wp         !! time in which contacts may come [s]
     real(wp) :: v(3) = 0.0_wp          !! of a past b, space [m/s]
     real(wp) :: omega_a(3) = 0.0_wp, omega_b(3) = 0.0_wp       !! spins, space [rad/s]
     type(view_t) :: a_in_b, b_in_a     !! see `update_views`
@@ -77,18 +77,18 @@ contains
 
   !> Largest way that points of two bodies move against one another from one pair of poses to
   !! another [m].
-  pure function way_between(before, now, reach_a, reach_b) result(way)
+  pure function way_between(before, now, radius_a, radius_b) result(way)
     type(poses_t), intent(in) :: before, now
-    real(wp), intent(in) :: reach_a, reach_b   !! of the bodies [m]
+    real(wp), intent(in) :: radius_a, radius_b   !! of the bodies [m]
     real(wp) :: way
 
     ! a turn by phi: |dq| = 2 sin(phi/4), and a point at distance r moves 4 r sin(phi/4) at most
     way = norm((now%x_a - before%x_a) - (now%x_b - before%x_b)) &
-      + 2*reach_a*norm(now%q_a - before%q_a) + 2*reach_b*norm(now%q_b - before%q_b)
+      + 2*radius_a*norm(now%q_a - before%q_a) + 2*radius_b*norm(now%q_b - before%q_b)
   end function way_between
 
   !> Whether two places touch, or come as near as the margin in the time ahead. Where there is one,
-  !! others are left out: touches to come that the bodies pass by would hold them.
+  !! others are left out: contact points to come that the bodies pass by would hold them.
   pure function closes(now, arm_a, arm_b, normal, depth) result(yes)
     type(meeting_t), intent(in) :: now
     real(wp), intent(in) :: arm_a(3), arm_b(3)   !! from the centres, space [m]

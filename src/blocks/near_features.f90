@@ -1,35 +1,36 @@
-!> What may touch of two bodies before they have moved against one another by a skin: probes of each
-!! with the facets and edges of the other that may be nearest to them, and edges that may cross.
+!> What may touch of two bodies before they have moved against one another by a skin: vertices of
+!! each with the facets and edges of the other that may be nearest to them, and edges that may
+!! cross.
 module near_features_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use bed_m, only: bed_t, bed_is_near, bed_distance
-  use surface_search_m, only: surface_t, near_list_t, found_t, gather_probes, gather_edges, &
+  use surface_search_m, only: surface_t, near_list_t, found_t, gather_vertices, gather_edges, &
     gather_facets, search_surface, min_distance, segment_distance2, nowhere
   use edge_crossing_m, only: edge_t, turn_before, way_apart
   use meeting_m, only: poses_t, view_t, meeting_t, inverse_view, seen_from, box_in_view
   implicit none
   private
-  public :: near_features_t, probes_near_t, search_t, list_features, list_bed
+  public :: near_features_t, near_vertices_t, search_t, list_features, list_bed
   public :: append_facets, append_edges, edge_in_view, way_to_crossing
 
-  !> Probes of one body near the other, and the features of the other they may touch.
-  type :: probes_near_t
+  !> Vertices of one body near the other, and the features of the other they may touch.
+  type :: near_vertices_t
     integer :: n = 0
-    integer, allocatable :: probe(:)
+    integer, allocatable :: vertex(:)
     real(wp), allocatable :: away(:)                        !! (n) from the other body [m]
     integer, allocatable :: facet_first(:), edge_first(:)   !! (n + 1) into the next two
     integer :: n_facets = 0, n_edges = 0
     integer, allocatable :: facet(:), edge(:)
-  end type probes_near_t
+  end type near_vertices_t
 
   !> The lists of a pair of bodies.
   type :: near_features_t
     type(poses_t) :: when                        !! poses at which they were made
     real(wp) :: valid = -1.0_wp                  !! way since then for which they hold [m]
     real(wp) :: ahead = 0.0_wp                   !! largest gap for which they hold [m]
-    type(probes_near_t) :: of_a, of_b
+    type(near_vertices_t) :: of_a, of_b
     integer :: n_crossings = 0
     integer, allocatable :: edge_a(:), edge_b(:) !! sorted by edge of a, then of b
     real(wp), allocatable :: away(:)             !! way before the two may cross [m]
@@ -39,7 +40,8 @@ module near_features_m
   type :: search_t
     real(wp) :: skin = 0.0_wp                    !! least way before lists are renewed [m]
     real(wp) :: lasting = 0.0_wp                 !! time that lists of fast bodies last [s]
-    real(wp) :: min_ahead = 0.0_wp               !! way of a touch that comes soon, at least [m],
+    real(wp) :: min_ahead = 0.0_wp
+      !! way of a contact point that comes soon, at least [m],
     real(wp) :: ahead = 0.0_wp                   !! and of the pair whose lists are made [m]
     real(wp) :: margin = 0.0_wp                  !! added to all gaps [m]
     real(wp) :: lasting_gaps = 10.0_wp           !! multiple of the gap for which short lists hold
@@ -60,12 +62,12 @@ contains
     real(wp) :: apart, skin
 
     call begin_lists(now%poses, search%ahead, near)
-    apart = norm(now%to_b) - a%reach - b%reach - search%ahead
+    apart = norm(now%to_b) - a%bounding_radius - b%bounding_radius - search%ahead
     skin = skin_for(now%speed, search)
     near%valid = max(apart, skin)
     if (apart > skin) return
-    call list_probes(now%b_in_a, skin, b, a, search, near%of_b)
-    call list_probes(now%a_in_b, skin, a, b, search, near%of_a)
+    call list_vertices(now%b_in_a, skin, b, a, search, near%of_b)
+    call list_vertices(now%a_in_b, skin, a, b, search, near%of_a)
     call list_crossings(now%a_in_b, a, b, search, near)
   end subroutine list_features
 
@@ -82,17 +84,17 @@ contains
     call begin_lists(now%poses, search%ahead, near)
     near%valid = skin_for(now%speed, search)
     margin = near%valid + search%ahead
-    associate (x => now%poses%x_a, reach => surface%reach + margin)
-      if (.not. bed_is_near(bed, x - reach, x + reach)) return
+    associate (x => now%poses%x_a, cutoff => surface%bounding_radius + margin)
+      if (.not. bed_is_near(bed, x - cutoff, x + cutoff)) return
     end associate
-    call list_probes(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
+    call list_vertices(now%b_in_a, near%valid, bed%surface, surface, search, near%of_b)
     call list_crossings(now%a_in_b, surface, bed%surface, search, near)
     near%of_a%n_facets = 0
     near%of_a%n_edges = 0
     margin = margin + surface%ball
     do i = 1, merge(1, surface%n_corners, surface%ball > 0.0_wp)
-      place = now%poses%x_a + matmul(now%turn_a, surface%probe(:, i))
-      call bed_distance(bed, place, margin, max(margin, surface%reach), search%found, &
+      place = now%poses%x_a + matmul(now%turn_a, surface%vertex(:, i))
+      call bed_distance(bed, place, margin, max(margin, surface%bounding_radius), search%found, &
         distance, outward)
       if (distance > margin .or. all(abs(outward) <= 0.0_wp)) cycle
       call append_near(bed%surface, i, place, abs(distance) + 2*(near%valid + search%ahead), &
@@ -124,25 +126,25 @@ contains
     skin = min(max(search%skin, speed*search%lasting), max_skin*search%skin)
   end function skin_for
 
-  !> Probes of the guest near the surface of the host or inside, each with the facets and edges that
-  !! may be nearest to it before the bodies have moved by the skin.
-  subroutine list_probes(guest_in_host, skin, guest, host, search, list)
+  !> Vertices of the guest near the surface of the host or inside, each with the facets and edges
+  !! that may be nearest to it before the bodies have moved by the skin.
+  subroutine list_vertices(guest_in_host, skin, guest, host, search, list)
     type(view_t), intent(in) :: guest_in_host
     real(wp), intent(in) :: skin               !! [m]
     type(surface_t), intent(in) :: guest, host
     type(search_t), intent(inout) :: search
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
     real(wp) :: margin, place(3), distance, outward(3), low(3), high(3)
     integer :: m
 
     list%n_facets = 0
     list%n_edges = 0
-    if (host%ball > 0.0_wp) return   ! its own centre is the probe
+    if (host%ball > 0.0_wp) return   ! its own centre is the vertex
     margin = skin + search%ahead + guest%ball
     call box_in_view(inverse_view(guest_in_host), host%low - margin, host%high + margin, low, high)
-    call gather_probes(guest, low, high, search%guests)
+    call gather_vertices(guest, low, high, search%guests)
     do m = 1, search%guests%n
-      place = seen_from(guest_in_host, guest%probe(:, search%guests%item(m)))
+      place = seen_from(guest_in_host, guest%vertex(:, search%guests%item(m)))
       if (any(place < host%low - margin) .or. any(place > host%high + margin)) cycle
       if (min_distance(host, place) > margin) cycle
       call search_surface(host, place, margin, search%found, distance, outward)
@@ -152,35 +154,35 @@ contains
       list%away(list%n) = distance - guest%ball
     end do
     call end_lists(list)
-  end subroutine list_probes
+  end subroutine list_vertices
 
-  !> Append a probe with the facets and edges of the host within reach; `away` is not set.
-  subroutine append_near(host, probe, place, reach, search, list)
+  !> Append a vertex with the facets and edges of the host within the cutoff; `away` is not set.
+  subroutine append_near(host, vertex, place, cutoff, search, list)
     type(surface_t), intent(in) :: host
-    integer, intent(in) :: probe
-    real(wp), intent(in) :: place(3), reach      !! of the probe, host axes [m]
+    integer, intent(in) :: vertex
+    real(wp), intent(in) :: place(3), cutoff      !! of the vertex, host axes [m]
     type(search_t), intent(inout) :: search
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
 
-    call gather_facets(host, place - reach, place + reach, search%found%facets)
-    call gather_edges(host, place - reach, place + reach, search%found%edges)
+    call gather_facets(host, place - cutoff, place + cutoff, search%found%facets)
+    call gather_edges(host, place - cutoff, place + cutoff, search%found%edges)
     list%n = list%n + 1
-    call ensure_capacity(list%n, list%probe)
+    call ensure_capacity(list%n, list%vertex)
     call ensure_capacity(list%n, list%away)
     call ensure_capacity(list%n, list%facet_first)
     call ensure_capacity(list%n, list%edge_first)
-    list%probe(list%n) = probe
+    list%vertex(list%n) = vertex
     list%facet_first(list%n) = list%n_facets + 1
     list%edge_first(list%n) = list%n_edges + 1
     associate (facets => search%found%facets, edges => search%found%edges)
-      call append_facets(host, facets%item(:facets%n), place, reach, list%n_facets, list%facet)
-      call append_edges(host, edges%item(:edges%n), place, reach, list%n_edges, list%edge)
+      call append_facets(host, facets%item(:facets%n), place, cutoff, list%n_facets, list%facet)
+      call append_edges(host, edges%item(:edges%n), place, cutoff, list%n_edges, list%edge)
     end associate
   end subroutine append_near
 
-  !> Close the lists of facets and edges of the last probe.
+  !> Close the lists of facets and edges of the last vertex.
   subroutine end_lists(list)
-    type(probes_near_t), intent(inout) :: list
+    type(near_vertices_t), intent(inout) :: list
 
     call ensure_capacity(list%n + 1, list%facet_first)
     call ensure_capacity(list%n + 1, list%edge_first)
@@ -188,66 +190,66 @@ contains
     list%edge_first(list%n + 1) = list%n_edges + 1
   end subroutine end_lists
 
-  !> Append those of some facets that are within reach of a place to a list of n numbers.
-  subroutine append_facets(host, facets, place, reach, n, list)
+  !> Append those of some facets that are within the cutoff of a place to a list of n numbers.
+  subroutine append_facets(host, facets, place, cutoff, n, list)
     type(surface_t), intent(in) :: host
     integer, intent(in) :: facets(:)
-    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    real(wp), intent(in) :: place(3), cutoff   !! host axes [m]
     integer, intent(inout) :: n
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
     call ensure_capacity(n + size(facets), list)
     do k = 1, size(facets)
-      if (.not. facet_is_near(host, facets(k), place, reach)) cycle
+      if (.not. facet_is_near(host, facets(k), place, cutoff)) cycle
       n = n + 1
       list(n) = facets(k)
     end do
   end subroutine append_facets
 
-  !> Append those of some edges that are within reach of a place to a list of n numbers.
-  subroutine append_edges(host, edges, place, reach, n, list)
+  !> Append those of some edges that are within the cutoff of a place to a list of n numbers.
+  subroutine append_edges(host, edges, place, cutoff, n, list)
     type(surface_t), intent(in) :: host
     integer, intent(in) :: edges(:)
-    real(wp), intent(in) :: place(3), reach   !! host axes [m]
+    real(wp), intent(in) :: place(3), cutoff   !! host axes [m]
     integer, intent(inout) :: n
     integer, allocatable, intent(inout) :: list(:)
     integer :: k
 
     call ensure_capacity(n + size(edges), list)
     do k = 1, size(edges)
-      if (.not. edge_is_near(host%edge(edges(k)), place, reach)) cycle
+      if (.not. edge_is_near(host%edge(edges(k)), place, cutoff)) cycle
       n = n + 1
       list(n) = edges(k)
     end do
   end subroutine append_edges
 
-  !> Whether a facet may be the nearest to a place, within reach of it.
-  pure function facet_is_near(host, f, place, reach) result(yes)
+  !> Whether a facet may be the nearest to a place, within the cutoff of it.
+  pure function facet_is_near(host, f, place, cutoff) result(yes)
     type(surface_t), intent(in) :: host
     integer, intent(in) :: f
-    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    real(wp), intent(in) :: place(3), cutoff   !! body axes [m]
     logical :: yes
     integer :: c
 
-    yes = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= reach
+    yes = abs(dot_product(host%normal(:, f), place) - host%offset(f)) <= cutoff
     if (.not. yes) return
     do c = host%side(f), host%side(f + 1) - 1
-      yes = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - reach
+      yes = dot_product(host%side_normal(:, c), place) >= host%side_offset(c) - cutoff
       if (.not. yes) return
     end do
   end function facet_is_near
 
-  !> Whether an edge is within reach of a place.
-  pure function edge_is_near(edge, place, reach) result(yes)
+  !> Whether an edge is within the cutoff of a place.
+  pure function edge_is_near(edge, place, cutoff) result(yes)
     type(edge_t), intent(in) :: edge
-    real(wp), intent(in) :: place(3), reach   !! body axes [m]
+    real(wp), intent(in) :: place(3), cutoff   !! body axes [m]
     logical :: yes
     real(wp) :: d(3)
 
     d = place - edge%start
     d = d - min(max(dot_product(d, edge%along), 0.0_wp), edge%extent)*edge%along
-    yes = dot_product(d, d) <= reach**2
+    yes = dot_product(d, d) <= cutoff**2
   end function edge_is_near
 
   !> Pairs of convex edges that may cross before the bodies have moved by the skin.
@@ -257,26 +259,27 @@ contains
     type(search_t), intent(inout) :: search
     type(near_features_t), intent(inout) :: near
     type(edge_t) :: guest
-    real(wp) :: reach, away, low(3), high(3)
+    real(wp) :: cutoff, away, low(3), high(3)
     integer :: m, k, i, j
 
     if (surface_a%ball > 0.0_wp .or. surface_b%ball > 0.0_wp) return
-    reach = near%valid + search%ahead + min(surface_a%length, surface_b%length)
-    call box_in_view(inverse_view(a_in_b), surface_b%low - reach, surface_b%high + reach, low, high)
+    cutoff = near%valid + search%ahead + min(surface_a%length, surface_b%length)
+    call box_in_view(inverse_view(a_in_b), surface_b%low - cutoff, surface_b%high + cutoff, low, &
+      high)
     call gather_edges(surface_a, low, high, search%guests)
     do m = 1, search%guests%n
       i = search%guests%item(m)
       if (i > surface_a%n_convex) exit
       guest = edge_in_view(a_in_b, surface_a%edge(i))
-      low = min(guest%start, guest%start + guest%extent*guest%along) - reach
-      high = max(guest%start, guest%start + guest%extent*guest%along) + reach
+      low = min(guest%start, guest%start + guest%extent*guest%along) - cutoff
+      high = max(guest%start, guest%start + guest%extent*guest%along) + cutoff
       if (any(low > surface_b%high) .or. any(high < surface_b%low)) cycle
       call gather_edges(surface_b, low, high, search%hosts)
       do k = 1, search%hosts%n
         j = search%hosts%item(k)
         if (j > surface_b%n_convex) exit
-        away = way_to_crossing(guest, surface_b%edge(j), near%valid, reach, &
-          min(surface_a%reach, surface_b%reach))
+        away = way_to_crossing(guest, surface_b%edge(j), near%valid, cutoff, &
+          min(surface_a%bounding_radius, surface_b%bounding_radius))
         if (away < nowhere) call add_crossing(i, j, away, near)
       end do
     end do
@@ -313,17 +316,17 @@ contains
 
   !> Way that two bodies may move before two edges of theirs may cross; `nowhere` where they cannot
   !! before the bodies have moved by a margin [m].
-  pure function way_to_crossing(guest, host, margin, reach, arm) result(way)
+  pure function way_to_crossing(guest, host, margin, cutoff, arm) result(way)
     type(edge_t), intent(in) :: guest, host   !! in the same axes
     real(wp), intent(in) :: margin            !! [m]
-    real(wp), intent(in) :: reach             !! distance from which edges cannot come to cross [m]
-    real(wp), intent(in) :: arm               !! reach of the smaller body: it turns by way/arm [m]
+    real(wp), intent(in) :: cutoff             !! distance from which edges cannot come to cross [m]
+    real(wp), intent(in) :: arm               !! radius of the smaller body: it turns by way/arm [m]
     real(wp) :: way
     real(wp) :: angle
 
     way = nowhere
     if (segment_distance2(guest%start, guest%along, guest%extent, host%start, host%along, &
-                          host%extent) > reach**2) return
+                          host%extent) > cutoff**2) return
     angle = turn_before(guest, host)
     if (angle >= margin/arm) return
     way = max(way_apart(guest, host, margin/arm), angle*arm)

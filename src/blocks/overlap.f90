@@ -190,8 +190,8 @@ contains
     end do
   end subroutine max_overlap
 
-  !> Depth below which that of a body and its partner is of no interest: neither the largest of all
-  !! nor deep for their size [m].
+  !> Depth below which that of a body and its counterpart is of no interest: neither the largest of
+  !! all nor deep for their size [m].
   pure function worth_finding(a, b, depth, deep) result(least)
     integer, intent(in) :: a, b           !! body; body, or below 1: wall or bed
     real(wp), intent(in) :: depth         !! largest so far [m]
@@ -267,15 +267,15 @@ contains
       depth = max(depth, body%ball - distance)
       return
     end if
-    do c = 1, size(body%reach)
+    do c = 1, size(body%bounding_radius)
       p = x + matmul(turn, body%middle(:, c))
-      if (.not. bed_is_near(bed, p - body%reach(c), p + body%reach(c))) then
+      if (.not. bed_is_near(bed, p - body%bounding_radius(c), p + body%bounding_radius(c))) then
         if (.not. bed_covers(bed, p)) cycle
       end if
       do i = body%cluster(c), body%cluster(c + 1) - 1
         p = x + matmul(turn, body%sample(:, i))
         if (.not. bed_covers(bed, p)) cycle
-        call bed_distance(bed, p, body%reach(c), 2*body%radius, found, distance, outward)
+        call bed_distance(bed, p, body%bounding_radius(c), 2*body%radius, found, distance, outward)
         depth = max(depth, -distance)
       end do
     end do
@@ -303,9 +303,10 @@ contains
     real(wp) :: p(3)
     integer :: c, i
 
-    do c = 1, size(a%reach)
+    do c = 1, size(a%bounding_radius)
       p = d + matmul(turn, a%middle(:, c))
-      if (any(p < b%tets%low - a%reach(c)) .or. any(p > b%tets%high + a%reach(c))) cycle
+      if (any(p < b%tets%low - a%bounding_radius(c)) .or. any(p > b%tets%high &
+        + a%bounding_radius(c))) cycle
       do i = a%cluster(c), a%cluster(c + 1) - 1
         p = d + turn(:, 1)*a%sample(1, i) + turn(:, 2)*a%sample(2, i) + turn(:, 3)*a%sample(3, i)
         if (any(p < b%tets%low) .or. any(p > b%tets%high)) cycle

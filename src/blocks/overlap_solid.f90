@@ -20,7 +20,7 @@ module overlap_solid_m
     real(wp), allocatable :: sample(:, :)        !! (3, n) surface points, cluster by cluster [m]
     integer, allocatable :: cluster(:)           !! (clusters + 1) first sample of each
     real(wp), allocatable :: middle(:, :)   !! (3, clusters) bounding spheres of the clusters [m]
-    real(wp), allocatable :: reach(:)            !! (clusters) [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (clusters) [m]
     !> (3, 3, tets) turns x - tet_origin into the weights of corners 2 to 4 [1/m].
     real(wp), allocatable :: to_tet(:, :, :)
     real(wp), allocatable :: tet_origin(:, :)    !! (3, tets) corner 1 [m]
@@ -204,7 +204,7 @@ contains
     call bins_build(solid%sample, solid%sample, spacing, bins)
     solid%sample = solid%sample(:, bins%item)
     n = count(bins%first(2:) > bins%first(:size(bins%first) - 1))
-    allocate (solid%cluster(n + 1), solid%middle(3, n), solid%reach(n))
+    allocate (solid%cluster(n + 1), solid%middle(3, n), solid%bounding_radius(n))
     n = 0
     do c = 1, size(bins%first) - 1
       i = bins%first(c)
@@ -214,7 +214,7 @@ contains
       solid%cluster(n) = i
       solid%middle(:, n) = 0.5_wp*(minval(solid%sample(:, i:last), 2) &
         + maxval(solid%sample(:, i:last), 2))
-      solid%reach(n) = maxval(norm2(solid%sample(:, i:last) &
+      solid%bounding_radius(n) = maxval(norm2(solid%sample(:, i:last) &
         - spread(solid%middle(:, n), 2, last - i + 1), 1))
     end do
     solid%cluster(n + 1) = size(solid%sample, 2) + 1

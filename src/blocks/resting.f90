@@ -1,24 +1,24 @@
-!> Who falls asleep and who wakes, and what becomes of the springs between them.
+!> Who falls asleep and who wakes, and what becomes of the displacements between them.
 module resting_m
   use kinds_m, only: wp
   use growing_m, only: ensure_capacity
   use vectors_m, only: norm
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
-  use springs_m, only: move_springs
+  use displacements_m, only: move_displacements
   use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, put_to_sleep, hold_or_wake, &
     all_still
   use contact_law_m, only: stored_energy
-  use contact_partners_m, only: partners_t, wrench_t, update_motion, motion_between
+  use counterparts_m, only: counterparts_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
-  use touching_m, only: find_touches
-  use contact_forces_m, only: contact_report_t, match_springs, sum_forces, push_group
-  use substep_limits_m, only: substep_limit, equal_part
-  use partners_met_m, only: store_partners
+  use contact_detection_m, only: detect_contacts
+  use contact_forces_m, only: contact_report_t, match_displacements, sum_forces, push_group
+  use substep_limits_m, only: substep_limit, equal_substep
+  use counterparts_met_m, only: store_counterparts
   use contact_state_m, only: contacts_t
   implicit none
   private
-  public :: wake_or_sleep, wake_touching
+  public :: wake_or_sleep, restore_contacts
 
 contains
 
@@ -38,14 +38,14 @@ contains
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      associate (acting => contacts%touching%acting)
+      associate (acting => contacts%detected%acting)
         call list_present(blocks, acting)
         call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
           contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
           contacts%woken)
       end associate
       changed = any(contacts%woken)
-      if (changed) call wake_touching(blocks, contacts)
+      if (changed) call restore_contacts(blocks, contacts)
     else
       changed = .false.
       do b = 1, blocks%n
@@ -53,16 +53,16 @@ contains
       end do
       if (any(contacts%sleep%candidate)) then
         dt_b = dt
-        if (.not. contacts%by_impulses) dt_b = equal_part(dt, substep_limit(walls, &
-          contacts%touching, blocks, dt, contacts%limits))
+        if (.not. contacts%by_impulses) dt_b = equal_substep(dt, substep_limit(walls, &
+          contacts%detected, blocks, dt, contacts%limits))
         call let_sleep(gravity, dt_b, contacts, blocks, changed)
       end if
     end if
     contacts%woken = .false.
-    if (changed .and. .not. contacts%by_impulses) call find_touches(walls, blocks, 0.0_wp, &
-      contacts%touching)
+    if (changed .and. .not. contacts%by_impulses) call detect_contacts(walls, blocks, 0.0_wp, &
+      contacts%detected)
     associate (rest => contacts%sleep%rest)
-      call store_partners(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
+      call store_counterparts(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
   end subroutine wake_or_sleep
 
@@ -81,11 +81,12 @@ contains
     if (contacts%by_impulses) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      call sum_memory(contacts%springs, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:))
+      call sum_memory(contacts%displacements, contacts%loads%force(:, 1:), &
+        contacts%loads%torque(:, 1:))
     else
-      call match_springs(contacts%touching, contacts%before, contacts%springs)
+      call match_displacements(contacts%detected, contacts%before, contacts%displacements)
       call foresee_motion(gravity, dt_b, blocks, contacts)
-      call sum_forces(dt_b, contacts%touching, contacts%springs, contacts%loads, ignored)
+      call sum_forces(dt_b, contacts%detected, contacts%displacements, contacts%loads, ignored)
     end if
     call update_supported(blocks, contacts)
     changed = .false.
@@ -94,7 +95,7 @@ contains
         if (.not. (sleep%candidate(b) .and. sleep%supported(b))) cycle
         if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
-                           blocks%fluid_torque(:, b), sleep%reach(b))) cycle
+                           blocks%fluid_torque(:, b), sleep%bounding_radius(b))) cycle
         ! should it wake before the step ends, contact has taken this
         loads%impulse(:, b) = loads%impulse(:, b) - blocks%mass(b)*blocks%v(:, b)
         loads%twist(:, b) = loads%twist(:, b) - blocks%l(:, b)
@@ -105,7 +106,7 @@ contains
     if (changed) call freeze_contacts(dt_b, blocks, contacts)
   end subroutine let_sleep
 
-  !> Velocities of the partners in the middle of a substep, if the candidates begin it at rest.
+  !> Velocities of the counterparts in the middle of a substep, if the candidates begin it at rest.
   subroutine foresee_motion(gravity, dt_b, blocks, contacts)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt_b         !! the substep [s]
@@ -113,18 +114,18 @@ contains
     type(contacts_t), intent(inout) :: contacts
     integer :: b
 
-    associate (acting => contacts%touching%acting)
-      call update_motion(blocks, acting%body(:acting%n), contacts%touching%partners)
+    associate (acting => contacts%detected%acting)
+      call update_motion(blocks, acting%body(:acting%n), contacts%detected%counterparts)
     end associate
     do b = 1, blocks%n
       if (blocks%fixed(b) .or. .not. blocks%present(b)) cycle
-      associate (v => contacts%touching%partners%v(:, b), &
-        omega => contacts%touching%partners%omega(:, b))
+      associate (v => contacts%detected%counterparts%v(:, b), &
+        omega => contacts%detected%counterparts%omega(:, b))
         if (contacts%sleep%candidate(b)) v = 0.0_wp
         if (contacts%sleep%candidate(b)) omega = 0.0_wp
         v = v + 0.5_wp*dt_b*(gravity + contacts%steady(:, b)/blocks%mass(b))
         omega = omega + 0.5_wp*dt_b*matmul( &
-          contacts%touching%partners%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
+          contacts%detected%counterparts%inverse_inertia(:, :, b), blocks%fluid_torque(:, b))
       end associate
     end do
   end subroutine foresee_motion
@@ -137,21 +138,21 @@ contains
     logical :: changed
     integer :: g, a, b
 
-    associate (sleep => contacts%sleep, springs => contacts%springs)
-      do g = 1, springs%n
-        a = springs%a(g)
-        b = springs%b(g)
-        if (is_carried(blocks, contacts%touching%partners, b)) sleep%candidate(a) = .false.
+    associate (sleep => contacts%sleep, displacements => contacts%displacements)
+      do g = 1, displacements%n
+        a = displacements%a(g)
+        b = displacements%b(g)
+        if (is_carried(blocks, contacts%detected%counterparts, b)) sleep%candidate(a) = .false.
         if (b < 1) cycle
-        if (is_carried(blocks, contacts%touching%partners, a)) sleep%candidate(b) = .false.
+        if (is_carried(blocks, contacts%detected%counterparts, a)) sleep%candidate(b) = .false.
       end do
       sleep%supported = blocks%fixed .or. blocks%asleep
       changed = .true.
       do while (changed)
         changed = .false.
-        do g = 1, springs%n
-          a = springs%a(g)
-          b = springs%b(g)
+        do g = 1, displacements%n
+          a = displacements%a(g)
+          b = displacements%b(g)
           if (b < 1) then
             changed = changed .or. .not. sleep%supported(a)
             sleep%supported(a) = .true.
@@ -164,21 +165,22 @@ contains
     end associate
   end subroutine update_supported
 
-  !> Whether a partner is moved at a given rate.
-  pure function is_carried(blocks, partners, b) result(yes)
+  !> Whether a counterpart is moved at a given rate.
+  pure function is_carried(blocks, counterparts, b) result(yes)
     type(blocks_t), intent(in) :: blocks
-    type(partners_t), intent(in) :: partners
+    type(counterparts_t), intent(in) :: counterparts
     integer, intent(in) :: b
     logical :: yes
 
     if (b < 0) then
-      yes = any(abs(partners%v(:, b)) > 0.0_wp)
+      yes = any(abs(counterparts%v(:, b)) > 0.0_wp)
     else
       yes = blocks%fixed(b) .and. .not. blocks%still(b)
     end if
   end function is_carried
 
-  !> Move the springs of touches between what does not move to those at rest, with their forces.
+  !> Move the displacements of contact points between what does not move to those at rest, with
+  !! their forces.
   subroutine freeze_contacts(dt_b, blocks, contacts)
     real(wp), intent(in) :: dt_b         !! the substep [s]
     type(blocks_t), intent(in) :: blocks
@@ -187,32 +189,32 @@ contains
     type(wrench_t) :: wrench
     integer :: g, t, a, b
 
-    associate (sleep => contacts%sleep, springs => contacts%springs)
-      call ensure_capacity(springs%n, sleep%chosen)
-      do g = 1, springs%n
-        a = springs%a(g)
-        b = springs%b(g)
+    associate (sleep => contacts%sleep, displacements => contacts%displacements)
+      call ensure_capacity(displacements%n, sleep%chosen)
+      do g = 1, displacements%n
+        a = displacements%a(g)
+        b = displacements%b(g)
         sleep%chosen(g) = at_rest(blocks, a, b)
         if (contacts%by_impulses .or. .not. sleep%chosen(g)) cycle
         wrench = wrench_t()
-        call push_group(g, dt_b, motion_between(contacts%touching%partners, a, b), &
-          contacts%touching, springs, wrench, ignored)
-        springs%force(:, g) = wrench%force
-        springs%torque_a(:, g) = wrench%torque_a
-        springs%torque_b(:, g) = wrench%torque_b
-        springs%energy(g) = stored_energy(springs%k(g), contacts%touching%law%gamma_t, &
-          norm(springs%xi(:, g)))
-        do t = contacts%touching%groups%first(g), contacts%touching%groups%first(g + 1) - 1
-          springs%energy(g) = springs%energy(g) + contacts%touching%response%energy(t)
+        call push_group(g, dt_b, motion_between(contacts%detected%counterparts, a, b), &
+          contacts%detected, displacements, wrench, ignored)
+        displacements%force(:, g) = wrench%force
+        displacements%torque_a(:, g) = wrench%torque_a
+        displacements%torque_b(:, g) = wrench%torque_b
+        displacements%energy(g) = stored_energy(displacements%k(g), contacts%detected%law%gamma_t, &
+          norm(displacements%xi(:, g)))
+        do t = contacts%detected%groups%first(g), contacts%detected%groups%first(g + 1) - 1
+          displacements%energy(g) = displacements%energy(g) + contacts%detected%response%energy(t)
         end do
       end do
-      call move_springs(sleep%chosen, springs, sleep%rest)
+      call move_displacements(sleep%chosen, displacements, sleep%rest)
       call update_loads(sleep)
     end associate
   end subroutine freeze_contacts
 
-  !> Give the springs of touches with a body that moves now back to those at work.
-  subroutine wake_touching(blocks, contacts)
+  !> Give the displacements of contact points with a body that moves now back to those at work.
+  subroutine restore_contacts(blocks, contacts)
     type(blocks_t), intent(in) :: blocks
     type(contacts_t), intent(inout) :: contacts
     integer :: i
@@ -222,12 +224,12 @@ contains
       do i = 1, sleep%rest%n
         sleep%chosen(i) = .not. at_rest(blocks, sleep%rest%a(i), sleep%rest%b(i))
       end do
-      call move_springs(sleep%chosen, sleep%rest, contacts%springs)
+      call move_displacements(sleep%chosen, sleep%rest, contacts%displacements)
       call update_loads(sleep)
     end associate
-  end subroutine wake_touching
+  end subroutine restore_contacts
 
-  !> Whether neither body a nor its partner moves.
+  !> Whether neither body a nor its counterpart moves.
   pure function at_rest(blocks, a, b) result(yes)
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, b

@@ -12,7 +12,7 @@ module rigid_body_m
   use boundary_kinds_m, only: side_code, is_wall
   use vectors_m, only: norm, rotation_matrix, quaternion_exp, quaternion_product, inverse3, &
     normalised
-  use tet_mesh_m, only: shape_t, reach_along
+  use tet_mesh_m, only: shape_t, extent_along
   use given_motion_m, only: given_motion_t, pose_at, fastest_between
   use drops_m, only: place_of_block, place_of_body, shape_of_place
   implicit none
@@ -77,7 +77,7 @@ module rigid_body_m
     real(wp), allocatable :: lagged_force(:, :)
       !! (6, n) force and torque of the fluid that the next step adds (`wall_balance_m`) [N, N m]
     real(wp), allocatable :: contact_force(:, :), contact_torque(:, :)
-    integer, allocatable :: contacts(:)   !! (n) different partners touched during the last step
+    integer, allocatable :: contacts(:)   !! (n) different counterparts touched during the last step
     integer, allocatable :: on_floor(:)          !! (n) 1 if the floor or the bed is one of them
   end type blocks_t
 
@@ -161,9 +161,9 @@ contains
     height = top
     if (at_water .and. case%run%physics /= 'dry' .and. .not. case%fluid%single_phase &
         .and. is_given(case%fluid%water_level)) height = min(top, case%fluid%water_level)
-    height = height + reach_along(shape, -turn(3, :))
+    height = height + extent_along(shape, -turn(3, :))
     if (is_wall(side_code(case%boundary%kind(2, 3)))) height = min(height, &
-      top - reach_along(shape, turn(3, :)))
+      top - extent_along(shape, turn(3, :)))
   end function height_at_level
 
   !> Blocks that another run left somewhere begin there, as they moved then.
@@ -309,14 +309,14 @@ contains
   end subroutine look_ahead
 
   !> By how much a body on a path may get faster in this step than it is now; 0 for others [m/s].
-  pure function haste(blocks, b, reach) result(more)
+  pure function haste(blocks, b, radius) result(more)
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: b
-    real(wp), intent(in) :: reach   !! [m]
+    real(wp), intent(in) :: radius   !! [m]
     real(wp) :: more
 
     more = max(0.0_wp, blocks%ahead(1, b) - norm(blocks%v(:, b))) &
-      + max(0.0_wp, blocks%ahead(2, b) - norm(blocks%omega(:, b)))*reach
+      + max(0.0_wp, blocks%ahead(2, b) - norm(blocks%omega(:, b)))*radius
   end function haste
 
   !> By how much the velocity and spin of a body on a path change within a time dt from now.

@@ -1,53 +1,54 @@
-!> Blocks at rest sleep: they keep their pose, and touches among them are not looked for, until the
-!! forces on them no longer balance.
+!> Blocks at rest sleep: they keep their pose, and contact points among them are not looked for,
+!! until the forces on them no longer balance.
 !!
 !! A block falls asleep when it has been slow for some time, rests on something, and the forces on
 !! it balance within half of a small share of its load. It stays asleep as long as they balance
 !! within that share: contact from sleepers, held bodies and walls, which is frozen like the poses,
 !! contact from what moves, the fluid, and weight. So a block wakes in the substep in which it is
 !! hit, when the flow changes, and when a neighbour that it rests on wakes and moves away. Nothing
-!! is lost meanwhile: frozen forces and springs are those of the awake block at the same pose, and a
-!! sleeper is never held by more than that share of its load.
+!! is lost meanwhile: frozen forces and displacements are those of the awake block at the same pose,
+!! and a sleeper is never held by more than that share of its load.
 module sleep_m
   use kinds_m, only: wp
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t
-  use springs_m, only: springs_t, reserve_springs
+  use displacements_m, only: displacements_t, reserve_displacements
   implicit none
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
   public :: store_quiet, may_sleep
   public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
-  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g reach)
-  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(reach/g)
+  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g radius)
+  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(radius/g)
   real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
 
   type :: sleep_t
     logical :: active = .false.
-    real(wp), allocatable :: reach(:)          !! (n) farthest point that touches [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
     real(wp), allocatable :: quiet(:)          !! (n) how long the block has been slow [s]
     real(wp), allocatable :: x(:, :), q(:, :)  !! (3, n), (4, n) poses when the step began
-    type(springs_t) :: rest                    !! touches at rest, between what does not move
+    type(displacements_t) :: rest              !! contact points at rest, between what does not move
     !> (3, n) sums of these on each body [N], [N m].
     real(wp), allocatable :: load(:, :), load_torque(:, :)
-    logical, allocatable :: candidate(:), supported(:), chosen(:)   !! (n), (n), (springs) work
+    logical, allocatable :: candidate(:), supported(:), chosen(:)
+      !! (n), (n), (displacements) work
   end type sleep_t
 
 contains
 
   !> Nobody sleeps yet.
-  subroutine sleep_init(active, reach, sleep)
+  subroutine sleep_init(active, radius, sleep)
     logical, intent(in) :: active
-    real(wp), intent(in) :: reach(:)           !! (n) [m]
+    real(wp), intent(in) :: radius(:)           !! (n) [m]
     type(sleep_t), intent(out) :: sleep
 
     sleep%active = active
-    sleep%reach = reach
-    allocate (sleep%quiet(size(reach)), source=0.0_wp)
-    allocate (sleep%candidate(size(reach)), sleep%supported(size(reach)), source=.false.)
-    allocate (sleep%load(3, size(reach)), sleep%load_torque(3, size(reach)), source=0.0_wp)
-    call reserve_springs(1, sleep%rest)
+    sleep%bounding_radius = radius
+    allocate (sleep%quiet(size(radius)), source=0.0_wp)
+    allocate (sleep%candidate(size(radius)), sleep%supported(size(radius)), source=.false.)
+    allocate (sleep%load(3, size(radius)), sleep%load_torque(3, size(radius)), source=0.0_wp)
+    call reserve_displacements(1, sleep%rest)
   end subroutine sleep_init
 
   !> Which bodies do not move: sleepers, and fixed ones without a given velocity that no path moves
@@ -79,7 +80,7 @@ contains
     yes = all(blocks%still .or. .not. blocks%present)
   end function all_still
 
-  !> Force and torque on each body of the touches at rest.
+  !> Force and torque on each body of the contact points at rest.
   pure subroutine update_loads(sleep)
     type(sleep_t), intent(inout) :: sleep
 
@@ -88,20 +89,20 @@ contains
     call sum_memory(sleep%rest, sleep%load, sleep%load_torque)
   end subroutine update_loads
 
-  !> Add the forces and torques on bodies of touches that remember them.
-  pure subroutine sum_memory(springs, force, torque)
-    type(springs_t), intent(in) :: springs
+  !> Add the forces and torques on bodies of contact points that remember them.
+  pure subroutine sum_memory(displacements, force, torque)
+    type(displacements_t), intent(in) :: displacements
     real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) [N], [N m]
     integer :: i, a, b
 
-    do i = 1, springs%n
-      a = springs%a(i)
-      b = springs%b(i)
-      force(:, a) = force(:, a) + springs%force(:, i)
-      torque(:, a) = torque(:, a) + springs%torque_a(:, i)
+    do i = 1, displacements%n
+      a = displacements%a(i)
+      b = displacements%b(i)
+      force(:, a) = force(:, a) + displacements%force(:, i)
+      torque(:, a) = torque(:, a) + displacements%torque_a(:, i)
       if (b < 1) cycle
-      force(:, b) = force(:, b) - springs%force(:, i)
-      torque(:, b) = torque(:, b) + springs%torque_b(:, i)
+      force(:, b) = force(:, b) - displacements%force(:, i)
+      torque(:, b) = torque(:, b) + displacements%torque_b(:, i)
     end do
   end subroutine sum_memory
 
@@ -128,9 +129,9 @@ contains
 
     do b = 1, blocks%n
       way = distance(blocks%x(:, b), sleep%x(:, b)) &
-        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%reach(b)
+        + 2.0_wp*norm2(blocks%q(:, b) - sleep%q(:, b))*sleep%bounding_radius(b)
       if (blocks%present(b) .and. .not. blocks%fixed(b) .and. &
-          way <= slow*sqrt(norm(gravity)*sleep%reach(b))*dt) then
+          way <= slow*sqrt(norm(gravity)*sleep%bounding_radius(b))*dt) then
         sleep%quiet(b) = sleep%quiet(b) + dt
       else
         sleep%quiet(b) = 0.0_wp
@@ -147,21 +148,21 @@ contains
     logical :: yes
 
     yes = .not. blocks%still(b) .and. sleep%quiet(b) > 0.0_wp
-    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%reach(b)
+    if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%bounding_radius(b)
   end function may_sleep
 
   !> Whether contact forces balance weight and fluid within a share of the tolerance.
-  pure function balanced(share, force, torque, steady, steady_torque, reach) result(yes)
+  pure function balanced(share, force, torque, steady, steady_torque, radius) result(yes)
     real(wp), intent(in) :: share              !! of the tolerance [-]
     real(wp), intent(in) :: force(3), torque(3)               !! of contact [N], [N m]
     real(wp), intent(in) :: steady(3), steady_torque(3)       !! all else [N], [N m]
-    real(wp), intent(in) :: reach              !! of the body [m]
+    real(wp), intent(in) :: radius              !! of the body [m]
     logical :: yes
     real(wp) :: bound
 
     bound = share*tolerance*norm(steady)
     yes = norm(force + steady) <= bound
-    if (yes) yes = norm(torque + steady_torque) <= bound*reach
+    if (yes) yes = norm(torque + steady_torque) <= bound*radius
   end function balanced
 
   !> Let body b sleep at its pose.
@@ -197,8 +198,8 @@ contains
     blocks%still(b) = .false.
   end subroutine wake
 
-  !> Complete the contact forces on some bodies by those of the touches at rest, and wake who is out
-  !! of balance.
+  !> Complete the contact forces on some bodies by those of the contact points at rest, and wake who
+  !! is out of balance.
   !!
   !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
   !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those
@@ -223,7 +224,7 @@ contains
       if (.not. blocks%asleep(b)) cycle
       other = steady(:, b) + blocks%mass(b)*gravity
       woken(b) = .not. balanced(1.0_wp, force(:, b), torque(:, b), other, &
-        blocks%fluid_torque(:, b), sleep%reach(b))
+        blocks%fluid_torque(:, b), sleep%bounding_radius(b))
       if (woken(b)) then
         call wake(b, blocks)
       else

@@ -7,17 +7,17 @@ module substep_limits_m
   use walls_m, only: walls_t
   use bed_m, only: bed_is_near, bed_place
   use neighbours_m, only: pair_list_t
-  use touching_m, only: touching_t
+  use contact_detection_m, only: contact_detection_t
   use contact_response_m, only: impact_turn, pile_turn
   implicit none
   private
-  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_part
+  public :: limits_t, limits_init, longest_substep_of, substep_limit, stiffness_limit, equal_substep
 
   type :: limits_t
     real(wp) :: substep_ratio = 0.0_wp           !! [-]
     real(wp) :: longest_substep = 0.0_wp         !! [s]
     real(wp) :: courant_max = 0.0_wp             !! C_s of eq. (6) [-]
-    real(wp), allocatable :: reach(:)            !! (n) farthest point that touches [m]
+    real(wp), allocatable :: bounding_radius(:)   !! (n) farthest point that touches [m]
     real(wp) :: smallest = 0.0_wp                !! smallest d_s of eq. (6) [m]
     real(wp) :: clear = 0.0_wp                   !! way of bodies that are not near to touch [m]
   end type limits_t
@@ -25,22 +25,22 @@ module substep_limits_m
 contains
 
   !> The limits of a case.
-  pure subroutine limits_init(input, touching, limits)
+  pure subroutine limits_init(input, detected, limits)
     type(contact_input_t), intent(in) :: input
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(limits_t), intent(out) :: limits
 
     limits%substep_ratio = input%substep_ratio
     limits%longest_substep = longest_substep_of(input)
     limits%courant_max = input%courant_max
-    if (touching%exact) then
-      limits%reach = touching%surface%reach
-      limits%smallest = touching%surface%smallest
-      limits%clear = touching%surface%clear
+    if (detected%exact) then
+      limits%bounding_radius = detected%surface%bounding_radius
+      limits%smallest = detected%surface%smallest
+      limits%clear = detected%surface%clear
     else
-      limits%reach = touching%spheres%reach
-      limits%smallest = touching%spheres%smallest
-      limits%clear = touching%spheres%clear
+      limits%bounding_radius = detected%spheres%bounding_radius
+      limits%smallest = detected%spheres%smallest
+      limits%clear = detected%spheres%clear
     end if
   end subroutine limits_init
 
@@ -57,9 +57,9 @@ contains
   !! The smallest of `substep_ratio` dt, a twentieth of the contact time, the limit of stiffness,
   !! and the Courant limit of eq. (6) with the highest relative speed any two points can have of two
   !! bodies near one another or of a body near a wall. Bodies that are not near stay apart.
-  pure function substep_limit(walls, touching, blocks, dt, limits) result(limit)
+  pure function substep_limit(walls, detected, blocks, dt, limits) result(limit)
     type(walls_t), intent(in) :: walls
-    type(touching_t), intent(in) :: touching
+    type(contact_detection_t), intent(in) :: detected
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt   !! fluid step [s]
     type(limits_t), intent(in) :: limits
@@ -67,21 +67,21 @@ contains
     real(wp) :: speed, near, fastest(2)
     integer :: b
 
-    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(touching))
-    if (touching%exact) then
-      near = fastest_near(blocks, limits, touching%surface%near)
+    limit = min(limits%substep_ratio*dt, limits%longest_substep, stiffness_limit(detected))
+    if (detected%exact) then
+      near = fastest_near(blocks, limits, detected%surface%near)
     else
-      near = fastest_near(blocks, limits, touching%spheres%near)
+      near = fastest_near(blocks, limits, detected%spheres%near)
     end if
     fastest = 0.0_wp
     do b = 1, blocks%n
       if (.not. blocks%present(b) .or. blocks%still(b)) cycle
-      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%reach(b) &
-        + haste(blocks, b, limits%reach(b))
+      speed = norm(blocks%v(:, b)) + norm(blocks%omega(:, b))*limits%bounding_radius(b) &
+        + haste(blocks, b, limits%bounding_radius(b))
       if (.not. speed <= fastest(2)) fastest(2) = speed
       if (.not. fastest(2) <= fastest(1)) fastest = fastest([2, 1])
       if (.not. speed <= near) then
-        if (near_wall(walls, blocks%x(:, b), limits%reach(b) + limits%clear)) near = speed
+        if (near_wall(walls, blocks%x(:, b), limits%bounding_radius(b) + limits%clear)) near = speed
       end if
     end do
     if (.not. near*limit <= limits%courant_max*limits%smallest) then
@@ -103,60 +103,60 @@ contains
 
     fastest = 0.0_wp
     do p = 1, near%n
-      associate (a => near%a(p), b => near%b(p), reach => limits%reach)
+      associate (a => near%a(p), b => near%b(p), radius => limits%bounding_radius)
         if (blocks%still(a) .and. blocks%still(b)) cycle
         if (distance(blocks%x(:, a), blocks%x(:, b) + near%shift(:, p)) &
-            > reach(a) + reach(b) + limits%clear) cycle
-        speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*reach(a) &
-          + norm(blocks%omega(:, b))*reach(b) + haste(blocks, a, reach(a)) &
-          + haste(blocks, b, reach(b))
+            > radius(a) + radius(b) + limits%clear) cycle
+        speed = distance(blocks%v(:, a), blocks%v(:, b)) + norm(blocks%omega(:, a))*radius(a) &
+          + norm(blocks%omega(:, b))*radius(b) + haste(blocks, a, radius(a)) &
+          + haste(blocks, b, radius(b))
       end associate
       if (.not. speed <= fastest) fastest = speed
     end do
   end function fastest_near
 
-  !> Whether a wall or the bed is within reach of a place.
-  pure function near_wall(walls, x, reach) result(yes)
+  !> Whether a wall or the bed is within a radius of a place.
+  pure function near_wall(walls, x, radius) result(yes)
     type(walls_t), intent(in) :: walls
-    real(wp), intent(in) :: x(3), reach   !! [m]
+    real(wp), intent(in) :: x(3), radius   !! [m]
     logical :: yes
     real(wp) :: place(3)
     integer :: w
 
     yes = .true.
     do w = 1, walls%n
-      if (dot_product(walls%normal(:, w), x) + reach > walls%offset(w)) return
+      if (dot_product(walls%normal(:, w), x) + radius > walls%offset(w)) return
     end do
     yes = walls%bed%there
     if (.not. yes) return
     place = bed_place(walls%bed, x)
-    yes = bed_is_near(walls%bed, place - reach, place + reach)
+    yes = bed_is_near(walls%bed, place - radius, place + radius)
   end function near_wall
 
-  !> Longest substep the present touches allow [s].
+  !> Longest substep the present contacts allow [s].
   !!
   !! For one pair of bodies a sixth of the bound of stability, which keeps the restitution within
   !! 0.01, or a third where they are slow; for all pairs together little more than half of it, also
   !! where bodies turn, and for the dashpots of several pairs.
-  pure function stiffness_limit(touching) result(limit)
-    type(touching_t), intent(in) :: touching
+  pure function stiffness_limit(detected) result(limit)
+    type(contact_detection_t), intent(in) :: detected
     real(wp) :: limit
     real(wp), parameter :: damping_turn = 4.0_wp   ! the sums are twice too large, 2 is stable
 
     limit = huge(1.0_wp)
-    if (touching%frequency2 > 0.0_wp) limit = impact_turn/sqrt(touching%frequency2)
-    associate (frequency2 => touching%sum_frequency2, damping => touching%damping)
+    if (detected%frequency2 > 0.0_wp) limit = impact_turn/sqrt(detected%frequency2)
+    associate (frequency2 => detected%sum_frequency2, damping => detected%damping)
       if (frequency2 > 0.0_wp) limit = min(limit, pile_turn/sqrt(frequency2))
       if (damping > 0.0_wp) limit = min(limit, damping_turn/damping)
     end associate
   end function stiffness_limit
 
   !> An equal part of the time left, no longer than allowed [s].
-  pure function equal_part(left, longest) result(dt_b)
+  pure function equal_substep(left, longest) result(dt_b)
     real(wp), intent(in) :: left, longest   !! [s]
     real(wp) :: dt_b
 
     dt_b = left/real(max(1, ceiling(left/longest*(1.0_wp - 1.0e-9_wp))), wp)
-  end function equal_part
+  end function equal_substep
 
 end module substep_limits_m

@@ -1,4 +1,4 @@
-!> The plane walls of the tank, and its bed, as partners of the blocks.
+!> The plane walls of the tank, and its bed, as counterparts of the blocks.
 module walls_m
   use kinds_m, only: wp
   use case_types_m, only: grid_input_t, boundary_input_t
@@ -12,8 +12,8 @@ module walls_m
 
   !> Sides that blocks can touch (`no_slip` and `slip`), and the periods of the others.
   !!
-  !! A wall is a partner with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max; the bed
-  !! is `bed_partner`.
+  !! A wall is a counterpart with a negative number: -1 x_min, -2 x_max, -3 y_min ... -6 z_max; the
+  !! bed is `bed_counterpart`.
   type :: walls_t
     integer :: n = 0
     integer :: number(6) = 0                !! -6..-1, ascending

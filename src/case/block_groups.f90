@@ -38,7 +38,7 @@ contains
         'only law = ''restitution'' has it')
     end if
     call v%option('solver', contact%solver, 'springs impulses', 'how the forces are found: ' &
-      //'springs in short steps, or impulses of all touches together in long ones', &
+      //'springs in short steps, or impulses of all contact points together in long ones', &
       example='''impulses''')
     if (v%good('solver')) then
       call v%require('solver', contact%solver == 'springs' .or. (contact%model == 'surface' &

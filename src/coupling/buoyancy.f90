@@ -7,7 +7,7 @@
 !! faces is therefore found from the tetrahedra, cut by the plane of the liquid where the surface
 !! crosses a body; K (a - g) adds to the force of the faces, a being the acceleration of the body.
 !! In still water the force is Archimedes' to round-off; a body and the fluid around it that
-!! accelerate alike feel nothing of each other but the pressure that does it, on the true volume.
+!! accelerate alike exert nothing on each other but the pressure that does it, on the true volume.
 !! The same terms make weight and inertia of the fluid those of its true volume, so they close the
 !! momentum of fluid and bodies.
 module buoyancy_m

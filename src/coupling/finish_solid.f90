@@ -1,4 +1,4 @@
-!> What follows when all bodies are painted: faces and cells that close, cut cells and their
+!> What follows when all bodies are voxelised: faces and cells that close, cut cells and their
 !! tetrahedra, links that round-off left open.
 module finish_solid_m
   use kinds_m, only: wp

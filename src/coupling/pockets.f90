@@ -43,12 +43,12 @@ contains
     do m = 1, solid%n_cut
       self%reached(m) = .false.
     end do
-    call spread_reach(grid, self, solid)
+    call spread_reached(grid, self, solid)
     left(1) = own_unreached(grid, self, solid)
     call global_sum(left)
     do while (left(1) > 0)
-      call exchange_reach(grid, self, solid)
-      call spread_reach(grid, self, solid)
+      call exchange_reached(grid, self, solid)
+      call spread_reached(grid, self, solid)
       changed(1) = left(1)
       left(1) = own_unreached(grid, self, solid)
       call global_sum(left)
@@ -56,7 +56,7 @@ contains
     end do
     solid%n_sealed = int(left(1))
     if (left(1) == 0) return
-    call exchange_reach(grid, self, solid)
+    call exchange_reached(grid, self, solid)
     do m = 1, solid%n_cut
       if (self%reached(m)) cycle
       solid%n_closed = solid%n_closed + 1
@@ -82,7 +82,7 @@ contains
   end function own_unreached
 
   !> Learn from the owners which cut cells of the halo are reached.
-  subroutine exchange_reach(grid, self, solid)
+  subroutine exchange_reached(grid, self, solid)
     type(grid_t), intent(in) :: grid
     type(pockets_t), intent(inout) :: self
     type(solid_geometry_t), intent(in) :: solid
@@ -104,10 +104,10 @@ contains
         self%reached(m) = self%flag(i(1), i(2), i(3)) == 1
       end associate
     end do
-  end subroutine exchange_reach
+  end subroutine exchange_reached
 
-  !> Spread the reach through the open faces of the cells kept here.
-  subroutine spread_reach(grid, self, solid)
+  !> Spread what is reached through the open faces of the cells kept here.
+  subroutine spread_reached(grid, self, solid)
     type(grid_t), intent(in) :: grid
     type(pockets_t), intent(inout) :: self
     type(solid_geometry_t), intent(in) :: solid
@@ -150,7 +150,7 @@ contains
       n_stack = n_stack + 1
       self%stack(n_stack) = m
     end subroutine push
-  end subroutine spread_reach
+  end subroutine spread_reached
 
   !> Number of the cut cell on side s of cut cell m in direction d, if the face between is open and
   !! the cell is kept here, else 0.

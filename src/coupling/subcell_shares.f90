@@ -3,7 +3,7 @@
 !! Each cell is cut into n x n x n sub-cells; one whose centre lies in a tetrahedron of the body is
 !! solid. The share of a cell is the share of its solid sub-cells, the centroid their mean. A face
 !! is cut into n x n squares likewise. A full cell is closed all round, as with exact shares, so no
-!! fluid is locked in a cell without room.
+!! fluid is locked in a cell without fluid volume.
 !!
 !! Source: the volume average of Yoshikawa et al. (2008), section 3 (2); that they take it by
 !! sub-cells is recalled from the earlier MICS papers. What counting does not give stays exact:

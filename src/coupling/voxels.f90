@@ -1,4 +1,4 @@
-!> Bodies with their images in other periods, painted into the cells kept here: shares, links,
+!> Bodies with their images in other periods, voxelised into the cells kept here: shares, links,
 !! lists.
 module voxels_m
   use kinds_m, only: wp
@@ -14,7 +14,7 @@ module voxels_m
   real(wp), parameter :: min_link = 1.0e-3_wp      !! shortest distance from a centre to a wall [h]
   real(wp), parameter :: no_hit = 2.0_wp            !! longer than any link
 
-  !> What is painted where.
+  !> What is voxelised where.
   type :: voxels_t
     logical, allocatable :: near(:)               !! (n) present and in the cells kept here
     integer, allocatable :: first(:, :), last(:, :)   !! (3, n) periods its images are shifted by

@@ -15,7 +15,7 @@ module grid_m
   public :: grid_t, grid_init, n_halo, unit_step
 
   integer, parameter :: n_halo = 3
-    !! halo width of cell and face arrays: reach of the fifth-order scheme
+    !! halo width of cell and face arrays: stencil of the fifth-order scheme
 
   !> `unit_step(:, d)` is the index step to the next cell in direction d.
   integer, parameter :: unit_step(3, 3) = reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])

@@ -22,7 +22,7 @@ module outflow_m
   implicit none
   private
   public :: outflow_t, outflow_init, start_outflow, update_outflow, resume_outflow
-  public :: reach, side_reach, pressure_outside, mean_velocity
+  public :: outside_distance, side_distance, pressure_outside, mean_velocity
 
   real(wp), parameter :: elsewhere = -huge(1.0_wp)   !! mark of cells of other processes
 
@@ -248,7 +248,7 @@ contains
 
   !> Length over which the pressure difference to the outside acts: half a cell, and as much water
   !! as the wave takes along [m].
-  pure function reach(side, at, half, rho) result(length)
+  pure function outside_distance(side, at, half, rho) result(length)
     type(outflow_t), intent(in) :: side
     integer, intent(in) :: at(3)     !! the cell
     real(wp), intent(in) :: half     !! half a cell [m]
@@ -259,7 +259,7 @@ contains
     if (side%active) then
       length = half + side%impulse(at(side%along(1)), at(side%along(2)))/rho
     end if
-  end function reach
+  end function outside_distance
 
   !> Pressure outside the side beside a cell, for a face at its mean velocity [Pa].
   pure function pressure_outside(side, at) result(p)
@@ -282,7 +282,7 @@ contains
   end function mean_velocity
 
   !> Length over which the pressure difference of a cell to the outside acts [m].
-  pure function side_reach(grid, s, d, cell, rho, sides) result(length)
+  pure function side_distance(grid, s, d, cell, rho, sides) result(length)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d, cell(3)
     real(wp), intent(in) :: rho   !! of the cell [kg/m3]
@@ -290,7 +290,7 @@ contains
     real(wp) :: length
 
     length = 0.5_wp*grid%h(d)
-    if (present(sides)) length = reach(sides(s, d), cell, length, rho)
-  end function side_reach
+    if (present(sides)) length = outside_distance(sides(s, d), cell, length, rho)
+  end function side_distance
 
 end module outflow_m

@@ -1,7 +1,7 @@
 !> What the flow has to know about the solids in the grid: shares, open faces, wall distances.
 !!
 !! Data: `coupling/solid_fraction.f90` fills it from the tetrahedra of the bodies, the flow
-!! reads it, and neither room knows the other.
+!! reads it, and neither package knows the other.
 module solid_geometry_m
   use kinds_m, only: wp
   use grid_m, only: grid_t, unit_step
@@ -230,7 +230,7 @@ contains
     solid%n_link = 0
   end subroutine clear_links
 
-  !> Free shares and links go from one geometry to another.
+  !> Effective apertures and links go from one geometry to another.
   subroutine hand_over_faces(from, to)
     type(solid_geometry_t), intent(inout) :: from, to
 

@@ -93,7 +93,7 @@ contains
                                            light%moment(:, b))
     end do
     light%displaced_start = sum(light%wet)
-    light%wet = 0.0_wp   ! felt with the first step, as by a block that is released
+    light%wet = 0.0_wp   ! counted with the first step, as for a block that is released
   end subroutine light_init
 
   !> What follows from the state after it was read.

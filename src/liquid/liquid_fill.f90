@@ -212,7 +212,8 @@ contains
     if (present(rest)) rest = left
   end subroutine raise_surface
 
-  !> Room and liquid of the cells whose solid share has changed, and the liquid that was in the way.
+  !> Fluid volume and liquid of the cells whose solid share has changed, and the liquid that was in
+  !! the way.
   subroutine take_from_solid(grid, before, after, vertical, flow, displaced)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: before, after
@@ -408,7 +409,7 @@ contains
     surface = reshape(all_columns, n)
   end subroutine find_surface
 
-  !> Cells of this process with room above the surface of their column.
+  !> Cells of this process with open volume above the surface of their column.
   subroutine cells_above(grid, axis, up, surface, flow, cell)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: axis

@@ -26,7 +26,7 @@ module liquid_transport_m
   implicit none
   private
   public :: liquid_transport_t, liquid_transport_init
-  public :: begin_transport, begin_part, sweep, small_cells, finish_transport
+  public :: begin_transport, begin_subcycle, sweep, small_cells, finish_transport
 
   !> The six orders of the directions.
   integer, parameter :: orders(3, 6) = reshape([1, 2, 3, 2, 3, 1, 3, 1, 2, 3, 2, 1, 1, 3, 2, &
@@ -38,9 +38,9 @@ module liquid_transport_m
     type(liquid_sweep_t) :: sweeps
     type(small_cells_t) :: small
     type(extended_fraction_t) :: extension
-    integer :: parts = 1                      !! equal parts in which the volumes of a step move;
+    integer :: subcycles = 1                 !! equal subcycles in which the volumes of a step move;
                                               !! the caller sets it before the step
-    integer :: order(3) = [1, 2, 3]           !! directions of the sweeps of this part
+    integer :: order(3) = [1, 2, 3]           !! directions of the sweeps of this subcycle
     real(wp) :: inflow = 0.0_wp               !! of liquid through the sides in this step [m3]
     real(wp), allocatable :: side(:)          !! work: liquid through the faces of the sides [m3]
   end type liquid_transport_t
@@ -64,7 +64,7 @@ contains
     allocate (self%side(2*(m(1)*m(2) + m(2)*m(3) + m(3)*m(1))), source=0.0_wp)
   end subroutine liquid_transport_init
 
-  !> Volumes through the faces in a part of the step, running values.
+  !> Volumes through the faces in a subcycle, running values.
   subroutine begin_transport(grid, old, new, dt, solver, self, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
@@ -80,30 +80,30 @@ contains
       self%volumes%w(:, :, k) = flow%liquid(:, :, k)
       self%volumes%v(:, :, k) = flow%fluid_volume(:, :, k)
       self%volumes%c(:, :, k) = flow%c(:, :, k)
-      if (self%parts > 1) self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :) &
-                                                       /real(self%parts, wp)
+      if (self%subcycles > 1) self%volumes%q(:, :, k, :) = self%volumes%q(:, :, k, :) &
+                                                       /real(self%subcycles, wp)
     end do
     self%sweeps%clamped = 0.0_wp
     self%small%converged = .true.
     self%inflow = 0.0_wp
   end subroutine begin_transport
 
-  !> The order of the directions and the small cells of an equal part of the step.
+  !> The order of the directions and the small cells of a subcycle, an equal part of the step.
   !!
   !! Where the fluid moves further than the sweeps can follow, the same volumes go in several
-  !! parts. The open volume of a cell then runs in equal parts too, so the last part ends at that of
-  !! the new geometry whatever their number.
-  subroutine begin_part(grid, old, part, step, self)
+  !! subcycles. The open volume of a cell then runs in equal steps too, so the last subcycle ends at
+  !! that of the new geometry whatever their number.
+  subroutine begin_subcycle(grid, old, subcycle, step, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old
-    integer, intent(in) :: part   !! 1..parts
+    integer, intent(in) :: subcycle   !! 1..subcycles
     integer, intent(in) :: step   !! number of the step; both pick the order of the directions
     type(liquid_transport_t), intent(inout) :: self
 
-    self%order = orders(:, 1 + modulo(step + part - 1, size(orders, 2)))
-    if (part > 1) call renew_shares(grid, old, self%small, self%volumes)
+    self%order = orders(:, 1 + modulo(step + subcycle - 1, size(orders, 2)))
+    if (subcycle > 1) call renew_shares(grid, old, self%small, self%volumes)
     call find_small_cells(grid, old, self%volumes, self%small)
-  end subroutine begin_part
+  end subroutine begin_subcycle
 
   !> Move liquid and open volume in direction d.
   subroutine sweep(grid, old, d, self)
@@ -115,7 +115,7 @@ contains
     call sweep_volumes(grid, old, d, self%volumes, self%sweeps)
   end subroutine sweep
 
-  !> The small cells give: the volumes are final for this part.
+  !> The small cells give: the volumes are final for this subcycle.
   subroutine small_cells(grid, self)
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self
@@ -124,7 +124,7 @@ contains
     self%inflow = self%inflow + inflow_of_sides(grid, self)
   end subroutine small_cells
 
-  !> Liquid that came in through the sides of the domain in this part of the step [m3].
+  !> Liquid that came in through the sides of the domain in this subcycle [m3].
   function inflow_of_sides(grid, self) result(inflow)
     type(grid_t), intent(in) :: grid
     type(liquid_transport_t), intent(inout) :: self

@@ -3,12 +3,12 @@
 !! In every cell the outflow of a step must be the change of its open volume,
 !! $$ \sum_f Q_f = V_t^n - V (1 - \alpha^{n+1}) $$
 !! The flux of the projected velocity fits to the order of the step only. The rest r is taken away
-!! by `Q_f := Q_f - k_f (phi_up - phi_low)` with `sum_f k_f (phi_c - phi_nb) = r_c` on the band of
-!! cells that a body cuts before or after the step and one ring around; k is the open area in the
-!! mean of the step. What the r of a connected part of the band sum up to (rounding; the volume
-!! that has nowhere to go in a sealed pocket; bodies that overlap) stays in its cells as an equal
-!! share of their open volume, unless the part reaches an open side, where it may exchange. With the
-!! carried volume Vt on the right the errors of one step are made good by the next.
+!! by `Q_f := Q_f - k_f (phi_up - phi_low)` with `sum_f k_f (phi_c - phi_nb) = r_c` on the narrow
+!! band of cells that a body cuts before or after the step and one ring around; k is the open area
+!! in the mean of the step. What the r of a connected part of the band sum up to (rounding; the
+!! volume that has nowhere to go in a sealed pocket; bodies that overlap) stays in its cells as an
+!! equal share of their open volume, unless the part reaches an open side, where it may exchange.
+!! With the carried volume Vt on the right the errors of one step are made good by the next.
 !!
 !! A block that lands moves other than the velocity that the last step ended with: contact stops
 !! it. Where it stands on a wall or on another block without fluid between, the fluid that followed
@@ -20,7 +20,7 @@ module open_flux_m
   use boundary_kinds_m, only: is_wall, gives_pressure
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
-  use flux_band_m, only: flux_band_t, flux_band_init, reserve, reserve_for_all, &
+  use narrow_band_m, only: narrow_band_t, narrow_band_init, reserve, reserve_for_all, &
                          find_parts, sum_by_part, drop_part, find_open_lines
   use cell_list_m, only: list_marked
   use krylov_m, only: conjugate_gradient
@@ -42,7 +42,7 @@ module open_flux_m
     integer :: iterations = 0            !! of the last step
     real(wp) :: residual = 0.0_wp        !! largest rest in the band after the last step [V]
     real(wp) :: unmatched = 0.0_wp       !! largest mean left in a part of the band [V]
-    type(flux_band_t) :: band
+    type(narrow_band_t) :: band
   end type open_flux_t
 
 contains
@@ -53,7 +53,7 @@ contains
     type(open_flux_t), intent(out) :: self
     logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
 
-    call flux_band_init(grid, self%band, pooled)
+    call narrow_band_init(grid, self%band, pooled)
   end subroutine open_flux_init
 
   !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
@@ -87,12 +87,12 @@ contains
     call correct_flux(grid, self%band, solver%x, q)
   end subroutine find_open_flux
 
-  !> The band, its conductances and parts; no parts without solids. If the bodies are where they
-  !! were in the last step only the conductances are found again, which stand in a work array.
+  !> The narrow band, its conductances and parts; no parts without solids. If the bodies are where
+  !! they were in the last step only the conductances are found again, which stand in a work array.
   subroutine find_band(grid, old, new, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
     real(wp) :: cells(1)
     logical :: solids
 
@@ -139,7 +139,7 @@ contains
 
   !> The marked cells and the ring around them.
   subroutine mark_band(band)
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
 
     call halo_exchange(band%marked, 1)
     call widen(1, band%marked, band%label)
@@ -209,7 +209,7 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: old_open, new_open
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
     integer :: d, s, a(3), b(3)
 
     do d = 1, 3
@@ -248,7 +248,7 @@ contains
   !> Cells of the band with a way out, in the order of the grid.
   subroutine list_band(grid, band)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
     integer :: i, j, k
 
     !$omp parallel do private(i, j) schedule(static)
@@ -274,7 +274,7 @@ contains
     type(solid_geometry_t), intent(in) :: new
     real(wp), intent(in), contiguous :: fluid_volume(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
     integer :: i, j, k, l
     real(wp) :: outflow, volume_left
 
@@ -294,7 +294,7 @@ contains
   !> Excess of fluid in a part of the band, which its cells share; none with an open side
   !! [open volumes].
   pure function share_of_part(band, c) result(share)
-    type(flux_band_t), intent(in) :: band
+    type(narrow_band_t), intent(in) :: band
     integer, intent(in) :: c   !! number of the part
     real(wp) :: share
 
@@ -307,7 +307,7 @@ contains
   function excess_stays(grid, fluid_volume, band) result(yes)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: fluid_volume(grid%first(1):, grid%first(2):, grid%first(3):)
-    type(flux_band_t), intent(in) :: band
+    type(narrow_band_t), intent(in) :: band
     logical :: yes
     real(wp) :: share, most(1)
     integer :: c, l, d, s, nb(3)
@@ -336,7 +336,7 @@ contains
   subroutine widen_to_domain(grid, old, new, band)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new
-    type(flux_band_t), intent(inout) :: band
+    type(narrow_band_t), intent(inout) :: band
 
     band%poses = 0
     band%marked = 0
@@ -395,7 +395,7 @@ contains
 
   !> Put the balances of the cells of the band on the grid, zero elsewhere; no potential yet.
   subroutine put_balances(band, first, r, phi)
-    type(flux_band_t), intent(in) :: band
+    type(narrow_band_t), intent(in) :: band
     integer, intent(in) :: first(3)
     real(wp), intent(inout), dimension(first(1):, first(2):, first(3):), contiguous :: r, phi
     integer :: k, l
@@ -415,7 +415,7 @@ contains
   !> Take the gradient of the potential from the volumes.
   subroutine correct_flux(grid, band, phi, q)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(in) :: band
+    type(narrow_band_t), intent(in) :: band
     real(wp), intent(in), contiguous :: phi(grid%lo(1) - 1:, grid%lo(2) - 1:, grid%lo(3) - 1:)
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer :: d, i, j, k, e(3)

@@ -29,7 +29,7 @@ module small_cells_m
     integer :: n = 0                          !! of this process
     integer, allocatable :: cell(:, :)        !! (3, *)
     integer, allocatable :: number(:, :, :)   !! of a small cell, 0 for others; halo filled
-    !> "Late" faces, whose donor is a small cell.
+    !> Implicit faces, whose donor is a small cell.
     integer :: n_implicit = 0
     integer, allocatable :: face(:, :)        !! (4, *) cell and direction of the lower face
     integer, allocatable :: donor(:, :), receiver(:, :)   !! (3, *)
@@ -190,7 +190,7 @@ contains
     end do
   end subroutine give_small_cells
 
-  !> C^ of what gave and got implicitly in the part before, for the next one; that of cells with
+  !> C^ of what gave and got implicitly in the subcycle before, for the next one; that of cells with
   !! solid stays that of the begin, as in the sweeps.
   subroutine renew_shares(grid, old, self, volumes)
     type(grid_t), intent(in) :: grid

@@ -7,7 +7,7 @@ module fluid_transport_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-                                begin_part, sweep, small_cells, finish_transport
+                                begin_subcycle, sweep, small_cells, finish_transport
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
                                      momentum_implicit
   use elliptic_solver_m, only: elliptic_solver_t
@@ -16,8 +16,9 @@ module fluid_transport_m
   public :: fluid_transport_t, fluid_transport_init, time_step_t, fit_fluxes, carry_fluid, &
             finish_carrying, fluxes_of_step
 
-  real(wp), parameter :: part_courant = 0.9_wp !! of one part at most: a cell gives less than it has
-  integer, parameter :: max_parts = 100        !! of one step
+  real(wp), parameter :: subcycle_courant = 0.9_wp
+    !! of one subcycle at most: a cell gives less than it has
+  integer, parameter :: max_subcycles = 100    !! of one step
 
   type :: fluid_transport_t
     type(liquid_transport_t) :: liquid
@@ -97,13 +98,13 @@ contains
     type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
     type(fluid_transport_t), intent(inout) :: self
 
-    self%liquid%parts = parts_of_step(time_step%courant)
+    self%liquid%subcycles = subcycles_of_step(time_step%courant)
     call take_arrays(scratch, self)
     call begin_transport(grid, before, after, time_step%dt, solver, self%liquid, flow)
   end subroutine fit_fluxes
 
   !> Stage 7: liquid and momentum pass the faces, direction by direction, small cells last. With
-  !! C-ISMAC momentum waits for the predictor, which uses the volumes of the same parts.
+  !! C-ISMAC momentum waits for the predictor, which uses the volumes of the same subcycles.
   subroutine carry_fluid(fluid, grid, before, time_step, flow, self)
     type(fluid_t), intent(in) :: fluid
     type(grid_t), intent(in) :: grid
@@ -111,11 +112,11 @@ contains
     type(time_step_t), intent(in) :: time_step
     type(flow_t), intent(inout) :: flow            !! its velocity
     type(fluid_transport_t), intent(inout) :: self
-    integer :: n, part
+    integer :: n, subcycle
 
     associate (liquid => self%liquid, volumes => self%liquid%volumes, momentum => self%momentum)
-      do part = 1, liquid%parts
-        call begin_part(grid, before, part, time_step%number, liquid)
+      do subcycle = 1, liquid%subcycles
+        call begin_subcycle(grid, before, subcycle, time_step%number, liquid)
         if (self%carries_momentum) then
           call momentum_begin(grid, fluid, volumes%w, volumes%v, volumes%c, flow%u, momentum)
           do n = 1, 3
@@ -139,7 +140,7 @@ contains
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m3]
 
-    q = self%liquid%parts*self%liquid%volumes%q
+    q = self%liquid%subcycles*self%liquid%volumes%q
   end subroutine fluxes_of_step
 
   !> The liquid in the cells and its share C, at the end of the step.
@@ -154,15 +155,15 @@ contains
     call give_arrays(scratch, self)
   end subroutine finish_carrying
 
-  !> Number of equal parts in which the volumes of a step move, so that none passes the Courant
+  !> Number of equal subcycles in which the volumes of a step move, so that none passes the Courant
   !! number that the sweeps can follow.
-  pure function parts_of_step(courant) result(parts)
+  pure function subcycles_of_step(courant) result(subcycles)
     real(wp), intent(in) :: courant   !! of the whole step [-]
-    integer :: parts
+    integer :: subcycles
     real(wp), parameter :: round_off = 1.0e-9_wp
 
-    parts = ceiling(min(courant/part_courant - round_off, real(max_parts, wp)))
-    parts = max(parts, 1)
-  end function parts_of_step
+    subcycles = ceiling(min(courant/subcycle_courant - round_off, real(max_subcycles, wp)))
+    subcycles = max(subcycles, 1)
+  end function subcycles_of_step
 
 end module fluid_transport_m

@@ -17,7 +17,7 @@ module surface_heights_m
   private
   public :: column_t, find_places, nine_heights, is_full, is_empty, no_height
 
-  integer, parameter :: reach = 3    !! cells of a column on either side of its middle
+  integer, parameter :: half_length = 3    !! cells of a column on either side of its middle
   integer, parameter :: search = 2   !! cells up or down in which a neighbour's height is looked for
   real(wp), parameter :: no_height = huge(1.0_wp)
 
@@ -200,19 +200,19 @@ contains
   !> Height of the surface in the column along d through a cell, over its centre, in cells.
   !!
   !! From the surface nearest to the cell the column reaches to the first full cell on one side and
-  !! the first empty one on the other, or to a wall. Not found if it is longer than its reach.
+  !! the first empty one on the other, or to a wall. Not found if it is longer.
   pure subroutine column_height(grid, c, middle, height, found)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), contiguous :: c(grid%first(1):, grid%first(2):, grid%first(3):)
     type(column_t), intent(in) :: middle   !! cell from which it is followed
     real(wp), intent(out) :: height
     logical, intent(out) :: found
-    real(wp) :: column(-reach:reach)
+    real(wp) :: column(-half_length:half_length)
     integer :: l, low, high, first, last
 
     height = 0.0_wp
-    first = -reach
-    last = reach
+    first = -half_length
+    last = half_length
     associate (at => middle%at, d => middle%d, way => middle%way)
       if (.not. grid%periodic(d)) then
         if (way > 0) then
@@ -256,7 +256,7 @@ contains
       logical, intent(in) :: pure_cell
       integer, intent(in) :: limit
 
-      ends_well = pure_cell .or. (abs(limit) < reach .and. .not. is_empty(share))
+      ends_well = pure_cell .or. (abs(limit) < half_length .and. .not. is_empty(share))
     end function ends_well
   end subroutine column_height
 

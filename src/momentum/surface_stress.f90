@@ -4,7 +4,7 @@
 !! div(mu (grad u + grad u^T)),
 !! $$ \partial_j(\mu\, \partial_i u_j) = (\partial_j \mu)(\partial_i u_j) $$
 !! for div u = 0, is zero in one fluid, but makes half of the dissipation of waves: without it the
-!! surface feels no stress mu du/dn instead of no stress at all. It is added explicitly; it is never
+!! surface is free of mu du/dn instead of free of all stress. It is added explicitly; it is never
 !! larger than the implicit part, so the step stays stable whatever its length. Cells beside bodies
 !! are left out: before the viscous stage their thin small cells may carry any velocity (with them a
 !! block thrown into water ended two runs).

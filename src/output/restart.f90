@@ -12,7 +12,7 @@
 !!     /flow        u (3,nz,ny,nx)  p liquid fluid_volume c alpha (1,nz,ny,nx)
 !!                  uf open (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
 !!     /blocks      position quaternion velocity angular_momentum ... (N,..)
-!!     /contacts    the tangential springs
+!!     /contacts    the tangential displacements
 !!
 !! The volume flux through a face is open*area*uf + solid_flux.
 module restart_m

@@ -14,7 +14,7 @@ module state_m
   use rigid_body_m, only: blocks_t
   use contacts_m, only: contacts_t
   use light_m, only: light_t
-  use springs_m, only: springs_t, reserve_springs
+  use displacements_m, only: displacements_t, reserve_displacements
   use clock_m, only: clock_t
   use run_state_m, only: run_state_t
   implicit none
@@ -25,7 +25,7 @@ module state_m
   character(*), parameter :: state_groups(*) = &
     [character(9) :: '/clock', '/energy', '/flow', '/blocks', '/light', '/contacts']
 
-  integer, parameter :: max_springs = 100000000
+  integer, parameter :: max_displacements = 100000000
 
   type, abstract :: state_visitor_t
   contains
@@ -183,34 +183,34 @@ contains
     call visitor%reals('/light/force', 'N, N m', [6, size(light%wet)], light%force)
   end subroutine visit_light
 
-  !> What the contacts remember: tangential springs, at work and at rest, and how long blocks have
-  !! been slow.
+  !> What the contacts remember: tangential displacements, at work and at rest, and how long blocks
+  !! have been slow.
   subroutine visit_contacts(visitor, contacts)
     class(state_visitor_t), intent(inout) :: visitor
     type(contacts_t), intent(inout) :: contacts
 
-    call visit_springs(visitor, '/contacts/', contacts%by_impulses, contacts%by_impulses, &
-                       contacts%springs)
+    call visit_displacements(visitor, '/contacts/', contacts%by_impulses, contacts%by_impulses, &
+                       contacts%displacements)
     associate (quiet => contacts%sleep%quiet, rest => contacts%sleep%rest)
       call visitor%reals('/contacts/quiet', 's', [size(quiet)], quiet)
-      call visit_springs(visitor, '/contacts/rest_', .true., contacts%by_impulses, rest)
+      call visit_displacements(visitor, '/contacts/rest_', .true., contacts%by_impulses, rest)
     end associate
   end subroutine visit_contacts
 
-  !> A list of tangential springs.
-  subroutine visit_springs(visitor, name, with_force, with_edge, s)
+  !> A list of tangential displacements.
+  subroutine visit_displacements(visitor, name, with_force, with_edge, s)
     class(state_visitor_t), intent(inout) :: visitor
     character(*), intent(in) :: name
     logical, intent(in) :: with_force   !! it remembers forces, torques and energies
-    logical, intent(in) :: with_edge    !! and the edge of the partner
-    type(springs_t), intent(inout) :: s
+    logical, intent(in) :: with_edge    !! and the edge of the counterpart
+    type(displacements_t), intent(inout) :: s
 
     call visitor%whole_number(name//'n', s%n)
-    if (s%n < 0 .or. s%n > max_springs) s%n = 0   ! a damaged file: its checksum shows it
-    call reserve_springs(max(1, s%n), s)
+    if (s%n < 0 .or. s%n > max_displacements) s%n = 0   ! a damaged file: its checksum shows it
+    call reserve_displacements(max(1, s%n), s)
     call visitor%integers(name//'a', [s%n], s%a)
     call visitor%integers(name//'b', [s%n], s%b)
-    call visitor%integers(name//'key', [s%n], s%key)
+    call visitor%integers(name//'key', [s%n], s%id)
     call visitor%reals(name//'stretch', 'm', [3, s%n], s%xi)
     call visitor%reals(name//'stiffness', 'N/m^gamma', [s%n], s%k)
     if (with_edge) call visitor%integers(name//'edge', [s%n], s%other)
@@ -219,7 +219,7 @@ contains
     call visitor%reals(name//'torque_a', 'N m', [3, s%n], s%torque_a)
     call visitor%reals(name//'torque_b', 'N m', [3, s%n], s%torque_b)
     call visitor%reals(name//'energy', 'J', [s%n], s%energy)
-  end subroutine visit_springs
+  end subroutine visit_displacements
 
   subroutine real_number(self, name, units, x)
     class(state_visitor_t), intent(inout) :: self

@@ -5,7 +5,7 @@ module face_velocity_m
   use fields_m, only: flow_t
   use boundary_kinds_m, only: gives_pressure
   use boundary_m, only: set_side_velocity
-  use outflow_m, only: outflow_t, side_reach, pressure_outside, mean_velocity
+  use outflow_m, only: outflow_t, side_distance, pressure_outside, mean_velocity
   use mixture_m, only: face_mean
   implicit none
   private
@@ -85,7 +85,7 @@ contains
               if (.not. gives_pressure(grid%side(s, d))) cycle
               outside = 0.0_wp
               if (heavy .and. present(sides)) outside = pressure_outside(sides(s, d), c)
-              length = side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides)
+              length = side_distance(grid, s, d, c, rho(c(1), c(2), c(3)), sides)
               a(i, j, k, d) = (rho_w(c(1), c(2), c(3))*gravity(d)*0.5_wp*grid%h(d) &
                 + outward*(p(c(1), c(2), c(3)) - outside))/(length*rho(c(1), c(2), c(3)))
             end do
@@ -143,7 +143,7 @@ contains
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
               uf(i, j, k, d) = uf(i, j, k, d) + dt*(outward*phi(c(1), c(2), c(3)) &
-                /(side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides)*rho(c(1), c(2), c(3))))
+                /(side_distance(grid, s, d, c, rho(c(1), c(2), c(3)), sides)*rho(c(1), c(2), c(3))))
             end do
           end do
         end do
@@ -187,9 +187,9 @@ contains
   !! `correction` is what a face at the surface differed from its cells before
   !! (`old_time_correction_m`). It fades with viscosity like the rest that the cells do not see.
   !!
-  !! At sides with a given pressure it is the cell's; at an outflow the part of the length `reach`
-  !! beyond half a cell has the mean velocity of the side. This drag is an acceleration of the face
-  !! that `a_face` does not hold, so half of it goes to the cell, too.
+  !! At sides with a given pressure it is the cell's; at an outflow the part of the length
+  !! `side_distance` beyond half a cell has the mean velocity of the side. This drag is an
+  !! acceleration of the face that `a_face` does not hold, so half of it goes to the cell, too.
   subroutine predict_face_velocity(grid, dt, rho, a, flow, correction, given, in_liquid)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
@@ -251,7 +251,8 @@ contains
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
-              share = 0.5_wp*grid%h(d)/side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), flow%sides)
+              share = 0.5_wp*grid%h(d)/side_distance(grid, s, d, c, rho(c(1), c(2), c(3)), &
+                flow%sides)
               mean = merge(-1.0_wp, 1.0_wp, s == 1)*mean_velocity(flow%sides(s, d), c)
               flow%uf(i, j, k, d) = share*without_acceleration(c) + (1.0_wp - share)*mean &
                 + dt*a%face(i, j, k, d)
@@ -283,9 +284,9 @@ contains
       contiguous :: rho, mu, u, a_face, a_cell
     real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
-    real(wp) :: nu, reach
+    real(wp) :: nu, inverse_h2
 
-    reach = sum(1.0_wp/grid%h**2)
+    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
@@ -294,7 +295,7 @@ contains
           nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
                /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
           uf(i, j, k) = face_mean(u(i - e(1), j - e(2), k - e(3)), u(i, j, k)) &
-            + face_step(dt, nu, reach)*(a_face(i, j, k) &
+            + face_step(dt, nu, inverse_h2)*(a_face(i, j, k) &
                 - face_mean(a_cell(i - e(1), j - e(2), k - e(3)), a_cell(i, j, k)))
         end do
       end do
@@ -341,9 +342,9 @@ contains
       contiguous :: rho, mu, correction
     real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
     integer :: i, j, k
-    real(wp) :: nu, reach, most
+    real(wp) :: nu, inverse_h2, most
 
-    reach = sum(1.0_wp/grid%h**2)
+    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu, most) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
@@ -357,7 +358,7 @@ contains
         do i = grid%lo(1), grid%hi(1) + e(1)
           nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
                /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
-          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, reach)/dt*correction(i, j, k)
+          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, inverse_h2)/dt*correction(i, j, k)
         end do
       end do
     end do
@@ -378,13 +379,13 @@ contains
 
   !> Time for which the Rhie-Chow acceleration of a face counts: dt' = dt/(1 + 2 nu dt sum 1/h^2)
   !! [s].
-  elemental function face_step(dt, nu, reach) result(step)
+  elemental function face_step(dt, nu, inverse_h2) result(step)
     real(wp), intent(in) :: dt      !! [s]
     real(wp), intent(in) :: nu      !! kinematic viscosity [m2/s]
-    real(wp), intent(in) :: reach   !! sum of 1/h**2 [1/m2]
+    real(wp), intent(in) :: inverse_h2   !! sum of 1/h**2 [1/m2]
     real(wp) :: step
 
-    step = dt/(1.0_wp + 2.0_wp*nu*dt*reach)
+    step = dt/(1.0_wp + 2.0_wp*nu*dt*inverse_h2)
   end function face_step
 
 end module face_velocity_m

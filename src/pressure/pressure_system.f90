@@ -14,7 +14,7 @@ module pressure_system_m
   use boundary_kinds_m, only: gives_pressure
   use rigid_motion_m, only: rigid_motion_t
   use rigid_flux_m, only: rigid_flux_t, rigid_flux_init, force_from_cells, add_cell_flux
-  use outflow_m, only: outflow_t, side_reach
+  use outflow_m, only: outflow_t, side_distance
   use mixture_m, only: face_mean
   use linear_operator_m, only: linear_operator_t, preconditioner_t, jacobi_t, identity_t
   use exact_sum_m, only: exact_dot
@@ -151,7 +151,7 @@ contains
             do i = a(1), b(1)
               c = [i, j, k] - merge(0, 1, s == 1)*e
               self%operator%cf(i, j, k, d) = aperture(i, j, k, d)*grid%area(d) &
-                /(rho(c(1), c(2), c(3))*side_reach(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
+                /(rho(c(1), c(2), c(3))*side_distance(grid, s, d, c, rho(c(1), c(2), c(3)), sides))
             end do
           end do
         end do

@@ -10,13 +10,13 @@ module case_check_m
   use boundary_kinds_m, only: side_code, is_wall
   use run_groups_m, only: side_name
   use value_text_m, only: quoted_text
-  use tet_mesh_m, only: shape_t, is_called, reach_along
+  use tet_mesh_m, only: shape_t, is_called, extent_along
   use shapes_builtin_m, only: make_shape, given_size
   use drops_m, only: place_of_block, shape_of_place, count_of_shape
   use wave_step_m, only: capillary_step
   use start_bodies_m, only: with_begun
   use bed_m, only: bed_t
-  use neighbours_m, only: pair_list_t, sort_bodies, add_partners
+  use neighbours_m, only: pair_list_t, sort_bodies, add_neighbours
   use scene_m, only: scene_t, set_scene, subject, held_text, near, is_free_beside, pair_depth, &
     way_out
   use overlap_solid_m, only: expected_samples
@@ -226,7 +226,7 @@ contains
     do b = 2, scene%n
       if (scene%outside(b) .or. .not. scene%dated(b)) cycle
       pairs%n = 0
-      call add_partners(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
+      call add_neighbours(b, x, radius, scene%walls%period, 0.0_wp, cells, pairs)
       do p = 1, pairs%n
         a = pairs%b(p)
         if (n == max_counted .or. .not. together(scene, a, b)) cycle
@@ -325,9 +325,9 @@ contains
     height = case%grid%origin(3) + case%grid%length(3)
     associate (shape => scene%blocks%shapes(scene%blocks%shape(b)))
       if (is_wall(side_code(case%boundary%kind(2, 3)))) then
-        height = height - reach_along(shape, turn(3, :))
+        height = height - extent_along(shape, turn(3, :))
       else
-        height = height + reach_along(shape, -turn(3, :))
+        height = height + extent_along(shape, -turn(3, :))
       end if
     end associate
   end function highest_place

@@ -46,17 +46,17 @@ contains
     type(shape_t), intent(in) :: shapes(:)   !! one for each `&shape`
     type(bed_t), intent(in) :: bed
     logical :: wet, blocks
-    integer :: touching(size(shapes))
+    integer :: n_points(size(shapes))
     real(wp) :: d_s
 
     wet = has_flow(case%run)
     blocks = case%run%physics /= 'fluid'
-    call find_touching(case, shapes, touching, d_s)
+    call count_contact_features(case, shapes, n_points, d_s)
     call print_run(unit, case)
     call print_grid(unit, case, wet)
     if (bed%there) call print_bed(unit, case, bed)
     if (case%run%physics /= 'dry') call print_liquid(unit, case, bed)
-    if (blocks) call print_shapes(unit, case, shapes, touching)
+    if (blocks) call print_shapes(unit, case, shapes, n_points)
     if (blocks) call print_bodies(unit, case, shapes, bed)
     if (blocks) call print_falls(unit, case, shapes, bed)
     call print_steps(unit, case, shapes, d_s, wet, blocks)
@@ -180,11 +180,11 @@ contains
 
   !> A table with one line for each shape: its tetrahedra, what of it touches (points and the
   !! smallest edge of the form, or spheres and the smallest diameter), mass and weight.
-  subroutine print_shapes(unit, case, shapes, touching)
+  subroutine print_shapes(unit, case, shapes, n_points)
     integer, intent(in) :: unit
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    integer, intent(in) :: touching(:)   !! points or spheres of each
+    integer, intent(in) :: n_points(:)   !! points or spheres of each
     character(*), parameter :: form = '(2x, a14, 1x, a9, 2(1x, a7), 4(1x, a12), 1x, a13)'
     character(:), allocatable :: submerged
     real(wp) :: mass, g, smallest
@@ -210,7 +210,7 @@ contains
       if (case%contact%model == 'surface') smallest = shapes(s)%smallest_edge
       write (unit, form) left(shapes(s)%name, 14), left(shapes(s)%kind, 9), &
         right(to_text(size(shapes(s)%tet, 2)), 7), &
-        right(to_text(touching(s)), 7), right(brief(smallest), 12), &
+        right(to_text(n_points(s)), 7), right(brief(smallest), 12), &
         right(brief(shapes(s)%volume), 12), right(brief(mass), 12), &
         right(brief(mass*g), 12), right(submerged, 13)
     end do
@@ -554,10 +554,10 @@ contains
 
   !> What of each shape touches, points of the surface or contact spheres, and the smallest length
   !! d_s of the contact Courant number, eq. (6), of all shapes.
-  subroutine find_touching(case, shapes, touching, d_s)
+  subroutine count_contact_features(case, shapes, n_points, d_s)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shapes(:)
-    integer, intent(out) :: touching(:)   !! how many [-]
+    integer, intent(out) :: n_points(:)   !! how many [-]
     real(wp), intent(out) :: d_s          !! [m]
     type(surface_t) :: surface
     integer :: s
@@ -566,13 +566,13 @@ contains
     do s = 1, size(shapes)
       if (case%contact%model == 'surface') then
         call surface_init(shapes(s), surface)
-        touching(s) = size(surface%probe, 2)
+        n_points(s) = size(surface%vertex, 2)
         d_s = min(d_s, surface%length)
       else
-        touching(s) = size(shapes(s)%sphere_radius)
+        n_points(s) = size(shapes(s)%sphere_radius)
         d_s = min(d_s, 2*minval(shapes(s)%sphere_radius))
       end if
     end do
-  end subroutine find_touching
+  end subroutine count_contact_features
 
 end module case_plan_m

@@ -16,7 +16,7 @@ module fall_m
   use vectors_m, only: rotation_matrix, cross
   use case_types_m, only: case_t, place_t, is_given, has_flow
   use boundary_kinds_m, only: side_code, is_wall
-  use tet_mesh_m, only: shape_t, reach_along
+  use tet_mesh_m, only: shape_t, extent_along
   use mass_properties_m, only: surface_area
   use bed_m, only: bed_t
   use bed_measure_m, only: bed_height
@@ -69,7 +69,7 @@ contains
     real(wp) :: turn(3, 3), g, speed, ground, top, drag_area
 
     turn = rotation_matrix(place%q)
-    fall%bottom = place%x(3) - reach_along(shape, -turn(3, :))
+    fall%bottom = place%x(3) - extent_along(shape, -turn(3, :))
     fall%has_floor = bed%there .or. is_wall(side_code(case%boundary%kind(1, 3)))
     fall%floor = bed_height(bed, place%x, case%grid%origin(3))
     ground = merge(fall%floor, -huge(ground), fall%has_floor)

@@ -3,7 +3,7 @@
 !! Measured as the peak of runs of 16**3 to 96**3 cells with and without blocks, surface tension
 !! and both couplings (gfortran 12): 510 to 780 B for a cell, those of the halo counted, 1200 B
 !! with `momentum = 'c_ismac'`; 29 kB for each of 1000 hexapods. When a block lands, lists of all
-!! cells come on top (`reserve_for_all` in `flux_band_m`): 36 B for a cell.
+!! cells come on top (`reserve_for_all` in `narrow_band_m`): 36 B for a cell.
 module memory_plan_m
   use, intrinsic :: iso_fortran_env, only: error_unit
   use kinds_m, only: wp, i8

@@ -58,7 +58,8 @@ contains
   end subroutine look_at_rest
 
   !> Overlap of a block of a shape at rest: the larger of that under its own weight, on the floor or
-  !! on another one of its kind, and that of a touch under a heaviest block that is another one [m].
+  !! on another one of its kind, and that of a contact point under a heaviest block that is another
+  !! one [m].
   function rest_depth(case, shape, law, heaviest) result(depth)
     type(case_t), intent(in) :: case
     type(shape_t), intent(in) :: shape

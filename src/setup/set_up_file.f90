@@ -69,7 +69,7 @@ contains
       .or. any(abs(blocks%given%omega) > 0.0_wp, 1))
   end function moves
 
-  !> Of each body its line in the case, its place without and with the reach of the random shift.
+  !> Of each body its line in the case, its place without and with the range of the random shift.
   subroutine write_places(case, blocks, run)
     type(case_t), intent(in) :: case
     type(blocks_t), intent(in) :: blocks

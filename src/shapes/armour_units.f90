@@ -210,8 +210,8 @@ contains
       real(wp) :: x(3)
       integer :: from
 
-      from = touch(k, a)
-      if (modulo(touch(k, b) - from, 6*half) == 2*half) then
+      from = meeting_point(k, a)
+      if (modulo(meeting_point(k, b) - from, 6*half) == 2*half) then
         x = ring(:, 1 + modulo(from + h, 6*half), k)
       else
         x = ring(:, 1 + modulo(from - h, 6*half), k)
@@ -219,7 +219,7 @@ contains
     end function arc
 
     !> Place in the ring of leg k, from 0, of the point nearest to leg a.
-    pure function touch(k, a) result(place)
+    pure function meeting_point(k, a) result(place)
       integer, intent(in) :: k, a
       integer :: place
       real(wp) :: distance(3), centre(3)
@@ -230,7 +230,7 @@ contains
         distance(m) = norm(ring(:, 1 + 2*half*(m - 1), k) - centre)
       end do
       place = 2*half*(minloc(distance, 1) - 1)
-    end function touch
+    end function meeting_point
   end subroutine add_core
 
   !> Regular octagon across e1, its flat sides towards e2 and e3.

@@ -21,10 +21,11 @@ module bed_m
   use bed_file_m, only: bed_form_t, read_bed_file
   implicit none
   private
-  public :: bed_t, make_bed, set_bed, bed_partner, bed_place, bed_covers, bed_distance, bed_is_near
+  public :: bed_t, make_bed, set_bed, bed_counterpart, bed_place, bed_covers, bed_distance, &
+    bed_is_near
   public :: facet_within, max_clip_corners, way_of, height_of
 
-  integer, parameter :: bed_partner = -7   !! its number as a partner of the blocks
+  integer, parameter :: bed_counterpart = -7   !! its number as a counterpart of the blocks
   integer, parameter :: max_clip_corners = 12  !! of a facet cut at five planes, and more
 
   type :: bed_t
@@ -170,9 +171,9 @@ contains
     ! a place on the edge between two flat facets must not slip between them
     bed%surface%side_offset = bed%surface%side_offset - no_gap*maxval(abs(bed%point))
     bed%surface%length = huge(1.0_wp)   ! the block limits the contact, as on a wall
-    bed%surface%probe = bed%surface%probe(:, :bed%surface%n_corners)
+    bed%surface%vertex = bed%surface%vertex(:, :bed%surface%n_corners)
     bed%surface%weight = bed%surface%weight(:bed%surface%n_corners)
-    call bins_build(bed%surface%probe, bed%surface%probe, spacing, bed%surface%probes)
+    call bins_build(bed%surface%vertex, bed%surface%vertex, spacing, bed%surface%vertices)
     low = near_tank(case, low)
     high = near_tank(case, high)
     low(3, :) = 0.0_wp
@@ -525,23 +526,23 @@ contains
     real(wp), intent(out) :: distance     !! [m]
     real(wp), intent(out) :: outward(3)   !! 0 where the distance is not exact
     real(wp), parameter :: least = 0.02_wp   !! share of `far` to begin with
-    real(wp) :: reach
+    real(wp) :: cutoff
 
-    reach = near
+    cutoff = near
     do
-      call gather_facets(bed%surface, x - reach, x + reach, found%facets)
-      call gather_edges(bed%surface, x - reach, x + reach, found%edges)
+      call gather_facets(bed%surface, x - cutoff, x + cutoff, found%facets)
+      call gather_edges(bed%surface, x - cutoff, x + cutoff, found%edges)
       call nearest_on_surface(bed%surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
-      if (abs(distance) <= reach) return
+      if (abs(distance) <= cutoff) return
       outward = 0.0_wp
-      if (reach <= near) then
+      if (cutoff <= near) then
         distance = nowhere
         if (.not. bed_covers(bed, x)) return
       end if
       distance = -far
-      if (reach >= far) return
-      reach = min(max(2*reach, least*far), far)
+      if (cutoff >= far) return
+      cutoff = min(max(2*cutoff, least*far), far)
     end do
   end subroutine bed_distance
 

@@ -27,7 +27,7 @@ module dense_spheres_m
     integer, allocatable :: corners(:)
     real(wp), allocatable :: x(:, :, :)      !! (3, corners, facets) [m]
     real(wp), allocatable :: normal(:, :)    !! (3, facets) outward
-    real(wp), allocatable :: middle(:, :), reach(:)   !! bounding spheres [m]
+    real(wp), allocatable :: middle(:, :), bounding_radius(:)   !! bounding spheres [m]
   end type facets_t
 
 contains
@@ -75,13 +75,13 @@ contains
     facets%n = size(shape%facet) - 1
     facets%corners = shape%facet(2:) - shape%facet(:facets%n)
     allocate (facets%x(3, maxval(facets%corners), facets%n), facets%normal(3, facets%n))
-    allocate (facets%middle(3, facets%n), facets%reach(facets%n))
+    allocate (facets%middle(3, facets%n), facets%bounding_radius(facets%n))
     do m = 1, facets%n
       n = facets%corners(m)
       facets%x(:, :n, m) = shape%point(:, shape%facet_point(shape%facet(m):shape%facet(m + 1) - 1))
       associate (x => facets%x(:, :n, m))
         facets%middle(:, m) = sum(x, 2)/real(n, wp)
-        facets%reach(m) = maxval(norm2(x - spread(facets%middle(:, m), 2, n), 1))
+        facets%bounding_radius(m) = maxval(norm2(x - spread(facets%middle(:, m), 2, n), 1))
         normal = 0.0_wp
         do k = 2, n - 1
           normal = normal + cross(x(:, k) - x(:, 1), x(:, k + 1) - x(:, 1))
@@ -167,7 +167,7 @@ contains
       nearest = p
       do f = 1, facets%n
         if (f == m) cycle
-        if (norm(facets%middle(:, f) - c) - facets%reach(f) >= least) cycle
+        if (norm(facets%middle(:, f) - c) - facets%bounding_radius(f) >= least) cycle
         if (abs(dot_product(facets%x(:, 1, f) - c, facets%normal(:, f))) >= least) cycle
         q = nearest_on_facet(c, facets%x(:, :facets%corners(f), f), facets%normal(:, f))
         d = norm(q - c)

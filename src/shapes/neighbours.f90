@@ -5,7 +5,7 @@ module neighbours_m
   implicit none
   private
   public :: bins_t, bins_build, pair_list_t, near_pairs, nearest_shift
-  public :: sort_bodies, add_partners
+  public :: sort_bodies, add_neighbours
 
   !> Items (points, or boxes that may span several bins) sorted into a block of equal bins.
   type :: bins_t
@@ -155,27 +155,27 @@ contains
     if (count(active) < 2) return
     call sort_bodies(x, radius, active, period, skin, cells, pairs)
     do a = 1, size(radius)
-      if (active(a)) call add_partners(a, x, radius, period, skin, cells, pairs)
+      if (active(a)) call add_neighbours(a, x, radius, period, skin, cells, pairs)
     end do
   end subroutine near_pairs
 
   !> Append the pairs of body a with the active bodies before it, after `sort_bodies`.
-  subroutine add_partners(a, x, radius, period, skin, cells, pairs)
+  subroutine add_neighbours(a, x, radius, period, skin, cells, pairs)
     integer, intent(in) :: a
     real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     integer, intent(in) :: cells(3)   !! from `sort_bodies`
     type(pair_list_t), intent(inout) :: pairs
-    integer :: b, i, j, k, c(3), reach(2, 3), begin
+    integer :: b, i, j, k, c(3), offset(2, 3), begin
     real(wp) :: d(3), shift(3)
 
     begin = pairs%n + 1
-    reach(1, :) = -1
-    reach(2, :) = 1
-    where (period > 0.0_wp .and. cells < 3) reach(1, :) = 1 - cells
-    where (period > 0.0_wp .and. cells < 3) reach(2, :) = 0
-    do k = reach(1, 3), reach(2, 3)
-      do j = reach(1, 2), reach(2, 2)
-        do i = reach(1, 1), reach(2, 1)
+    offset(1, :) = -1
+    offset(2, :) = 1
+    where (period > 0.0_wp .and. cells < 3) offset(1, :) = 1 - cells
+    where (period > 0.0_wp .and. cells < 3) offset(2, :) = 0
+    do k = offset(1, 3), offset(2, 3)
+      do j = offset(1, 2), offset(2, 2)
+        do i = offset(1, 1), offset(2, 1)
           c = pairs%cell(:, a) + [i, j, k]
           where (period > 0.0_wp) c = modulo(c, cells)
           if (any(c < 0) .or. any(c >= cells)) cycle
@@ -194,8 +194,8 @@ contains
         end do
       end do
     end do
-    call sort_partners(begin, pairs)
-  end subroutine add_partners
+    call sort_neighbours(begin, pairs)
+  end subroutine add_neighbours
 
   !> What to add to the distance d so that it points to the nearest periodic image [m].
   pure function nearest_shift(period, d) result(shift)
@@ -210,13 +210,13 @@ contains
     end do
   end function nearest_shift
 
-  !> Put the bodies into cells no smaller than the reach of the largest pair.
+  !> Put the bodies into cells no smaller than the cutoff of the largest pair.
   subroutine sort_bodies(x, radius, active, period, skin, cells, pairs)
     real(wp), intent(in) :: x(:, :), radius(:), period(3), skin   !! as in `near_pairs`
     logical, intent(in) :: active(:)
     integer, intent(out) :: cells(3)   !! cells in each direction
     type(pair_list_t), intent(inout) :: pairs
-    real(wp) :: low(3), high(3), edge(3), reach
+    real(wp) :: low(3), high(3), edge(3), cutoff
     integer :: a, c, d, most
 
     low = huge(1.0_wp)
@@ -230,10 +230,10 @@ contains
       low = 0.0_wp
       high = period
     end where
-    reach = 2*maxval(radius, active) + skin
+    cutoff = 2*maxval(radius, active) + skin
     most = max(1, nint((8.0_wp*size(radius))**(1.0_wp/3.0_wp)))
     do d = 1, 3
-      cells(d) = min(max(1, int(min((high(d) - low(d))/reach, real(most, wp)))), most)
+      cells(d) = min(max(1, int(min((high(d) - low(d))/cutoff, real(most, wp)))), most)
     end do
     edge = max((high - low)/real(cells, wp), tiny(1.0_wp))
     if (.not. allocated(pairs%chain)) then
@@ -270,8 +270,8 @@ contains
     pairs%shift(:, pairs%n) = shift
   end subroutine add_pair
 
-  !> Sort the pairs from `begin` on, all of one body, by partner.
-  pure subroutine sort_partners(begin, pairs)
+  !> Sort the pairs from `begin` on, all of one body, by counterpart.
+  pure subroutine sort_neighbours(begin, pairs)
     integer, intent(in) :: begin
     type(pair_list_t), intent(inout) :: pairs
     integer :: i, j, b
@@ -290,6 +290,6 @@ contains
       pairs%b(j + 1) = b
       pairs%shift(:, j + 1) = shift
     end do
-  end subroutine sort_partners
+  end subroutine sort_neighbours
 
 end module neighbours_m

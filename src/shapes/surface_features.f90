@@ -1,6 +1,6 @@
 !> The exact surface of a shape, made ready for contact: what can touch, and what can be touched.
 !!
-!! What can touch are probes (corners, and points inside large flat faces) and sharp convex edges.
+!! What can touch are vertices (corners, and points inside large flat faces) and sharp convex edges.
 !! What is touched is the surface itself: flat convex facets and the edges between them
 !! (`surface_search_m`).
 module surface_features_m
@@ -34,11 +34,11 @@ contains
 
     if (shape%kind == 'sphere') then
       surface%ball = shape%sphere_radius(1)
-      surface%reach = surface%ball
+      surface%bounding_radius = surface%ball
       surface%length = 2*surface%ball
-      allocate (surface%probe(3, 1), source=0.0_wp)
+      allocate (surface%vertex(3, 1), source=0.0_wp)
       allocate (surface%weight(1), source=1.0_wp)
-      call bins_build(surface%probe, surface%probe, surface%ball, surface%probes)
+      call bins_build(surface%vertex, surface%vertex, surface%ball, surface%vertices)
       return
     end if
     surface%length = 0.25_wp*shape%smallest_edge
@@ -48,7 +48,7 @@ contains
     bend = [(bend_of(shape, edge(:, e), surface%normal), e=1, size(edge, 2))]
     call find_corners(shape, edge, bend, point_normal, is_corner)
     call make_edges(shape, edge, bend, point_normal, surface)
-    call make_probes(shape, is_corner, surface)
+    call make_vertices(shape, is_corner, surface)
     call sort_into_bins(shape, surface)
     if (present(with_net)) then
       if (.not. with_net) return
@@ -264,7 +264,7 @@ contains
   !! The corners of one flat face weigh `flat_sum` together, or one each where they are fewer: a
   !! many-cornered face is no stiffer than a square one. The points inside carry equal faces that
   !! lie exactly on one another, where no corner is inside the other body.
-  pure subroutine make_probes(shape, is_corner, surface)
+  pure subroutine make_vertices(shape, is_corner, surface)
     type(shape_t), intent(in) :: shape
     logical, intent(in) :: is_corner(:)                !! (points)
     type(surface_t), intent(inout) :: surface
@@ -282,12 +282,12 @@ contains
     do f = 1, size(shape%facet) - 1
       if (norm(area_vector(shape, f)) > large*whole) n = n + size(corners(shape, f))
     end do
-    allocate (surface%probe(3, n), surface%weight(n))
+    allocate (surface%vertex(3, n), surface%weight(n))
     n = 0
     do c = 1, size(is_corner)
       if (.not. is_corner(c)) cycle
       n = n + 1
-      surface%probe(:, n) = shape%point(:, c)
+      surface%vertex(:, n) = shape%point(:, c)
       surface%weight(n) = weight(c)
     end do
     do f = 1, size(shape%facet) - 1
@@ -296,13 +296,13 @@ contains
       middle = sum(shape%point(:, corners(shape, f)), 2)/real(m, wp)
       do c = shape%facet(f), shape%facet(f + 1) - 1
         n = n + 1
-        surface%probe(:, n) = (1.0_wp - inset)*shape%point(:, shape%facet_point(c)) + inset*middle
+        surface%vertex(:, n) = (1.0_wp - inset)*shape%point(:, shape%facet_point(c)) + inset*middle
         surface%weight(n) = face_sum/real(m, wp)
       end do
     end do
-  end subroutine make_probes
+  end subroutine make_vertices
 
-  !> Bounding box, reach and bins.
+  !> Bounding box and radius, bins.
   subroutine sort_into_bins(shape, surface)
     type(shape_t), intent(in) :: shape
     type(surface_t), intent(inout) :: surface
@@ -317,9 +317,9 @@ contains
     end do
     surface%low = minval(low, 2)
     surface%high = maxval(high, 2)
-    surface%reach = maxval(norm2(shape%point(:, shape%facet_point), 1))
+    surface%bounding_radius = maxval(norm2(shape%point(:, shape%facet_point), 1))
     call bins_build(low, high, 2*surface%length, surface%facets)
-    call bins_build(surface%probe, surface%probe, 2*surface%length, surface%probes)
+    call bins_build(surface%vertex, surface%vertex, 2*surface%length, surface%vertices)
     n = size(surface%edge)
     deallocate (low, high)
     allocate (low(3, n), high(3, n))

@@ -10,17 +10,17 @@ module surface_search_m
   use edge_crossing_m, only: edge_t
   implicit none
   private
-  public :: surface_t, near_list_t, found_t, gather_probes, gather_edges, gather_facets
+  public :: surface_t, near_list_t, found_t, gather_vertices, gather_edges, gather_facets
   public :: nearest_on_surface, search_surface, min_distance, segment_distance2, nowhere
 
   type :: surface_t
     real(wp) :: ball = 0.0_wp                    !! radius of a sphere; 0: a polyhedron [m]
-    real(wp) :: reach = 0.0_wp                   !! of the sphere about the origin around it [m]
+    real(wp) :: bounding_radius = 0.0_wp         !! of the sphere about the origin around it [m]
     real(wp) :: length = 0.0_wp                  !! d_s of the contact Courant number, eq. (6) [m]
     real(wp) :: low(3) = 0.0_wp, high(3) = 0.0_wp    !! bounding box [m]
-    real(wp), allocatable :: probe(:, :)         !! (3, n) points that touch; sphere: its centre [m]
+    real(wp), allocatable :: vertex(:, :)        !! (3, n) points that touch; sphere: its centre [m]
     real(wp), allocatable :: weight(:)           !! (n) share of the stiffness [-]
-    integer :: n_corners = 0                     !! the first probes are corners
+    integer :: n_corners = 0                     !! the first vertices are corners
     !> Facets: normal.x = offset; inside where side_normal.x >= side_offset for all of its sides.
     real(wp), allocatable :: normal(:, :), offset(:)              !! (3, n) outward, (n) [m]
     integer, allocatable :: side(:)              !! (n + 1) first side of each facet
@@ -28,7 +28,7 @@ module surface_search_m
     type(edge_t), allocatable :: edge(:)         !! those that are not flat, convex ones first
     integer :: n_convex = 0
     real(wp), allocatable :: end_outward(:, :, :)   !! (3, 2, n) outward at the start, at the end
-    type(bins_t) :: probes, facets, edges
+    type(bins_t) :: vertices, facets, edges
     real(wp) :: net_step(3) = 1.0_wp             !! of a net over the bounding box [m]
     real(wp), allocatable :: net(:, :, :)        !! signed distance at its nodes, from 0 [m]
   end type surface_t
@@ -50,14 +50,14 @@ module surface_search_m
 
 contains
 
-  !> Probes inside a box.
-  subroutine gather_probes(surface, low, high, list)
+  !> Vertices inside a box.
+  subroutine gather_vertices(surface, low, high, list)
     type(surface_t), intent(in) :: surface
     real(wp), intent(in) :: low(3), high(3)   !! [m]
     type(near_list_t), intent(inout) :: list
 
-    call gather(surface%probes, size(surface%weight), low, high, list)
-  end subroutine gather_probes
+    call gather(surface%vertices, size(surface%weight), low, high, list)
+  end subroutine gather_vertices
 
   !> Edges whose bins meet a box; the box should not be much smaller than a bin.
   subroutine gather_edges(surface, low, high, list)
@@ -216,16 +216,16 @@ contains
     real(wp), intent(in) :: x(3), begin              !! body axes; half the first box [m]
     type(found_t), intent(inout) :: found            !! work
     real(wp), intent(out) :: distance, outward(3)    !! [m], see `nearest_on_surface`
-    real(wp) :: reach
+    real(wp) :: cutoff
 
-    reach = begin
+    cutoff = begin
     do
-      call gather_facets(surface, x - reach, x + reach, found%facets)
-      call gather_edges(surface, x - reach, x + reach, found%edges)
+      call gather_facets(surface, x - cutoff, x + cutoff, found%facets)
+      call gather_edges(surface, x - cutoff, x + cutoff, found%edges)
       call nearest_on_surface(surface, x, found%facets%item(:found%facets%n), &
         found%edges%item(:found%edges%n), distance, outward)
-      if (abs(distance) <= reach .or. reach > 2*surface%reach) return
-      reach = merge(abs(distance), 2*reach, abs(distance) < 2*reach)
+      if (abs(distance) <= cutoff .or. cutoff > 2*surface%bounding_radius) return
+      cutoff = merge(abs(distance), 2*cutoff, abs(distance) < 2*cutoff)
     end do
   end subroutine search_surface
 

@@ -5,7 +5,7 @@ module tet_mesh_m
   use kinds_m, only: wp, name_length
   implicit none
   private
-  public :: shape_t, is_called, extreme_of_family, reach_along, surface_of_tets, chain_of, opposite
+  public :: shape_t, is_called, extreme_of_family, extent_along, surface_of_tets, chain_of, opposite
   public :: max_facet_corners
 
   integer, parameter :: max_facet_corners = 48   !! of one polygon of the surface
@@ -60,21 +60,21 @@ contains
   end function extreme_of_family
 
   !> How far a shape reaches from its centre of mass along a direction [m].
-  pure function reach_along(shape, n) result(reach)
+  pure function extent_along(shape, n) result(extent)
     type(shape_t), intent(in) :: shape
     real(wp), intent(in) :: n(3)   !! unit vector, body axes
-    real(wp) :: reach
+    real(wp) :: extent
     integer :: i
 
     if (shape%kind == 'sphere') then
-      reach = shape%sphere_radius(1)
+      extent = shape%sphere_radius(1)
       return
     end if
-    reach = 0.0_wp
+    extent = 0.0_wp
     do i = 1, size(shape%point, 2)
-      reach = max(reach, dot_product(n, shape%point(:, i)))
+      extent = max(extent, dot_product(n, shape%point(:, i)))
     end do
-  end function reach_along
+  end function extent_along
 
   !> The faces that belong to one tetrahedron only, and that tetrahedron.
   pure subroutine surface_of_tets(n_point, tet, triangle, triangle_tet)

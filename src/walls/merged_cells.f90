@@ -18,7 +18,7 @@ module merged_cells_m
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
   public :: max_targets, is_unmerged, velocity_at_wall
 
-  integer, parameter :: reach = 2            !! layers of the halo with small cells that are needed
+  integer, parameter :: halo_layers = 2      !! layers of the halo with small cells that are needed
   integer, parameter :: max_targets = 3  !! of a small cell
 
   !> The cells at walls, and the groups among them. A wall cell is a cut cell or a target.
@@ -105,7 +105,7 @@ contains
     logical :: yes
     integer :: d, e(3)
 
-    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, reach)
+    yes = solid%inside(c(1), c(2), c(3)) /= 0 .and. is_near(grid, c, halo_layers)
     if (.not. yes) return
     yes = any(solid%aperture(c(1), c(2), c(3), :) > 0.0_wp)
     do d = 1, 3
@@ -151,7 +151,7 @@ contains
     do b = 1, size(solid%body_cell) - 1
       do m = solid%body_cell(b), solid%body_cell(b + 1) - 1
         c = solid%cell(:, m)
-        if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, reach)) cycle
+        if (solid%inside(c(1), c(2), c(3)) /= 0 .or. .not. is_near(grid, c, halo_layers)) cycle
         n = self%number(c(1), c(2), c(3))
         if (n == 0) then
           call add_cell(c, b, self)
@@ -178,7 +178,7 @@ contains
     subroutine add_beside(c)
       integer, intent(in) :: c(3)
 
-      if (.not. is_near(grid, c, reach)) return
+      if (.not. is_near(grid, c, halo_layers)) return
       if (solid%alpha(c(1), c(2), c(3)) <= 0.0_wp) call add_cell(c, b, self)
     end subroutine add_beside
   end subroutine add_cut_cells

@@ -125,49 +125,45 @@ contains
     real(wp) :: excess(3, self%n_small)   !! of a small cell over the mean of its targets
     integer :: g, m
 
-    !$omp parallel do private(total) schedule(static)
+    !$omp parallel do schedule(static)
     do m = 1, self%n_small
       if (is_unmerged(self, m)) cycle
-      call mean_of_targets(grid, self, m, a, total)
       associate (f => self%cell(:, m))
-        excess(:, m) = a(f(1), f(2), f(3), :) - total
+        excess(:, m) = a(f(1), f(2), f(3), :) - mean_of_targets(grid, self, m, a)
       end associate
     end do
     !$omp parallel do private(weight, total, w, m) schedule(static)
     do g = 1, self%n_groups
       associate (c => self%cell(:, self%leader(g)))
         weight = rho(c(1), c(2), c(3))*mean_apertures(grid, aperture, c)
-      end associate
-      total = 0.0_wp
-      do m = self%first(g), self%first(g + 1) - 1
-        associate (f => self%cell(:, self%part(1, m)))
-          w = self%share(self%part(2, m), self%part(1, m))*rho(f(1), f(2), f(3)) &
-              *mean_apertures(grid, aperture, f)
-          weight = weight + w
-          total = total + w*excess(:, self%part(1, m))
-        end associate
-      end do
-      associate (c => self%cell(:, self%leader(g)))
+        total = 0.0_wp
+        do m = self%first(g), self%first(g + 1) - 1
+          associate (f => self%cell(:, self%part(1, m)))
+            w = self%share(self%part(2, m), self%part(1, m))*rho(f(1), f(2), f(3)) &
+                *mean_apertures(grid, aperture, f)
+            weight = weight + w
+            total = total + w*excess(:, self%part(1, m))
+          end associate
+        end do
         a(c(1), c(2), c(3), :) = a(c(1), c(2), c(3), :) + total/max(weight, tiny(1.0_wp))
       end associate
     end do
-    !$omp parallel do private(total) schedule(static)
+    !$omp parallel do schedule(static)
     do m = 1, self%n_small
       if (is_unmerged(self, m) .or. .not. grid%owns(self%cell(:, m))) cycle
-      call mean_of_targets(grid, self, m, a, total)
       associate (f => self%cell(:, m))
-        a(f(1), f(2), f(3), :) = total
+        a(f(1), f(2), f(3), :) = mean_of_targets(grid, self, m, a)
       end associate
     end do
   end subroutine share_acceleration
 
   !> Mean of the targets of a small cell by shares.
-  pure subroutine mean_of_targets(grid, self, small, a, mean)
+  pure function mean_of_targets(grid, self, small, a) result(mean)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: self
     integer, intent(in) :: small
     real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-    real(wp), intent(out) :: mean(3)
+    real(wp) :: mean(3)
     integer :: n
 
     mean = 0.0_wp
@@ -177,7 +173,7 @@ contains
         mean = mean + self%share(n, small)*a(c(1), c(2), c(3), :)
       end associate
     end do
-  end subroutine mean_of_targets
+  end function mean_of_targets
 
   !> The own small cells change along with their targets since the velocities `before`, by forces
   !! that act on targets alone: by T_t of what those change. The wall bears what the group lacks of

@@ -31,10 +31,10 @@ contains
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow
-    real(wp) :: reach
+    real(wp) :: inverse_h2
     integer :: m, d, c(3)
 
-    reach = sum(1.0_wp/grid%h**2)
+    inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(d, c) schedule(dynamic, 64)
     do m = 1, merged%n
       do d = 1, 3
@@ -62,7 +62,7 @@ contains
         if (time >= dt) return   ! as everywhere
         nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k))/face_mean(rho(p, q, r), rho(i, j, k))
         flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
-          - (face_step(dt, nu, reach) - face_step(time, nu, reach))*(a%face(i, j, k, d) &
+          - (face_step(dt, nu, inverse_h2) - face_step(time, nu, inverse_h2))*(a%face(i, j, k, d) &
               - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
       end associate
     end subroutine shorten

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rooms import HEIGHT, TOP
+from packages import HEIGHT, TOP
 
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", "CONTRIBUTING.md", "CITATION.cff", "verification/README.md"]

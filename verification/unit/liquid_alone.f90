@@ -5,7 +5,7 @@ module liquid_alone_m
   use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use elliptic_solver_m, only: elliptic_solver_t, elliptic_solver_init
-  use liquid_transport_m, only: liquid_transport_t, begin_transport, begin_part, sweep, &
+  use liquid_transport_m, only: liquid_transport_t, begin_transport, begin_subcycle, sweep, &
                                 small_cells, finish_transport
   implicit none
   private
@@ -22,12 +22,12 @@ contains
     type(liquid_transport_t), intent(inout) :: self
     type(flow_t), intent(inout) :: flow
     type(elliptic_solver_t) :: solver
-    integer :: n, part
+    integer :: n, subcycle
 
     solver = balance_solver(grid)
     call begin_transport(grid, old, new, dt, solver, self, flow)
-    do part = 1, self%parts
-      call begin_part(grid, old, part, step, self)
+    do subcycle = 1, self%subcycles
+      call begin_subcycle(grid, old, subcycle, step, self)
       do n = 1, 3
         call sweep(grid, old, self%order(n), self)
       end do

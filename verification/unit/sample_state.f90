@@ -9,7 +9,7 @@ module sample_state_m
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_init
   use contacts_m, only: contacts_t, contacts_init
-  use springs_m, only: springs_t
+  use displacements_m, only: displacements_t
   use clock_m, only: clock_init
   use run_state_m, only: run_state_t
   implicit none
@@ -66,7 +66,7 @@ contains
       s%blocks%contact_force(:, b) = start + [1.1_wp, 1.2_wp, 1.3_wp]*b
       s%blocks%contacts(b) = b
     end do
-    call make_springs(start, s%contacts)
+    call make_displacements(start, s%contacts)
   end subroutine make_sample
 
   subroutine make_case(periodic, case)
@@ -97,32 +97,32 @@ contains
     case%body(3)%release_time = 1.5_wp
   end subroutine make_case
 
-  subroutine make_springs(start, contacts)
+  subroutine make_displacements(start, contacts)
     real(wp), intent(in) :: start
     type(contacts_t), intent(inout) :: contacts
 
-    call fill_springs(start, contacts%springs)
-    contacts%springs%n = 4
-    call fill_springs(2*start, contacts%sleep%rest)
+    call fill_displacements(start, contacts%displacements)
+    contacts%displacements%n = 4
+    call fill_displacements(2*start, contacts%sleep%rest)
     contacts%sleep%rest%n = 3
     contacts%sleep%quiet = [start, 0.0_wp, 1.0_wp]
-  end subroutine make_springs
+  end subroutine make_displacements
 
-  subroutine fill_springs(start, s)
+  subroutine fill_displacements(start, s)
     real(wp), intent(in) :: start
-    type(springs_t), intent(inout) :: s
+    type(displacements_t), intent(inout) :: s
     integer :: i
 
     s%a = [2, 2, 3, 3]
     s%b = [1, -1, 1, 2]
-    s%key = [7, 8, 9, 10]
+    s%id = [7, 8, 9, 10]
     s%k = [(start + 0.1_wp*i, i=1, 4)]
     s%energy = 3*s%k
     s%xi = reshape([(start + 0.01_wp*i, i=1, 12)], [3, 4])
     s%force = 2*s%xi
     s%torque_a = 3*s%xi
     s%torque_b = 4*s%xi
-  end subroutine fill_springs
+  end subroutine fill_displacements
 
   !> Fill an array, halo included, with numbers that tell the cell of the domain: those of periodic
   !! images are equal.

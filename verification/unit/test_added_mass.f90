@@ -36,7 +36,7 @@ contains
   subroutine push(name, weights, expected, touched, clips)
     character(*), intent(in) :: name
     real(wp), intent(in) :: weights, expected   !! [-], [kg]
-    integer, intent(in), optional :: touched    !! partners, default: one under a force
+    integer, intent(in), optional :: touched    !! counterparts, default: one under a force
     integer, intent(in), optional :: clips      !! bodies whose added mass is cut, default: none
     integer :: n_clipped, n
 

@@ -19,8 +19,8 @@ program test_bed
   use walls_m, only: walls_t, walls_init
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, has_place, max_overlap
-  use touches_m, only: touches_t
-  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
+  use contact_points_m, only: contact_points_t
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   use bed_file_m, only: bed_form_t, read_bed_file
   use bed_m, only: bed_t, make_bed, set_bed, bed_covers, bed_distance, bed_place
   implicit none
@@ -578,7 +578,7 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_surface_t) :: contact
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     character(:), allocatable :: message
     real(wp), parameter :: deep = 1.0e-4_wp, edge = 0.02_wp, top = 0.04_wp
     integer, parameter :: round(9) = [2, 3, 6, 9, 8, 7, 4, 1, 2]   ! the points about the fifth
@@ -607,9 +607,9 @@ contains
     call check('a saddle: '//message, len(message) == 0)
     call blocks_init(case, shapes, blocks)
     call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
-    call find_surface_touches(walls, blocks, 0.0_wp, contact, touches)
-    call check('an edge on a saddle touches it', touches%n > 0)
-    call check('as deep as it lies', maxval(touches%item(:touches%n)%depth), deep*sqrt(0.5_wp), &
+    call find_surface_points(walls, blocks, 0.0_wp, contact, points)
+    call check('an edge on a saddle touches it', points%n > 0)
+    call check('as deep as it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
       1.0e-12_wp)
   end subroutine edge_on_saddle
 

@@ -1,9 +1,9 @@
-!> The contact law: closed form of the impact, its inversion, forces of one touch.
+!> The contact law: closed form of the impact, its inversion, forces of one contact point.
 program test_contact_law
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: contact_input_t
-  use contact_law_m, only: contact_law_t, spring_t, load_t, stored_energy, normal_force, &
+  use contact_law_m, only: contact_law_t, stiffness_t, load_t, stored_energy, normal_force, &
     tangential_force, tangential_slip
   use law_restitution_m, only: law_restitution_t, restitution_of, impact_duration, &
     damping_ratio_of
@@ -53,22 +53,22 @@ contains
     real(wp), parameter :: linear(3) = [1.0_wp, 0.603_wp, 0.368_wp]   !! depth of the linear spring
     integer, parameter :: steps = 400000
     type(law_restitution_t) :: law
-    type(spring_t) :: spring, beside(2)
+    type(stiffness_t) :: elastic, beside(2)
     real(wp) :: d, v, dt, force, eta, deepest, slope
     integer :: i, m
 
     do m = 1, 5
       d = 0.15_wp*hard*real(m, wp)**2
-      call law%normal_spring(3.0_wp, weight, d + [-step, step], hard, beside)
-      call law%normal_spring(3.0_wp, weight, d, hard, spring)
+      call law%normal_stiffness(3.0_wp, weight, d + [-step, step], hard, beside)
+      call law%normal_stiffness(3.0_wp, weight, d, hard, elastic)
       call check('force is the slope of energy', (beside(2)%energy - beside(1)%energy)/(2*step), &
-        spring%force, 1.0e-6_wp*spring%force)
-      slope = 3.0_wp*weight*spring%hardness*spring%steepness
+        elastic%force, 1.0e-6_wp*elastic%force)
+      slope = 3.0_wp*weight*elastic%hardness*elastic%steepness
       call check('stiffness is the slope of force', (beside(2)%force - beside(1)%force)/(2*step), &
         slope, 1.0e-6_wp*slope)
     end do
-    call law%normal_spring(3.0_wp, weight, 0.1_wp*hard, hard, spring)
-    call check('linear where shallow', spring%force, 0.3_wp*weight*hard, 2.0e-4_wp*spring%force)
+    call law%normal_stiffness(3.0_wp, weight, 0.1_wp*hard, hard, elastic)
+    call check('linear where shallow', elastic%force, 0.3_wp*weight*hard, 2.0e-4_wp*elastic%force)
     do m = 1, size(zeta)
       dt = 4.0_wp/real(steps, wp)
       d = 0.0_wp
@@ -78,9 +78,9 @@ contains
         d = d + 0.5_wp*dt*v
         if (d < 0.0_wp) exit
         deepest = max(deepest, d)
-        call law%normal_spring(1.0_wp, 1.0_wp, d, hard, spring)
-        eta = 2*zeta(m)*sqrt(spring%hardness)
-        force = normal_force(spring%force, eta, -v)
+        call law%normal_stiffness(1.0_wp, 1.0_wp, d, hard, elastic)
+        eta = 2*zeta(m)*sqrt(elastic%hardness)
+        force = normal_force(elastic%force, eta, -v)
         v = v - dt*force/(1.0_wp + merge(0.5_wp*eta*dt, 0.0_wp, force > 0.0_wp))
         d = d + 0.5_wp*dt*v
       end do
@@ -173,8 +173,8 @@ contains
       time, 1.0e-15_wp)
   end subroutine check_overdamped
 
-  !> A touch carries a load within what it may give way, but is no stiffer than that of two blocks
-  !! of that mass.
+  !> A contact point carries a load within what it may give way, but is no stiffer than that of two
+  !! blocks of that mass.
   subroutine check_load()
     real(wp), parameter :: mass = 0.01_wp, heavy = 100*mass, g = 9.81_wp, time = 1.0e-2_wp
     type(contact_input_t) :: input
@@ -197,17 +197,17 @@ contains
       input%k_n, 0.0_wp)
   end subroutine check_load
 
-  !> Equations (1) and (2) for one touch.
+  !> Equations (1) and (2) for one contact point.
   subroutine check_forces()
     type(law_constants_t) :: law
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp) :: f(3), xi(3), v(3)
 
     law%gamma_n = 1.5_wp
-    call law%normal_spring(2.0e5_wp, 0.5_wp, 1.0e-4_wp, 1.0e-5_wp, spring)
-    call check('spring alone', spring%force, 0.1_wp, 1.0e-15_wp)
-    call check('its energy', spring%energy, 4.0e-6_wp, 1.0e-20_wp)
-    call check('its slope', 1.0e5_wp*spring%steepness, 1.5e3_wp, 1.0e-10_wp)
+    call law%normal_stiffness(2.0e5_wp, 0.5_wp, 1.0e-4_wp, 1.0e-5_wp, elastic)
+    call check('spring alone', elastic%force, 0.1_wp, 1.0e-15_wp)
+    call check('its energy', elastic%energy, 4.0e-6_wp, 1.0e-20_wp)
+    call check('its slope', 1.0e5_wp*elastic%steepness, 1.5e3_wp, 1.0e-10_wp)
     call check('closing adds', normal_force(10.0_wp, 10.0_wp, -0.2_wp), 12.0_wp, 1.0e-13_wp)
     call check('never pulls', normal_force(10.0_wp, 10.0_wp, 2.0_wp), 0.0_wp, 0.0_wp)
     call check('energy of the spring', stored_energy(3.0_wp, 1.0_wp, 2.0_wp), 6.0_wp, 1.0e-15_wp)

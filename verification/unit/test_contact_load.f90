@@ -1,16 +1,16 @@
-!> What touches have to carry at rest, and how far they give way.
+!> Load of contact points at rest, and how far they give way.
 program test_contact_load
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
   use case_types_m, only: contact_input_t, case_t
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
-  use contact_law_m, only: contact_law_t, load_t, spring_t
+  use contact_law_m, only: contact_law_t, load_t, stiffness_t
   use contact_laws_m, only: choose_law
   use contact_load_m, only: load_of, hard_depth, depth_at_rest
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t
-  use contact_partners_m, only: partners_t, partners_init, update_partners
+  use counterparts_m, only: counterparts_t, counterparts_init, update_counterparts
   implicit none
 
   real(wp), parameter :: g = 9.81_wp, size(2) = [0.02_wp, 0.3_wp]
@@ -45,15 +45,15 @@ contains
       1.0e4_wp]
     type(contact_input_t) :: input
     class(contact_law_t), allocatable :: law
-    type(spring_t) :: spring
+    type(stiffness_t) :: elastic
     real(wp) :: depth
     integer :: i
 
     call choose_law(input, law)
     do i = 1, 4
       depth = depth_at_rest(law, k, hard, force(i))
-      call law%normal_spring(k, 1.0_wp, depth, hard, spring)
-      call check('the spring holds the force', spring%force, force(i), 1.0e-9_wp*force(i))
+      call law%normal_stiffness(k, 1.0_wp, depth, hard, elastic)
+      call check('the spring holds the force', elastic%force, force(i), 1.0e-9_wp*force(i))
     end do
     call check('as a linear spring where shallow', depth_at_rest(law, k, hard, 1.0_wp), 1.0e-4_wp, &
       1.0e-7_wp)
@@ -64,13 +64,13 @@ contains
       1.0e-12_wp)
   end subroutine check_depth
 
-  !> What the partners of a case carry: the heaviest body that moves freely; and each may give way
-  !! by a hundredth of its edge.
+  !> What the counterparts of a case carry: the heaviest body that moves freely; and each may give
+  !! way by a hundredth of its edge.
   subroutine check_heaviest()
     type(case_t) :: case
     type(blocks_t) :: blocks
     type(walls_t) :: walls
-    type(partners_t) :: partners
+    type(counterparts_t) :: counterparts
     type(load_t) :: load
     integer :: b
 
@@ -80,20 +80,20 @@ contains
       case%body(b)%position = 0.5_wp*b
     end do
     call blocks_init(case, shapes, blocks)
-    call partners_init(blocks, partners)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
+    call counterparts_init(blocks, counterparts)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
     load = load_of(blocks%mass(2), g)
-    call check('the heaviest', partners%load%mass, blocks%mass(2), 0.0_wp)
-    call check('its weight', partners%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
-    call check('may give way', partners%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
+    call check('the heaviest', counterparts%load%mass, blocks%mass(2), 0.0_wp)
+    call check('its weight', counterparts%load%weight, blocks%mass(2)*g, 1.0e-12_wp*load%weight)
+    call check('may give way', counterparts%give(1:3), 0.01_wp*size([1, 2, 1]), 1.0e-15_wp)
     case%body(2)%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
-    call check('nobody carries a held one', partners%load%mass, blocks%mass(1), 0.0_wp)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
+    call check('nobody carries a held one', counterparts%load%mass, blocks%mass(1), 0.0_wp)
     case%body%fixed = .true.
     call blocks_init(case, shapes, blocks)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -g], blocks, partners)
-    call check('all held: no load', partners%load%mass, 0.0_wp, 0.0_wp)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -g], blocks, counterparts)
+    call check('all held: no load', counterparts%load%mass, 0.0_wp, 0.0_wp)
   end subroutine check_heaviest
 
 end program test_contact_load

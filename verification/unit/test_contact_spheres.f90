@@ -1,5 +1,5 @@
-!> Touches of contact spheres: depth, place and normal on bodies, walls and periodic images, those
-!! that come soon, and none lost while a list is kept.
+!> Contact points of contact spheres: depth, place and normal on bodies, walls and periodic images,
+!! those that come soon, and none lost while a list is kept.
 program test_contact_spheres
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
@@ -10,8 +10,8 @@ program test_contact_spheres
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use touches_m, only: touches_t
-  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_touches
+  use contact_points_m, only: contact_points_t
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
   implicit none
 
   real(wp), parameter :: r(2) = [0.03_wp, 0.05_wp]   !! radii of the two balls [m]
@@ -73,31 +73,31 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_spheres_t) :: spheres
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     real(wp) :: place(3, 2)
     integer :: b
 
     place(:, 1) = 0.5_wp
     place(:, 2) = 0.5_wp + (sum(r) - d)*n
     call begin(['small', 'large'], place, blocks, walls, spheres)
-    call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-    call check('one touch', touches%n, 1)
-    associate (touch => touches%item(1))
-      call check('of the second and the first', all([touch%a, touch%b, touch%key] == [2, 1, 1]))
-      call check('overlap', touch%depth, d, 1.0e-15_wp)
-      call check('from the second to the first', touch%normal, -n, 1.0e-13_wp)
-      call check('middle seen from the second', touch%arm_a, -(r(2) - 0.5_wp*d)*n, 1.0e-15_wp)
-      call check('middle seen from the first', touch%arm_b, (r(1) - 0.5_wp*d)*n, 1.0e-15_wp)
-      call check('diameter of the smaller one', touch%length, 2*r(1), 1.0e-16_wp)
+    call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+    call check('one contact point', points%n, 1)
+    associate (point => points%item(1))
+      call check('of the second and the first', all([point%a, point%b, point%id] == [2, 1, 1]))
+      call check('overlap', point%depth, d, 1.0e-15_wp)
+      call check('from the second to the first', point%normal, -n, 1.0e-13_wp)
+      call check('middle seen from the second', point%arm_a, -(r(2) - 0.5_wp*d)*n, 1.0e-15_wp)
+      call check('middle seen from the first', point%arm_b, (r(1) - 0.5_wp*d)*n, 1.0e-15_wp)
+      call check('diameter of the smaller one', point%length, 2*r(1), 1.0e-16_wp)
     end associate
     do b = 1, 2
       blocks%still = [b == 1, b == 2]
-      call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-      call check('one moves', touches%n, 1)
+      call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+      call check('one moves', points%n, 1)
     end do
     blocks%still = .true.
-    call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-    call check('both are still', touches%n, 0)
+    call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+    call check('both are still', points%n, 0)
   end subroutine check_pair
 
   !> A ball touches the floor on the floor.
@@ -105,16 +105,16 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_spheres_t) :: spheres
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
 
     call begin(['large'], reshape([0.5_wp, 0.5_wp, r(2) - d], [3, 1]), blocks, walls, spheres)
-    call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-    call check('one wall', touches%n, 1)
-    associate (touch => touches%item(1))
-      call check('the floor', touch%b, -5)
-      call check('depth in the floor', touch%depth, d, 1.0e-15_wp)
-      call check('normal into the floor', touch%normal, -z, 0.0_wp)
-      call check('place on the floor', touch%arm_a, -(r(2) - d)*z, 1.0e-15_wp)
+    call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+    call check('one wall', points%n, 1)
+    associate (point => points%item(1))
+      call check('the floor', point%b, -5)
+      call check('depth in the floor', point%depth, d, 1.0e-15_wp)
+      call check('normal into the floor', point%normal, -z, 0.0_wp)
+      call check('place on the floor', point%arm_a, -(r(2) - d)*z, 1.0e-15_wp)
     end associate
   end subroutine check_floor
 
@@ -123,18 +123,18 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_spheres_t) :: spheres
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     real(wp) :: place(3, 2)
 
     place = 0.5_wp
     place(1, :) = [0.01_wp, 1.01_wp - (sum(r) - d)]
     call begin(['small', 'large'], place, blocks, walls, spheres, .true.)
-    call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-    call check('one image', touches%n, 1)
-    associate (touch => touches%item(1))
-      call check('its overlap', touch%depth, d, 1.0e-15_wp)
-      call check('over the border', touch%normal, x, 1.0e-13_wp)
-      call check('seen from the image', touch%arm_b, -(r(1) - 0.5_wp*d)*x, 1.0e-15_wp)
+    call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+    call check('one image', points%n, 1)
+    associate (point => points%item(1))
+      call check('its overlap', point%depth, d, 1.0e-15_wp)
+      call check('over the border', point%normal, x, 1.0e-13_wp)
+      call check('seen from the image', point%arm_b, -(r(1) - 0.5_wp*d)*x, 1.0e-15_wp)
     end associate
   end subroutine check_image
 
@@ -144,22 +144,22 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_spheres_t) :: spheres
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     real(wp) :: place(3, 2), rate
 
     place = 0.5_wp
     place(1, 2) = 0.5_wp + sum(r) + gap
     call begin(['small', 'large'], place, blocks, walls, spheres)
-    call find_sphere_touches(walls, blocks, 1.0_wp, spheres, touches)
-    call check('nothing moves', touches%n, 0)
+    call find_sphere_points(walls, blocks, 1.0_wp, spheres, points)
+    call check('nothing moves', points%n, 0)
     blocks%v(1, :) = speed*[2, 1]
     blocks%omega(2, 1) = 4.0_wp
     rate = speed + 4.0_wp*r(1)
-    call find_sphere_touches(walls, blocks, 1.001_wp*gap/rate, spheres, touches)
-    call check('soon', touches%n, 1)
-    call check('depth below zero', touches%item(1)%depth, -gap, 1.0e-15_wp)
-    call find_sphere_touches(walls, blocks, 0.999_wp*gap/rate, spheres, touches)
-    call check('not yet', touches%n, 0)
+    call find_sphere_points(walls, blocks, 1.001_wp*gap/rate, spheres, points)
+    call check('soon', points%n, 1)
+    call check('depth below zero', points%item(1)%depth, -gap, 1.0e-15_wp)
+    call find_sphere_points(walls, blocks, 0.999_wp*gap/rate, spheres, points)
+    call check('not yet', points%n, 0)
   end subroutine check_soon
 
   !> While a cube slides over another, and both tremble, the list kept finds as much overlap as all
@@ -169,7 +169,7 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_spheres_t) :: spheres
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
     real(wp) :: step
     integer :: i, b, n
 
@@ -184,9 +184,9 @@ contains
         blocks%q(:, b) = quaternion_product(quaternion_exp(step/r(2)*vector(i, 2 + b)), &
           blocks%q(:, b))
       end do
-      call find_sphere_touches(walls, blocks, 0.0_wp, spheres, touches)
-      n = n + touches%n
-      call check('overlap of all', sum(touches%item(:touches%n)%depth), overlap_of_all(blocks), &
+      call find_sphere_points(walls, blocks, 0.0_wp, spheres, points)
+      n = n + points%n
+      call check('overlap of all', sum(points%item(:points%n)%depth), overlap_of_all(blocks), &
         1.0e-13_wp)
     end do
     call check('they touch often', n > 1000)

@@ -1,4 +1,5 @@
-!> Touches of exact surfaces: where they are, how deep, and forces that follow from an energy.
+!> Contact points of exact surfaces: where they are, how deep, and forces that follow from an
+!! energy.
 program test_contact_surface
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
@@ -9,8 +10,8 @@ program test_contact_surface
   use random_counter_m, only: uniform, random_rotation
   use rigid_body_m, only: blocks_t, blocks_init, release_body
   use walls_m, only: walls_t, walls_init
-  use touches_m, only: touches_t
-  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_touches
+  use contact_points_m, only: contact_points_t
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
   implicit none
 
   !> A small world of its own.
@@ -19,7 +20,7 @@ program test_contact_surface
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contact_surface_t) :: surface
-    type(touches_t) :: touches
+    type(contact_points_t) :: points
   end type world_t
 
   real(wp), parameter :: d = 0.02_wp         !! edge of the cubes, diameter of the ball [m]
@@ -31,7 +32,7 @@ program test_contact_surface
   call check_corner_in_face()
   call check_crossing_edges()
   call check_faces_on_one_another()
-  call check_touches_to_come()
+  call check_points_to_come()
   call check_balls()
   call check_energy()
   call check_lists()
@@ -74,7 +75,7 @@ contains
   subroutine find(world)
     type(world_t), intent(inout) :: world
 
-    call find_surface_touches(world%walls, world%blocks, 0.0_wp, world%surface, world%touches)
+    call find_surface_points(world%walls, world%blocks, 0.0_wp, world%surface, world%points)
   end subroutine find
 
   !> A hexapod on one, two and three legs: the heights 1.5 d, sqrt(2) d, 2.5 d/sqrt(3) and the
@@ -98,11 +99,11 @@ contains
         world%blocks%q(:, 1) = q(:, pose)
         world%blocks%x(3, 1) = height(pose) + sunk
         call find(world)
-        call check('above its height it does not touch', world%touches%n, 0)
+        call check('above its height it does not touch', world%points%n, 0)
         world%blocks%x(3, 1) = height(pose) - sunk
         call find(world)
-        call check('corners that stand', world%touches%n, corners(pose))
-        call check('sunk', maxval(world%touches%item(:world%touches%n)%depth), sunk, 1.0e-15_wp)
+        call check('corners that stand', world%points%n, corners(pose))
+        call check('sunk', maxval(world%points%item(:world%points%n)%depth), sunk, 1.0e-15_wp)
       end do
     end do
   end subroutine check_rest_heights
@@ -121,13 +122,13 @@ contains
       world%blocks%x(1:2, upper) = [0.503_wp, 0.498_wp]
       world%blocks%x(3, upper) = 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth
       call find(world)
-      call check('one corner in a face', world%touches%n, 1)
-      call check('its depth', world%touches%item(1)%depth, depth, 1.0e-15_wp)
-      call check('normal from a to b', world%touches%item(1)%normal(3), &
+      call check('one corner in a face', world%points%n, 1)
+      call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
+      call check('normal from a to b', world%points%item(1)%normal(3), &
                  merge(1.0_wp, -1.0_wp, upper == 1), 1.0e-14_wp)
-      call check('its arm', world%touches%item(1)%arm_a + world%blocks%x(:, 2), &
+      call check('its arm', world%points%item(1)%arm_a + world%blocks%x(:, 2), &
                  [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
-      call check('both arms meet', world%touches%item(1)%arm_b + world%blocks%x(:, 1), &
+      call check('both arms meet', world%points%item(1)%arm_b + world%blocks%x(:, 1), &
                  [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
     end do
   end subroutine check_corner_in_face
@@ -142,15 +143,15 @@ contains
     world%blocks%q(:, 2) = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], 0.25_wp*pi)
     world%blocks%x(:, 2) = [0.503_wp, 0.496_wp, 0.5_wp + sqrt(2.0_wp)*d - depth]
     call find(world)
-    call check('two edges cross', world%touches%n, 1)
-    call check('depth between the edges', world%touches%item(1)%depth, depth, 1.0e-15_wp)
-    call check('they count', world%touches%item(1)%weight, 1.0_wp, 1.0e-15_wp)
-    call check('normal to both', world%touches%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], &
+    call check('two edges cross', world%points%n, 1)
+    call check('depth between the edges', world%points%item(1)%depth, depth, 1.0e-15_wp)
+    call check('they count', world%points%item(1)%weight, 1.0_wp, 1.0e-15_wp)
+    call check('normal to both', world%points%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], &
       1.0e-14_wp)
-    call check('where they cross', world%touches%item(1)%arm_b(1:2), [0.003_wp, 0.0_wp], 1.0e-15_wp)
+    call check('where they cross', world%points%item(1)%arm_b(1:2), [0.003_wp, 0.0_wp], 1.0e-15_wp)
     world%blocks%x(3, 2) = world%blocks%x(3, 2) + 2*depth
     call find(world)
-    call check('apart', world%touches%n, 0)
+    call check('apart', world%points%n, 0)
   end subroutine check_crossing_edges
 
   !> Cubes exactly on one another, and two beams crossed flat: carried without tilt.
@@ -170,11 +171,11 @@ contains
       call find(world)
       force = 0.0_wp
       torque = 0.0_wp
-      do t = 1, world%touches%n
-        if (abs(world%touches%item(t)%normal(3)) < 0.5_wp) cycle
-        force = force + world%touches%item(t)%weight*world%touches%item(t)%depth
-        torque = torque + cross(world%touches%item(t)%arm_b, world%touches%item(t)%normal) &
-          *world%touches%item(t)%weight*world%touches%item(t)%depth
+      do t = 1, world%points%n
+        if (abs(world%points%item(t)%normal(3)) < 0.5_wp) cycle
+        force = force + world%points%item(t)%weight*world%points%item(t)%depth
+        torque = torque + cross(world%points%item(t)%arm_b, world%points%item(t)%normal) &
+          *world%points%item(t)%weight*world%points%item(t)%depth
       end do
       call check('a face carries', force > 0.9_wp*depth)
       if (cross_laid == 0) call check('without tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
@@ -183,8 +184,8 @@ contains
   end subroutine check_faces_on_one_another
 
   !> A cube a gap above another: with a margin, as for impulses, it may touch soon if it comes down,
-  !! by its fall or its spin, not if it goes sideways. Without one all within reach may.
-  subroutine check_touches_to_come()
+  !! by its fall or its spin, not if it goes sideways. Without one all that are near may.
+  subroutine check_points_to_come()
     real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
     type(world_t) :: world
     real(wp) :: v(3, 4), spin(4)
@@ -199,15 +200,15 @@ contains
       world%blocks%v(:, 2) = v(:, m)
       world%blocks%omega(2, 2) = spin(m)
       world%surface%search%margin = 1.0e-4_wp
-      call find_surface_touches(world%walls, world%blocks, ahead, world%surface, world%touches)
-      call check('comes', (world%touches%n > 0) .eqv. (m == 1 .or. m == 4))
+      call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
+      call check('comes', (world%points%n > 0) .eqv. (m == 1 .or. m == 4))
       if (m == 4) call check('on the side that comes down', &
-        minval(world%touches%item(:world%touches%n)%arm_a(1)) > 0.0_wp)
+        minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
       world%surface%search%margin = 0.0_wp
-      call find_surface_touches(world%walls, world%blocks, ahead, world%surface, world%touches)
-      call check('within reach', world%touches%n > 0)
+      call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
+      call check('near enough', world%points%n > 0)
     end do
-  end subroutine check_touches_to_come
+  end subroutine check_points_to_come
 
   !> A ball touches a ball, a face, an edge, a corner and a wall at one point each.
   subroutine check_balls()
@@ -233,13 +234,13 @@ contains
         way = [0.0_wp, 0.0_wp, 1.0_wp]
       end if
       call find(world)
-      call check('a ball touches once', world%touches%n, 1)
-      call check('its depth', world%touches%item(1)%depth, depth, 1.0e-15_wp)
-      call check('its normal', world%touches%item(1)%normal, -way, 1.0e-12_wp)
+      call check('a ball touches once', world%points%n, 1)
+      call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
+      call check('its normal', world%points%item(1)%normal, -way, 1.0e-12_wp)
     end do
   end subroutine check_balls
 
-  !> The forces of any touching pair follow from the energy of its springs: the work of a small
+  !> The forces of any pair in contact follow from the energy of its springs: the work of a small
   !! motion, in any direction and about any axis, against the change of energy.
   subroutine check_energy()
     type(world_t) :: new, world, moved
@@ -247,7 +248,7 @@ contains
     character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'cube']
     real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work
     real(wp) :: worst, scale
-    integer :: i, m, found, faded, touching, kinks, t
+    integer :: i, m, found, faded, detected, kinks, t
 
     kinks = 0
     found = 0
@@ -261,13 +262,13 @@ contains
         world%blocks%q(:, 2) = random_rotation(2, i)
         direction = [uniform(3, i, 1), uniform(3, i, 2), uniform(3, i, 3)] - 0.5_wp
         direction = direction/norm2(direction)
-        call bring_together(world, direction, 3.0e-4_wp, touching)
-        if (touching == 0) cycle
+        call bring_together(world, direction, 3.0e-4_wp, detected)
+        if (detected == 0) cycle
         found = found + 1
         call forces(world, force, torque)
-        associate (touch => world%touches%item(:world%touches%n))
-          scale = sum(touch%weight*touch%depth)
-          if (any([(any(abs(touch(t)%weight_shift) > 0.0_wp), t=1, size(touch))])) faded = faded + 1
+        associate (point => world%points%item(:world%points%n))
+          scale = sum(point%weight*point%depth)
+          if (any([(any(abs(point(t)%weight_shift) > 0.0_wp), t=1, size(point))])) faded = faded + 1
         end associate
         direction = [uniform(4, i, 1), uniform(4, i, 2), uniform(4, i, 3)] - 0.5_wp
         axis = ([uniform(4, i, 4), uniform(4, i, 5), uniform(4, i, 6)] - 0.5_wp)/d
@@ -292,11 +293,11 @@ contains
     call check('hardly any at a kink', kinks < 5)
   end subroutine check_energy
 
-  !> Move body 2 along a direction until the deepest touch has about the depth wanted.
-  subroutine bring_together(world, direction, depth, touching)
+  !> Move body 2 along a direction until the deepest contact has about the depth wanted.
+  subroutine bring_together(world, direction, depth, detected)
     type(world_t), intent(inout) :: world
     real(wp), intent(in) :: direction(3), depth
-    integer, intent(out) :: touching
+    integer, intent(out) :: detected
     real(wp) :: far, near, middle
     integer :: m
 
@@ -306,18 +307,18 @@ contains
       middle = 0.5_wp*(near + far)
       world%blocks%x(:, 2) = 0.5_wp + middle*direction
       call find(world)
-      if (world%touches%n == 0) then
+      if (world%points%n == 0) then
         far = middle
-      else if (maxval(world%touches%item(:world%touches%n)%depth) < depth) then
+      else if (maxval(world%points%item(:world%points%n)%depth) < depth) then
         far = middle
       else
         near = middle
       end if
     end do
-    touching = world%touches%n
+    detected = world%points%n
   end subroutine bring_together
 
-  !> Force and torque on body 2 from its touches with body 1, for springs of stiffness one.
+  !> Force and torque on body 2 from its contact points with body 1, for springs of stiffness one.
   subroutine forces(world, force, torque)
     type(world_t), intent(in) :: world
     real(wp), intent(out) :: force(3), torque(3)
@@ -326,24 +327,24 @@ contains
 
     force = 0.0_wp
     torque = 0.0_wp
-    do t = 1, world%touches%n
-      associate (touch => world%touches%item(t), w => world%touches%item(t)%weight, &
-        depth => world%touches%item(t)%depth)
-        f = -w*depth*touch%normal - 0.5_wp*w*depth**2*touch%weight_shift
+    do t = 1, world%points%n
+      associate (point => world%points%item(t), w => world%points%item(t)%weight, &
+        depth => world%points%item(t)%depth)
+        f = -w*depth*point%normal - 0.5_wp*w*depth**2*point%weight_shift
         force = force + f
-        torque = torque + cross(touch%arm_a, f) - 0.5_wp*w*depth**2*touch%weight_turn
+        torque = torque + cross(point%arm_a, f) - 0.5_wp*w*depth**2*point%weight_turn
       end associate
     end do
   end subroutine forces
 
-  !> Energy of the springs of all touches.
+  !> Energy of the springs of all contact points.
   function energy(world)
     type(world_t), intent(inout) :: world
     real(wp) :: energy
 
     call find(world)
-    energy = sum(0.5_wp*world%touches%item(:world%touches%n)%weight &
-                 *world%touches%item(:world%touches%n)%depth**2)
+    energy = sum(0.5_wp*world%points%item(:world%points%n)%weight &
+                 *world%points%item(:world%points%n)%depth**2)
   end function energy
 
   !> Shift and turn body 2.
@@ -377,8 +378,8 @@ contains
         fresh%blocks%x = world%blocks%x
         fresh%blocks%q = world%blocks%q
         call find(fresh)
-        if (world%touches%n > 0) touched = touched + 1
-        if (.not. same_touches(world, fresh)) differ = differ + 1
+        if (world%points%n > 0) touched = touched + 1
+        if (.not. same_points(world, fresh)) differ = differ + 1
       end do
     end do
     call check('lists of any age give the same', differ, 0)
@@ -386,16 +387,16 @@ contains
   end subroutine check_lists
 
   !> Whether what touches is the same in two worlds, bit by bit.
-  function same_touches(one, two) result(same)
+  function same_points(one, two) result(same)
     type(world_t), intent(in) :: one, two
     logical :: same
     integer :: n
 
-    n = one%touches%n
-    same = n == two%touches%n
+    n = one%points%n
+    same = n == two%points%n
     if (.not. same .or. n == 0) return
-    same = all(one%touches%item(:n)%key == two%touches%item(:n)%key) &
-      .and. .not. any(abs(one%touches%item(:n)%depth - two%touches%item(:n)%depth) > 0.0_wp)
-  end function same_touches
+    same = all(one%points%item(:n)%id == two%points%item(:n)%id) &
+      .and. .not. any(abs(one%points%item(:n)%depth - two%points%item(:n)%depth) > 0.0_wp)
+  end function same_points
 
 end program test_contact_surface

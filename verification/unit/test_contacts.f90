@@ -58,7 +58,7 @@ contains
     call check_energy()
     if (solvers(model) == 'springs') call check_constants()
     call check_added_mass()
-    call check_moving_partners()
+    call check_moving_counterparts()
     call check_periodic_image()
     call check_bookkeeping()
     call check_runaway()
@@ -246,7 +246,7 @@ contains
     end do
   end subroutine check_colliding_balls
 
-  !> Many touches at once damp like one: a cube on its face, edge and corner.
+  !> Many contact points at once damp like one: a cube on its face, edge and corner.
   subroutine check_landing_cube()
     real(wp), parameter :: e(3) = [0.1_wp, 0.3_wp, 0.7_wp]
     type(world_t) :: world
@@ -368,8 +368,9 @@ contains
     end do
   end function lowest
 
-  !> A ball at rest on the floor, nudged, swings on its tangential spring: with k_t = 2/7 k_n and
-  !! the mass 2/7 M that a ball sets against a tangential push, half a period is the contact time.
+  !> A ball at rest on the floor, nudged, swings on its tangential displacement: with k_t = 2/7 k_n
+  !! and the mass 2/7 M that a ball sets against a tangential push, half a period is the contact
+  !! time.
   subroutine check_swinging_ball()
     real(wp), parameter :: nudge = 1.0e-4_wp   ! too small to slip [m/s]
     type(world_t) :: world
@@ -470,7 +471,8 @@ contains
       0.0_wp)
   end subroutine check_incline_on_body
 
-  !> Two cubes set one on the other come to rest; partners are counted; forces balance the weight.
+  !> Two cubes set one on the other come to rest; counterparts are counted; forces balance the
+  !! weight.
   subroutine check_stack()
     type(world_t) :: world
     real(wp) :: height, change(3, 2), weight, v(3, 2)
@@ -495,7 +497,7 @@ contains
     call check('at rest', maxval(abs(world%blocks%v)), 0.0_wp, &
       merge(1.0e-9_wp, 1.0e-8_wp, solvers(model) == 'springs'))
     call check('on the floor', all(world%blocks%on_floor == [1, 0]))
-    call check('partners', all(world%blocks%contacts == [2, 1]))
+    call check('counterparts', all(world%blocks%contacts == [2, 1]))
     call check('weight on each', maxval(abs(world%blocks%contact_force(3, :) - weight)), 0.0_wp, &
       1.0e-8_wp)
     call check('no torque', maxval(abs(world%blocks%contact_torque)), 0.0_wp, 1.0e-10_wp)
@@ -532,7 +534,7 @@ contains
     round_off = real(drifts, wp)*0.5_wp*spacing(0.5_wp)*sum(world%blocks%mass)*0.8_wp
     call check('they met', kinetic_energy(world%blocks) &
       < 0.9_wp*sum(world%blocks%mass)*0.5_wp*0.64_wp &
-      .and. world%contacts%springs%n >= 0)
+      .and. world%contacts%displacements%n >= 0)
     call check('momentum', maxval(abs(p - p0)), 0.0_wp, 1.0e-14_wp)
     call check('angular momentum', maxval(abs(l - l0)), 0.0_wp, round_off)
     call check('to round-off', round_off < 1.0e-12_wp)
@@ -631,7 +633,7 @@ contains
   end subroutine check_constants
 
   !> A sliding floor drags a cube along; a moved body pushes a ball to (1 + e) times its own speed.
-  subroutine check_moving_partners()
+  subroutine check_moving_counterparts()
     type(world_t) :: world
 
     call new_world(world, 1, 'cube')
@@ -656,7 +658,7 @@ contains
     call check('pushed', world%blocks%v(1, 2), 0.6_wp, 0.005_wp)
     call check('the pusher keeps its speed', world%blocks%v(1, 1), 0.4_wp, 0.0_wp)
     call check('and its way', world%blocks%x(1, 1), 0.5_wp + 10*dt*0.4_wp, 1.0e-14_wp)
-  end subroutine check_moving_partners
+  end subroutine check_moving_counterparts
 
   !> Two balls collide through a periodic side as they do in the middle.
   subroutine check_periodic_image()
@@ -681,7 +683,7 @@ contains
   end subroutine check_periodic_image
 
   !> A pile moves the same to the last bit however often the lists are made anew, and from the state
-  !! of a restart: poses, momenta, springs and who sleeps.
+  !! of a restart: poses, momenta, displacements and who sleeps.
   subroutine check_bookkeeping()
     type(world_t) :: one, two
     integer :: b, n
@@ -701,7 +703,7 @@ contains
     two%case = one%case
     two%gravity = one%gravity
     call start(two)
-    associate (spheres => two%contacts%touching%spheres)
+    associate (spheres => two%contacts%detected%spheres)
       spheres%skin = spheres%skin - 1.98_wp*spheres%free_way
       spheres%free_way = 0.01_wp*spheres%free_way
     end associate
@@ -711,7 +713,7 @@ contains
       call check('same bits with another skin', same(one%blocks, two%blocks))
       call check('touching', sum(one%blocks%contacts) > 5)
       call contacts_init(two%case%contact, two%blocks, two%contacts)   ! as after a restart
-      two%contacts%springs = one%contacts%springs
+      two%contacts%displacements = one%contacts%displacements
       two%contacts%sleep%quiet = one%contacts%sleep%quiet
       two%contacts%sleep%rest = one%contacts%sleep%rest
       if (n == 1) then
@@ -719,11 +721,11 @@ contains
         call release_body(0.4_wp, 6, two%blocks)
       end if
     end do
-    two%contacts%springs%xi = 0.0_wp
+    two%contacts%displacements%xi = 0.0_wp
     two%contacts%sleep%rest%force = 0.0_wp   ! where they sleep
     call run(one, 1)
     call run(two, 1)
-    call check('the springs matter', .not. same(one%blocks, two%blocks))
+    call check('the displacements matter', .not. same(one%blocks, two%blocks))
   end subroutine check_bookkeeping
 
   !> Whether two states are equal to the last bit.

@@ -6,15 +6,15 @@ program test_deep_overlaps
   use tet_mesh_m, only: shape_t
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
-  use touches_m, only: touch_t, touches_t, add_touch
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, store_overlap, store_touches, &
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, store_overlap, store_points, &
     warn_of_overlaps, overlap_fault, size_of_pair
   implicit none
 
   real(wp), parameter :: size(2) = [0.02_wp, 0.3_wp]
   integer, parameter :: floor = -5
   type(deep_overlaps_t) :: deep
-  type(touches_t) :: touches
+  type(contact_points_t) :: points
   integer :: warnings
 
   call make_cubes()
@@ -26,7 +26,7 @@ program test_deep_overlaps
   call store_overlap(2, floor, 0.024_wp, deep)
   call check('shares of both', deep%share(:3), [0.055_wp, 0.08_wp, 0.0_wp], 1.0e-12_wp)
   call check('the deepest stays', deep%depth(:3), [0.0011_wp, 0.024_wp, 0.0_wp], 0.0_wp)
-  call check('with whom', deep%partner(1) == 2 .and. deep%partner(2) == floor)
+  call check('with whom', deep%counterpart(1) == 2 .and. deep%counterpart(2) == floor)
   call check('no fault yet', len(overlap_fault(deep)) == 0)
   warnings = 3
   call warn_of_overlaps(0.5_wp, deep, warnings)
@@ -34,11 +34,11 @@ program test_deep_overlaps
   call check('both are told', deep%warned(1) .and. deep%warned(2) .and. .not. deep%warned(3))
   call warn_of_overlaps(0.6_wp, deep, warnings)
   call check('told once', warnings, 4)
-  call add_touch(touch_t(3, 2, 1, depth=0.0039_wp), touches)
-  call add_touch(touch_t(3, 2, 2, depth=0.0041_wp), touches)
-  call store_touches(touches, deep)
-  call check('touches, those before forgotten', deep%share(:3), [0.0_wp, 0.205_wp, 0.205_wp], &
-    1.0e-12_wp)
+  call add_point(contact_point_t(3, 2, 1, depth=0.0039_wp), points)
+  call add_point(contact_point_t(3, 2, 2, depth=0.0041_wp), points)
+  call store_points(points, deep)
+  call check('contact points, those before forgotten', deep%share(:3), [0.0_wp, 0.205_wp, &
+    0.205_wp], 1.0e-12_wp)
   call check('a fault from a fifth on', index(overlap_fault(deep), &
     'body 2 and body 3 reach 0.0041 m into one another, 20.5 % of the size of the smaller') == 1)
   call finish_checks()

@@ -1,4 +1,4 @@
-!> What a fall is foreseen to be: drag, shadow, terminal speed, the way to it, heights and speeds.
+!> What is predicted of a fall: drag, shadow, terminal speed, the way to it, heights and speeds.
 program test_fall
   use check_m, only: check, finish_checks
   use kinds_m, only: wp, pi

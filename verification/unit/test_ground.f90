@@ -6,7 +6,7 @@ program test_ground
   use case_types_m, only: case_t
   use case_input_m, only: read_case
   use errors_m, only: problems_t
-  use tet_mesh_m, only: shape_t, reach_along
+  use tet_mesh_m, only: shape_t, extent_along
   use vectors_m, only: quaternion_from_axis, rotation_matrix
   use random_counter_m, only: uniform, random_rotation
   use case_check_m, only: make_shapes
@@ -128,7 +128,7 @@ contains
       do k = 1, 10
         blocks%q(:, 1) = random_rotation(s, k)
         turn = rotation_matrix(blocks%q(:, 1))
-        expected = 0.25_wp + reach_along(shapes(s), -matmul(n, turn))/n(3) &
+        expected = 0.25_wp + extent_along(shapes(s), -matmul(n, turn))/n(3) &
           + ground_gap*shapes(s)%smallest_edge
         call check('a '//trim(name)//' on a slope', height(), expected, 1.0e-6_wp*expected)
       end do

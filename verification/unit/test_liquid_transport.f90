@@ -102,8 +102,8 @@ contains
   end function room_error
 
   !> A ball of liquid goes once around a periodic domain, cells not cubes.
-  subroutine ball_in_uniform_stream(steps, parts)
-    integer, intent(in) :: steps, parts   !! of the turn, of each step
+  subroutine ball_in_uniform_stream(steps, subcycles)
+    integer, intent(in) :: steps, subcycles   !! of the turn, of each step
     type(grid_t) :: grid
     type(solid_geometry_t) :: old, new
     type(flow_t) :: flow
@@ -128,7 +128,7 @@ contains
     flow%uf(:, :, :, 2) = -0.24_wp
     flow%uf(:, :, :, 3) = 0.24_wp
     worst = 0.0_wp
-    transport%parts = parts
+    transport%subcycles = subcycles
     do step = 1, steps
       call transport_liquid(grid, old, new, 1.0_wp/real(steps, wp), step, transport, flow)
       worst = max(worst, out_of_bounds(grid, flow))
@@ -220,8 +220,8 @@ contains
 
   !> A box on a loop deep under water, fluid moved by the correction alone: all liquid, all the
   !! time.
-  subroutine box_under_water(parts)
-    integer, intent(in) :: parts   !! of each step
+  subroutine box_under_water(subcycles)
+    integer, intent(in) :: subcycles   !! of each step
     type(grid_t) :: grid
     type(solid_geometry_t) :: old, new
     type(flow_t) :: flow
@@ -238,7 +238,7 @@ contains
     worst = 0.0_wp
     impure = 0.0_wp
     small = 0
-    transport%parts = parts
+    transport%subcycles = subcycles
     do step = 1, 60
       call set_boxes(grid, low, high, old)
       angle = 2.0_wp*pi*real(step, wp)/60.0_wp

@@ -7,7 +7,7 @@ program test_lubrication
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use bed_m, only: bed_partner
+  use bed_m, only: bed_counterpart
   use lubrication_m, only: lubrication_t, lubrication_init, lubricate, film_resistance, &
     film_impulse, film_pull
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
@@ -157,8 +157,9 @@ contains
     type(blocks_t) :: blocks
     type(walls_t) :: walls
     type(contacts_t) :: contacts
-    real(wp) :: x(3, n), v(3, n), force(3, bed_partner:n), pair(3, bed_partner:2), expected(3, n)
-    integer :: i, j, felt
+    real(wp) :: x(3, n), v(3, n), force(3, bed_counterpart:n), pair(3, bed_counterpart:2), &
+      expected(3, n)
+    integer :: i, j, active
 
     call random_number(x)
     call random_number(v)
@@ -166,7 +167,7 @@ contains
     x(1, :) = modulo(x(1, :) - 0.5_wp, 1.0_wp)
     v = v - 0.5_wp
     expected = 0.0_wp
-    felt = 0
+    active = 0
     do i = 1, n
       do j = i + 1, n
         call start('no_slip', x(:, [i, j]), v(:, [i, j]), blocks, walls, contacts)
@@ -176,7 +177,7 @@ contains
         call lubricate(walls, blocks, dt, contacts%lubrication, pair)
         expected(:, i) = expected(:, i) + pair(:, 1)
         expected(:, j) = expected(:, j) + pair(:, 2)
-        if (norm2(pair(:, 1)) > 0.0_wp) felt = felt + 1
+        if (norm2(pair(:, 1)) > 0.0_wp) active = active + 1
       end do
     end do
     call start('no_slip', x, v, blocks, walls, contacts)
@@ -184,7 +185,7 @@ contains
     walls%n = 0
     force = 0.0_wp
     call lubricate(walls, blocks, dt, contacts%lubrication, force)
-    call check('some pairs have a film, most have none', felt > n/2 .and. felt < n*(n - 1)/4)
+    call check('some pairs have a film, most have none', active > n/2 .and. active < n*(n - 1)/4)
     do i = 1, n
       call check('force on a sphere of the swarm', force(:, i), expected(:, i), &
                  1.0e-12_wp*maxval(abs(expected)))

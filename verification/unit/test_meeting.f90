@@ -54,9 +54,9 @@ contains
     end do
   end subroutine check_box
 
-  !> No two points within reach move further against one another, and some move nearly as far.
+  !> No two points within the radius move further against one another, and some move nearly as far.
   subroutine check_way()
-    real(wp), parameter :: reach_a = 2.0_wp, reach_b = 1.0_wp, x(3) = [1.0_wp, 0.0_wp, 0.0_wp], &
+    real(wp), parameter :: radius_a = 2.0_wp, radius_b = 1.0_wp, x(3) = [1.0_wp, 0.0_wp, 0.0_wp], &
       y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
     type(poses_t) :: before, now
     real(wp) :: way, longest, turn
@@ -69,31 +69,31 @@ contains
       now%x_a = before%x_a + 0.1_wp*vector(i, 8)
       now%q_a = quaternion_product(quaternion_from_axis(y, turn), before%q_a)
       now%q_b = quaternion_product(quaternion_from_axis(x, 2*turn), before%q_b)
-      way = way_between(before, now, reach_a, reach_b)
+      way = way_between(before, now, radius_a, radius_b)
       longest = 0.0_wp
       do k = 1, 100
-        longest = max(longest, norm2(place(now%x_a, now%q_a, reach_a, 2*k) &
-          - place(before%x_a, before%q_a, reach_a, 2*k) &
-          - place(now%x_b, now%q_b, reach_b, 2*k + 1) &
-          + place(before%x_b, before%q_b, reach_b, 2*k + 1)))
+        longest = max(longest, norm2(place(now%x_a, now%q_a, radius_a, 2*k) &
+          - place(before%x_a, before%q_a, radius_a, 2*k) &
+          - place(now%x_b, now%q_b, radius_b, 2*k + 1) &
+          + place(before%x_b, before%q_b, radius_b, 2*k + 1)))
       end do
       call check('none goes further', longest <= way)
       call check('some nearly as far', longest > 0.6_wp*way)
     end do
     now = before
     now%q_a = quaternion_product(quaternion_from_axis(y, 0.1_wp), before%q_a)
-    way = way_between(before, now, reach_a, reach_b)
-    call check('a turn alone', way, 4*reach_a*sin(0.1_wp/4), 1.0e-14_wp)
+    way = way_between(before, now, radius_a, radius_b)
+    call check('a turn alone', way, 4*radius_a*sin(0.1_wp/4), 1.0e-14_wp)
   end subroutine check_way
 
   !> Point number k at a distance from the centre of a body.
-  pure function place(x, q, reach, k) result(p)
-    real(wp), intent(in) :: x(3), q(4), reach
+  pure function place(x, q, radius, k) result(p)
+    real(wp), intent(in) :: x(3), q(4), radius
     integer, intent(in) :: k
     real(wp) :: p(3)
 
     p = vector(k, 9)
-    p = x + matmul(rotation_matrix(q), reach*p/norm2(p))
+    p = x + matmul(rotation_matrix(q), radius*p/norm2(p))
   end function place
 
   pure function vector(i, k) result(v)

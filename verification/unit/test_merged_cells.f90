@@ -34,7 +34,7 @@ program test_merged_cells
   do m = 1, 2   ! the second time from what the first has left
     call find_merged_cells(box%grid, box%solid, merged)
   end do
-  call the_links()
+  call the_targets()
   allocate (mass(merged%n), noted(3, merged%n), to_wall(3, merged%n))
   call random_numbers(seed, mass)
   mass = 2.0_wp + mass
@@ -47,7 +47,7 @@ program test_merged_cells
 contains
 
   !> Who belongs to whom.
-  subroutine the_links()
+  subroutine the_targets()
     call check('all know their body', all(merged%body(:merged%n) == 1))
     call check('each cell once', count(merged%number > 0) == merged%n)
     call check('small have their centre in the box', all([(centre_in_box(m), m=1, merged%n_small)]))
@@ -67,7 +67,7 @@ contains
                spread(1.0_wp, 1, merged%n_small), 1.0e-13_wp)
     call check('every part is in one group', merged%first(merged%n_groups + 1) - 1, &
                count(merged%target(:, :merged%n_small) > 0))
-  end subroutine the_links
+  end subroutine the_targets
 
   !> Momentum, profile, and a fluid that moves with the box.
   subroutine the_shares()
@@ -186,7 +186,7 @@ contains
     call check('others do not', maxval(abs(u(5, 5, top, :) - before(5, 5, top, :))), 0.0_wp, &
                1.0e-14_wp)
     n = merged%target(3, small)
-    call check('targets, small and wall have what the group of the links has', &
+    call check('targets, small and wall have what the merged viscous mass has', &
                mass(small)*t*change + to_wall(:, small), mass(small)*t**2*change, 1.0e-13_wp)
     call check('a target of one small', count(merged%target(:, :merged%n_small) == n), 1)
   end subroutine the_rest

@@ -10,7 +10,7 @@ program test_momentum
   use elliptic_solver_m, only: elliptic_solver_t
   use liquid_alone_m, only: balance_solver
   use liquid_transport_m, only: liquid_transport_t, liquid_transport_init, begin_transport, &
-    begin_part, finish_transport
+    begin_subcycle, finish_transport
   use liquid_fill_m, only: fill_liquid
   use mixture_m, only: mass_through
   use momentum_conservative_m, only: momentum_t, momentum_init, momentum_begin, momentum_sweep, &
@@ -61,19 +61,19 @@ contains
   end subroutine start
 
   !> One step of liquid and momentum.
-  subroutine carry(dt, step, parts)
+  subroutine carry(dt, step, subcycles)
     real(wp), intent(in) :: dt
     integer, intent(in) :: step
-    integer, intent(in), optional :: parts   !! of the step, else 1
+    integer, intent(in), optional :: subcycles   !! of the step, else 1
     type(elliptic_solver_t) :: solver
-    integer :: n, part
+    integer :: n, subcycle
 
-    transport%parts = 1
-    if (present(parts)) transport%parts = parts
+    transport%subcycles = 1
+    if (present(subcycles)) transport%subcycles = subcycles
     solver = balance_solver(grid)
     call begin_transport(grid, old, new, dt, solver, transport, flow)
-    do part = 1, transport%parts
-      call begin_part(grid, old, part, step, transport)
+    do subcycle = 1, transport%subcycles
+      call begin_subcycle(grid, old, subcycle, step, transport)
       call momentum_begin(grid, fluid, transport%volumes%w, transport%volumes%v, &
                           transport%volumes%c, flow%u, momentum)
       do n = 1, 3
@@ -126,8 +126,8 @@ contains
   end function deviation
 
   !> A uniform velocity carried by another, sheared flow through boxes of liquid stays.
-  subroutine uniform_through_an_interface(parts)
-    integer, intent(in) :: parts   !! of each step
+  subroutine uniform_through_an_interface(subcycles)
+    integer, intent(in) :: subcycles   !! of each step
     real(wp) :: nothing(3, 0)
     integer :: step, d
 
@@ -139,12 +139,12 @@ contains
       flow%u(:, :, :, d) = stream(d)
     end do
     do step = 1, 8
-      call carry(2.5e-3_wp*real(parts, wp), step, parts)
+      call carry(2.5e-3_wp*real(subcycles, wp), step, subcycles)
     end do
     call check('uniform velocity through an interface', deviation(0.0_wp), 0.0_wp, 1.0e-14_wp)
     call check('the interface is there', count(abs(flow%c(1:16, 1:8, 1:12) - 0.5_wp) < 0.49_wp) &
                > 50)
-    call check('parts keep cells from being small', transport%small%n_implicit, 0)
+    call check('subcycles keep cells from being small', transport%small%n_implicit, 0)
   end subroutine uniform_through_an_interface
 
   !> Total momentum of a domain without sides, velocity and liquid of any form.

@@ -6,7 +6,7 @@ program test_near_features
   use surface_search_m, only: surface_t, nearest_on_surface
   use edge_crossing_m, only: edge_t, crossing_t, cross_edges
   use meeting_m, only: poses_t, view_t, meeting_t, seen_from, way_between
-  use near_features_m, only: near_features_t, probes_near_t, search_t, list_features, edge_in_view
+  use near_features_m, only: near_features_t, near_vertices_t, search_t, list_features, edge_in_view
   use two_cubes_m, only: make_solid, random_poses, moved, meeting_at, distance_from_cube
   implicit none
 
@@ -50,7 +50,7 @@ contains
   end subroutine check_how_long
 
   !> A cube on edge over the corner of another: its lower corners are as far as Pythagoras says. A
-  !! ball is as far as its surface, and is not probed by corners.
+  !! ball is as far as its surface, and is not tested by corners.
   subroutine check_corner_and_ball()
     real(wp), parameter :: apart(3) = [0.02_wp, 0.03_wp, 0.06_wp]   !! of the nearest corners [m]
     type(near_features_t) :: near
@@ -60,7 +60,7 @@ contains
     call check('one corner of each', all([near%of_a%n, near%of_b%n] == 1))
     call check('seven hundredths away', [near%of_a%away(1), near%of_b%away(1)], &
       [0.07_wp, 0.07_wp], 1.0e-14_wp)
-    call check('the corner of b', cube%probe(:, near%of_b%probe(1)), &
+    call check('the corner of b', cube%vertex(:, near%of_b%vertex(1)), &
       -[0.5_wp, 0.5_wp, 0.5_wp], 0.0_wp)
     call list_features(meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.4_wp, 0.3_wp, 1.05_wp], &
       no_turn, no_turn)), ball, cube, search, near)
@@ -87,7 +87,7 @@ contains
     end associate
   end subroutine check_edge_in_view
 
-  !> After a way shorter than that for which the lists hold, they still have every probe that
+  !> After a way shorter than that for which the lists hold, they still have every vertex that
   !! touches, with what it touches, and every pair of edges that cross; and none came sooner than
   !! told.
   subroutine check_nothing_missing()
@@ -101,33 +101,33 @@ contains
       now = meeting_at(random_poses(i, 0.9_wp, 1.4_wp))
       call list_features(now, cube, cube, search, near)
       now = meeting_at(moved(i, near%valid, now%poses))
-      way = way_between(near%when, now%poses, cube%reach, cube%reach)
+      way = way_between(near%when, now%poses, cube%bounding_radius, cube%bounding_radius)
       call check('moved far enough', way <= near%valid .and. way > 0.8_wp*near%valid)
-      call check_probes(now%b_in_a, way, near%of_b, n)
-      call check_probes(now%a_in_b, way, near%of_a, n)
+      call check_vertices(now%b_in_a, way, near%of_b, n)
+      call check_vertices(now%a_in_b, way, near%of_a, n)
       call check_crossings(now%a_in_b, way, near, n)
     end do
     call check('many touch', n > 3000)
   end subroutine check_nothing_missing
 
-  !> Every probe of a guest within reach of the host is listed.
-  subroutine check_probes(guest_in_host, way, list, n)
+  !> Every vertex of a guest within the cutoff of the host is listed.
+  subroutine check_vertices(guest_in_host, way, list, n)
     type(view_t), intent(in) :: guest_in_host
     real(wp), intent(in) :: way                !! since the lists were made [m]
-    type(probes_near_t), intent(in) :: list
-    integer, intent(inout) :: n                !! probes that touch
+    type(near_vertices_t), intent(in) :: list
+    integer, intent(inout) :: n                !! vertices that touch
     real(wp) :: place(3), wanted, distance, outward(3)
     integer :: p, m
 
     do p = 1, size(cube%weight)
-      place = seen_from(guest_in_host, cube%probe(:, p))
+      place = seen_from(guest_in_host, cube%vertex(:, p))
       wanted = distance_from_cube(place)
       if (wanted > ahead) cycle
       n = n + 1
       do m = list%n, 1, -1
-        if (list%probe(m) == p) exit
+        if (list%vertex(m) == p) exit
       end do
-      call check('the probe is listed', m > 0)
+      call check('the vertex is listed', m > 0)
       if (m == 0) cycle
       call nearest_on_surface(cube, place, &
         list%facet(list%facet_first(m):list%facet_first(m + 1) - 1), &
@@ -135,7 +135,7 @@ contains
       call check('with what is nearest to it', distance, wanted, 1.0e-14_wp)
       call check('no sooner than told', list%away(m) <= way + wanted + 1.0e-14_wp)
     end do
-  end subroutine check_probes
+  end subroutine check_vertices
 
   !> Every pair of edges that cross, or will within the way ahead, is listed.
   subroutine check_crossings(a_in_b, way, near, n)

@@ -1,4 +1,4 @@
-!> Volumes through the faces that fit a moving body, in every cell of the band around it.
+!> Volumes through the faces that fit a moving body, in every cell of the narrow band around it.
 program test_open_flux
   use kinds_m, only: wp
   use boundary_kinds_m, only: side_slip

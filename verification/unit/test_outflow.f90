@@ -4,8 +4,8 @@ program test_outflow
   use case_types_m, only: grid_input_t, boundary_input_t, fluid_t
   use grid_m, only: grid_t, grid_init
   use fields_m, only: flow_t, flow_init
-  use outflow_m, only: outflow_init, start_outflow, update_outflow, reach, pressure_outside, &
-    mean_velocity
+  use outflow_m, only: outflow_init, start_outflow, update_outflow, outside_distance, &
+    pressure_outside, mean_velocity
   use parallel_m, only: parallel_init, parallel_final
   use check_m, only: check, finish_checks
   implicit none
@@ -92,13 +92,14 @@ contains
     call check('higher column', pressure_outside(flow%sides(2, 1), [5, 3, 1]), &
                at_rest + g*0.05_wp*(rho_l - rho_g) - g*0.05_wp*rho_l, 1.0e-9_wp)
     c = sqrt(g*0.25_wp)
-    call check('reach in liquid', reach(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
+    call check('distance in liquid', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
                0.5_wp + c*dt, 1.0e-14_wp)
-    call check('reach in a mixed cell', reach(flow%sides(2, 1), [4, 1, 3], 0.5_wp, 501.0_wp), &
-               0.5_wp + 0.5_wp*rho_l*c*dt/501.0_wp, 1.0e-14_wp)
-    call check('reach in gas', reach(flow%sides(2, 1), [4, 3, 5], 0.5_wp, rho_g), 0.5_wp, 0.0_wp)
-    call check('reach elsewhere', reach(flow%sides(1, 1), [1, 3, 1], 0.5_wp, rho_l), 0.5_wp, &
-               0.0_wp)
+    call check('distance in a mixed cell', outside_distance(flow%sides(2, 1), [4, 1, 3], 0.5_wp, &
+               501.0_wp), 0.5_wp + 0.5_wp*rho_l*c*dt/501.0_wp, 1.0e-14_wp)
+    call check('distance in gas', outside_distance(flow%sides(2, 1), [4, 3, 5], 0.5_wp, rho_g), &
+      0.5_wp, 0.0_wp)
+    call check('distance elsewhere', outside_distance(flow%sides(1, 1), [1, 3, 1], 0.5_wp, rho_l), &
+               0.5_wp, 0.0_wp)
   end subroutine level_and_wave
 
   !> The mean velocity starts from that of the faces and follows it in 4 L/c, as far as there is
@@ -138,7 +139,8 @@ contains
     call update()
     call check('full: bottom', pressure_outside(flow%sides(2, 1), [5, 1, 1]), 0.45_wp*g*rho_l, &
                1.0e-9_wp)
-    call check('full: reach', reach(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), 0.5_wp, 0.0_wp)
+    call check('full: distance', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
+      0.5_wp, 0.0_wp)
   end subroutine no_level
 
 end program test_outflow

@@ -226,9 +226,9 @@ contains
   end subroutine free_box
 
   !> A free box half a millimetre deep in the floor of a closed box: its 4 x 2 covered cells below
-  !! take no part, and all open cells share what they swallow of its way down.
+  !! take no part, and all open cells share the volume that they displace on its way down.
   subroutine pressed_box()
-    real(wp) :: motion(6), force(6, 1), swallowed
+    real(wp) :: motion(6), force(6, 1), displaced
     integer, parameter :: open_cells = 12*8*12 - 4*2*3
 
     call build(closed, .true.)
@@ -243,16 +243,16 @@ contains
     call check('pressed box: converged', pressure%report%converged .and. &
                any(pressure%report%passes == [1, 2]))
     associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
-      swallowed = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
+      displaced = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
                   /(open_cells*box%grid%volume)
     end associate
     call divergence(box%grid, box%solid%effective, box%flow, pressure%system%active, &
                     pressure%system%solver%rhs, force(1, 1))
     associate (net => pressure%system%solver%rhs(1:12, 1:8, 1:12)/box%grid%volume)
-      call check('pressed box: evenly shared', maxval(abs(net - swallowed), &
+      call check('pressed box: evenly shared', maxval(abs(net - displaced), &
                  pressure%system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
     end associate
-    call check('pressed box: it moves on', abs(swallowed) > 1.0e-3_wp)
+    call check('pressed box: it moves on', abs(displaced) > 1.0e-3_wp)
     call force_from_faces(box%grid, box%bodies, pressure%system%operator%flux, &
                           pressure%phi_total, force)
     call check('pressed box: momentum is force times step', box%bodies%mass(1) &

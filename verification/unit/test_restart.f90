@@ -93,7 +93,7 @@ contains
     inquire (file=path//'.part', exist=there)
     call check('no unfinished file is left', .not. there)
     call make_sample(7.0_wp, periodic, other)
-    other%contacts%springs%n = 0
+    other%contacts%displacements%n = 0
     call read_sample(other, info, message)
     call check('a restart file is read', info, 0)
     if (info /= 0) print '(a)', message
@@ -112,7 +112,7 @@ contains
       - s%flow%p(4, 4, max(1, s%grid%first(3)):min(s%grid%n(3), s%grid%last(3)))) <= 0.0_wp))
   end subroutine test_comes_back
 
-  !> Without fluid and without springs.
+  !> Without fluid and without displacements.
   subroutine test_dry()
     type(sample_t) :: s, other
     integer :: info
@@ -120,14 +120,14 @@ contains
 
     call make_sample(0.5_wp, .false., s)
     deallocate (s%flow%u)
-    s%contacts%springs%n = 0
+    s%contacts%displacements%n = 0
     call write_sample(s, info, message)
     call check('a dry restart file is written', info, 0)
     call make_sample(7.0_wp, .false., other)
     deallocate (other%flow%u)
     call read_sample(other, info, message)
     call check('a dry restart file is read', info, 0)
-    call check('no springs come back', other%contacts%springs%n, 0)
+    call check('no displacements come back', other%contacts%displacements%n, 0)
     call check('blocks come back', other%blocks%v(3, 2), s%blocks%v(3, 2), 0.0_wp)
   end subroutine test_dry
 

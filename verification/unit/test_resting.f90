@@ -1,4 +1,5 @@
-!> Who falls asleep and who wakes at the start of a step, and where the springs of its touches go.
+!> Who falls asleep and who wakes at the start of a step, and where the displacements of its contact
+!! points go.
 program test_resting
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
@@ -8,8 +9,8 @@ program test_resting
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use sleep_m, only: update_stillness
-  use contact_partners_m, only: update_partners
-  use touching_m, only: find_touches
+  use counterparts_m, only: update_counterparts
+  use contact_detection_m, only: detect_contacts
   use contact_state_m, only: contacts_t, contacts_init
   use resting_m, only: wake_or_sleep
   implicit none
@@ -29,8 +30,8 @@ program test_resting
 
   call make_ball()
   call check_balance()
-  call check_touch()
-  call check_springs()
+  call check_contact()
+  call check_displacements()
   call check_held()
   call finish_checks()
 
@@ -78,9 +79,10 @@ contains
     call blocks_init(case, shapes, world%blocks)
     call walls_init(case%grid, case%boundary, world%walls)
     call contacts_init(case%contact, world%blocks, world%contacts)
-    call update_partners(world%walls, gravity, world%blocks, world%contacts%touching%partners)
+    call update_counterparts(world%walls, gravity, world%blocks, &
+      world%contacts%detected%counterparts)
     call update_stillness(world%blocks, changed)
-    call find_touches(world%walls, world%blocks, 0.0_wp, world%contacts%touching)
+    call detect_contacts(world%walls, world%blocks, 0.0_wp, world%contacts%detected)
     world%contacts%sleep%quiet = 1000.0_wp
   end subroutine begin
 
@@ -122,7 +124,7 @@ contains
   end subroutine check_balance
 
   !> What is no candidate, or touches nothing, or what is moved, stays awake.
-  subroutine check_touch()
+  subroutine check_contact()
     type(world_t) :: world
     integer :: support
 
@@ -139,11 +141,12 @@ contains
       call start_step(world)
       call check('on what is moved', .not. world%blocks%asleep(1 + support))
     end do
-  end subroutine check_touch
+  end subroutine check_contact
 
-  !> The spring of a sleeper rests with the force and the energy of its touch, is told as a partner
-  !! met, and is at work again when the sleeper wakes. What it had of momentum went into the touch.
-  subroutine check_springs()
+  !> The displacement of a sleeper rests with the force and the energy of its contact, is told as a
+  !! counterpart met, and is at work again when the sleeper wakes. What it had of momentum went into
+  !! the contact point.
+  subroutine check_displacements()
     type(world_t) :: world
     real(wp), parameter :: slow = 1.0e-6_wp   !! [m/s]
     real(wp) :: energy
@@ -153,25 +156,25 @@ contains
     energy = 0.5_wp*load**2/k_n
     call start_step(world)
     associate (contacts => world%contacts, blocks => world%blocks)
-      call check('at rest', all([contacts%springs%n, contacts%sleep%rest%n] == [0, 1]))
+      call check('at rest', all([contacts%displacements%n, contacts%sleep%rest%n] == [0, 1]))
       call check('its force', contacts%sleep%rest%force(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
       call check('its energy', contacts%sleep%rest%energy(1), energy, 1.0e-9_wp*energy)
       call check('bears the block', contacts%sleep%load(:, 1), [0.0_wp, 0.0_wp, load], &
         1.0e-9_wp*load)
-      call check('no more touches', contacts%touching%touches%n, 0)
-      call check('but a partner', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
+      call check('no more contact points', contacts%detected%points%n, 0)
+      call check('but a counterpart', all([contacts%met%n, contacts%met%a(1), contacts%met%b(1)] &
         == [1, 1, -5]))
       call check('stands', norm2(blocks%v(:, 1)), 0.0_wp, 0.0_wp)
       call check('its momentum', contacts%loads%impulse(1, 1), -blocks%mass(1)*slow, &
         1.0e-12_wp*blocks%mass(1)*slow)
       contacts%steady(1, 1) = 0.1_wp*load
       call start_step(world)
-      call check('at work again', all([contacts%springs%n, contacts%sleep%rest%n] == [1, 0]))
+      call check('at work again', all([contacts%displacements%n, contacts%sleep%rest%n] == [1, 0]))
       call check('bears nobody now', norm2(contacts%sleep%load(:, 1)), 0.0_wp, 0.0_wp)
-      call check('touches again', contacts%touching%touches%n, 1)
+      call check('touches again', contacts%detected%points%n, 1)
     end associate
-  end subroutine check_springs
+  end subroutine check_displacements
 
   !> A ball on one that is held sleeps, and the one held bears it.
   subroutine check_held()

@@ -266,7 +266,7 @@ contains
       call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
       call check('sphere: true volume', s%volume, 4*pi/3*a**3, 1e-13_wp*a**3)
       call check('sphere: 20 (2 r)^2 triangles', size(s%triangle, 2), 20*(2*r)**2)
-      call check('sphere: touches with its true radius', s%sphere_radius(1), a, 0.0_wp)
+      call check('sphere: contact points with its true radius', s%sphere_radius(1), a, 0.0_wp)
       outside(r) = maxval(norm2(s%point, 1))/a - 1
     end do
     call check('sphere: corners stand out by 4.6 and 1.2 per cent', outside, &

@@ -24,8 +24,8 @@ program test_short_list
 
 contains
 
-  !> A short list holds until the way since then and the gap that counts as a touch are as told; no
-  !! longer than the lists it was chosen from, and as long as these where they are empty.
+  !> A short list holds until the way since then and the gap that counts as a contact point are as
+  !! told; no longer than the lists it was chosen from, and as long as these where they are empty.
   subroutine check_how_long()
     real(wp), parameter :: none(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     type(near_features_t) :: near
@@ -34,7 +34,8 @@ contains
     real(wp) :: left
 
     now = meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 1.001_wp], none, none))
-    call check('none yet', .not. short_list_holds(now, cube%reach, cube%reach, short))
+    call check('none yet', .not. short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
+      short))
     now%gap = gap
     call list_features(now, cube, cube, search, near)
     call choose_features(now, 0.0_wp, search, cube, cube, near, short)
@@ -42,26 +43,30 @@ contains
     call check('features', n_chosen(short), 16 + short%n_edges)
     left = short%until - gap
     now%poses%x_b(1) = 0.999_wp*left
-    call check('holds', short_list_holds(now, cube%reach, cube%reach, short))
+    call check('holds', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
     now%poses%x_b(1) = 1.001_wp*left
-    call check('moved too far', .not. short_list_holds(now, cube%reach, cube%reach, short))
+    call check('moved too far', .not. short_list_holds(now, cube%bounding_radius, &
+      cube%bounding_radius, short))
     now%gap = 0.9_wp*gap
-    call check('less counts as a touch', short_list_holds(now, cube%reach, cube%reach, short))
+    call check('less counts as a contact point', short_list_holds(now, cube%bounding_radius, &
+      cube%bounding_radius, short))
     now%poses = short%when
     call choose_features(now, near%valid - 0.5_wp*gap, search, cube, cube, near, short)
     now%poses%x_b(1) = 0.49_wp*gap
-    call check('the lists hold', short_list_holds(now, cube%reach, cube%reach, short))
+    call check('the lists hold', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
+      short))
     now%poses%x_b(1) = 0.51_wp*gap
     call check('no longer than the lists', &
-      .not. short_list_holds(now, cube%reach, cube%reach, short))
+      .not. short_list_holds(now, cube%bounding_radius, cube%bounding_radius, short))
     now = meeting_at(poses_t([0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.0_wp, 3.0_wp], none, none))
     call list_features(now, cube, cube, search, near)
     call choose_features(now, 0.0_wp, search, cube, cube, near, short)
     now%poses%x_b(3) = 3.0_wp - 0.999_wp*near%valid
-    call check('as long as empty lists', short_list_holds(now, cube%reach, cube%reach, short))
+    call check('as long as empty lists', short_list_holds(now, cube%bounding_radius, &
+      cube%bounding_radius, short))
   end subroutine check_how_long
 
-  !> As long as it holds, a short list made some time after the lists has every probe that touches
+  !> As long as it holds, a short list made some time after the lists has every vertex that touches
   !! or soon will, with what it touches, and every pair of edges that cross.
   subroutine check_nothing_missing()
     type(near_features_t) :: near
@@ -76,28 +81,29 @@ contains
       call list_features(now, cube, cube, search, near)
       now = meeting_at(moved(i, 0.5_wp*near%valid, now%poses))
       now%gap = gap
-      way = way_between(near%when, now%poses, cube%reach, cube%reach)
+      way = way_between(near%when, now%poses, cube%bounding_radius, cube%bounding_radius)
       call choose_features(now, way, search, cube, cube, near, short)
       now = meeting_at(moved(i, min(short%until - gap, short%left), now%poses))
       now%gap = gap
-      call check('holds still', short_list_holds(now, cube%reach, cube%reach, short))
-      call check_probes(now%b_in_a, short%item(:short%of_a - 1), n)
-      call check_probes(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
+      call check('holds still', short_list_holds(now, cube%bounding_radius, cube%bounding_radius, &
+        short))
+      call check_vertices(now%b_in_a, short%item(:short%of_a - 1), n)
+      call check_vertices(now%a_in_b, short%item(short%of_a:short%edges - 1), n)
       call check_crossings(now%a_in_b, short%item(short%edges:short%n), n)
     end do
     call check('many touch', n > 3000)
   end subroutine check_nothing_missing
 
-  !> Every probe of a guest within the gap of the host is in its part of the list.
-  subroutine check_probes(guest_in_host, item, n)
+  !> Every vertex of a guest within the gap of the host is in its part of the list.
+  subroutine check_vertices(guest_in_host, item, n)
     type(view_t), intent(in) :: guest_in_host
     integer, intent(in) :: item(:)
-    integer, intent(inout) :: n                !! probes that touch
+    integer, intent(inout) :: n                !! vertices that touch
     real(wp) :: place(3), wanted, distance, outward(3)
     integer :: p, m
 
     do p = 1, size(cube%weight)
-      place = seen_from(guest_in_host, cube%probe(:, p))
+      place = seen_from(guest_in_host, cube%vertex(:, p))
       wanted = distance_from_cube(place)
       if (wanted > gap) cycle
       n = n + 1
@@ -106,7 +112,7 @@ contains
         if (item(m) == p) exit
         m = m + 3 + item(m + 1) + item(m + 2)
       end do
-      call check('the probe is listed', m <= size(item))
+      call check('the vertex is listed', m <= size(item))
       if (m > size(item)) cycle
       associate (facets => item(m + 3:m + 2 + item(m + 1)), &
         edges => item(m + 3 + item(m + 1):m + 2 + item(m + 1) + item(m + 2)))
@@ -114,7 +120,7 @@ contains
       end associate
       call check('with what is nearest to it', distance, wanted, 1.0e-14_wp)
     end do
-  end subroutine check_probes
+  end subroutine check_vertices
 
   !> Every pair of edges that cross, or are within the gap of it, is in its part of the list.
   subroutine check_crossings(a_in_b, item, n)

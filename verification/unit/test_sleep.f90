@@ -10,7 +10,7 @@ program test_sleep
   use rigid_body_m, only: blocks_t, blocks_init, release_body, kinetic_energy, potential_energy, &
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
-  use springs_m, only: reserve_springs
+  use displacements_m, only: reserve_displacements
   use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, may_sleep, &
     update_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
@@ -70,21 +70,21 @@ contains
   end subroutine make_shapes
 
   !> Contact balances all else within a share of one per cent of it, torques within that at the
-  !! reach of the body; without any load only in full.
+  !! radius of the body; without any load only in full.
   subroutine check_balanced()
-    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, reach = 0.3_wp
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, radius = 0.3_wp
     real(wp), parameter :: load(3) = [0.0_wp, 6.0_wp, -8.0_wp]   !! of size 10
     real(wp), parameter :: off(2) = [0.0999_wp, 0.1001_wp]
 
-    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, reach), &
-      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, reach)]))
+    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, radius), &
+      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, radius)]))
     call check('half of it', all([ &
-      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, reach), &
-      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, reach)]))
-    call check('torque', all([balanced(1.0_wp, -load, off(1)*reach*x - 3*x, load, 3*x, reach), &
-      .not. balanced(1.0_wp, -load, off(2)*reach*x - 3*x, load, 3*x, reach)]))
-    call check('no load', all([balanced(1.0_wp, none, none, none, none, reach), &
-      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, reach)]))
+      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, radius), &
+      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, radius)]))
+    call check('torque', all([balanced(1.0_wp, -load, off(1)*radius*x - 3*x, load, 3*x, radius), &
+      .not. balanced(1.0_wp, -load, off(2)*radius*x - 3*x, load, 3*x, radius)]))
+    call check('no load', all([balanced(1.0_wp, none, none, none, none, radius), &
+      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, radius)]))
   end subroutine check_balanced
 
   !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) on end;
@@ -94,13 +94,13 @@ contains
     type(sleep_t) :: sleep
     real(wp) :: way, fall
     integer :: b, n
-    real(wp), parameter :: reach = 0.3_wp
+    real(wp), parameter :: radius = 0.3_wp
 
     call new_world(.true., 4, world)
     call start(world)
-    call sleep_init(.true., spread(reach, 1, 4), sleep)
-    fall = sqrt(reach/g)
-    way = 5.0e-4_wp*sqrt(g*reach)*0.101_wp*fall
+    call sleep_init(.true., spread(radius, 1, 4), sleep)
+    fall = sqrt(radius/g)
+    way = 5.0e-4_wp*sqrt(g*radius)*0.101_wp*fall
     associate (blocks => world%blocks)
       blocks%v = 1.0_wp   ! does not count, but how far it comes
       blocks%fixed(3) = .true.
@@ -130,18 +130,18 @@ contains
       call store_poses(blocks, sleep)
       blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
       blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
-        turn*way/sleep%reach(2)), blocks%q(:, 2))
-      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%reach(2)/g), blocks, sleep)
+        turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))
+      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
     end associate
   end subroutine creep
 
-  !> What rests bears on body and partner, on the partner the other way, and on no wall.
+  !> What rests bears on body and counterpart, on the counterpart the other way, and on no wall.
   subroutine check_loads()
     type(sleep_t) :: sleep
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
 
     call sleep_init(.true., [1.0_wp, 1.0_wp, 1.0_wp], sleep)
-    call reserve_springs(3, sleep%rest)
+    call reserve_displacements(3, sleep%rest)
     sleep%rest%n = 3
     sleep%rest%a(:3) = [1, 2, 3]
     sleep%rest%b(:3) = [-5, 1, 1]
@@ -243,7 +243,7 @@ contains
     call check('no substeps', one%report%substeps, 0)
     call check('same poses', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 1.0e-8_wp)
     call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 1.0e-4_wp)
-    call check('same partners', all(one%blocks%contacts == two%blocks%contacts))
+    call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
     call check('balance', maxval(abs(one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g)), &
       0.0_wp, 1.0e-12_wp)
     call check('the slab bears all', one%blocks%contact_force(3, 1), -n*one%blocks%mass(2)*g, &
@@ -351,8 +351,8 @@ contains
     world%blocks%fluid_force(2, 1) = 0.02_wp*weight(world)
     call step(world)
     call check('awake on the slope', .not. world%blocks%asleep(1))
-    call check('remembers its springs: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
-    call check('remembers its springs: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
+    call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
+    call check('keeps its displacements: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
   end subroutine check_slope
 
   !> Fluid force on a sleeper grows: it slides once it passes friction, no later than 1 %, and not

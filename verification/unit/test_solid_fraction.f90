@@ -34,7 +34,7 @@ program test_solid_fraction
   call links_of_a_box()
   call links_of_a_sphere()
   call partly_outside()
-  call touching_bodies()
+  call bodies_in_contact()
   call sealed_pocket()
   call periods()
   call any_part_of_the_grid()
@@ -624,7 +624,7 @@ contains
   end subroutine partly_outside
 
   !> Two boxes that overlap by half a cell, and two that share a cell without overlap.
-  subroutine touching_bodies()
+  subroutine bodies_in_contact()
     type(grid_t) :: grid
     type(blocks_t) :: blocks
     type(solid_geometry_t) :: solid
@@ -653,7 +653,7 @@ contains
     call check('side by side: and is no cut cell', solid%cut(10, 5, 5), 0)
     call check('side by side: its faces are closed', solid%aperture(10, 5, 5, 2), 0.0_wp, 0.0_wp)
     call check('side by side: the centre belongs to one of them', solid%inside(10, 5, 5) > 0)
-  end subroutine touching_bodies
+  end subroutine bodies_in_contact
 
   !> A lid on a well of 2 x 2 cells: closed off, unless the floor is an open side.
   subroutine sealed_pocket()

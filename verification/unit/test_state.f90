@@ -101,15 +101,15 @@ contains
     case (24); name = '/blocks/fluid_force'; s%blocks%fluid_force(3, 3) = 1.0_wp
     case (25); name = '/blocks/contact_torque'; s%blocks%contact_torque(1, 3) = 1.0_wp
     case (26); name = '/blocks/on_floor'; s%blocks%on_floor(2) = 1
-    case (27); name = '/contacts/n'; s%contacts%springs%n = 3
-    case (28); name = '/contacts/key'; s%contacts%springs%key(4) = 11
-    case (29); name = '/contacts/stretch'; call touch(s%contacts%springs%xi(3, 4))
+    case (27); name = '/contacts/n'; s%contacts%displacements%n = 3
+    case (28); name = '/contacts/key'; s%contacts%displacements%id(4) = 11
+    case (29); name = '/contacts/stretch'; call touch(s%contacts%displacements%xi(3, 4))
     case (30); name = '/contacts/quiet'; call touch(s%contacts%sleep%quiet(1))
     case (31); name = '/contacts/rest_stretch'; call touch(s%contacts%sleep%rest%xi(2, 3))
     case (32); name = '/contacts/rest_torque_b'; call touch(s%contacts%sleep%rest%torque_b(1, 1))
     case (33); name = '/contacts/rest_energy'; call touch(s%contacts%sleep%rest%energy(3))
     case (34); name = '/blocks/asleep'; s%blocks%asleep(2) = .not. s%blocks%asleep(2)
-    case default; name = '/contacts/stiffness'; call touch(s%contacts%springs%k(1))
+    case default; name = '/contacts/stiffness'; call touch(s%contacts%displacements%k(1))
     end select
   end subroutine change
 

@@ -10,7 +10,7 @@ program test_unknown_names
   use shapes_builtin_m, only: make_shape
   use drops_m, only: place_of_block
   use rigid_body_m, only: blocks_t, blocks_init
-  use touching_m, only: touching_t, touching_init
+  use contact_detection_m, only: contact_detection_t, detection_init
   use grid_m, only: grid_t, grid_init
   use tvd_m, only: scheme_of
   use fluid_transport_m, only: fluid_transport_t, fluid_transport_init
@@ -54,7 +54,7 @@ contains
     type(grid_t) :: grid
     type(shape_t) :: shapes(1)
     type(blocks_t) :: blocks
-    type(touching_t) :: touching
+    type(contact_detection_t) :: detected
     type(fluid_transport_t) :: transport
     type(pressure_system_t) :: system
     type(monolithic_t) :: coupling
@@ -89,7 +89,7 @@ contains
       if (len(message) > 0) error stop 'test_unknown_names: a shape that the program refuses'
       place = place_of_block(drop, 1)
       call blocks_init(case, shapes, blocks)
-      call touching_init(contact, 1.0e-4_wp, blocks, touching)
+      call detection_init(contact, 1.0e-4_wp, blocks, detected)
       call grid_init(case%grid, case%boundary, grid)
       if (scheme_of(numerics%advection) == 0) error stop 'test_unknown_names: scheme 0'
       subcells = subcells_of(numerics)

@@ -101,7 +101,7 @@ class Bodies:
     fluid_torque: Array  # (T, N, 3) about the centroid [N m]
     contact_force: Array  # (T, N, 3) [N]
     contact_torque: Array  # (T, N, 3) [N m]
-    contacts: IntArray  # (T, N) different partners touched
+    contacts: IntArray  # (T, N) different counterparts touched
     on_floor: IntArray  # (T, N)
 
     @property

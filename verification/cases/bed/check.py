@@ -48,7 +48,7 @@ def slope(run: Run, checks: Checks) -> None:
         checks.close(f"{name}: box [m/s2]", float(ours[0]), slides, 0.01)
         checks.close(f"{name}: sphere [m/s2]", float(ours[1]), 5 / 7 * G * np.sin(THETA), 0.01)
     checks.true(
-        f"{name}: the bed is the one partner, and the floor",
+        f"{name}: the bed is the one counterpart, and the floor",
         bool((b.contacts[-1] == 1).all() and (b.on_floor[-1] == 1).all()),
     )
 

@@ -1,8 +1,8 @@
-"""The rooms of the Fortran sources: which uses which, what must not be, and a picture of it.
+"""The packages of the Fortran sources: which uses which, what must not be, and a picture of it.
 
-A room is a folder of `src`; files at its top are the room `top`. A file may use files of its own
-room and of rooms in lower layers. Rooms of one layer know nothing of each other, and no files use
-one another in a circle.
+A package is a folder of `src`; files at its top are the package `top`. A file may use files of its
+own package and of packages in lower layers. Packages of one layer know nothing of each other, and
+no files use one another in a circle.
 """
 
 import re
@@ -30,7 +30,7 @@ LAYERS = (
     (TOP,),
 )
 """From the lowest to the highest."""
-HEIGHT = {room: height for height, layer in enumerate(LAYERS) for room in layer}
+HEIGHT = {package: height for height, layer in enumerate(LAYERS) for package in layer}
 
 MODULE = re.compile(r"^\s*(?:module|program)\s+(\w+)\s*$", re.MULTILINE | re.IGNORECASE)
 USE = re.compile(
@@ -58,17 +58,20 @@ def imports(source: Path) -> Imports:
     return found
 
 
-def room_of(file: str) -> str:
-    """The room of a file named from `src`."""
+def package_of(file: str) -> str:
+    """The package of a file named from `src`."""
     return file.split("/")[0] if "/" in file else TOP
 
 
 def faults(found: Imports) -> list[str]:
-    """What is against the order of the rooms, a line each, and the first circle among files."""
-    lines = [f"{room}: no such room in LAYERS" for room in sorted(_rooms(found) - HEIGHT.keys())]
+    """What is against the order of the packages, a line each, and the first circle among files."""
+    lines = [
+        f"{package}: no such package in LAYERS"
+        for package in sorted(_packages(found) - HEIGHT.keys())
+    ]
     for file, used in sorted(found.items()):
         for other in sorted(used):
-            above, below = room_of(file), room_of(other)
+            above, below = package_of(file), package_of(other)
             if above == below or not {above, below} <= HEIGHT.keys():
                 continue
             if HEIGHT[above] <= HEIGHT[below]:
@@ -81,18 +84,20 @@ def faults(found: Imports) -> list[str]:
 
 
 def arrows(found: Imports) -> Counter[tuple[str, str]]:
-    """How many times files of one room use a file of another one."""
-    pairs = ((room_of(file), room_of(other)) for file, used in found.items() for other in used)
+    """How many times files of one package use a file of another one."""
+    pairs = (
+        (package_of(file), package_of(other)) for file, used in found.items() for other in used
+    )
     return Counter(pair for pair in pairs if pair[0] != pair[1])
 
 
-def _rooms(found: Imports) -> set[str]:
-    return {room_of(file) for file in found}
+def _packages(found: Imports) -> set[str]:
+    return {package_of(file) for file in found}
 
 
-# The picture: the flow on the left, the blocks on the right, what joins them above. All rooms use
-# `base`, nearly all `case`, and `setup` and `top` use nearly all: these four are bands that tell
-# their counts in words. Boxes: middle x, height, width.
+# The picture: the flow on the left, the blocks on the right, what joins them above. All packages
+# use `base`, nearly all `case`, and `setup` and `top` use nearly all: these four are bands that
+# tell their counts in words. Boxes: middle x, height, width.
 BANDS = {"base": 0.0, "case": 1.0, "setup": 8.75, TOP: 9.75}
 BOXES = {
     "grid": (4.8, 2.2, 7.6),
@@ -170,29 +175,33 @@ ALONG = 0.42  # of an arrow is before its count
 
 
 def picture(found: Imports) -> Figure:
-    """The rooms in their layers; an arrow runs from the user to the used and bears its count."""
-    counts, files = arrows(found), Counter(room_of(file) for file in found)
+    """The packages in their layers; an arrow runs from the user to the used and bears its count."""
+    counts, files = arrows(found), Counter(package_of(file) for file in found)
     figure = Figure(figsize=(10.5, 9.4))
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axis.set_xlim(0.7, 12.6)
     axis.set_ylim(-0.45, 10.2)
     axis.axis("off")
-    for room, height in BANDS.items():
-        up = room in ("setup", TOP)
-        others = [(b if up else a, n) for (a, b), n in counts.items() if room == (a if up else b)]
+    for package, height in BANDS.items():
+        up = package in ("setup", TOP)
+        others = [
+            (b if up else a, n) for (a, b), n in counts.items() if package == (a if up else b)
+        ]
         others.sort(key=lambda pair: -HEIGHT[pair[0]])
         words = ",  ".join(f"{other} {n}" for other, n in others)
-        title = f"{room} ({files[room]} files): {CONTENT[room]}"
-        _box(axis, room, (6.65, height, 11.3), title, f"{'uses' if up else 'used by'}  {words}")
-    for room, place in BOXES.items():
-        _box(axis, room, place, f"{room} ({files[room]} files)", CONTENT[room])
+        title = f"{package} ({files[package]} files): {CONTENT[package]}"
+        _box(axis, package, (6.65, height, 11.3), title, f"{'uses' if up else 'used by'}  {words}")
+    for package, place in BOXES.items():
+        _box(axis, package, place, f"{package} ({files[package]} files)", CONTENT[package])
     for (user, used), n in sorted(counts.items()):
         if user in BOXES and used in BOXES:
             _arrow(axis, user, used, n)
     return figure
 
 
-def _box(axis: Axes, room: str, place: tuple[float, float, float], title: str, words: str) -> None:
+def _box(
+    axis: Axes, package: str, place: tuple[float, float, float], title: str, words: str
+) -> None:
     x, y, wide = place
     box = FancyBboxPatch(
         (x - wide / 2, y - TALL / 2),
@@ -200,7 +209,7 @@ def _box(axis: Axes, room: str, place: tuple[float, float, float], title: str, w
         TALL,
         boxstyle="round,pad=0,rounding_size=0.08",
         facecolor="#f4f4f4",
-        edgecolor=COLOURS.get(room, GREY),
+        edgecolor=COLOURS.get(package, GREY),
         linewidth=1.3,
         zorder=3,
     )

@@ -1,13 +1,13 @@
-!> Which partners each body has touched in a step.
-module partners_met_m
+!> Which counterparts each body has touched in a step.
+module counterparts_met_m
   use growing_m, only: ensure_capacity
   use rigid_body_m, only: blocks_t
   use walls_m, only: floor_wall
-  use bed_m, only: bed_partner
-  use springs_m, only: comes_before
+  use bed_m, only: bed_counterpart
+  use displacements_m, only: comes_before
   implicit none
   private
-  public :: met_t, store_partners, count_partners
+  public :: met_t, store_counterparts, count_counterparts
 
   !> Pairs that touched, sorted.
   type :: met_t
@@ -18,18 +18,18 @@ module partners_met_m
 contains
 
   !> Add pairs that touch to those that touched in this step.
-  subroutine store_partners(touches_a, touches_b, met)
-    integer, intent(in) :: touches_a(:), touches_b(:)     !! (touches) sorted
+  subroutine store_counterparts(points_a, points_b, met)
+    integer, intent(in) :: points_a(:), points_b(:)       !! (points) sorted
     type(met_t), intent(inout) :: met
     integer :: t, m, a, b
 
     a = 0
     b = 0
     m = 1
-    do t = 1, size(touches_a)
-      if (a == touches_a(t) .and. b == touches_b(t)) cycle
-      a = touches_a(t)
-      b = touches_b(t)
+    do t = 1, size(points_a)
+      if (a == points_a(t) .and. b == points_b(t)) cycle
+      a = points_a(t)
+      b = points_b(t)
       do while (m <= met%n)
         if (.not. comes_before(met%a(m), met%b(m), 0, a, b, 0)) exit
         m = m + 1
@@ -43,7 +43,7 @@ contains
       met%b(m) = b
       met%n = met%n + 1
     end do
-  end subroutine store_partners
+  end subroutine store_counterparts
 
   !> Whether entry m of the pairs met is the pair (a, b).
   pure function is_met(met, m, a, b) result(yes)
@@ -55,8 +55,8 @@ contains
     if (yes) yes = met%a(m) == a .and. met%b(m) == b
   end function is_met
 
-  !> Number of partners each body met in this step, and whether the floor was one of them.
-  pure subroutine count_partners(met, blocks)
+  !> Number of counterparts each body met in this step, and whether the floor was one of them.
+  pure subroutine count_counterparts(met, blocks)
     type(met_t), intent(in) :: met
     type(blocks_t), intent(inout) :: blocks
     integer :: m, a, b
@@ -68,8 +68,8 @@ contains
       b = met%b(m)
       blocks%contacts(a) = blocks%contacts(a) + 1
       if (b > 0) blocks%contacts(b) = blocks%contacts(b) + 1
-      if (b == floor_wall .or. b == bed_partner) blocks%on_floor(a) = 1
+      if (b == floor_wall .or. b == bed_counterpart) blocks%on_floor(a) = 1
     end do
-  end subroutine count_partners
+  end subroutine count_counterparts
 
-end module partners_met_m
+end module counterparts_met_m

@@ -1,11 +1,12 @@
-!> The band of cells around the bodies as a graph: lists of its cells, sorted by connected part.
+!> The narrow band of cells around the bodies as a graph: lists of its cells, sorted by connected
+!! part.
 !!
 !! Cells are joined by the conductance k of the face between them; as a linear operator the band is
 !! `y_c = sum_f k_f (x_c - x_nb)`. A part that a wall or another
 !! body separates from the rest has a volume balance of its own. Parts reach across processes; they
 !! are numbered by the smallest cell number in them, so the numbering does not depend on the
 !! processes.
-module flux_band_m
+module narrow_band_m
   use kinds_m, only: wp, i8
   use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, unit_step
@@ -15,7 +16,7 @@ module flux_band_m
   use parallel_m, only: halo_exchange, global_sum, nproc, my_rank
   implicit none
   private
-  public :: flux_band_t, flux_band_init, reserve, reserve_for_all, find_parts, sum_by_part, &
+  public :: narrow_band_t, narrow_band_init, reserve, reserve_for_all, find_parts, sum_by_part, &
             drop_part, find_open_lines
 
   !> Work of finding and sorting the parts.
@@ -29,7 +30,7 @@ module flux_band_m
     integer(i8), allocatable :: accumulator(:, :)   !! of the sums
   end type part_finder_t
 
-  type, extends(linear_operator_t) :: flux_band_t
+  type, extends(linear_operator_t) :: narrow_band_t
     ! Arrays over cells with one halo cell.
     integer, allocatable :: marked(:, :, :)  !! 1: in the band, else 0
     integer, allocatable :: line(:, :, :)    !! (2, j, k) first and last cell of a line that has
@@ -56,14 +57,14 @@ module flux_band_m
     type(part_finder_t) :: finder
   contains
     procedure :: apply => apply_band
-  end type flux_band_t
+  end type narrow_band_t
 
 contains
 
   !> Allocate; lists grow by doubling.
-  subroutine flux_band_init(grid, self, pooled)
+  subroutine narrow_band_init(grid, self, pooled)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(out) :: self
+    type(narrow_band_t), intent(out) :: self
     logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
     integer, parameter :: first_parts = 64
     integer :: a(3), b(3)
@@ -80,11 +81,11 @@ contains
     call ensure_capacity(1, self%cell)
     call reserve(self)
     call allocate_parts(first_parts, self)
-  end subroutine flux_band_init
+  end subroutine narrow_band_init
 
   subroutine allocate_parts(n, self)
     integer, intent(in) :: n
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
 
     allocate (self%first(n + 1), self%vents(n), self%largest(n), self%total(2*n))
     allocate (self%finder%home(n), self%finder%accumulator(accumulator_size, 2*n))
@@ -92,7 +93,7 @@ contains
 
   !> Room in the lists for all cells.
   subroutine reserve(self)
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: n
 
     n = size(self%cell, 2)
@@ -107,7 +108,7 @@ contains
   !> Room in the lists for all own cells and no more; what they held is lost.
   subroutine reserve_for_all(grid, self)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: n
 
     n = product(grid%hi - grid%lo + 1)
@@ -127,7 +128,7 @@ contains
 
   !> y = A x of the conductances; zero outside the sides of the domain.
   subroutine apply_band(self, x, y)
-    class(flux_band_t), intent(inout) :: self
+    class(narrow_band_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: x(:, :, :)
     real(wp), intent(inout), contiguous :: y(:, :, :)
 
@@ -189,7 +190,7 @@ contains
   !> Find the connected parts, on all processes, and sort the list by them.
   subroutine find_parts(grid, self)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, c(3)
 
     call join_neighbours(self)
@@ -205,7 +206,7 @@ contains
 
   !> Join cells of this process across faces with a conductance: `root` of each cell of the list.
   subroutine join_neighbours(self)
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, d, c(3), e(3), m, a, b
 
     do l = 1, self%n
@@ -245,7 +246,7 @@ contains
   !> Give all cells of a connected part, on whatever process, the smallest global number in it.
   subroutine join_processes(grid, self)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, c(3)
     integer(i8) :: changes(1)
 
@@ -294,7 +295,7 @@ contains
   !> The labels of all parts on all processes, rising.
   subroutine list_parts(grid, self)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, c(3), rank, n
 
     rank = my_rank()
@@ -368,7 +369,7 @@ contains
 
   !> Stable sort of the cells by part; `first` marks where each begins.
   subroutine sort_by_part(self)
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, c, d
 
     associate (part => self%finder%part, order => self%finder%root, n => self%n)
@@ -403,7 +404,7 @@ contains
   !> Cells at an open side, sum of r and sum of the open volume of each part, over all processes.
   subroutine sum_by_part(grid, self)
     type(grid_t), intent(in) :: grid
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: c, l, n
 
     n = self%parts
@@ -443,7 +444,7 @@ contains
   !> Take a part out of the system: its faces conduct nothing.
   subroutine drop_part(c, self)
     integer, intent(in) :: c
-    type(flux_band_t), intent(inout) :: self
+    type(narrow_band_t), intent(inout) :: self
     integer :: l, d, at(3), f(3)
 
     do l = self%first(c), self%first(c + 1) - 1
@@ -457,4 +458,4 @@ contains
     end do
   end subroutine drop_part
 
-end module flux_band_m
+end module narrow_band_m

@@ -1,10 +1,10 @@
-!> Two partners that touch: how they move against one another, and what a force does to both.
-program test_contact_partners
+!> Two counterparts that touch: how they move against one another, and what a force does to both.
+program test_counterparts
   use kinds_m, only: wp
   use check_m, only: check, finish_checks
   use vectors_m, only: cross
   use random_counter_m, only: uniform
-  use contact_partners_m, only: inertia_t, motion_t, wrench_t, inverse_effective_mass, act, &
+  use counterparts_m, only: inertia_t, motion_t, wrench_t, inverse_effective_mass, act, &
     relative_velocity, largest_speed
   implicit none
 
@@ -80,4 +80,4 @@ contains
     v = [uniform(i, k, 1), uniform(i, k, 2), uniform(i, k, 3)] - 0.5_wp
   end function vector
 
-end program test_contact_partners
+end program test_counterparts

@@ -1,6 +1,6 @@
 !> What touches now and what will soon: which of the two a gap makes it, for both contact models,
 !! and how stiff both are together.
-program test_touching
+program test_contact_detection
   use kinds_m, only: wp, pi
   use check_m, only: check, finish_checks
   use case_types_m, only: case_t
@@ -8,9 +8,9 @@ program test_touching
   use shapes_builtin_m, only: make_shape
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
-  use contact_partners_m, only: update_partners
+  use counterparts_m, only: update_counterparts
   use substep_limits_m, only: longest_substep_of
-  use touching_m, only: touching_t, touching_init, find_touches
+  use contact_detection_m, only: contact_detection_t, detection_init, detect_contacts
   implicit none
 
   real(wp), parameter :: r = 0.05_wp                 !! of the balls [m]
@@ -36,7 +36,7 @@ contains
     type(shape_t) :: shapes(1)
     type(blocks_t) :: blocks
     type(walls_t) :: walls
-    type(touching_t) :: touching
+    type(contact_detection_t) :: detected
     character(:), allocatable :: message
 
     allocate (case%shape(1), case%body(2), case%drop(0))
@@ -54,26 +54,26 @@ contains
     case%body(1)%velocity = [0.0_wp, 0.0_wp, -fast]
     call blocks_init(case, shapes, blocks)
     call walls_init(case%grid, case%boundary, walls)
-    call touching_init(case%contact, longest_substep_of(case%contact), blocks, touching)
-    call update_partners(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, touching%partners)
-    call check(model//': the model', touching%exact .eqv. model == 'surface')
-    call find_touches(walls, blocks, 0.0_wp, touching)
-    call check(model//': nothing touches', touching%touches%n + touching%soon%n, 0)
-    call check(model//': and swings', touching%frequency2, 0.0_wp, 0.0_wp)
-    call find_touches(walls, blocks, ahead, touching)
-    call check(model//': but soon', all([touching%touches%n, touching%soon%n] == [0, 1]))
-    call check(model//': it will swing', touching%frequency2, once, 1.0e-6_wp*once)
+    call detection_init(case%contact, longest_substep_of(case%contact), blocks, detected)
+    call update_counterparts(walls, [0.0_wp, 0.0_wp, -9.81_wp], blocks, detected%counterparts)
+    call check(model//': the model', detected%exact .eqv. model == 'surface')
+    call detect_contacts(walls, blocks, 0.0_wp, detected)
+    call check(model//': nothing touches', detected%points%n + detected%soon%n, 0)
+    call check(model//': and swings', detected%frequency2, 0.0_wp, 0.0_wp)
+    call detect_contacts(walls, blocks, ahead, detected)
+    call check(model//': but soon', all([detected%points%n, detected%soon%n] == [0, 1]))
+    call check(model//': it will swing', detected%frequency2, once, 1.0e-6_wp*once)
     blocks%x(3, 1) = r - gap
-    call find_touches(walls, blocks, ahead, touching)
-    call check(model//': touches', all([touching%touches%n, touching%soon%n] == [1, 0]))
-    call check(model//': swings', touching%frequency2, once, 1.0e-4_wp*once)
+    call detect_contacts(walls, blocks, ahead, detected)
+    call check(model//': touches', all([detected%points%n, detected%soon%n] == [1, 0]))
+    call check(model//': swings', detected%frequency2, once, 1.0e-4_wp*once)
     blocks%x(3, 2) = 3*r
     blocks%v(3, 2) = -fast
     blocks%v(3, 1) = fast
-    call find_touches(walls, blocks, ahead, touching)
-    call check(model//': one more soon', all([touching%touches%n, touching%soon%n] == [1, 1]))
-    call check(model//': the ball between swings with both', touching%response%frequency2(1), &
+    call detect_contacts(walls, blocks, ahead, detected)
+    call check(model//': one more soon', all([detected%points%n, detected%soon%n] == [1, 1]))
+    call check(model//': the ball between swings with both', detected%response%frequency2(1), &
       2*once, 1.0e-4_wp*once)
   end subroutine check_frequency
 
-end program test_touching
+end program test_contact_detection

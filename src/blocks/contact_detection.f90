@@ -1,0 +1,104 @@
+!> What touches now or soon, found by the model of the case, and how each contact point responds.
+module contact_detection_m
+  use kinds_m, only: wp
+  use case_types_m, only: contact_input_t
+  use rigid_body_m, only: blocks_t
+  use walls_m, only: walls_t
+  use bed_m, only: bed_counterpart
+  use contact_points_m, only: contact_points_t, ensure_points, set_apart
+  use contact_groups_m, only: groups_t, form_groups
+  use contact_spheres_m, only: contact_spheres_t, contact_spheres_init, find_sphere_points
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
+  use contact_law_m, only: contact_law_t
+  use contact_laws_m, only: choose_law
+  use counterparts_m, only: counterparts_t, counterparts_init, update_motion, update_inertia
+  use acting_bodies_m, only: acting_t, acting_init, list_acting
+  use contact_response_m, only: response_t, respond, add_frequencies, highest_frequency2, &
+    bound_by_sums
+  implicit none
+  private
+  public :: contact_detection_t, detection_init, detect_contacts
+
+  type :: contact_detection_t
+    class(contact_law_t), allocatable :: law
+    logical :: exact = .false.                   !! the exact surfaces touch, not contact spheres
+    type(contact_spheres_t) :: spheres
+    type(contact_surface_t) :: surface
+    type(counterparts_t) :: counterparts
+    type(acting_t) :: acting                     !! bodies that are awake or touch
+    type(contact_points_t) :: points
+    type(contact_points_t) :: soon               !! those that may come before the substep ends
+    type(groups_t) :: groups
+    type(response_t) :: response, response_soon
+    real(wp) :: frequency2 = 0.0_wp              !! square of the highest frequency, or above [1/s2]
+    real(wp) :: sum_frequency2 = 0.0_wp          !! by `bound_by_sums` [1/s2]
+    real(wp) :: damping = 0.0_wp                 !! rate of the dashpots, likewise [1/s]
+  end type contact_detection_t
+
+contains
+
+  !> The contact law and model of a case, without any contact point yet.
+  subroutine detection_init(input, longest_substep, blocks, self)
+    type(contact_input_t), intent(in) :: input
+    real(wp), intent(in) :: longest_substep      !! [s]
+    type(blocks_t), intent(in) :: blocks
+    type(contact_detection_t), intent(out) :: self
+
+    call choose_law(input, self%law)
+    select case (input%model)
+    case ('surface'); self%exact = .true.
+    case ('spheres'); self%exact = .false.
+    case default; error stop 'detection_init: no such model'
+    end select
+    if (self%exact) then
+      call contact_surface_init(input%courant_max, longest_substep, blocks, self%surface)
+    else
+      call contact_spheres_init(input%courant_max, blocks, self%spheres)
+    end if
+    call counterparts_init(blocks, self%counterparts)
+    call acting_init(blocks%n, self%acting)
+    allocate (self%response%frequency2(bed_counterpart:blocks%n))
+    allocate (self%response_soon%frequency2(bed_counterpart:blocks%n))
+    allocate (self%response%stiffness(bed_counterpart:blocks%n))
+    allocate (self%response%damping(bed_counterpart:blocks%n))
+    allocate (self%response_soon%stiffness, mold=self%response%stiffness)
+    allocate (self%response_soon%damping, mold=self%response%damping)
+    call ensure_points(1, self%points)
+    call ensure_points(1, self%soon)
+  end subroutine detection_init
+
+  !> Find what touches at the present poses, how each contact point responds, and how stiff all is
+  !! together, counting also what may touch within a time `ahead`.
+  subroutine detect_contacts(walls, blocks, ahead, self)
+    type(walls_t), intent(in) :: walls
+    type(blocks_t), intent(in) :: blocks
+    real(wp), intent(in) :: ahead   !! [s]
+    type(contact_detection_t), intent(inout) :: self
+
+    if (self%exact) then
+      call find_surface_points(walls, blocks, ahead, self%surface, self%points)
+    else
+      call find_sphere_points(walls, blocks, ahead, self%spheres, self%points)
+    end if
+    call set_apart(self%points, self%soon)
+    call form_groups(self%points, self%groups)
+    self%frequency2 = 0.0_wp
+    self%sum_frequency2 = 0.0_wp
+    self%damping = 0.0_wp
+    call list_acting(blocks, self%points, self%soon, self%acting)
+    associate (acting => self%acting%body(:self%acting%n))
+      call update_motion(blocks, acting, self%counterparts)
+      if (self%points%n + self%soon%n == 0) return
+      call update_inertia(blocks, acting, self%counterparts)
+    end associate
+    call respond(self%points, self%law, self%counterparts, self%response)
+    if (self%soon%n > 0) then
+      call respond(self%soon, self%law, self%counterparts, self%response_soon)
+      call add_frequencies(self%points, self%soon, self%response, self%response_soon)
+      self%frequency2 = highest_frequency2(self%soon, self%response_soon)
+    end if
+    self%frequency2 = max(self%frequency2, highest_frequency2(self%points, self%response))
+    call bound_by_sums(self%points, self%response, self%sum_frequency2, self%damping)
+  end subroutine detect_contacts
+
+end module contact_detection_m
