@@ -59,6 +59,11 @@ module contact_surface_m
     real(wp), allocatable :: turn(:, :, :)       !! (3, 3, bodies) body to space
     real(wp), allocatable :: q(:, :)             !! (4, bodies) the attitudes of that
     integer, allocatable :: old_slot(:), old_a(:), old_b(:)   !! work
+    !> Pairs that can touch: not both still, not both fixed.
+    logical :: live_listed = .false.
+    integer :: n_live = 0
+    integer, allocatable :: live(:)              !! (n_live) numbers in `near`, rising
+    integer, allocatable :: state(:)             !! (bodies) of which they are, see `state_of`
   end type contact_surface_t
 
   real(wp), parameter :: skin_share = 0.2_wp     !! least skin over the smallest d_s
@@ -83,6 +88,7 @@ contains
     allocate (self%bounding_radius(blocks%n), self%present(blocks%n))
     allocate (self%x(3, blocks%n), self%turn(3, 3, blocks%n), self%q(4, blocks%n), source=0.0_wp)
     allocate (self%pairs(0), self%taken(0), self%with_bed(blocks%n))
+    allocate (self%state(blocks%n), source=0)
     self%smallest = huge(1.0_wp)
     do b = 1, blocks%n
       self%bounding_radius(b) = self%surface(blocks%shape(b))%bounding_radius
@@ -118,12 +124,13 @@ contains
     integer :: a, b, p, w
 
     do b = 1, blocks%n
-      if (.not. blocks%present(b)) cycle
+      if (.not. blocks%present(b) .or. (blocks%still(b) .and. btest(self%state(b), 0))) cycle
       if (all(abs(blocks%q(:, b) - self%q(:, b)) <= 0.0_wp)) cycle
       self%q(:, b) = blocks%q(:, b)
       self%turn(:, :, b) = rotation_matrix(blocks%q(:, b))
     end do
     call renew_pairs(walls, blocks, self)
+    call renew_live(blocks, self)
     points%n = 0
     p = 1
     do a = 1, blocks%n
@@ -136,13 +143,9 @@ contains
           call add_wall_points(walls, blocks, a, w, gap, self, points)
         end do
       end if
-      do while (p <= self%near%n)
-        if (self%near%a(p) /= a) exit
-        b = self%near%b(p)
-        if (.not. ((blocks%fixed(a) .and. blocks%fixed(b)) &
-                   .or. (blocks%still(a) .and. blocks%still(b)))) then
-          call add_pair_points(blocks, ahead, self%slot(p), self, points)
-        end if
+      do while (p <= self%n_live)
+        if (self%near%a(self%live(p)) /= a) exit
+        call add_pair_points(blocks, ahead, self%slot(self%live(p)), self, points)
         p = p + 1
       end do
     end do
@@ -156,6 +159,31 @@ contains
 
     if (pairs_may_be_missing(self, blocks)) call list_pairs(walls, blocks, self)
   end subroutine renew_pairs
+
+  !> List the pairs that can touch anew where the list no longer holds.
+  pure subroutine renew_live(blocks, self)
+    type(blocks_t), intent(in) :: blocks
+    type(contact_surface_t), intent(inout) :: self
+    integer :: p
+
+    if (self%live_listed .and. all(self%state == state_of(blocks%still, blocks%fixed))) return
+    self%state = state_of(blocks%still, blocks%fixed)
+    call ensure_capacity(self%near%n, self%live)
+    self%n_live = 0
+    do p = 1, self%near%n
+      if (iand(self%state(self%near%a(p)), self%state(self%near%b(p))) /= 0) cycle
+      self%n_live = self%n_live + 1
+      self%live(self%n_live) = p
+    end do
+    self%live_listed = .true.
+  end subroutine renew_live
+
+  !> Bit 0: still, bit 1: fixed. Two bodies with a bit in common cannot touch.
+  elemental integer function state_of(still, fixed)
+    logical, intent(in) :: still, fixed
+
+    state_of = merge(1, 0, still) + merge(2, 0, fixed)
+  end function state_of
 
   !> Whether a pair may have come near that is not in the list.
   pure function pairs_may_be_missing(self, blocks) result(yes)
@@ -203,6 +231,7 @@ contains
       end associate
     end do
     self%listed = .true.
+    self%live_listed = .false.
     self%listed_skin = self%wide_skin
     self%present = blocks%present
     self%x = blocks%x

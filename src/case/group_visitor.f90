@@ -255,9 +255,11 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
+    type(variable_t) :: entry
 
-    call self%numbers(variable, to_text(pack(x, is_given(x))), .false., x, allowed, meaning, &
-      ' ['//allowed%unit//']', example, required)
+    entry = described(variable, 'number', to_text(pack(x, is_given(x))), meaning, example, required)
+    entry%allowed = allowed
+    call self%numbers(entry, .false., x)
   end subroutine real_values
 
   !> A whole number.
@@ -283,43 +285,43 @@ contains
     type(allowed_t), intent(in) :: allowed
     character(*), intent(in) :: meaning, example
     logical, intent(in), optional :: required
+    type(variable_t) :: entry
     real(wp) :: values(size(n))
 
+    entry = described(variable, 'number', to_text(n), meaning, example, required)
+    entry%allowed = allowed
     values = n
-    call self%numbers(variable, to_text(n), .true., values, allowed, meaning, '', example, required)
+    call self%numbers(entry, .true., values)
     n = nint(values)
   end subroutine integer_values
 
   !> Numbers of either kind.
-  subroutine numbers(self, variable, text, whole, x, allowed, meaning, unit, example, required)
+  subroutine numbers(self, entry, whole, x)
     class(group_visitor_t), intent(inout) :: self
-    character(*), intent(in) :: variable, text   !! `x` as the user would write it
+    type(variable_t), intent(inout) :: entry
     logical, intent(in) :: whole
     real(wp), intent(inout) :: x(:)
-    type(allowed_t), intent(in) :: allowed
-    character(*), intent(in) :: meaning, unit, example
-    logical, intent(in), optional :: required
-    type(variable_t) :: entry
-    character(:), allocatable :: problem
+    character(:), allocatable :: meaning, problem
     real(wp) :: values(size(x))
-    integer :: i, j
+    integer :: i, j, fewest
 
     if (.not. self%reading) then
-      entry = described(variable, 'number', text, meaning, example, required)
-      entry%allowed = allowed
       entry%most = size(x)
       call self%put_variable(entry)
       return
     end if
-    i = self%lookup(variable, meaning//unit, required)
+    meaning = entry%meaning
+    if (.not. whole) meaning = meaning//' ['//entry%allowed%unit//']'
+    i = self%lookup(entry%name, meaning, entry%required)
     if (i == 0) return
-    if (.not. self%count_is(i, merge(allowed%fewest, size(x), allowed%fewest > 0), size(x))) return
+    fewest = merge(entry%allowed%fewest, size(x), entry%allowed%fewest > 0)
+    if (.not. self%count_is(i, fewest, size(x))) return
     values = x
     do j = 1, self%group%assignment(i)%n
       call self%read_number(i, j, whole, values(j))
     end do
-    if (.not. self%good(variable)) return
-    problem = allowed%problem(pack(values, is_given(values)))
+    if (.not. self%good(entry%name)) return
+    problem = entry%allowed%problem(pack(values, is_given(values)))
     if (len(problem) > 0) then
       call self%fault(i, problem)
     else

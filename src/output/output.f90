@@ -128,8 +128,8 @@ contains
     type(bed_t), intent(in) :: bed
     type(output_t), intent(inout) :: output
 
-    call create_run_file(output%folder//run_name, output%text, output%parameters, state%grid, &
-      state%blocks, bed, make_row(output%properties, 0.0_wp, state, step_report_t()), &
+    call create_run_file(output%folder//run_name, output%text, output%parameters, state, &
+      bed, make_row(output%properties, 0.0_wp, state, step_report_t()), &
       output%run_file)
     if (state%light%on .and. is_root()) call output%run_file%file%attribute('/provenance', 'note', &
       not_resolved)

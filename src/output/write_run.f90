@@ -13,6 +13,7 @@ module write_run_m
   use bed_m, only: bed_t
   use errors_m, only: exit_files
   use clock_m, only: clock_t
+  use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
   use hdf5_table_m, only: h5_table_t, creating, reopening, appending
   use file_space_m, only: bytes_for_change
@@ -37,35 +38,34 @@ module write_run_m
 contains
 
   !> Create the file with everything but rows.
-  subroutine create_run_file(path, text, parameters, grid, blocks, bed, row, self)
+  subroutine create_run_file(path, text, parameters, state, bed, row, self)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
-    type(grid_t), intent(in) :: grid
-    type(blocks_t), intent(in) :: blocks
+    type(run_state_t), intent(in) :: state
     type(bed_t), intent(in) :: bed
     type(quantity_t), intent(in) :: row(:)         !! any: its columns are created
     type(run_file_t), intent(out) :: self
     integer :: c
 
     if (.not. is_root()) return
-    associate (file => self%file)
+    associate (file => self%file, blocks => state%blocks)
       call file%create(path, .false.)
       call file%attribute('/', 'format', 'mics-run')
       call file%attribute('/', 'format_version', 1)
       call write_provenance(text, parameters, file)
-      call write_grid(grid, file)
+      call write_grid(state%grid, file)
       if (bed%there) call write_bed(bed, file)
       call write_shapes(blocks, file)
       call write_bodies(blocks, file)
       call file%group('/series')
+      self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
+                          [blocks%n, size(once_name)])
+      self%status = blocks%status
+      self%q = first_sign(blocks%q)
+      call self%begin(creating)
+      call list_columns(row, blocks, self)
+      call file%flush()
     end associate
-    self%once = reshape([(once_values(blocks, c), c=1, size(once_name))], &
-                        [blocks%n, size(once_name)])
-    self%status = blocks%status
-    self%q = first_sign(blocks%q)
-    call self%begin(creating)
-    call list_columns(row, blocks, self)
-    call self%file%flush()
   end subroutine create_run_file
 
   !> The columns, see `hdf5_table_m`.

@@ -43,7 +43,7 @@ contains
     call grid_init(case%grid, case%boundary, state%grid)
     call clock_init(case%run, state%clock)
     call blocks_init(case, shapes, state%blocks)
-    call create_run_file(path, case%text, parameters, state%grid, state%blocks, bed, &
+    call create_run_file(path, case%text, parameters, state, bed, &
       make_row(case%fluid, 0.0_wp, state, report), file)
     call write_places(case, state%blocks, file)
     n = 0

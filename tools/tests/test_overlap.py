@@ -74,7 +74,7 @@ def test_shadows_bound_the_gap() -> None:
         assert apart(one, other) <= gap(one, other) + 1e-9
 
 
-def test_touches_of_a_thousand_cubes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_contacts_of_a_thousand_cubes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four layers of 250 cubes 5 % of an edge apart; the two lower ones touch."""
     c, n, count = cube(1.0), 16, 0
     bodies = {}
@@ -92,7 +92,7 @@ def test_touches_of_a_thousand_cubes(monkeypatch: pytest.MonkeyPatch) -> None:
         bed=(np.zeros((0, 3)), np.zeros((0, 3), int)),
     )  # fmt: skip
     start = time.process_time()
-    found = overlap.touches(run, -1)
+    found = overlap.find_contacts(run, -1)
     assert time.process_time() - start < 4.0, "CPU seconds; 45 with a gap and a depth of each pair"
     assert sorted(found.blocks) == [(k, k + 250) for k in range(250)]
     assert list(found.blocks.values()) == pytest.approx([0.005] * 250)

@@ -8,7 +8,7 @@ import pytest
 
 from micstools import cli
 from micstools.piles import layer, maps, pile_numbers
-from micstools.reading.overlap import Placed, present_bodies, sphere_gap, touches
+from micstools.reading.overlap import Placed, find_contacts, present_bodies, sphere_gap
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes import shape as shapes
 from synthetic import UPRIGHT, Motion
@@ -160,7 +160,7 @@ def test_blocks_touch_and_cover_through_a_periodic_side(make_run, capsys) -> Non
     run = make_run(Motion(shape=shapes.cube(0.02), places=ends, t_end=3.0, cells=(12, 4, 8),
                           field_step=3.0, more=PERIODIC))  # fmt: skip
     assert run.period.tolist() == pytest.approx([0.3, 0.0, 0.0])
-    seen = touches(run, -1)
+    seen = find_contacts(run, -1)
     assert (3, 4) in seen.blocks and set(seen.blocks) == {(3, 4)}
     bodies = present_bodies(run, -1)
     assert [float(bodies[k].position[0]) for k in (3, 4)] == pytest.approx([0.295, 0.015])
@@ -185,7 +185,7 @@ def test_contact_spheres_touch_where_they_are(make_run) -> None:
     assert way > 0.0206
     ends = [(np.array([x, 0.05, -lowest]), UPRIGHT) for x in (0.04, 0.04 + way)]
     spheres, surface = (
-        touches(
+        find_contacts(
             make_run(Motion(shape=cube, places=ends, t_end=3.0, cells=(12, 4, 8),
                             field_step=3.0, more=f"&contact model = '{model}' /\n")), -1)
         for model in ("spheres", "surface")

@@ -17,7 +17,7 @@ from micstools.cases import settings
 from micstools.piles import pile_ensemble
 from micstools.piles.pile_ensemble import Pile
 from micstools.piles.shares import in_words
-from micstools.reading.overlap import touches
+from micstools.reading.overlap import find_contacts
 from micstools.reading.reader import BadRun, Run
 from micstools.shapes.geometry import quaternion_from_axis, quaternion_product
 
@@ -97,7 +97,7 @@ CHOICES = (
 
 def first_on_floor(run: Run) -> int | None:
     """Number of the drop, from 1, of the first one that lies on the floor in the end, if any."""
-    seen = touches(run, -1)
+    seen = find_contacts(run, -1)
     return next((n for n, k in enumerate(run.bodies.dropped, 1) if seen.on_floor(int(k))), None)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from micstools.reading import health, kicks, rest, units
-from micstools.reading.overlap import overlap, present_bodies, touches
+from micstools.reading.overlap import find_contacts, overlap, present_bodies
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import Unit, figure
 from micstools.shapes.geometry import attitude_change_deg, below_plane
@@ -147,7 +147,7 @@ def first_block(run: Run) -> list[Finding]:
         rows = {"before the second is dropped": before, **rows}
     found = []
     for when, row in rows.items():
-        seen = touches(run, row)
+        seen = find_contacts(run, row)
         on_fixed = [k for k in seen.of(first) if b.fixed[k]]
         sides = [side for side in seen.walls_of(first) if not side.startswith("z")]
         speed = float(np.linalg.norm(b.velocity[row, first]))
@@ -164,7 +164,7 @@ def first_block(run: Run) -> list[Finding]:
 
 def walls(run: Run) -> Finding:
     """The paper on figure 7: the blocks pile up in touch with the front and the back wall."""
-    seen = touches(run, len(run.bodies.time) - 1)
+    seen = find_contacts(run, len(run.bodies.time) - 1)
     by_side = {s: [k for k, side in seen.walls if side == s] for s in ("y_min", "y_max")}
     figures = ", ".join(f"{side}: blocks {_named(blocks)}" for side, blocks in by_side.items())
     statement = "blocks of the final pile touch the front and the back wall"
@@ -197,7 +197,7 @@ def classify(run: Run, row: int = -1) -> tuple[str, list[int]]:
     """
     b = run.bodies
     row = row % len(b.time)
-    seen = touches(run, row)
+    seen = find_contacts(run, row)
     low = [int(k) for k in b.dropped if seen.on_floor(int(k))]
     if not b.present(row).all() or len(low) > 1:
         return "other", low

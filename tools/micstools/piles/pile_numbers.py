@@ -9,7 +9,7 @@ import numpy as np
 from micstools.piles import layer, pile_form
 from micstools.piles.maps import bed_volume, ground_map, height_map
 from micstools.reading import block_numbers, rest
-from micstools.reading.overlap import images, present_bodies, touches, without_machines
+from micstools.reading.overlap import find_contacts, images, present_bodies, without_machines
 from micstools.reading.reader import BadRun, Run
 from micstools.reading.units import SI, Unit, Units, ascii_of
 from micstools.shapes.geometry import Array
@@ -78,7 +78,7 @@ def numbers(
     if not b.n:
         raise BadRun(f"{run.folder} holds no blocks: there is no pile to look at")
     row = row % len(b.time)
-    bodies, seen = present_bodies(run, row), touches(run, row)
+    bodies, seen = present_bodies(run, row), find_contacts(run, row)
     bodies = without_machines(run, bodies)
     if not bodies:
         raise BadRun(f"{run.folder}: no block is let go at t = {b.time[row]:g} s: there is no pile")

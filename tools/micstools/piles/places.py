@@ -12,7 +12,7 @@ import pandas as pd
 
 from micstools.piles.shares import in_words, wilson
 from micstools.reading import rest
-from micstools.reading.overlap import touches
+from micstools.reading.overlap import find_contacts
 from micstools.reading.reader import Run
 from micstools.reading.units import Unit
 from micstools.shapes.geometry import Array
@@ -117,7 +117,7 @@ def planned(run: Run) -> Array:
 
 def places(run: Run, survey: Survey = Survey()) -> list[Place]:  # noqa: B008 (it is frozen)
     """Every unit at the end of a run, in the order of their numbers."""
-    b, seen, plan = run.bodies, touches(run, -1), planned(run)
+    b, seen, plan = run.bodies, find_contacts(run, -1), planned(run)
     present, shown = b.present(-1), survey.of(run.into_tank(plan))
     level = np.where(present[:, None], survey.of(run.into_tank(b.position[-1])), math.nan)
     away = np.linalg.norm((b.position[-1] - plan)[:, :2], axis=1)

@@ -208,7 +208,7 @@ def bed_gap(body: Placed, facets: Array, reach: float, spheres: bool = False) ->
 
 
 @dataclass(frozen=True)
-class Touches:
+class Contacts:
     """What touches what at one row, by the true shapes."""
 
     blocks: dict[tuple[int, int], float]  # gap of each touching pair, first number the lower [m]
@@ -228,7 +228,7 @@ class Touches:
         return body in self.bed or (body, "z_min") in self.walls
 
 
-def touches(run: Run, row: int) -> Touches:
+def find_contacts(run: Run, row: int) -> Contacts:
     """What is within the reach of `scales` of each other: pairs of released blocks, and they and
     walls or the bed."""
     reach = scales.reach(run)
@@ -254,7 +254,7 @@ def touches(run: Run, row: int) -> Touches:
         gaps |= {(k, side): min(g, gaps[k, side]) for side, g in around.items()}
         beds[k] = min(beds[k], bed_gap(bodies[k], corners[facets], reach, spheres=True))
     walls = {key: g for key, g in gaps.items() if g <= reach}
-    return Touches(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
+    return Contacts(blocks, walls, {k: g for k, g in beds.items() if g <= reach})
 
 
 def _stick_out(body: Placed) -> float:

@@ -62,7 +62,7 @@ def restitution(run: Run, checks: Checks) -> None:
         checks.below(f"e = {e:g}, {how}: momentum", drift, MOMENTUM_BAND)
     energy = run.series.kinetic_energy_bodies + run.series.contact_energy
     gain = float(energy.max() / energy[0] - 1.0)
-    whose = "of oblique touches" if oblique else "of all"
+    whose = "of oblique contacts" if oblique else "of all"
     checks.below(f"e = {e:g}: gain of energy {whose}", max(gain, 0.0), ENERGY_BAND, not oblique)
 
 

@@ -40,8 +40,8 @@ class Fall:
         size = "2 m" if self.length > 1 else "50 mm"
         self.name = f"{self.kind} of {size}{', surface tension' if tension else ''}"
         self.name += f", {self.cells} cells"
-        touches = np.flatnonzero(b.contacts[:, 0] > 0)
-        first = int(touches[0]) if touches.size else b.time.size
+        contacts = np.flatnonzero(b.contacts[:, 0] > 0)
+        first = int(contacts[0]) if contacts.size else b.time.size
         windows = kicks.acceleration(run, self.length, clear=0.0)[:first, 0]
         self.time: Array = b.time[:first] / np.sqrt(self.length / g)
         self.windows: Array = windows
