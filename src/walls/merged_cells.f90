@@ -34,7 +34,7 @@ module merged_cells_m
     real(wp), allocatable :: normal(:, :)        !! (3, *) of the wall, into the fluid
     integer, allocatable :: target(:, :)         !! (max_targets, n_small) numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the small cell, sum 1
-    real(wp), allocatable :: nearer(:, :)        !! likewise: 1 - r
+    real(wp), allocatable :: r(:, :)             !! likewise: distance from the wall over theirs
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the small cell in a cell, 0 to 1
     !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
@@ -62,7 +62,7 @@ contains
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%middle(0), self%ratio(0), self%centre(0))
     allocate (self%target(max_targets, 0), self%share(max_targets, 0))
-    allocate (self%nearer(max_targets, 0), self%distance(max_targets, 0))
+    allocate (self%r(max_targets, 0), self%distance(max_targets, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -218,12 +218,12 @@ contains
     call ensure_capacity(self%n_small, self%normal)
     call ensure_capacity(self%n_small, self%target)
     call ensure_capacity(self%n_small, self%share)
-    call ensure_capacity(self%n_small, self%nearer)
+    call ensure_capacity(self%n_small, self%r)
     call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
       call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), step(:, :, m), &
-                     self%share(:, m), self%nearer(:, m), self%distance(:, m))
+                     self%share(:, m), self%r(:, m), self%distance(:, m))
     end do
     do m = 1, self%n_small
       body = self%body(m)
@@ -237,22 +237,22 @@ contains
     end do
   end subroutine find_targets
 
-  !> Normal of the wall of small cell c, the steps to its targets, their shares of it, 1 - r, and
-  !! the distances of their fluid; r and distances as without a wall where there is no normal, r
+  !> Normal of the wall of small cell c, the steps to its targets, their shares of it, r, and the
+  !! distances of their fluid; r and distances as without a wall where there is no normal, r
   !! also where the wall has an edge, which the stream of the targets passes straight.
-  subroutine find_wall(grid, solid, c, normal, steps, share, nearer, distance)
+  subroutine find_wall(grid, solid, c, normal, steps, share, r, distance)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     integer, intent(in) :: c(3)
     real(wp), intent(out) :: normal(3)
     integer, intent(out) :: steps(3, max_targets)
-    real(wp), intent(out), dimension(max_targets) :: share, nearer, distance
+    real(wp), intent(out), dimension(max_targets) :: share, r, distance
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: n
 
     normal = wall_normal(grid, solid, c)
-    nearer = 0.0_wp
+    r = 1.0_wp
     distance = 0.0_wp
     call to_targets(grid, solid, c, normal, steps, share)
     if (all(abs(normal) <= 0.0_wp)) return
@@ -260,8 +260,8 @@ contains
     do n = 1, max_targets
       if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
       distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
-      nearer(n) = 1.0_wp - max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
-      nearer(n) = (1.0_wp - edge_in(solid, c))*nearer(n)
+      r(n) = max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
+      r(n) = r(n) + edge_in(solid, c)*(1.0_wp - r(n))
     end do
   end subroutine find_wall
 

@@ -60,7 +60,7 @@ contains
             given = given + part*scaled_to_wall(excess(:, small), self%normal(:, small), t, 1.0_wp)
             do d = 1, 3   ! L T
               matrix(:, d) = matrix(:, d) + part*scaled_to_wall( &
-                unit(:, d), self%normal(:, small), t**2, 1.0_wp - self%nearer(which, small))
+                unit(:, d), self%normal(:, small), t**2, self%r(which, small))
             end do
           end associate
         end do
@@ -81,7 +81,7 @@ contains
         t = along_share(self, m, n)
         associate (c => self%cell(:, self%target(n, m)), normal => self%normal(:, m))
           given = u(c(1), c(2), c(3), :) - before(:, self%target(n, m))
-          given = excess(:, m) - scaled_to_wall(given, normal, t, 1.0_wp - self%nearer(n, m))
+          given = excess(:, m) - scaled_to_wall(given, normal, t, self%r(n, m))
           to_wall(:, m) = to_wall(:, m) &
             + self%share(n, m)*mass(m)*scaled_to_wall(given, normal, 1.0_wp - t, 0.0_wp)
         end associate
@@ -107,7 +107,7 @@ contains
       associate (c => self%cell(:, self%target(n, small)))
         velocity = velocity + self%share(n, small)*(wall + scaled_to_wall( &
           u(c(1), c(2), c(3), :) - wall, self%normal(:, small), along_share(self, small, n), &
-          1.0_wp - self%nearer(n, small)))
+          self%r(n, small)))
       end associate
     end do
   end function small_velocity

@@ -64,7 +64,7 @@ contains
     real(wp) :: share
 
     associate (c => merged%cell(:, small))
-      share = share_along(1.0_wp - merged%nearer(n, small), merged%slip(c(1), c(2), c(3)))
+      share = share_along(merged%r(n, small), merged%slip(c(1), c(2), c(3)))
     end associate
   end function along_share
 
@@ -92,7 +92,7 @@ contains
           c = merged%cell(:, merged%target(n, m))
           behind = 2*c - f
           if (.not. centre_in_fluid(grid, solid, behind)) cycle
-          weight = merged%share(n, m)*merged%nearer(n, m)
+          weight = merged%share(n, m)*(1.0_wp - merged%r(n, m))
           if (weight <= 0.0_wp) cycle
           slip = slip + weight*slip_by_two(grid, merged, m, bodies, u, c, behind, &
                                            merged%distance(n, m))

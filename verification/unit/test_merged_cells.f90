@@ -56,12 +56,12 @@ contains
     call check('at an edge to both beside it, most to the one along the normal', &
                merged%share(:, merged%number(4, 6, top)), &
                [0.0_wp, 0.7_wp, 0.8_wp]/1.5_wp, 1.0e-12_wp)
-    call check('no profile at an edge', merged%nearer(:, merged%number(4, 6, top)), &
-               spread(0.0_wp, 1, 3), 0.0_wp)
+    call check('no profile at an edge', merged%r(:, merged%number(4, 6, top)), &
+               spread(1.0_wp, 1, 3), 0.0_wp)
     call check('the normal of the top', merged%normal(:, merged%number(4, 5, top)), &
                [0.0_wp, 0.0_wp, 1.0_wp], 1.0e-12_wp)
     call check('the middle of a small lies at half of it', &
-               1.0_wp - merged%nearer(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
+               merged%r(3, merged%number(4, 5, top)), r, 1.0e-12_wp)
     call check('no small is alone', .not. any([(is_unmerged(merged, m), m=1, merged%n_small)]))
     call check('the shares of a small are one', sum(merged%share(:, :merged%n_small), 1), &
                spread(1.0_wp, 1, merged%n_small), 1.0e-13_wp)
