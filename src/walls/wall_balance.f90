@@ -92,7 +92,9 @@ contains
       associate (c => merged%cell(:, m))
         if (.not. grid%owns(c)) cycle
         mass = self%moved(:, m)
-        if (present(taken)) mass = -self%mass(m)
+        if (present(taken)) then
+          if (taken) mass = -self%mass(m)
+        end if
         self%to_wall(:, m) = self%to_wall(:, m) + dt*mass*a(c(1), c(2), c(3), :)
       end associate
     end do
