@@ -12,6 +12,7 @@ from micstools.reading.reader import Bodies, Run
 
 BAND = 0.01
 CREEP = 1e-6  # [m/s]
+QUICK = ("deg*_mu???", "*_awake", "*_4ms")
 VARIES = ("contact friction", "contact wall_friction", "contact sleep", "contact solver")
 ROWS = np.loadtxt(Path(__file__).with_name("D5.csv"), delimiter=",", skiprows=2)
 
