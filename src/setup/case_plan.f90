@@ -36,6 +36,8 @@ module case_plan_m
   real(wp), parameter :: seconds_per_substep = 4.0e-5_wp   !! of a block that is awake [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
+  real(wp), parameter :: share_shaken = 0.04_wp
+    !! of the time until the last release in which landing blocks keep one awake that lies [-]
 
 contains
 
@@ -416,13 +418,23 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     real(wp) :: seconds
     type(place_t) :: place
+    real(wp) :: last, waits   ! release, sum of the times from each release to the last [s]
     integer :: i, k
 
     seconds = 0.0_wp
+    last = 0.0_wp
+    do i = 1, size(case%drop)
+      do k = 1, case%drop(i)%count
+        place = place_of_block(case%drop(i), k)
+        last = min(max(last, place%time), case%run%t_end)
+      end do
+    end do
+    waits = 0.0_wp
     do i = 1, size(case%drop)
       do k = 1, case%drop(i)%count
         place = place_of_block(case%drop(i), k)
         seconds = seconds + awake(shape_of_place(place, shapes), place%time)
+        waits = waits + max(last - place%time, 0.0_wp)
       end do
     end do
     do i = 1, size(case%body)
@@ -430,6 +442,7 @@ contains
       seconds = seconds + awake(findloc(shapes%name, case%body(i)%shape, 1), &
                                 case%body(i)%release_time)
     end do
+    if (case%contact%sleep) seconds = seconds + share_shaken*waits
   contains
     !> Time for which a block of shape s is awake that is let go at a time.
     pure real(wp) function awake(s, time)
