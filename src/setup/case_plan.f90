@@ -418,23 +418,21 @@ contains
     type(shape_t), intent(in) :: shapes(:)
     real(wp) :: seconds
     type(place_t) :: place
-    real(wp) :: last, waits   ! release, sum of the times from each release to the last [s]
-    integer :: i, k
+    real(wp) :: time, last, sum_times   ! a release, the last one, all together [s]
+    integer :: i, k, n
 
     seconds = 0.0_wp
     last = 0.0_wp
-    do i = 1, size(case%drop)
-      do k = 1, case%drop(i)%count
-        place = place_of_block(case%drop(i), k)
-        last = min(max(last, place%time), case%run%t_end)
-      end do
-    end do
-    waits = 0.0_wp
+    sum_times = 0.0_wp
+    n = 0
     do i = 1, size(case%drop)
       do k = 1, case%drop(i)%count
         place = place_of_block(case%drop(i), k)
         seconds = seconds + awake(shape_of_place(place, shapes), place%time)
-        waits = waits + max(last - place%time, 0.0_wp)
+        time = min(place%time, case%run%t_end)
+        last = max(last, time)
+        sum_times = sum_times + time
+        n = n + 1
       end do
     end do
     do i = 1, size(case%body)
@@ -442,7 +440,7 @@ contains
       seconds = seconds + awake(findloc(shapes%name, case%body(i)%shape, 1), &
                                 case%body(i)%release_time)
     end do
-    if (case%contact%sleep) seconds = seconds + share_shaken*waits
+    if (case%contact%sleep) seconds = seconds + share_shaken*(n*last - sum_times)
   contains
     !> Time for which a block of shape s is awake that is let go at a time.
     pure real(wp) function awake(s, time)
