@@ -6,8 +6,8 @@ module resting_m
   use rigid_body_m, only: blocks_t
   use walls_m, only: walls_t
   use displacements_m, only: move_displacements
-  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, put_to_sleep, hold_or_wake, &
-    all_still
+  use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, rest_tolerance, &
+    put_to_sleep, hold_or_wake, all_still
   use contact_law_m, only: stored_energy
   use counterparts_m, only: counterparts_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
@@ -74,7 +74,6 @@ contains
     type(contacts_t), intent(inout) :: contacts
     type(blocks_t), intent(inout) :: blocks
     logical, intent(out) :: changed      !! somebody fell asleep
-    real(wp), parameter :: half = 0.5_wp
     type(contact_report_t) :: ignored
     integer :: b
 
@@ -93,7 +92,7 @@ contains
     associate (sleep => contacts%sleep, loads => contacts%loads)
       do b = 1, blocks%n
         if (.not. (sleep%candidate(b) .and. sleep%supported(b))) cycle
-        if (.not. balanced(half, loads%force(:, b), loads%torque(:, b), &
+        if (.not. balanced(rest_tolerance, loads%force(:, b), loads%torque(:, b), &
                            contacts%steady(:, b) + blocks%mass(b)*gravity, &
                            blocks%fluid_torque(:, b), sleep%bounding_radius(b))) cycle
         ! should it wake before the step ends, contact has taken this

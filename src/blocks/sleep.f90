@@ -2,12 +2,15 @@
 !! until the forces on them no longer balance.
 !!
 !! A block falls asleep when it has been slow for some time, rests on something, and the forces on
-!! it balance within half of a small share of its load. It stays asleep as long as they balance
-!! within that share: contact from sleepers, held bodies and walls, which is frozen like the poses,
+!! it balance within `rest_tolerance` of its load. It stays asleep as long as they balance within
+!! `wake_tolerance`: contact from sleepers, held bodies and walls, which is frozen like the poses,
 !! contact from what moves, the fluid, and weight. So a block wakes in the substep in which it is
 !! hit, when the flow changes, and when a neighbour that it rests on wakes and moves away. Nothing
 !! is lost meanwhile: frozen forces and displacements are those of the awake block at the same pose,
 !! and a sleeper is never held by more than that share of its load.
+!!
+!! A block that its load leaves out of balance by `rest_tolerance` is no longer slow after a quarter
+!! of the time asked. Measured choice: docs/decisions/sleep.md.
 module sleep_m
   use kinds_m, only: wp
   use vectors_m, only: distance, norm
@@ -17,11 +20,13 @@ module sleep_m
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
   public :: store_quiet, may_sleep
-  public :: balanced, put_to_sleep, stop_sleepers, hold_or_wake, all_still
+  public :: balanced, rest_tolerance, put_to_sleep, stop_sleepers, hold_or_wake, all_still
 
-  real(wp), parameter :: slow = 5.0e-4_wp      !! speed of a candidate over sqrt(g radius)
-  real(wp), parameter :: time_to_sleep = 5.0_wp     !! time before it sleeps over sqrt(radius/g)
-  real(wp), parameter :: tolerance = 1.0e-2_wp !! force that wakes, over weight and fluid force
+  real(wp), parameter :: slow = 5.0e-4_wp            !! speed of a candidate over sqrt(g radius)
+  real(wp), parameter :: time_to_sleep = 1.0_wp      !! before it sleeps, over sqrt(radius/g)
+  real(wp), parameter :: rest_tolerance = 2.0e-3_wp
+    !! imbalance of what falls asleep, over weight and fluid force
+  real(wp), parameter :: wake_tolerance = 2.0e-2_wp  !! imbalance that wakes, likewise
 
   type :: sleep_t
     logical :: active = .false.
@@ -139,7 +144,7 @@ contains
     end do
   end subroutine store_quiet
 
-  !> Whether a block has been slow for long: several times that of a fall by its size.
+  !> Whether a block has been slow for long: some time of a fall by its size.
   pure function may_sleep(gravity, b, blocks, sleep) result(yes)
     real(wp), intent(in) :: gravity(3)         !! [m/s2]
     integer, intent(in) :: b
@@ -151,16 +156,16 @@ contains
     if (yes) yes = sleep%quiet(b)**2*norm(gravity) >= time_to_sleep**2*sleep%bounding_radius(b)
   end function may_sleep
 
-  !> Whether contact forces balance weight and fluid within a share of the tolerance.
-  pure function balanced(share, force, torque, steady, steady_torque, radius) result(yes)
-    real(wp), intent(in) :: share              !! of the tolerance [-]
+  !> Whether contact forces balance weight and fluid within a tolerance.
+  pure function balanced(tolerance, force, torque, steady, steady_torque, radius) result(yes)
+    real(wp), intent(in) :: tolerance          !! over `steady` [-]
     real(wp), intent(in) :: force(3), torque(3)               !! of contact [N], [N m]
     real(wp), intent(in) :: steady(3), steady_torque(3)       !! all else [N], [N m]
     real(wp), intent(in) :: radius              !! of the body [m]
     logical :: yes
     real(wp) :: bound
 
-    bound = share*tolerance*norm(steady)
+    bound = tolerance*norm(steady)
     yes = norm(force + steady) <= bound
     if (yes) yes = norm(torque + steady_torque) <= bound*radius
   end function balanced
@@ -223,7 +228,7 @@ contains
       torque(:, b) = torque(:, b) + sleep%load_torque(:, b)
       if (.not. blocks%asleep(b)) cycle
       other = steady(:, b) + blocks%mass(b)*gravity
-      woken(b) = .not. balanced(1.0_wp, force(:, b), torque(:, b), other, &
+      woken(b) = .not. balanced(wake_tolerance, force(:, b), torque(:, b), other, &
         blocks%fluid_torque(:, b), sleep%bounding_radius(b))
       if (woken(b)) then
         call wake(b, blocks)

@@ -1,7 +1,7 @@
 !> How long a substep of contact may be.
 module substep_limits_m
   use kinds_m, only: wp
-  use case_types_m, only: contact_input_t
+  use case_types_m, only: contact_input_t, is_given
   use vectors_m, only: distance, norm
   use rigid_body_m, only: blocks_t, haste
   use walls_m, only: walls_t
@@ -30,7 +30,8 @@ contains
     type(contact_detection_t), intent(in) :: detected
     type(limits_t), intent(out) :: limits
 
-    limits%substep_ratio = input%substep_ratio
+    limits%substep_ratio = 1.0_wp
+    if (is_given(input%substep_ratio)) limits%substep_ratio = input%substep_ratio
     limits%longest_substep = longest_substep_of(input)
     limits%courant_max = input%courant_max
     if (detected%exact) then

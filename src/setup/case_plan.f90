@@ -2,8 +2,8 @@
 module case_plan_m
   use kinds_m, only: wp, i8
   use errors_m, only: to_text, brief
-  use case_types_m, only: case_t, shape_input_t, place_t, is_given, smallest_spacing, has_flow, &
-    not_resolved
+  use case_types_m, only: case_t, contact_input_t, shape_input_t, place_t, is_given, &
+    smallest_spacing, has_flow, contact_of, not_resolved
   use drops_m, only: place_of_block, shape_of_place
   use boundary_kinds_m, only: side_code, gives_pressure
   use named_files_m, only: file_text
@@ -463,10 +463,12 @@ contains
     real(wp), intent(in) :: d_s   !! of the contact Courant number [m]
     class(contact_law_t), allocatable :: law
     type(load_t) :: heaviest
+    type(contact_input_t) :: contact
     real(wp) :: ratio_step, time_step, courant_step, mass, k
     integer :: s
 
-    ratio_step = case%contact%substep_ratio*case%run%dt
+    contact = contact_of(case)
+    ratio_step = contact%substep_ratio*case%run%dt
     time_step = case%contact%contact_time/substeps_per_contact
     courant_step = case%contact%courant_max*d_s/speed
     call entry(unit, 'body step', brief(min(ratio_step, time_step, courant_step)) &

@@ -13,7 +13,6 @@ NO_CONSTANTS = {
     "shapes/armour_units.f90": {"cosine", "sine"},
     "shapes/shapes_builtin.f90": {"golden"},
     "shapes/contact_sphere_placement.f90": {"turn"},
-    "blocks/resting.f90": {"half"},
     # a ratio of two constants of the page
     "blocks/contact_response.f90": {"share"},
     # marks for "none"

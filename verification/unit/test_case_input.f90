@@ -4,7 +4,7 @@ program test_case_input
   use check_m, only: check, finish_checks
   use kinds_m, only: wp, pi
   use errors_m, only: problems_t
-  use case_types_m, only: case_t, is_given
+  use case_types_m, only: case_t, contact_input_t, contact_of, is_given
   use case_input_m, only: read_case, parameters_text
   implicit none
 
@@ -15,6 +15,7 @@ program test_case_input
   character(*), parameter :: cube = base//'&shape name = ''c'' kind = ''cube'' size = 0.02 /'//lf
 
   call test_defaults()
+  call test_substeps()
   call test_values()
   call test_attitudes()
   call test_way_back()
@@ -66,6 +67,26 @@ contains
     call check('no ' &
       //'groups', size(case%water) + size(case%shape) + size(case%body) + size(case%drop), 0)
   end subroutine test_defaults
+
+  !> A substep is a share of a step of the flow, or of a step if the case says so.
+  subroutine test_substeps()
+    call check('substeps', [substep_ratio('coupled', ''), substep_ratio('dry', ''), &
+      substep_ratio('light', ''), substep_ratio('light', 'substep_ratio = 0.05')], &
+      [0.05_wp, 1.0_wp, 1.0_wp, 0.05_wp], 0.0_wp)
+  end subroutine test_substeps
+
+  function substep_ratio(physics, contact)
+    character(*), intent(in) :: physics, contact
+    real(wp) :: substep_ratio
+    type(contact_input_t) :: contact_input
+    type(case_t) :: case
+    type(problems_t) :: problems
+
+    call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid//'&fluid water_level = 0.1 /' &
+      //'&contact '//contact//' /', case, problems)
+    contact_input = contact_of(case)
+    substep_ratio = contact_input%substep_ratio
+  end function substep_ratio
 
   !> Values arrive where they belong; each repeated group starts from the defaults.
   subroutine test_values()

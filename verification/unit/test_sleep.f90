@@ -11,8 +11,8 @@ program test_sleep
     set_velocity_after_fluid
   use walls_m, only: walls_t, walls_init
   use displacements_m, only: reserve_displacements
-  use sleep_m, only: sleep_t, sleep_init, balanced, store_poses, store_quiet, may_sleep, &
-    update_loads
+  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_poses, store_quiet, &
+    may_sleep, update_loads
   use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
   implicit none
 
@@ -48,6 +48,7 @@ program test_sleep
     call check_slope()
     call check_flow()
     call check_chain()
+    call check_edge()
   end do
   call finish_checks()
 
@@ -69,25 +70,22 @@ contains
     end do
   end subroutine make_shapes
 
-  !> Contact balances all else within a share of one per cent of it, torques within that at the
-  !! radius of the body; without any load only in full.
+  !> Contact balances all else within a tolerance of it, torques within that at the radius of the
+  !! body; without any load only in full.
   subroutine check_balanced()
     real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, radius = 0.3_wp
     real(wp), parameter :: load(3) = [0.0_wp, 6.0_wp, -8.0_wp]   !! of size 10
     real(wp), parameter :: off(2) = [0.0999_wp, 0.1001_wp]
 
-    call check('force', all([balanced(1.0_wp, off(1)*x - load, none, load, none, radius), &
-      .not. balanced(1.0_wp, off(2)*x - load, none, load, none, radius)]))
-    call check('half of it', all([ &
-      balanced(0.5_wp, 0.5_wp*off(1)*x - load, none, load, none, radius), &
-      .not. balanced(0.5_wp, 0.5_wp*off(2)*x - load, none, load, none, radius)]))
-    call check('torque', all([balanced(1.0_wp, -load, off(1)*radius*x - 3*x, load, 3*x, radius), &
-      .not. balanced(1.0_wp, -load, off(2)*radius*x - 3*x, load, 3*x, radius)]))
-    call check('no load', all([balanced(1.0_wp, none, none, none, none, radius), &
-      .not. balanced(1.0_wp, 1.0e-30_wp*x, none, none, none, radius)]))
+    call check('force', all([balanced(0.01_wp, off(1)*x - load, none, load, none, radius), &
+      .not. balanced(0.01_wp, off(2)*x - load, none, load, none, radius)]))
+    call check('torque', all([balanced(0.01_wp, -load, off(1)*radius*x - 3*x, load, 3*x, radius), &
+      .not. balanced(0.01_wp, -load, off(2)*radius*x - 3*x, load, 3*x, radius)]))
+    call check('no load', all([balanced(0.01_wp, none, none, none, none, radius), &
+      .not. balanced(0.01_wp, 1.0e-30_wp*x, none, none, none, radius)]))
   end subroutine check_balanced
 
-  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for 5 sqrt(r/g) on end;
+  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for sqrt(r/g) on end;
   !! its turning counts, and one that is held or not there is never one.
   subroutine check_quiet()
     type(world_t) :: world
@@ -105,7 +103,7 @@ contains
       blocks%v = 1.0_wp   ! does not count, but how far it comes
       blocks%fixed(3) = .true.
       blocks%present(4) = .false.
-      do n = 1, 49
+      do n = 1, 9
         call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
       end do
       call check('not yet', .not. any([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)]))
@@ -113,7 +111,7 @@ contains
       call check('candidates', all([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)] &
         .eqv. [.true., .true., .false., .false.]))
       call creep(world, way, [0.99_wp, 0.5_wp], 0.51_wp, sleep)
-      call check('turns too fast', sleep%quiet(:2), [51*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
+      call check('turns too fast', sleep%quiet(:2), [11*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
       call creep(world, way, [1.01_wp, 0.0_wp], 0.0_wp, sleep)
       call check('moves too fast', sleep%quiet(1), 0.0_wp, 0.0_wp)
     end associate
@@ -242,12 +240,12 @@ contains
     call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp, 0.0_wp)
     call check('no substeps', one%report%substeps, 0)
     call check('same poses', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 1.0e-8_wp)
-    call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 1.0e-4_wp)
+    call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 2*rest_tolerance)
     call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
     call check('balance', maxval(abs(one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g)), &
       0.0_wp, 1.0e-12_wp)
     call check('the slab bears all', one%blocks%contact_force(3, 1), -n*one%blocks%mass(2)*g, &
-      1.0e-4_wp*one%blocks%mass(2)*g)
+      n*rest_tolerance*one%blocks%mass(2)*g)
     call check('about its middle', maxval(abs(one%blocks%contact_torque(:, 1))), 0.0_wp, &
       1.0e-4_wp*one%blocks%mass(2)*g*d)
   end subroutine check_rest
@@ -348,15 +346,15 @@ contains
     call check('sleeps on a slope less steep', world%blocks%asleep(1))
     x = world%blocks%x(:, 1)
     energy = world%report%energy
-    world%blocks%fluid_force(2, 1) = 0.02_wp*weight(world)
+    world%blocks%fluid_force(2, 1) = 0.03_wp*weight(world)
     call step(world)
     call check('awake on the slope', .not. world%blocks%asleep(1))
     call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
     call check('keeps its displacements: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
   end subroutine check_slope
 
-  !> Fluid force on a sleeper grows: it slides once it passes friction, no later than 1 %, and not
-  !! before; then it comes to rest when the force ends.
+  !> Fluid force on a sleeper grows: it slides once it passes friction, within 2 % of the load, and
+  !! not before; then it comes to rest when the force ends.
   subroutine check_flow()
     type(world_t) :: world
     real(wp) :: force
@@ -426,6 +424,21 @@ contains
     call check('awake on a belt', .not. world%blocks%asleep(1))
     call check('that does not rub', abs(world%blocks%v(1, 1)), 0.0_wp, 1.0e-12_wp)
   end subroutine check_belt
+
+  !> A cube on its edge that leans by 5e-4 falls over, though the torque on it is less than what a
+  !! sleeper is held by.
+  subroutine check_edge()
+    type(world_t) :: world
+    real(wp), parameter :: upright = atan(1.0_wp), up(2) = [sqrt(0.5_wp), 0.5_wp]
+
+    call new_world(.true., 1, world)
+    world%case%body(1)%position(3) = up(1)*d
+    call start(world)
+    world%blocks%q(:, 1) = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], upright + 5.0e-4_wp)
+    call run(world, 1.5_wp)
+    call check('falls from its edge', world%blocks%x(3, 1), up(2)*d, 1.0e-3_wp*d)
+    call check('sleeps on its face', world%blocks%asleep(1))
+  end subroutine check_edge
 
   !> A push at one end of a row of sleepers reaches the other end, as if all were awake.
   subroutine check_chain()
