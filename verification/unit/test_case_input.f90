@@ -82,8 +82,8 @@ contains
     type(case_t) :: case
     type(problems_t) :: problems
 
-    call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid//'&fluid water_level = 0.1 /' &
-      //'&contact '//contact//' /', case, problems)
+    call read_case('&run t_end = 1  physics = '''//physics//''' /'//grid &
+      //'&fluid water_level = 0.1 / &contact '//contact//' /', case, problems)
     contact_input = contact_of(case)
     substep_ratio = contact_input%substep_ratio
   end function substep_ratio
