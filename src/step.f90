@@ -107,15 +107,15 @@ contains
         call update_outflow(grid, case%fluid, dt, flow%c, flow%uf, flow%sides)
         call start_of_stages(case%fluid%gravity, dt, blocks, coupling)
         ! 9 merging
-        call coupling%merge_cells(case, grid, sim%solid, dt, flow, scratch)
+        call coupling%merge_cells(grid, sim%solid, dt, flow, scratch)
         ! 10 forces
-        call coupling%add_forces(case, grid, sim%solid, dt, flow, scratch)
+        call coupling%add_forces(grid, sim%solid, dt, flow, scratch)
         ! 11 viscosity
-        call coupling%add_viscosity(case, grid, sim%solid, dt, flow, scratch)
+        call coupling%add_viscosity(grid, sim%solid, dt, flow, scratch)
         ! 12 faces
-        call coupling%predict_faces(case, grid, sim%solid, dt, flow, scratch)
+        call coupling%predict_faces(grid, sim%solid, dt, flow, scratch)
         ! 13 projection
-        call coupling%project(case, grid, sim%solid, dt, flow, scratch, coupling_report)
+        call coupling%project(grid, sim%solid, dt, flow, scratch, coupling_report)
         ! 14 closing
         call motion_after_fluid(case%fluid%gravity, dt, blocks, coupling)
         call coupling%close(grid, sim%solid, flow, blocks, coupling_report)
@@ -237,8 +237,7 @@ contains
     begins = sim%blocks%present .and. .not. sim%initialised
     if (.not. any(begins)) return
     call copy_motion(sim%blocks, sim%coupling%bodies)
-    call sim%coupling%force_at_release(sim%case, sim%grid, sim%solid, begins, sim%flow, &
-                                       sim%scratch, force)
+    call sim%coupling%force_at_release(sim%grid, sim%solid, begins, sim%flow, sim%scratch, force)
     do b = 1, sim%blocks%n
       if (.not. begins(b)) cycle
       sim%blocks%fluid_force(:, b) = force(1:3, b)
@@ -256,8 +255,9 @@ contains
     call copy_motion(sim%blocks, sim%coupling%bodies)
     call update_added_mass(sim%grid, sim%case%fluid, sim%solid, sim%coupling%bodies, sim%flow%c, &
                          sim%blocks, n_clipped)
-    call sim%coupling%begin(sim%case, sim%grid, sim%solid, sim%clock%dt, dt_before, sim%flow, &
-                            sim%blocks, sim%scratch)
+    ! what the walls owe is an impulse
+    sim%blocks%lagged_force = dt_before/sim%clock%dt*sim%blocks%lagged_force
+    call sim%coupling%begin(sim%grid, sim%solid, sim%clock%dt, sim%flow, sim%blocks, sim%scratch)
   end subroutine begin
 
   !> The blocks in the grid at their poses; where they were before stays in `sim%before`, of which

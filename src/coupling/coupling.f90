@@ -32,6 +32,8 @@ module coupling_m
   end type coupling_report_t
 
   type, abstract :: coupling_t
+    type(fluid_t) :: fluid
+    real(wp) :: dt_release = 0.0_wp                !! in which a block begins to move [s]
     type(rigid_motion_t) :: bodies
     type(rigid_motion_t) :: at_start
       !! the same with the motion at the start of the step
@@ -57,11 +59,10 @@ module coupling_m
 
   abstract interface
     !> Force and torque with which bodies that are let go begin to move (6, bodies) [N, N m].
-    subroutine of_release(self, case, grid, solid, begins, flow, scratch, force)
-      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+    subroutine of_release(self, grid, solid, begins, flow, scratch, force)
+      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
       implicit none
       class(coupling_t), intent(inout) :: self   !! its bodies in place
-      type(case_t), intent(in) :: case
       type(grid_t), intent(in) :: grid
       type(solid_geometry_t), intent(in) :: solid
       logical, intent(in) :: begins(:)           !! (blocks) those let go; all others are held
@@ -71,25 +72,23 @@ module coupling_m
     end subroutine of_release
 
     !> What the stages will need of the start of the step, and what acts before the transport.
-    subroutine of_start(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
-      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, blocks_t, scratch_t, wp
+    subroutine of_start(self, grid, solid, dt, flow, blocks, scratch)
+      import :: coupling_t, grid_t, solid_geometry_t, flow_t, blocks_t, scratch_t, wp
       implicit none
       class(coupling_t), intent(inout) :: self   !! its bodies as they move at the start
-      type(case_t), intent(in) :: case
       type(grid_t), intent(in) :: grid
       type(solid_geometry_t), intent(in) :: solid
-      real(wp), intent(in) :: dt, dt_before      !! of this step and of the one before, 0: none [s]
+      real(wp), intent(in) :: dt                 !! [s]
       type(flow_t), intent(inout) :: flow
       type(blocks_t), intent(in) :: blocks
       type(scratch_t), intent(inout) :: scratch
     end subroutine of_start
 
     !> A stage after the transport: fluid and bodies are where the step ends.
-    subroutine of_stage(self, case, grid, solid, dt, flow, scratch)
-      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
+    subroutine of_stage(self, grid, solid, dt, flow, scratch)
+      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp
       implicit none
       class(coupling_t), intent(inout) :: self
-      type(case_t), intent(in) :: case
       type(grid_t), intent(in) :: grid
       type(solid_geometry_t), intent(in) :: solid
       real(wp), intent(in) :: dt   !! [s]
@@ -98,12 +97,11 @@ module coupling_m
     end subroutine of_stage
 
     !> Pressure; velocity of faces, cells and bodies; force and torque of the step on each body.
-    subroutine of_projection(self, case, grid, solid, dt, flow, scratch, report)
-      import :: coupling_t, case_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp, &
+    subroutine of_projection(self, grid, solid, dt, flow, scratch, report)
+      import :: coupling_t, grid_t, solid_geometry_t, flow_t, scratch_t, wp, &
         coupling_report_t
       implicit none
       class(coupling_t), intent(inout) :: self
-      type(case_t), intent(in) :: case
       type(grid_t), intent(in) :: grid
       type(solid_geometry_t), intent(in) :: solid
       real(wp), intent(in) :: dt   !! [s]
@@ -134,6 +132,8 @@ contains
     type(case_t), intent(in) :: case
     class(coupling_t), intent(inout) :: self
 
+    self%fluid = case%fluid
+    self%dt_release = case%run%dt
     call rigid_motion_init(n, self%bodies)
     call rigid_motion_init(n, self%at_start)
     call viscous_init(grid, n, self%viscous, pooled=.true.)

@@ -41,6 +41,7 @@ module mass_average_m
   real(wp), parameter :: held_density = 1.0e6_wp   !! inertia of a fixed body in the mixture [kg/m3]
 
   type, extends(coupling_t) :: mass_average_t
+    integer :: passes = 1
     type(solid_geometry_t) :: whole                !! the domain without solids
     real(wp), allocatable :: rho(:, :, :)          !! of the mixture of fluid and solid [kg/m3]
     real(wp), allocatable :: u_before(:, :, :, :)  !! velocity before the predictor [m/s]
@@ -67,6 +68,7 @@ contains
     integer :: a(3), b(3)
 
     call coupling_init(grid, n, case, self)
+    self%passes = case%numerics%coupling_passes
     a = grid%first
     b = grid%last
     call solid_geometry_init(grid, self%whole, n)
@@ -76,9 +78,8 @@ contains
   end subroutine mass_average_init
 
   !> Archimedes' force: the mixture makes the inertia of the fluid.
-  subroutine force_at_release(self, case, grid, solid, begins, flow, scratch, force)
+  subroutine force_at_release(self, grid, solid, begins, flow, scratch, force)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     logical, intent(in) :: begins(:)
@@ -88,35 +89,33 @@ contains
 
     associate (unused => begins, unused_too => scratch)
     end associate
-    call displaced_force(grid, case%fluid, solid, self%bodies, flow%c, force)
+    call displaced_force(grid, self%fluid, solid, self%bodies, flow%c, force)
   end subroutine force_at_release
 
   !> Stage 3: with C-ISMAC the acceleration of the cells.
-  subroutine begin(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
+  subroutine begin(self, grid, solid, dt, flow, blocks, scratch)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt, dt_before
+    real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(blocks_t), intent(in) :: blocks
     type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => dt, unused_too => dt_before, unused_as_well => blocks)
+    associate (unused => dt, unused_too => blocks)
     end associate
     if (.not. self%implicit_momentum) return
-    call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+    call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
     call density_of_mixture(grid, solid, self%bodies, flow%rho, self%rho)
-    call keep_acceleration(grid, case%fluid%gravity, self%whole%aperture, self%rho, flow, self)
+    call keep_acceleration(grid, self%fluid%gravity, self%whole%aperture, self%rho, flow, self)
     call give(scratch, self%tension%force)
   end subroutine begin
 
   !> Stage 9: one velocity for fluid and bodies in a cell, the mean by mass. Buoyancy and the
   !! contact force act on the bodies before; gravity in the mixture is that of the fluid, so still
   !! water stays still.
-  subroutine merge_cells(self, case, grid, solid, dt, flow, scratch)
+  subroutine merge_cells(self, grid, solid, dt, flow, scratch)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -126,7 +125,7 @@ contains
     associate (unused => scratch)
     end associate
     associate (bodies => self%bodies, system => self%pressure%system)
-      call displaced_force(grid, case%fluid, solid, bodies, flow%c, self%from_level)
+      call displaced_force(grid, self%fluid, solid, bodies, flow%c, self%from_level)
       call push_bodies(dt, self%from_level, bodies)
       self%total = self%from_level
       call density_of_mixture(grid, solid, bodies, flow%rho, self%rho)
@@ -139,9 +138,8 @@ contains
   end subroutine merge_cells
 
   !> Stage 10: old pressure, weight of the fluid, surface tension and surface stress.
-  subroutine add_forces(self, case, grid, solid, dt, flow, scratch)
+  subroutine add_forces(self, grid, solid, dt, flow, scratch)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -151,9 +149,9 @@ contains
 
     call take(scratch, by_stress)
     associate (a => self%acceleration)
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
+      call face_acceleration(grid, self%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
-      call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+      call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
       call add_tension(grid, self%rho, self%tension, a%face)
       call give(scratch, self%tension%force)
       call cell_mean_of_faces(grid, self%whole%aperture, a%face, a%cell)
@@ -166,16 +164,15 @@ contains
   end subroutine add_forces
 
   !> Stage 11: viscosity of the mixture; with C-ISMAC advection, too.
-  subroutine add_viscosity(self, case, grid, solid, dt, flow, scratch)
+  subroutine add_viscosity(self, grid, solid, dt, flow, scratch)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => case, unused_too => solid)
+    associate (unused => solid)
     end associate
     call take_arrays(scratch, self%viscous)
     call build_viscous(grid, self%whole, self%bodies, self%rho, flow%mu, dt, self%viscous)
@@ -187,16 +184,15 @@ contains
   end subroutine add_viscosity
 
   !> Stage 12: velocity of the faces before the pressure.
-  subroutine predict_faces(self, case, grid, solid, dt, flow, scratch)
+  subroutine predict_faces(self, grid, solid, dt, flow, scratch)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => case, unused_too => solid, unused_as_well => scratch)
+    associate (unused => solid, unused_too => scratch)
     end associate
     call halo_exchange(self%acceleration%cell, n_halo)
     call fill_velocity_halo(grid, flow%u)
@@ -206,9 +202,8 @@ contains
 
   !> Stage 13: projection of the mixture and the force on the bodies; `coupling_passes` times, later
   !! passes from the mean by mass alone.
-  subroutine project(self, case, grid, solid, dt, flow, scratch, report)
+  subroutine project(self, grid, solid, dt, flow, scratch, report)
     class(mass_average_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -218,7 +213,7 @@ contains
     integer :: pass
 
     associate (bodies => self%bodies, last => self%pressure%report)
-      do pass = 1, case%numerics%coupling_passes
+      do pass = 1, self%passes
         if (pass > 1) then
           call average_cells(grid, solid, bodies, flow, self%rho)
           self%u_before = flow%u

@@ -99,29 +99,28 @@ contains
   !> Stage 3: the motion of the bodies as it goes on, the merged cells at the start; for C-ISMAC the
   !! acceleration of the cells, else how the faces at the surface differ from them, and the first
   !! half of the old pressure.
-  subroutine begin(self, case, grid, solid, dt, dt_before, flow, blocks, scratch)
+  subroutine begin(self, grid, solid, dt, flow, blocks, scratch)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    real(wp), intent(in) :: dt, dt_before
+    real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(blocks_t), intent(in) :: blocks
     type(scratch_t), intent(inout) :: scratch
 
-    call extrapolate_motion(case%fluid%gravity, dt, blocks, self)
-    self%lagged(:, :blocks%n) = dt_before/dt*blocks%lagged_force   ! what is owed is an impulse
+    call extrapolate_motion(self%fluid%gravity, dt, blocks, self)
+    self%lagged(:, :blocks%n) = blocks%lagged_force
     call find_merged_before(grid, solid, self)
     if (self%implicit_momentum) then
-      call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+      call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
       call find_liquid(grid, flow, self%half_kick%takes_part)
-      call keep_acceleration(grid, case%fluid%gravity, solid%aperture, flow%rho, flow, self)
+      call keep_acceleration(grid, self%fluid%gravity, solid%aperture, flow%rho, flow, self)
       call give(scratch, self%tension%force)
     else
       call take(scratch, self%correction)
       call take(scratch, self%half_kick%given)
       call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
-      call add_first_half(grid, case%fluid, solid, self%merged_before, self%bodies, &
+      call add_first_half(grid, self%fluid, solid, self%merged_before, self%bodies, &
                           self%extrapolated, dt, flow, self%acceleration, self%half_kick)
     end if
   end subroutine begin
@@ -165,9 +164,8 @@ contains
   !> Stage 9: small cells at the new places and their targets, one momentum for each group; inertia
   !! of the fluid in cut cells; how fast the fluid runs past the walls; the pressure system and the
   !! flux of the unit motions of the bodies.
-  subroutine merge_cells(self, case, grid, solid, dt, flow, scratch)
+  subroutine merge_cells(self, grid, solid, dt, flow, scratch)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -179,7 +177,7 @@ contains
     self%unforced_motion = self%bodies%motion
     call find_merged_cells(grid, solid, self%merged)
     call copy_density(flow%rho, self%rho)
-    call begin_balance(grid, case%fluid, solid, self%merged, flow, self%rho, self%balance)
+    call begin_balance(grid, self%fluid, solid, self%merged, flow, self%rho, self%balance)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
@@ -208,9 +206,8 @@ contains
 
   !> Stage 10: weight, old pressure, surface tension and surface stress, on cells and bodies. Cells
   !! at the surface and in gas get the first three after the faces.
-  subroutine add_forces(self, case, grid, solid, dt, flow, scratch)
+  subroutine add_forces(self, grid, solid, dt, flow, scratch)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -219,9 +216,9 @@ contains
     real(wp), allocatable :: by_stress(:, :, :, :)   ! acceleration of the cells [m/s2]
 
     call take(scratch, by_stress)
-    call find_surface_force(case%fluid, grid, solid, flow%c, scratch, self)
+    call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
     associate (a => self%acceleration)
-      call face_acceleration(grid, case%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
+      call face_acceleration(grid, self%fluid%gravity, flow%rho, self%rho, flow%p, a%face, &
                              flow%sides)
       call add_tension(grid, self%rho, self%tension, a%face)
       self%counted = self%at_start%motion + self%extrapolated
@@ -232,13 +229,13 @@ contains
         call accelerate_cells(grid, dt, flow, self)
       else
         call add_second_half(grid, dt, a%cell, self%half_kick, flow%u)
-        call force_of_half_kick(grid, case%fluid, self%merged_before, self%merged, self%bodies, &
+        call force_of_half_kick(grid, self%fluid, self%merged_before, self%merged, self%bodies, &
                                 dt, flow, a%cell, self%half_kick, self%from_half_kick)
         call give(scratch, self%half_kick%given)
       end if
       call add_product(grid, dt, by_stress, flow%u)
     end associate
-    call push_by_known_forces(case, grid, solid, dt, flow, self)
+    call push_by_known_forces(grid, solid, dt, flow, self)
     call give(scratch, self%tension%force)
     call give(scratch, by_stress)
   end subroutine add_forces
@@ -262,8 +259,7 @@ contains
   end subroutine accelerations_of_groups
 
   !> The same forces on the bodies.
-  subroutine push_by_known_forces(case, grid, solid, dt, flow, self)
-    type(case_t), intent(in) :: case
+  subroutine push_by_known_forces(grid, solid, dt, flow, self)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -273,25 +269,22 @@ contains
     associate (bodies => self%bodies, flux => self%pressure%system%operator%flux)
       call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
-      self%defect = mass_defect(grid, case%fluid, solid, bodies, flux, flow)
-      call count_fluid(case%fluid%gravity, dt, self)
+      self%defect = mass_defect(grid, self%fluid, solid, bodies, flux, flow)
+      call count_fluid(self%fluid%gravity, dt, self)
       self%from_level = self%from_level + self%from_half_kick + self%lagged
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
     end associate
   end subroutine push_by_known_forces
 
   !> Stage 11: viscosity, in cells and bodies at once; with C-ISMAC advection, too.
-  subroutine add_viscosity(self, case, grid, solid, dt, flow, scratch)
+  subroutine add_viscosity(self, grid, solid, dt, flow, scratch)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => case)
-    end associate
     call take_arrays(scratch, self%viscous)
     associate (bodies => self%bodies, viscous => self%viscous, merged => self%merged, &
                balance => self%balance)
@@ -316,17 +309,14 @@ contains
   end subroutine add_viscosity
 
   !> Stage 12: velocity of the faces before the pressure.
-  subroutine predict_faces(self, case, grid, solid, dt, flow, scratch)
+  subroutine predict_faces(self, grid, solid, dt, flow, scratch)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
     type(flow_t), intent(inout) :: flow
     type(scratch_t), intent(inout) :: scratch
 
-    associate (unused => case)
-    end associate
     self%predicted%x = self%bodies%x
     self%predicted%motion = self%at_start%motion + self%extrapolated
     call fill_velocity_halo(grid, flow%u, layers=1)
@@ -354,9 +344,8 @@ contains
   !> Stage 13: pressure and motion of the bodies in one solve. What the fluid at the walls owes the
   !! bodies (`wall_balance_m`) is known only afterwards: free bodies get it, and the pressure
   !! follows in a second solve; the little that this one changes of it is left to the next step.
-  subroutine project(self, case, grid, solid, dt, flow, scratch, report)
+  subroutine project(self, grid, solid, dt, flow, scratch, report)
     class(monolithic_t), intent(inout) :: self
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     real(wp), intent(in) :: dt
@@ -390,7 +379,7 @@ contains
       end do
       call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
-      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, &
+      call extend_pressure(grid, self%fluid%gravity, flow%rho, solid%alpha, &
                            pressure%system%active, pressure%known, pressure%closed, flow%p)
       call give_faces(scratch, pressure%system%operator%cf)
     end associate
@@ -485,9 +474,8 @@ contains
 
   !> Force and torque of the fluid on bodies that are let go, with the pressure by which they
   !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.
-  subroutine force_at_release(self, case, grid, solid, begins, flow, scratch, force)
+  subroutine force_at_release(self, grid, solid, begins, flow, scratch, force)
     class(monolithic_t), intent(inout) :: self   !! its bodies in place
-    type(case_t), intent(in) :: case
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     logical, intent(in) :: begins(:)         !! (blocks) those let go; all others are held
@@ -503,19 +491,19 @@ contains
     moving = self%bodies
     allocate (uf, source=flow%uf)
     allocate (solid_flux, source=flow%solid_flux)
-    call displaced_force(grid, case%fluid, solid, self%bodies, flow%c, force)
-    associate (bodies => self%bodies, system => self%pressure%system, dt => case%run%dt)
+    call displaced_force(grid, self%fluid, solid, self%bodies, flow%c, force)
+    associate (bodies => self%bodies, system => self%pressure%system, dt => self%dt_release)
       bodies%motion = 0.0_wp
       do b = 1, bodies%n
         bodies%free(b) = .false.
         if (b <= size(begins)) bodies%free(b) = moving%free(b) .and. begins(b)
-        force(1:3, b) = force(1:3, b) + bodies%mass(b)*case%fluid%gravity
+        force(1:3, b) = force(1:3, b) + bodies%mass(b)*self%fluid%gravity
       end do
       self%at_start = bodies
       call take_faces(scratch, system%operator%cf)
       call set_pressure_system(grid, solid%effective, flow%rho, system, flow%sides)
       call build_rigid_flux(grid, solid, bodies, system%active, system%operator%flux)
-      self%defect = mass_defect(grid, case%fluid, solid, bodies, system%operator%flux, flow)
+      self%defect = mass_defect(grid, self%fluid, solid, bodies, system%operator%flux, flow)
       call count_fluid(weightless, dt, self)
       call push_bodies(dt, force, bodies)
       flow%uf = 0.0_wp
@@ -523,10 +511,10 @@ contains
       call solve_pressure(grid, solid, flow%rho, dt, flow, bodies, self%pressure)
       do b = 1, bodies%n
         a = bodies%motion(:, b)/dt
-        force(1:3, b) = bodies%mass(b)*(a(1:3) - case%fluid%gravity)
+        force(1:3, b) = bodies%mass(b)*(a(1:3) - self%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
       end do
-      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
+      call extend_pressure(grid, self%fluid%gravity, flow%rho, solid%alpha, system%active, &
                            self%pressure%known, self%pressure%closed, flow%p)
       call give_faces(scratch, system%operator%cf)
     end associate

@@ -94,11 +94,11 @@ contains
   !> Those between two looks at the motion of the block.
   subroutine stages()
     report = coupling_report_t()
-    call coupling%merge_cells(block%case, block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%add_forces(block%case, block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%add_viscosity(block%case, block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%predict_faces(block%case, block%grid, block%solid, dt, block%flow, scratch)
-    call coupling%project(block%case, block%grid, block%solid, dt, block%flow, scratch, report)
+    call coupling%merge_cells(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_forces(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_viscosity(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%predict_faces(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%project(block%grid, block%solid, dt, block%flow, scratch, report)
   end subroutine stages
 
   !> Before its first step the sphere has the force of that fall, and the fluid the pressure of it,
@@ -114,8 +114,7 @@ contains
     call ready()
     allocate (p, source=block%flow%p)
     allocate (uf, source=block%flow%uf)
-    call coupling%force_at_release(block%case, block%grid, block%solid, [.true.], block%flow, &
-                                   scratch, force)
+    call coupling%force_at_release(block%grid, block%solid, [.true.], block%flow, scratch, force)
     a(1:3) = force(1:3, 1)/block%blocks%mass(1) - [0.0_wp, 0.0_wp, g]
     expected = (s - 1.0_wp)/(s + 0.5_wp)
     call check('let go: acceleration', -a(3)/g, expected, 0.02_wp*abs(expected))
@@ -130,8 +129,7 @@ contains
     block%blocks%fluid_force(:, 1) = force(1:3, 1)
     block%blocks%fluid_torque(:, 1) = force(4:6, 1)
     call begin_step(block%blocks)
-    call coupling%begin(block%case, block%grid, block%solid, dt, 0.0_wp, block%flow, &
-                        block%blocks, scratch)
+    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
     call advance()
     call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
                0.02_wp*abs(expected))
@@ -338,8 +336,7 @@ contains
     block%blocks%contact_torque(:, 1) = forces(:, 4)
     gain(1:3) = block%case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
     gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
-    call coupling%begin(block%case, block%grid, block%solid, dt, 0.5_wp*dt, block%flow, &
-                        block%blocks, scratch)
+    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
     call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
                1.0e-12_wp)
   end subroutine goes_on_as_before
