@@ -168,8 +168,8 @@ contains
       end do
       call update_motion(blocks, acting, detected%counterparts)
       call sum_forces(dt_b, detected, displacements, loads, report)
-      if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, contacts%lubrication, &
-        loads%force)
+      if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
+        contacts%lubrication, loads%force)
       if (contacts%sleep%active) call hold_or_wake(acting, gravity, contacts%steady, blocks, &
         contacts%sleep, loads%force(:, 1:), loads%torque(:, 1:), contacts%woken)
       do k = 1, size(acting)

@@ -176,8 +176,8 @@ contains
         call update_inertia(blocks, there, detected%counterparts)
       end associate
       loads%film = 0.0_wp
-      if (contacts%lubrication%active) call lubricate(walls, blocks, step, contacts%lubrication, &
-        loads%film)
+      if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
+        contacts%lubrication, loads%film)
       call make_rows(h, contacts%contact_time, detected%points, detected%law, &
                      detected%counterparts, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
@@ -190,12 +190,14 @@ contains
     end associate
   end subroutine solve_step
 
-  !> Accelerations of all bodies with rows but for contact, at the start of the step.
+  !> Accelerations of all bodies with rows but for contact, at the start of the step. An impact in
+  !! the step returns the speed that the films leave.
   pure subroutine fall_freely(gravity, step, contacts, blocks, rows)
     real(wp), intent(in) :: gravity(3), step   !! [m/s2, s]
     type(contacts_t), intent(in) :: contacts
     type(blocks_t), intent(in) :: blocks
     type(rows_t), intent(inout) :: rows
+    real(wp) :: by_film(3)
     integer :: k
 
     do k = 1, rows%n_active
@@ -205,8 +207,9 @@ contains
           if (blocks%path(b)%n > 0) rows%a_free(:, b) = change_by_motion(blocks, b, step)/step
         end if
         if (rows%inverse_mass(b) <= 0.0_wp) cycle
-        rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) &
-          + rows%inverse_mass(b)*contacts%loads%film(:, b)
+        by_film = rows%inverse_mass(b)*contacts%loads%film(:, b)
+        rows%v_start(1:3, b) = rows%v_start(1:3, b) + step*by_film
+        rows%a_free(1:3, b) = gravity + contacts%steady(:, b)/blocks%mass(b) + by_film
         rows%a_free(4:6, b) = matmul(rows%inverse_inertia(:, :, b), blocks%fluid_torque(:, b) &
           - cross(blocks%omega(:, b), blocks%l(:, b)))
       end associate

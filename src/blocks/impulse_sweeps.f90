@@ -402,7 +402,7 @@ contains
   pure subroutine move_arms(hits, rows)
     integer, intent(in) :: hits
     type(rows_t), intent(inout) :: rows
-    real(wp) :: way(3), p(3)
+    real(wp) :: way(3), p(3), closing
     integer :: k, m, r
 
     do k = 1, rows%n_pairs
@@ -423,8 +423,11 @@ contains
         rows%turn(:, k) = rows%turn(:, k) - cross(way, p)
         row%arm_a = row%arm_a - way
         row%arm_b = row%arm_b + way
-        if (abs(rows%closing(r)) > 0.0_wp) rows%closing(r) = dot_product(row%n, &
-          past(rows%v_start(:, rows%a(k)), rows%v_start(:, rows%b(k)), row))
+        if (abs(rows%closing(r)) > 0.0_wp) then
+          closing = dot_product(row%n, past(rows%v_start(:, rows%a(k)), rows%v_start(:, &
+            rows%b(k)), row))
+          rows%closing(r) = merge(min(closing, 0.0_wp), closing, rows%closing(r) < 0.0_wp)
+        end if
       end associate
     end do
   end subroutine move_arms

@@ -51,10 +51,11 @@ contains
   !!
   !! Normal approach only: the resistance to sliding grows with the logarithm of the gap and is left
   !! out.
-  subroutine lubricate(walls, blocks, dt, lubrication, force)
+  subroutine lubricate(walls, blocks, dt, ahead, lubrication, force)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: dt                        !! substep [s]
+    real(wp), intent(in) :: ahead                     !! time until its middle [s]
     type(lubrication_t), intent(inout) :: lubrication
     real(wp), intent(inout) :: force(:, bed_counterpart:)
       !! (3, counterparts) of all counterparts [N]
@@ -71,46 +72,47 @@ contains
         if (.not. active(a)) cycle
         do while (p <= near%n)
           if (near%a(p) /= a) exit
-          call film_of_pair(walls%period, blocks, near%b(p), a, dt, lubrication, force)
+          call film_of_pair(walls%period, blocks, near%b(p), a, dt, ahead, lubrication, force)
           p = p + 1
         end do
-        call films_at_walls(walls, blocks, a, dt, lubrication, force)
+        call films_at_walls(walls, blocks, a, dt, ahead, lubrication, force)
       end do
     end associate
   end subroutine lubricate
 
   !> Films between sphere a and the walls. A slip wall is a mirror: behind it comes a second sphere,
   !! as fast, at twice the gap.
-  pure subroutine films_at_walls(walls, blocks, a, dt, lubrication, force)
+  pure subroutine films_at_walls(walls, blocks, a, dt, ahead, lubrication, force)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a
-    real(wp), intent(in) :: dt                        !! [s]
+    real(wp), intent(in) :: dt, ahead                 !! [s]
     type(lubrication_t), intent(in) :: lubrication
     real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
-    real(wp) :: n(3), f(3), gap, sides
+    real(wp) :: n(3), f(3), gap, sides, opening
     integer :: w
 
     do w = 1, walls%n
       n = walls%normal(:, w)
       gap = walls%offset(w) - dot_product(n, blocks%x(:, a)) - lubrication%radius(a)
       sides = merge(2.0_wp, 1.0_wp, walls%slip(w))
-      f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap, &
-               -sides*dot_product(n, blocks%v(:, a)), sides*inverse_mass(blocks, a), dt)*n
+      opening = -sides*dot_product(n, blocks%v(:, a))
+      f = push(lubrication, lubrication%radius(a)/sides, n, sides*gap + ahead*opening, opening, &
+               sides*inverse_mass(blocks, a), dt)*n
       force(:, a) = force(:, a) - f
       force(:, walls%number(w)) = force(:, walls%number(w)) + f
     end do
   end subroutine films_at_walls
 
   !> The film between spheres a and b.
-  pure subroutine film_of_pair(period, blocks, a, b, dt, lubrication, force)
+  pure subroutine film_of_pair(period, blocks, a, b, dt, ahead, lubrication, force)
     real(wp), intent(in) :: period(3)                 !! 0 where not periodic [m]
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, b
-    real(wp), intent(in) :: dt                        !! [s]
+    real(wp), intent(in) :: dt, ahead                 !! [s]
     type(lubrication_t), intent(in) :: lubrication
     real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
-    real(wp) :: d(3), n(3), f(3), gap, distance, radius
+    real(wp) :: d(3), n(3), f(3), gap, opening, distance, radius
 
     d = blocks%x(:, b) - blocks%x(:, a)
     d = d + nearest_shift(period, d)
@@ -120,7 +122,8 @@ contains
     n = d/distance
     radius = lubrication%radius(a)*lubrication%radius(b) &
       /(lubrication%radius(a) + lubrication%radius(b))
-    f = push(lubrication, radius, n, gap, dot_product(n, blocks%v(:, b) - blocks%v(:, a)), &
+    opening = dot_product(n, blocks%v(:, b) - blocks%v(:, a))
+    f = push(lubrication, radius, n, gap + ahead*opening, opening, &
              inverse_mass(blocks, a) + inverse_mass(blocks, b), dt)*n
     force(:, a) = force(:, a) - f
     force(:, b) = force(:, b) + f
