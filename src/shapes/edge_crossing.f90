@@ -43,7 +43,7 @@ contains
     real(wp), intent(in) :: least             !! <= 0 [m]
     real(wp), intent(in) :: most              !! > 0 [m]
     type(crossing_t), intent(out) :: crossing
-    real(wp) :: d(3), n(3), sine2, depth, s, t, cosine, peak_s, peak_t, ends(2)
+    real(wp) :: d(3), n(3), sine2, sine, depth, s, t, cosine, peak_s, peak_t, ends(2)
 
     associate (u => guest%along, w => host%along)
       d = host%start - guest%start
@@ -65,10 +65,11 @@ contains
       cosine = dot_product(u, w)
       peak_s = s + depth*lean(n, u, host%into)
       peak_t = t + depth*lean(-n, w, guest%into)
-      ends = [between_ends(peak_s, guest%extent, depth) &
-        *between_ends(t + cosine*(peak_s - s), host%extent, depth), &
-        between_ends(peak_t, host%extent, depth) &
-        *between_ends(s + cosine*(peak_t - t), guest%extent, depth)]
+      sine = sqrt(sine2)
+      ends = [between_ends(peak_s, guest%extent, depth, sine) &
+        *between_ends(t + cosine*(peak_s - s), host%extent, depth, sine), &
+        between_ends(peak_t, host%extent, depth, sine) &
+        *between_ends(s + cosine*(peak_t - t), guest%extent, depth, sine)]
       crossing%weight = crossing%weight*either(ends)
       if (crossing%weight < min_weight) crossing%weight = 0.0_wp
       crossing%depth = depth
@@ -175,20 +176,23 @@ contains
   end function lean
 
   !> One along an edge, falling to zero at its ends.
-  pure function between_ends(place, extent, depth) result(part)
+  pure function between_ends(place, extent, depth, sine) result(part)
     real(wp), intent(in) :: place, extent   !! from the start of the edge; of the edge [m]
     real(wp), intent(in) :: depth           !! [m]
+    real(wp), intent(in) :: sine            !! of the angle between the edges
     real(wp) :: part
 
-    part = fade(min(place, extent - place)/fade_width(extent, depth))
+    part = fade(min(place, extent - place)/fade_width(extent, depth, sine))
   end function between_ends
 
-  !> Way in which the weight fades at an end of an edge [m].
-  pure function fade_width(extent, depth) result(width)
+  !> Way in which the weight fades at an end of an edge [m]. By a shift of the bodies the crossing
+  !! runs along the edge up to 1/sine times as far: the force that turns it back is no stiffer.
+  pure function fade_width(extent, depth, sine) result(width)
     real(wp), intent(in) :: extent, depth   !! [m]
+    real(wp), intent(in) :: sine
     real(wp) :: width
 
-    width = max(share*depth, min_share*extent)
+    width = max(share*depth, min_share*extent)/sine
   end function fade_width
 
   !> Relative change of the weight of a crossing with a shift of the guest [1/m] and with a turn
@@ -201,22 +205,23 @@ contains
     real(wp), intent(out) :: with_shift(3), with_turn(3)
     real(wp) :: d(3), normal(3), sine2, s, t, cosine, lean_s, lean_t, steep(3), steepness
     real(wp) :: by_n(3), by_normal(3), by_d(3), by_u(3), by_into(3, 2)
-    real(wp) :: by_s, by_t, by_depth, by_lean, by_cosine, by_peak, by_other, by_depths(2)
-    real(wp) :: ends(2, 2)
+    real(wp) :: by_s, by_t, by_depth, by_sine, by_lean, by_cosine, by_peak, by_other
+    real(wp) :: by_width(2), by_second(2), ends(2, 2), sine
 
     associate (u => guest%along, w => host%along, n => crossing%normal, depth => crossing%depth)
       d = host%start - guest%start
       normal = cross(u, w)
       sine2 = dot_product(normal, normal)
+      sine = sqrt(sine2)
       s = dot_product(cross(d, w), normal)/sine2
       t = dot_product(cross(d, u), normal)/sine2
       cosine = dot_product(u, w)
       lean_s = lean(n, u, host%into)
       lean_t = lean(-n, w, guest%into)
-      ends(1, 1) = between_ends(s + depth*lean_s, guest%extent, depth)
-      ends(2, 1) = between_ends(t + cosine*depth*lean_s, host%extent, depth)
-      ends(1, 2) = between_ends(t + depth*lean_t, host%extent, depth)
-      ends(2, 2) = between_ends(s + cosine*depth*lean_t, guest%extent, depth)
+      ends(1, 1) = between_ends(s + depth*lean_s, guest%extent, depth, sine)
+      ends(2, 1) = between_ends(t + cosine*depth*lean_s, host%extent, depth, sine)
+      ends(1, 2) = between_ends(t + depth*lean_t, host%extent, depth, sine)
+      ends(2, 2) = between_ends(s + cosine*depth*lean_t, guest%extent, depth, sine)
 
       by_n = 0.0_wp
       by_into = 0.0_wp
@@ -226,12 +231,14 @@ contains
       by_n = by_n - by_normal
 
       ! the peak of the guest in the host
-      call end_slope(s + depth*lean_s, guest%extent, depth, by_peak, by_depths(1))
-      call end_slope(t + cosine*depth*lean_s, host%extent, depth, by_other, by_depths(2))
-      call share_of_either(product(ends, 1), 1, by_peak, by_other, by_depths)
+      call end_slope(s + depth*lean_s, guest%extent, depth, sine, by_peak, by_width)
+      call end_slope(t + cosine*depth*lean_s, host%extent, depth, sine, by_other, by_second)
+      by_width = by_width + by_second
+      call share_of_either(product(ends, 1), 1, by_peak, by_other, by_width)
       by_s = by_peak
       by_t = by_other
-      by_depth = lean_s*(by_peak + cosine*by_other) + sum(by_depths)
+      by_depth = lean_s*(by_peak + cosine*by_other) + by_width(1)
+      by_sine = by_width(2)
       by_cosine = by_other*depth*lean_s
       by_lean = depth*(by_peak + cosine*by_other)
       by_u = 0.0_wp
@@ -243,12 +250,14 @@ contains
       end if
 
       ! the peak of the host in the guest
-      call end_slope(t + depth*lean_t, host%extent, depth, by_peak, by_depths(1))
-      call end_slope(s + cosine*depth*lean_t, guest%extent, depth, by_other, by_depths(2))
-      call share_of_either(product(ends, 1), 2, by_peak, by_other, by_depths)
+      call end_slope(t + depth*lean_t, host%extent, depth, sine, by_peak, by_width)
+      call end_slope(s + cosine*depth*lean_t, guest%extent, depth, sine, by_other, by_second)
+      by_width = by_width + by_second
+      call share_of_either(product(ends, 1), 2, by_peak, by_other, by_width)
       by_t = by_t + by_peak
       by_s = by_s + by_other
-      by_depth = by_depth + lean_t*(by_peak + cosine*by_other) + sum(by_depths)
+      by_depth = by_depth + lean_t*(by_peak + cosine*by_other) + by_width(1)
+      by_sine = by_sine + by_width(2)
       by_cosine = by_cosine + by_other*depth*lean_t
       by_lean = depth*(by_peak + cosine*by_other)
       steep = guest%into(:, 1) - guest%into(:, 2)
@@ -263,7 +272,8 @@ contains
       by_n = by_n - by_depth*d
       by_d = -by_depth*n + (by_s*cross(w, normal) + by_t*cross(u, normal))/sine2
       by_normal = (by_s*cross(d, w) + by_t*cross(d, u) - 2*(by_s*s + by_t*t)*normal)/sine2 &
-        + (by_n - dot_product(by_n, n)*n)/sign(sqrt(sine2), dot_product(normal, n))
+        + (by_n - dot_product(by_n, n)*n)/sign(sine, dot_product(normal, n)) &
+        + by_sine/sine*normal
       by_u = by_u + by_cosine*w + by_t*cross(normal, d)/sine2 + cross(w, by_normal)
 
       with_shift = -by_d
@@ -286,32 +296,33 @@ contains
     if (present(by_into)) by_into(:, i) = by_into(:, i) + slope*normal
   end subroutine fan_slope
 
-  !> Change of log(`between_ends`) with the place and with the depth [1/m]; zero where it is zero.
-  pure subroutine end_slope(place, extent, depth, by_place, by_depth)
-    real(wp), intent(in) :: place, extent, depth   !! as in `between_ends`
-    real(wp), intent(out) :: by_place, by_depth
+  !> Change of log(`between_ends`) with the place, with the depth [1/m] and with the sine; zero where
+  !! it is zero.
+  pure subroutine end_slope(place, extent, depth, sine, by_place, by_width)
+    real(wp), intent(in) :: place, extent, depth, sine   !! as in `between_ends`
+    real(wp), intent(out) :: by_place, by_width(2)
     real(wp) :: x, width, slope
 
-    width = fade_width(extent, depth)
+    width = fade_width(extent, depth, sine)
     x = min(place, extent - place)/width
-    by_place = 0.0_wp
-    by_depth = 0.0_wp
-    slope = fade_slope(x)/width
-    by_place = sign(slope, 0.5_wp*extent - place)
-    if (share*depth > min_share*extent) by_depth = -share*x*slope
+    slope = fade_slope(x)
+    by_place = sign(slope/width, 0.5_wp*extent - place)
+    by_width = 0.0_wp
+    if (share*depth > min_share*extent) by_width(1) = -share*x*slope/(width*sine)
+    by_width(2) = x*slope/sine
   end subroutine end_slope
 
   !> From changes of log(parts(which)) to those of log(`either`).
-  pure subroutine share_of_either(parts, which, by_peak, by_other, by_depths)
+  pure subroutine share_of_either(parts, which, by_peak, by_other, by_width)
     real(wp), intent(in) :: parts(2)
     integer, intent(in) :: which
-    real(wp), intent(inout) :: by_peak, by_other, by_depths(2)
+    real(wp), intent(inout) :: by_peak, by_other, by_width(2)
     real(wp) :: ratio
 
     ratio = parts(which)*(1.0_wp - parts(3 - which))/max(either(parts), tiny(1.0_wp))
     by_peak = ratio*by_peak
     by_other = ratio*by_other
-    by_depths = ratio*by_depths
+    by_width = ratio*by_width
   end subroutine share_of_either
 
 end module edge_crossing_m

@@ -7,9 +7,15 @@ program test_edge_crossing
   implicit none
 
   real(wp), parameter :: depth = 0.01_wp, most = 0.1_wp
+  real(wp) :: sine = 1.0_wp   !! of the angle between keel and ridge
 
   call check_crossing()
   call check_slope()
+  sine = 0.3_wp
+  call check_slope()
+  sine = 0.05_wp
+  call check_slope()
+  sine = 1.0_wp
   call check_bounds()
   call finish_checks()
 
@@ -27,18 +33,20 @@ contains
     edge%outward = [0.0_wp, 0.0_wp, 1.0_wp]
   end function ridge
 
-  !> A keel along x, from -1 to 1, that hangs down to `depth` below the ridge, over place y of it;
-  !! shifted, and turned about the middle of the crossing.
+  !> A keel from -1 to 1, at an angle whose sine is `sine` to the ridge, that hangs down to `depth`
+  !! below it, over place y of it; shifted, and turned about the middle of the crossing.
   function keel(y, shift, turn) result(edge)
     real(wp), intent(in) :: y, shift(3), turn(3)
     type(edge_t) :: edge
     real(wp) :: r(3, 3), middle(3)
 
-    edge%start = [-1.0_wp, y, -depth]
-    edge%along = [1.0_wp, 0.0_wp, 0.0_wp]
-    edge%extent = 2.0_wp
-    edge%into(:, 1) = sqrt(0.5_wp)*[0.0_wp, 1.0_wp, 1.0_wp]
-    edge%into(:, 2) = sqrt(0.5_wp)*[0.0_wp, -1.0_wp, 1.0_wp]
+    associate (cosine => sqrt(1.0_wp - sine**2))
+      edge%start = [-sine, y - cosine, -depth]
+      edge%along = [sine, cosine, 0.0_wp]
+      edge%extent = 2.0_wp
+      edge%into(:, 1) = sqrt(0.5_wp)*[-cosine, sine, 1.0_wp]
+      edge%into(:, 2) = sqrt(0.5_wp)*[cosine, -sine, 1.0_wp]
+    end associate
     edge%outward = [0.0_wp, 0.0_wp, -1.0_wp]
     if (norm2(turn) > 0.0_wp) then
       middle = [0.0_wp, y, -0.5_wp*depth]
@@ -75,15 +83,15 @@ contains
   !> The slope of depth^2 weight with a shift and a turn of the keel, near an end of the ridge.
   !!
   !! The force of the depth acts along the normal at the crossing; what is left is the slope of the
-  !! weight.
+  !! weight. With a shift that is no steeper than in a hundredth of the edge, whatever the angle.
   subroutine check_slope()
     type(crossing_t) :: crossing, there(2)
-    real(wp), parameter :: step = 1.0e-7_wp, none(3) = 0.0_wp
+    real(wp), parameter :: step = 1.0e-7_wp, none(3) = 0.0_wp, width = 0.02_wp
     real(wp) :: with_shift(3), with_turn(3), unit(3), y, found
     integer :: d, faded
 
     faded = 0
-    y = 0.985_wp
+    y = 1.0_wp - 1.5_wp*width/sine
     do while (y < 1.01_wp)
       call cross_edges(keel(y, none, none), ridge(), 0.0_wp, most, crossing)
       if (crossing%weight > 0.05_wp .and. crossing%weight < 0.95_wp) then
@@ -101,8 +109,9 @@ contains
           found = (there(2)%weight - there(1)%weight)/(2*step*crossing%weight)
           call check('slope with a turn', with_turn(d), found, 1.0e-3_wp)
         end do
+        call check('not too steep', norm2(with_shift)*crossing%weight < 2.0_wp/width)
       end if
-      y = y + 0.1_wp*depth
+      y = y + 0.05_wp*width/sine
     end do
     call check('some have faded', faded > 3)
   end subroutine check_slope
