@@ -296,8 +296,8 @@ contains
     if (present(by_into)) by_into(:, i) = by_into(:, i) + slope*normal
   end subroutine fan_slope
 
-  !> Change of log(`between_ends`) with the place, with the depth [1/m] and with the sine; zero where
-  !! it is zero.
+  !> Change of log(`between_ends`) with place and depth [1/m] and with the sine; zero where it is
+  !! zero.
   pure subroutine end_slope(place, extent, depth, sine, by_place, by_width)
     real(wp), intent(in) :: place, extent, depth, sine   !! as in `between_ends`
     real(wp), intent(out) :: by_place, by_width(2)
