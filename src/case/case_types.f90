@@ -241,15 +241,15 @@ contains
     yes = run%physics == 'coupled' .or. run%physics == 'fluid'
   end function has_flow
 
-  !> How the blocks of a case touch. Where it does not say how long substeps may be, in a flow the
-  !! share of a step that the paper gives, else a step.
+  !> How the blocks of a case touch. Where it does not say how long substeps may be: the share of a
+  !! step that the paper gives; in 'light', whose steps follow what falls, a step.
   pure function contact_of(case) result(contact)
     type(case_t), intent(in) :: case
     type(contact_input_t) :: contact
 
     contact = case%contact
-    if (.not. is_given(contact%substep_ratio)) contact%substep_ratio = merge(0.05_wp, 1.0_wp, &
-      has_flow(case%run))
+    if (.not. is_given(contact%substep_ratio)) contact%substep_ratio = merge(1.0_wp, 0.05_wp, &
+      case%run%physics == 'light')
   end function contact_of
 
   !> How many lengths the size of a kind of shape has; 0 where it comes from a file or a mass.

@@ -33,10 +33,10 @@ module case_plan_m
 
   !> Time of one step on one core, as measured with a dozen blocks [s].
   real(wp), parameter :: seconds_per_cell = 2.0e-6_wp, seconds_per_block = 1.0e-4_wp
-  real(wp), parameter :: seconds_per_substep = 4.0e-5_wp   !! of a block that is awake [s]
+  real(wp), parameter :: seconds_per_substep = 1.5e-5_wp   !! of a block that is awake [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
-  real(wp), parameter :: share_shaken = 0.04_wp
+  real(wp), parameter :: share_shaken = 0.025_wp
     !! of the time until the last release in which landing blocks keep one awake that lies [-]
 
 contains

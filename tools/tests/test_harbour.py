@@ -93,12 +93,12 @@ def test_one_by_one(blocks: int, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not MICS.exists(), reason="needs the program")
 def test_time_counts_blocks_that_others_wake(tmp_path: Path) -> None:
-    """Measured 25 minutes for the first 1,125 of 2,000, at the end 1.5 s a simulated second."""
+    """Measured 18 minutes for the first 1,420 of 2,000, at the end .7 s a simulated second."""
     case = tmp_path / "light.nml"
     write(case, "--light", "--blocks", "2000", "--every", "3")
     plan = subprocess.run([MICS, "--check", case], capture_output=True, text=True, timeout=60)
-    found = re.search(r"time of the run +about ([\d.]+) hours", plan.stdout)
-    assert found and 2 < float(found[1]) < 4
+    found = re.search(r"time of the run +about ([\d.]+) minutes", plan.stdout)
+    assert found and 25 < float(found[1]) < 60
 
 
 def test_one_by_one_refuses() -> None:
