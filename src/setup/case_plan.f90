@@ -36,7 +36,7 @@ module case_plan_m
   real(wp), parameter :: seconds_per_substep = 1.5e-5_wp   !! of a block that is awake [s]
   real(wp), parameter :: substeps_per_contact = 20.0_wp
   real(wp), parameter :: time_awake = 20.0_wp   !! of a block dropped, over sqrt(size/g) [-]
-  real(wp), parameter :: share_shaken = 0.025_wp
+  real(wp), parameter :: share_shaken = 0.035_wp
     !! of the time until the last release in which landing blocks keep one awake that lies [-]
 
 contains
