@@ -41,6 +41,7 @@ module contact_response_m
   !> Two counterparts that touch.
   type :: couple_t
     type(inertia_t) :: a, b
+    real(wp) :: k = 0.0_wp   !! stiffness of a contact point of weight one [N/m^gamma]
   end type couple_t
 
 contains
@@ -104,7 +105,7 @@ contains
     type(stiffness_t) :: elastic
     real(wp), parameter :: calm_share = 0.25_wp   !! of the load
     real(wp) :: weights(6), centres(3, 6), nn(6), arm(3)
-    real(wp) :: load(3), total, inverse, k, hard, share, highest, steep, calm, speed
+    real(wp) :: load(3), total, inverse, hard, share, highest, steep, calm, speed
     integer :: a, b, t, i
 
     a = points%item(first)%a
@@ -114,17 +115,17 @@ contains
     centres = 0.0_wp
     load = 0.0_wp
     steep = 0.0_wp
-    k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), counterparts%load, &
+    of%k = law%normal_constant(1.0_wp/(of%a%inverse_mass + of%b%inverse_mass), counterparts%load, &
       min(counterparts%give(a), counterparts%give(b)))
     hard = min(counterparts%hard(a), counterparts%hard(b))
     do t = first, last
       associate (point => points%item(t))
-        response%k(t) = point%weight*k
-        call law%normal_stiffness(k, point%weight, point%depth, hard, elastic)
+        response%k(t) = point%weight*of%k
+        call law%normal_stiffness(of%k, point%weight, point%depth, hard, elastic)
         response%elastic(t) = elastic%force
         response%energy(t) = elastic%energy
         response%eta(t) = point%weight*elastic%hardness
-        response%stiff(t) = k*response%eta(t)
+        response%stiff(t) = of%k*response%eta(t)
         steep = max(steep, elastic%steepness)
         load = load + elastic%force*point%normal
         nn = response%eta(t)*square(point%normal)
@@ -144,12 +145,11 @@ contains
         arm = arm + (point%arm_b - point%arm_a)
         inverse = inverse + inverse_effective_mass(of%b, arm, point%normal)
       end associate
-      highest = max(highest, k*total*inverse)
+      highest = max(highest, of%k*total*inverse)
       share = response%eta(t)
-      call law%damping(share, k, total, inverse, response%eta(t), response%decay(t))
+      call law%damping(share, of%k, total, inverse, response%eta(t), response%decay(t))
       if (points%item(t)%weight < 1.0_wp .and. points%item(t)%depth > 0.0_wp) then
-        call damp_alone(points%item(t), share, k, law, of, response%eta(t), response%decay(t), &
-                        highest)
+        call damp_alone(points%item(t), share, law, of, response%eta(t), response%decay(t), highest)
       end if
     end do
     if (law%damping_ratio > 0.0_wp) call damp_as_one(points, first, last, law, of, response, &
@@ -200,10 +200,9 @@ contains
   !! Its force goes along the gradient of its energy. Where the weight begins, that is steep, and
   !! the mass that the contact point moves by a change of its depth a million times smaller than
   !! along the normal: a dashpot for that mass would throw the bodies.
-  pure subroutine damp_alone(point, share, k, law, of, eta, decay, highest)
+  pure subroutine damp_alone(point, share, law, of, eta, decay, highest)
     type(contact_point_t), intent(in) :: point
-    real(wp), intent(in) :: share, k
-      !! of the contact point in the stiffness k of a whole one [-, N/m]
+    real(wp), intent(in) :: share   !! of the stiffness of a contact point of weight one [-]
     class(contact_law_t), intent(in) :: law
     type(couple_t), intent(in) :: of
     real(wp), intent(inout) :: eta, decay   !! lowered, raised [N s/m, 1/s]
@@ -215,10 +214,10 @@ contains
 
     call push_apart(point, law%gamma_n, 1.0_wp, wrench)
     call drive(of, wrench, motion, inverse)
-    call law%damping(share, k, share, inverse, eta_alone, decay_alone)
+    call law%damping(share, of%k, share, inverse, eta_alone, decay_alone)
     eta = min(eta, eta_alone)
     decay = max(decay, 0.5_wp*eta*inverse)
-    highest = max(highest, k*share*inverse)
+    highest = max(highest, of%k*share*inverse)
   end subroutine damp_alone
 
   !> The motion M^-1 W that a wrench gives the pair at once, and its power W.M^-1 W.

@@ -7,8 +7,7 @@ module contacts_m
   use rigid_body_m, only: blocks_t, begin_step, drift, kick_body, hold_sleepers, look_ahead, &
     follow_motions
   use walls_m, only: walls_t
-  use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, hold_or_wake, &
-                     all_still
+  use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, all_still
   use lubrication_m, only: lubricate
   use counterparts_m, only: update_counterparts, update_motion
   use acting_bodies_m, only: list_present
@@ -19,7 +18,7 @@ module contacts_m
   use substep_limits_m, only: substep_limit, stiffness_limit, equal_substep
   use counterparts_met_m, only: store_counterparts, count_counterparts
   use contact_state_m, only: contacts_t, contacts_init
-  use resting_m, only: wake_or_sleep, restore_contacts
+  use resting_m, only: wake_or_sleep, hold_or_wake, restore_contacts
   implicit none
   private
   public :: contacts_t, contacts_init, move_blocks, contact_report_t
@@ -170,8 +169,7 @@ contains
       call sum_forces(dt_b, detected, displacements, loads, report)
       if (contacts%lubrication%active) call lubricate(walls, blocks, dt_b, 0.0_wp, &
         contacts%lubrication, loads%force)
-      if (contacts%sleep%active) call hold_or_wake(acting, gravity, contacts%steady, blocks, &
-        contacts%sleep, loads%force(:, 1:), loads%torque(:, 1:), contacts%woken)
+      if (contacts%sleep%active) call hold_or_wake(gravity, contacts, blocks)
       do k = 1, size(acting)
         associate (b => acting(k))
           loads%impulse(:, b) = loads%impulse(:, b) + dt_b*(loads%force(:, b) - held(1:3, b))

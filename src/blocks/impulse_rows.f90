@@ -13,7 +13,7 @@ module impulse_rows_m
   use contact_points_m, only: contact_point_t, contact_points_t
   use displacements_m, only: displacements_t, reserve_displacements, comes_before
   use counterparts_m, only: counterparts_t
-  use contact_law_m, only: contact_law_t
+  use contact_detection_m, only: contact_detection_t
   implicit none
   private
   public :: row_t, rows_t, rows_init, make_rows, store_memory, sum_loads, past, in_space
@@ -95,25 +95,23 @@ contains
   !! The soft contact point is a spring of the frequency 1/contact_time of what it pushes, damped so
   !! much that it creeps back: a1 = 2 zeta + h w, a2 = h w a1, a3 = 1/(1 + a2); Catto, Solver2D
   !! (2024).
-  subroutine make_rows(h, contact_time, points, law, counterparts, blocks, memory, rows)
+  subroutine make_rows(h, contact_time, detected, blocks, memory, rows)
     real(wp), intent(in) :: h                     !! sub-sweep [s]
     real(wp), intent(in) :: contact_time          !! [s]
-    type(contact_points_t), intent(in) :: points
-    class(contact_law_t), intent(in) :: law
-    type(counterparts_t), intent(in) :: counterparts
+    type(contact_detection_t), intent(in) :: detected
     type(blocks_t), intent(in) :: blocks
     type(displacements_t), intent(in) :: memory
     type(rows_t), intent(inout) :: rows
     real(wp) :: w, a1, a2
     integer :: t, m, r
 
-    call copy_counterparts(counterparts, blocks, rows)
-    call reserve_rows(points%n, rows)
+    call copy_counterparts(detected%counterparts, blocks, rows)
+    call reserve_rows(detected%points%n, rows)
     rows%n = 0
     rows%n_pairs = 0
     m = 1
-    do t = 1, points%n
-      associate (point => points%item(t))
+    do t = 1, detected%points%n
+      associate (point => detected%points%item(t), law => detected%law)
         if (point%weight < min_weight) cycle
         r = rows%n + 1
         rows%n = r

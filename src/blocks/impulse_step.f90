@@ -18,9 +18,8 @@ module impulse_step_m
   use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
   use impulse_sweeps_m, only: solve_rows, restore
   use lubrication_m, only: lubricate
-  use sleep_m, only: hold_or_wake
   use acting_bodies_m, only: list_present
-  use resting_m, only: restore_contacts
+  use resting_m, only: hold_or_wake, restore_contacts
   use counterparts_met_m, only: store_counterparts
   implicit none
   private
@@ -62,11 +61,7 @@ contains
       do
         call solve_step(walls, gravity, step, h, n, contacts, blocks)
         if (.not. contacts%sleep%active) exit
-        associate (acting => contacts%detected%acting)
-          call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
-            contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
-            contacts%woken)
-        end associate
+        call hold_or_wake(gravity, contacts, blocks)
         if (.not. any(contacts%woken)) exit
         call restore_contacts(blocks, contacts)   ! what wakes takes part: once more
       end do
@@ -178,8 +173,7 @@ contains
       loads%film = 0.0_wp
       if (contacts%lubrication%active) call lubricate(walls, blocks, step, 0.5_wp*step, &
         contacts%lubrication, loads%film)
-      call make_rows(h, contacts%contact_time, detected%points, detected%law, &
-                     detected%counterparts, blocks, contacts%displacements, rows)
+      call make_rows(h, contacts%contact_time, detected, blocks, contacts%displacements, rows)
       if (rows%n > 0) then
         call fall_freely(gravity, step, contacts, blocks, rows)
         call solve_rows(h, n, max_opening*contacts%smallest_edge/contacts%contact_time, rows)

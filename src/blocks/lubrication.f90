@@ -61,7 +61,8 @@ contains
       !! (3, counterparts) of all counterparts [N]
     real(wp), parameter :: round_off = 1.0e-9_wp
     logical :: active(blocks%n)
-    integer :: a, p
+    real(wp) :: f(3)
+    integer :: a, b, p
 
     active = blocks%present(:blocks%n) .and. lubrication%radius > 0.0_wp
     associate (near => lubrication%near)
@@ -72,7 +73,10 @@ contains
         if (.not. active(a)) cycle
         do while (p <= near%n)
           if (near%a(p) /= a) exit
-          call film_of_pair(walls%period, blocks, near%b(p), a, dt, ahead, lubrication, force)
+          b = near%b(p)
+          f = film_of_pair(walls%period, blocks, b, a, dt, ahead, lubrication)
+          force(:, b) = force(:, b) - f
+          force(:, a) = force(:, a) + f
           p = p + 1
         end do
         call films_at_walls(walls, blocks, a, dt, ahead, lubrication, force)
@@ -104,16 +108,17 @@ contains
     end do
   end subroutine films_at_walls
 
-  !> The film between spheres a and b.
-  pure subroutine film_of_pair(period, blocks, a, b, dt, ahead, lubrication, force)
+  !> Force of the film between spheres a and b on b, its opposite acts on a [N].
+  pure function film_of_pair(period, blocks, a, b, dt, ahead, lubrication) result(f)
     real(wp), intent(in) :: period(3)                 !! 0 where not periodic [m]
     type(blocks_t), intent(in) :: blocks
     integer, intent(in) :: a, b
     real(wp), intent(in) :: dt, ahead                 !! [s]
     type(lubrication_t), intent(in) :: lubrication
-    real(wp), intent(inout) :: force(:, bed_counterpart:) !! [N]
-    real(wp) :: d(3), n(3), f(3), gap, opening, distance, radius
+    real(wp) :: f(3)
+    real(wp) :: d(3), n(3), gap, opening, distance, radius
 
+    f = 0.0_wp
     d = blocks%x(:, b) - blocks%x(:, a)
     d = d + nearest_shift(period, d)
     distance = norm(d)
@@ -125,9 +130,7 @@ contains
     opening = dot_product(n, blocks%v(:, b) - blocks%v(:, a))
     f = push(lubrication, radius, n, gap + ahead*opening, opening, &
              inverse_mass(blocks, a) + inverse_mass(blocks, b), dt)*n
-    force(:, a) = force(:, a) - f
-    force(:, b) = force(:, b) + f
-  end subroutine film_of_pair
+  end function film_of_pair
 
   !> Force that drives the two sides of a film apart; negative where it holds them together [N].
   !!

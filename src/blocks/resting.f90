@@ -7,7 +7,7 @@ module resting_m
   use walls_m, only: walls_t
   use displacements_m, only: move_displacements
   use sleep_m, only: update_loads, sum_memory, may_sleep, balanced, rest_tolerance, &
-    put_to_sleep, hold_or_wake, all_still
+    wake_tolerance, put_to_sleep, wake, all_still
   use contact_law_m, only: stored_energy
   use counterparts_m, only: counterparts_t, wrench_t, update_motion, motion_between
   use acting_bodies_m, only: list_present
@@ -18,7 +18,7 @@ module resting_m
   use contact_state_m, only: contacts_t
   implicit none
   private
-  public :: wake_or_sleep, restore_contacts
+  public :: wake_or_sleep, hold_or_wake, restore_contacts
 
 contains
 
@@ -38,12 +38,8 @@ contains
     if (all_still(blocks)) then
       contacts%loads%force = 0.0_wp
       contacts%loads%torque = 0.0_wp
-      associate (acting => contacts%detected%acting)
-        call list_present(blocks, acting)
-        call hold_or_wake(acting%body(:acting%n), gravity, contacts%steady, blocks, &
-          contacts%sleep, contacts%loads%force(:, 1:), contacts%loads%torque(:, 1:), &
-          contacts%woken)
-      end associate
+      call list_present(blocks, contacts%detected%acting)
+      call hold_or_wake(gravity, contacts, blocks)
       changed = any(contacts%woken)
       if (changed) call restore_contacts(blocks, contacts)
     else
@@ -65,6 +61,42 @@ contains
       call store_counterparts(rest%a(:rest%n), rest%b(:rest%n), contacts%met)
     end associate
   end subroutine wake_or_sleep
+
+  !> Complete the contact forces on the acting bodies by those of the contact points at rest, and
+  !! wake who is out of balance.
+  !!
+  !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
+  !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those
+  !! who sleep on get the force and torque that hold them.
+  subroutine hold_or_wake(gravity, contacts, blocks)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
+    type(contacts_t), intent(inout) :: contacts   !! its loads and `woken`
+    type(blocks_t), intent(inout) :: blocks
+    real(wp) :: other(3)
+    integer :: k
+
+    contacts%woken = .false.
+    associate (acting => contacts%detected%acting, loads => contacts%loads, &
+               sleep => contacts%sleep, woken => contacts%woken)
+      do k = 1, acting%n
+        associate (b => acting%body(k))
+          if (.not. blocks%still(b)) cycle
+          loads%force(:, b) = loads%force(:, b) + sleep%load(:, b)
+          loads%torque(:, b) = loads%torque(:, b) + sleep%load_torque(:, b)
+          if (.not. blocks%asleep(b)) cycle
+          other = contacts%steady(:, b) + blocks%mass(b)*gravity
+          woken(b) = .not. balanced(wake_tolerance, loads%force(:, b), loads%torque(:, b), other, &
+            blocks%fluid_torque(:, b), sleep%bounding_radius(b))
+          if (woken(b)) then
+            call wake(b, blocks)
+          else
+            loads%force(:, b) = -other
+            loads%torque(:, b) = -blocks%fluid_torque(:, b)
+          end if
+        end associate
+      end do
+    end associate
+  end subroutine hold_or_wake
 
   !> Let candidates sleep that are held up, touch nothing that is moved at a given rate, and on
   !! which the forces of a substep balance if they do not move.

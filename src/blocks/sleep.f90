@@ -20,7 +20,7 @@ module sleep_m
   private
   public :: sleep_t, sleep_init, update_stillness, update_loads, sum_memory, store_poses
   public :: store_quiet, may_sleep
-  public :: balanced, rest_tolerance, put_to_sleep, stop_sleepers, hold_or_wake, all_still
+  public :: balanced, rest_tolerance, wake_tolerance, put_to_sleep, wake, stop_sleepers, all_still
 
   real(wp), parameter :: slow = 5.0e-4_wp            !! speed of a candidate over sqrt(g radius)
   real(wp), parameter :: time_to_sleep = 1.0_wp      !! before it sleeps, over sqrt(radius/g)
@@ -202,41 +202,5 @@ contains
     blocks%asleep(b) = .false.
     blocks%still(b) = .false.
   end subroutine wake
-
-  !> Complete the contact forces on some bodies by those of the contact points at rest, and wake who
-  !! is out of balance.
-  !!
-  !! Nothing at rest has moved, and in the middle of a substep sleepers have the velocity that the
-  !! other forces give them, like all blocks: what wakes now moves as if it had been awake. Those
-  !! who sleep on get the force and torque that hold them.
-  subroutine hold_or_wake(bodies, gravity, steady, blocks, sleep, force, torque, woken)
-    integer, intent(in) :: bodies(:)
-    real(wp), intent(in) :: gravity(3)         !! [m/s2]
-    real(wp), intent(in) :: steady(:, :)       !! (3, n) of the fluid [N]
-    type(blocks_t), intent(inout) :: blocks
-    type(sleep_t), intent(inout) :: sleep
-    real(wp), intent(inout) :: force(:, :), torque(:, :)   !! (3, n) of contact [N], [N m]
-    logical, intent(out) :: woken(:)           !! (n)
-    real(wp) :: other(3)
-    integer :: b, k
-
-    woken = .false.
-    do k = 1, size(bodies)
-      b = bodies(k)
-      if (.not. blocks%still(b)) cycle
-      force(:, b) = force(:, b) + sleep%load(:, b)
-      torque(:, b) = torque(:, b) + sleep%load_torque(:, b)
-      if (.not. blocks%asleep(b)) cycle
-      other = steady(:, b) + blocks%mass(b)*gravity
-      woken(b) = .not. balanced(wake_tolerance, force(:, b), torque(:, b), other, &
-        blocks%fluid_torque(:, b), sleep%bounding_radius(b))
-      if (woken(b)) then
-        call wake(b, blocks)
-      else
-        force(:, b) = -other
-        torque(:, b) = -blocks%fluid_torque(:, b)
-      end if
-    end do
-  end subroutine hold_or_wake
 
 end module sleep_m
