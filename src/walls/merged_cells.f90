@@ -222,8 +222,7 @@ contains
     call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
-      call find_wall(grid, solid, self%cell(:, m), self%normal(:, m), step(:, :, m), &
-                     self%share(:, m), self%r(:, m), self%distance(:, m))
+      call find_wall(grid, solid, m, self, step(:, :, m))
     end do
     do m = 1, self%n_small
       body = self%body(m)
@@ -237,32 +236,34 @@ contains
     end do
   end subroutine find_targets
 
-  !> Normal of the wall of small cell c, the steps to its targets, their shares of it, r, and the
+  !> Normal of the wall of small cell m, the steps to its targets, their shares of it, r, and the
   !! distances of their fluid; r and distances as without a wall where there is no normal, r
   !! also where the wall has an edge, which the stream of the targets passes straight.
-  subroutine find_wall(grid, solid, c, normal, steps, share, r, distance)
+  subroutine find_wall(grid, solid, m, self, steps)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
-    integer, intent(in) :: c(3)
-    real(wp), intent(out) :: normal(3)
+    integer, intent(in) :: m
+    type(merged_cells_t), intent(inout) :: self
     integer, intent(out) :: steps(3, max_targets)
-    real(wp), intent(out), dimension(max_targets) :: share, r, distance
     integer, parameter :: here(3) = 0
     real(wp) :: own   !! distance of the fluid of the small cell [m]
     integer :: n
 
-    normal = wall_normal(grid, solid, c)
-    r = 1.0_wp
-    distance = 0.0_wp
-    call to_targets(grid, solid, c, normal, steps, share)
-    if (all(abs(normal) <= 0.0_wp)) return
-    own = distance_to_fluid(grid, solid, c, here, normal)
-    do n = 1, max_targets
-      if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
-      distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
-      r(n) = max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
-      r(n) = r(n) + edge_in(solid, c)*(1.0_wp - r(n))
-    end do
+    associate (c => self%cell(:, m), normal => self%normal(:, m), share => self%share(:, m), &
+               r => self%r(:, m), distance => self%distance(:, m))
+      normal = wall_normal(grid, solid, c)
+      r = 1.0_wp
+      distance = 0.0_wp
+      call to_targets(grid, solid, c, normal, steps, share)
+      if (all(abs(normal) <= 0.0_wp)) return
+      own = distance_to_fluid(grid, solid, c, here, normal)
+      do n = 1, max_targets
+        if (share(n) <= 0.0_wp .or. .not. is_near(grid, c + steps(:, n), n_halo)) cycle
+        distance(n) = distance_to_fluid(grid, solid, c, steps(:, n), normal)
+        r(n) = max(0.0_wp, min(1.0_wp, own/max(distance(n), tiny(own))))
+        r(n) = r(n) + edge_in(solid, c)*(1.0_wp - r(n))
+      end do
+    end associate
   end subroutine find_wall
 
   !> Of the own cut cells with their centre in the fluid the normal of the wall, and how far from it

@@ -78,13 +78,14 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
     type(merged_cells_t), intent(inout) :: merged
-    real(wp) :: slip, weight, weights
+    real(wp) :: wall(3), slip, weight, weights
     integer :: m, n, c(3), behind(3)
 
-    !$omp parallel do private(n, c, behind, slip, weight, weights) schedule(static)
+    !$omp parallel do private(n, c, behind, wall, slip, weight, weights) schedule(static)
     do m = 1, merged%n_small
       associate (f => merged%cell(:, m))
         if (.not. grid%owns(f)) cycle
+        wall = velocity_at_wall(grid, merged, m, bodies)
         slip = 0.0_wp
         weights = 0.0_wp
         do n = 1, max_targets
@@ -94,7 +95,7 @@ contains
           if (.not. centre_in_fluid(grid, solid, behind)) cycle
           weight = merged%share(n, m)*(1.0_wp - merged%r(n, m))
           if (weight <= 0.0_wp) cycle
-          slip = slip + weight*slip_by_two(grid, merged, m, bodies, u, c, behind, &
+          slip = slip + weight*slip_by_two(grid, wall, merged%normal(:, m), u, c, behind, &
                                            merged%distance(n, m))
           weights = weights + weight
         end do
@@ -104,24 +105,19 @@ contains
     call halo_exchange(merged%slip, n_halo)
   end subroutine find_slip
 
-  !> s of the layer at wall cell m as cell c and the one behind it have it.
-  pure function slip_by_two(grid, merged, m, bodies, u, c, behind, distance) result(slip)
+  !> s of the layer at a wall as cell c and the one behind it have it.
+  pure function slip_by_two(grid, wall, n, u, c, behind, distance) result(slip)
     type(grid_t), intent(in) :: grid
-    type(merged_cells_t), intent(in) :: merged
-    integer, intent(in) :: m
-    type(rigid_motion_t), intent(in) :: bodies
+    real(wp), intent(in) :: wall(3), n(3)   !! its velocity [m/s] and normal
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
     integer, intent(in) :: c(3), behind(3)
     real(wp), intent(in) :: distance   !! of the fluid of c from the wall [m]
     real(wp) :: slip
-    real(wp) :: wall(3), near(3), far(3), further   !! velocities past the wall, along it
+    real(wp) :: near(3), far(3), further   !! velocities past the wall, along it
 
-    wall = velocity_at_wall(grid, merged, m, bodies)
-    associate (n => merged%normal(:, m))
-      near = scaled_to_wall(u(c(1), c(2), c(3), :) - wall, n, 1.0_wp, 0.0_wp)
-      far = scaled_to_wall(u(behind(1), behind(2), behind(3), :) - wall, n, 1.0_wp, 0.0_wp)
-      further = dot_product(n, (behind - c)*grid%h)
-    end associate
+    near = scaled_to_wall(u(c(1), c(2), c(3), :) - wall, n, 1.0_wp, 0.0_wp)
+    far = scaled_to_wall(u(behind(1), behind(2), behind(3), :) - wall, n, 1.0_wp, 0.0_wp)
+    further = dot_product(n, (behind - c)*grid%h)
     slip = layer_slip(dot_product(near, far)/max(dot_product(far, far), tiny(1.0_wp)), &
                       distance/(distance + further))
   end function slip_by_two
@@ -141,13 +137,14 @@ contains
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! halo filled [m/s]
     type(merged_cells_t), intent(inout) :: merged
-    real(wp) :: slip, weight, weights
+    real(wp) :: wall(3), slip, weight, weights
     integer :: m, d, behind(3), f(3)
 
-    !$omp parallel do private(d, behind, f, slip, weight, weights) schedule(dynamic, 64)
+    !$omp parallel do private(d, behind, f, wall, slip, weight, weights) schedule(dynamic, 64)
     do m = merged%n_small + 1, merged%n
       merged%centre(m) = 1.0_wp
       if (merged%middle(m) <= 0.0_wp) cycle
+      wall = velocity_at_wall(grid, merged, m, bodies)
       slip = 0.0_wp
       weights = 0.0_wp
       associate (c => merged%cell(:, m), n => merged%normal(:, m))
@@ -157,7 +154,7 @@ contains
           f = max(c, behind)
           weight = abs(n(d))*solid%aperture(f(1), f(2), f(3), d)
           if (weight <= 0.0_wp) cycle
-          slip = slip + weight*slip_by_two(grid, merged, m, bodies, u, c, behind, merged%middle(m))
+          slip = slip + weight*slip_by_two(grid, wall, n, u, c, behind, merged%middle(m))
           weights = weights + weight
         end do
       end associate
