@@ -53,8 +53,7 @@ contains
       flow%uf = dt*a%face
       call solve_pressure(grid, solid, flow%rho, dt, flow, held, p)
       converged = converged .and. p%report%converged
-      call extend_pressure(grid, case%fluid%gravity, flow%rho, solid%alpha, system%active, &
-                           p%known, p%closed, flow%p)
+      call extend_pressure(grid, case%fluid%gravity, solid%alpha, flow, p)
       call give_faces(scratch, system%operator%cf)
       flow%uf = uf
       call all_fluid_of_faces(grid, solid, self%bodies, system%operator%flux, flow%uf, &

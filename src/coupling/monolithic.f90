@@ -379,8 +379,7 @@ contains
       end do
       call impose_rigid_velocity(grid, solid, merged, bodies, flow%u)
       call fill_velocity_halo(grid, flow%u)
-      call extend_pressure(grid, self%fluid%gravity, flow%rho, solid%alpha, &
-                           pressure%system%active, pressure%known, pressure%closed, flow%p)
+      call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, pressure)
       call give_faces(scratch, pressure%system%operator%cf)
     end associate
     call sum_forces(dt, self)
@@ -514,8 +513,7 @@ contains
         force(1:3, b) = bodies%mass(b)*(a(1:3) - self%fluid%gravity)
         force(4:6, b) = matmul(bodies%inertia(:, :, b), a(4:6))
       end do
-      call extend_pressure(grid, self%fluid%gravity, flow%rho, solid%alpha, system%active, &
-                           self%pressure%known, self%pressure%closed, flow%p)
+      call extend_pressure(grid, self%fluid%gravity, solid%alpha, flow, self%pressure)
       call give_faces(scratch, system%operator%cf)
     end associate
     self%bodies = moving

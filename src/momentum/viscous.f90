@@ -392,38 +392,35 @@ contains
     type(viscous_t), intent(inout) :: self
     real(wp), intent(in) :: x_body(:, :)
     real(wp), intent(out) :: y_body(:, :)
-    integer :: j, k, c
 
     call halo_exchange(self%s, n_halo, layers=1)
-    !$omp parallel do collapse(2) private(j) schedule(static)
-    do c = 1, 3
-      do k = grid%lo(3), grid%hi(3)
-        do j = grid%lo(2), grid%hi(2)
-          call apply_row(grid, self%diagonal, self%link, self%s, j, k, c, &
-                         self%y(grid%lo(1):grid%hi(1), j, k, c))
-        end do
-      end do
-    end do
+    call apply_to_cells(grid, self%diagonal, self%link, self%s, self%y)
     call add_walls(self%walls, x_body, -1.0_wp, lbound(self%y), self%y)
     y_body = rows_of_bodies(bodies, self, self%s, x_body)
   end subroutine apply_viscous
 
-  !> One line of the system, the links to bodies left out, applied to component c of s.
-  pure subroutine apply_row(grid, diagonal, link, s, j, k, c, y)
+  !> y := the system without the links to bodies, applied to s.
+  subroutine apply_to_cells(grid, diagonal, link, s, y)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
       contiguous :: diagonal, link, s
-    integer, intent(in) :: j, k, c
-    real(wp), intent(inout), contiguous :: y(grid%lo(1):)
-    integer :: i
+    real(wp), intent(inout), contiguous :: y(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    integer :: i, j, k, c
 
-    do i = grid%lo(1), grid%hi(1)
-      y(i) = diagonal(i, j, k, c)*s(i, j, k, c) &
-        - link(i, j, k, 1)*s(i - 1, j, k, c) - link(i + 1, j, k, 1)*s(i + 1, j, k, c) &
-        - link(i, j, k, 2)*s(i, j - 1, k, c) - link(i, j + 1, k, 2)*s(i, j + 1, k, c) &
-        - link(i, j, k, 3)*s(i, j, k - 1, c) - link(i, j, k + 1, 3)*s(i, j, k + 1, c)
+    !$omp parallel do collapse(2) private(i, j) schedule(static)
+    do c = 1, 3
+      do k = grid%lo(3), grid%hi(3)
+        do j = grid%lo(2), grid%hi(2)
+          do i = grid%lo(1), grid%hi(1)
+            y(i, j, k, c) = diagonal(i, j, k, c)*s(i, j, k, c) &
+              - link(i, j, k, 1)*s(i - 1, j, k, c) - link(i + 1, j, k, 1)*s(i + 1, j, k, c) &
+              - link(i, j, k, 2)*s(i, j - 1, k, c) - link(i, j + 1, k, 2)*s(i, j + 1, k, c) &
+              - link(i, j, k, 3)*s(i, j, k - 1, c) - link(i, j, k + 1, 3)*s(i, j, k + 1, c)
+          end do
+        end do
+      end do
     end do
-  end subroutine apply_row
+  end subroutine apply_to_cells
 
   !> Add to the cells what the links to bodies do that move, times a factor.
   pure subroutine add_walls(walls, motion, factor, first, y)

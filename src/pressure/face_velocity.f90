@@ -203,16 +203,13 @@ contains
     logical, intent(in), contiguous, optional, &
       dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: given, in_liquid
       !! has the cell its acceleration in `flow%u`, is it away from gas; absent: everywhere
-    integer :: i, j, k, d, e(3)
+    integer :: i, j, k, d
 
     do d = 1, 3
-      e = unit_step(:, d)
-      call interpolate(grid, dt, e, rho, flow%mu, flow%u(:, :, :, d), a%face(:, :, :, d), &
-                       a%cell(:, :, :, d), flow%uf(:, :, :, d))
+      call interpolate(grid, dt, d, rho, a, flow)
       if (present(given)) call interpolate_beside_gas(grid, dt, d, flow%u(:, :, :, d), a, given, &
                                                       in_liquid, flow%uf(:, :, :, d))
-      if (present(correction)) call add_correction(grid, dt, e, rho, flow%mu, &
-                                                 correction(:, :, :, d), flow%uf(:, :, :, d))
+      if (present(correction)) call add_correction(grid, dt, d, rho, correction, flow)
       call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
@@ -250,7 +247,7 @@ contains
         do k = lower(3), upper(3)
           do j = lower(2), upper(2)
             do i = lower(1), upper(1)
-              c = [i, j, k] - merge(0, 1, s == 1)*e
+              c = [i, j, k] - merge(0, 1, s == 1)*unit_step(:, d)
               share = 0.5_wp*grid%h(d)/side_distance(grid, s, d, c, rho(c(1), c(2), c(3)), &
                 flow%sides)
               mean = merge(-1.0_wp, 1.0_wp, s == 1)*mean_velocity(flow%sides(s, d), c)
@@ -275,28 +272,31 @@ contains
     end function without_acceleration
   end subroutine predict_face_velocity
 
-  !> Velocity of the lower faces in one direction, e along it.
-  subroutine interpolate(grid, dt, e, rho, mu, u, a_face, a_cell, uf)
+  !> Velocity of the lower faces in direction d.
+  subroutine interpolate(grid, dt, d, rho, a, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: rho, mu, u, a_face, a_cell
-    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
+    integer, intent(in) :: d
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(acceleration_t), intent(in) :: a
+    type(flow_t), intent(inout) :: flow
+    integer :: i, j, k, e(3)
     real(wp) :: nu, inverse_h2
 
+    e = unit_step(:, d)
     inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
         !$omp simd private(nu)
         do i = grid%lo(1), grid%hi(1) + e(1)
-          nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
-               /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
-          uf(i, j, k) = face_mean(u(i - e(1), j - e(2), k - e(3)), u(i, j, k)) &
-            + face_step(dt, nu, inverse_h2)*(a_face(i, j, k) &
-                - face_mean(a_cell(i - e(1), j - e(2), k - e(3)), a_cell(i, j, k)))
+          associate (p => i - e(1), q => j - e(2), r => k - e(3))
+            nu = face_mean(flow%mu(p, q, r), flow%mu(i, j, k)) &
+                 /face_mean(rho(p, q, r), rho(i, j, k))
+            flow%uf(i, j, k, d) = face_mean(flow%u(p, q, r, d), flow%u(i, j, k, d)) &
+              + face_step(dt, nu, inverse_h2)*(a%face(i, j, k, d) &
+                  - face_mean(a%cell(p, q, r, d), a%cell(i, j, k, d)))
+          end associate
         end do
       end do
     end do
@@ -333,17 +333,19 @@ contains
     end do
   end subroutine interpolate_beside_gas
 
-  !> Add what the faces in one direction differed from their cells.
-  subroutine add_correction(grid, dt, e, rho, mu, correction, uf)
+  !> Add what the faces in direction d differed from their cells.
+  subroutine add_correction(grid, dt, d, rho, correction, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
-    integer, intent(in) :: e(3)
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: rho, mu, correction
-    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer :: i, j, k
+    integer, intent(in) :: d
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in), contiguous :: &
+      correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
+    type(flow_t), intent(inout) :: flow
+    integer :: i, j, k, e(3)
     real(wp) :: nu, inverse_h2, most
 
+    e = unit_step(:, d)
     inverse_h2 = sum(1.0_wp/grid%h**2)
     !$omp parallel do private(i, j, nu, most) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
@@ -351,14 +353,15 @@ contains
         most = 0.0_wp
         !$omp simd reduction(max: most)
         do i = grid%lo(1), grid%hi(1) + e(1)
-          most = max(most, abs(correction(i, j, k)))
+          most = max(most, abs(correction(i, j, k, d)))
         end do
         if (most <= 0.0_wp) cycle
         !$omp simd private(nu)
         do i = grid%lo(1), grid%hi(1) + e(1)
-          nu = face_mean(mu(i - e(1), j - e(2), k - e(3)), mu(i, j, k)) &
+          nu = face_mean(flow%mu(i - e(1), j - e(2), k - e(3)), flow%mu(i, j, k)) &
                /face_mean(rho(i - e(1), j - e(2), k - e(3)), rho(i, j, k))
-          uf(i, j, k) = uf(i, j, k) + face_step(dt, nu, inverse_h2)/dt*correction(i, j, k)
+          flow%uf(i, j, k, d) = flow%uf(i, j, k, d) &
+            + face_step(dt, nu, inverse_h2)/dt*correction(i, j, k, d)
         end do
       end do
     end do

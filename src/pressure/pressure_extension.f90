@@ -2,9 +2,11 @@
 module pressure_extension_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, n_halo, unit_step
+  use fields_m, only: flow_t
   use cell_list_m, only: list_marked
   use boundary_m, only: fill_scalar_halo
   use mixture_m, only: face_mean
+  use pressure_m, only: pressure_t
   use parallel_m, only: global_sum, halo_exchange
   implicit none
   private
@@ -19,18 +21,13 @@ contains
   !! Cells that are nearly full of solid do not lend theirs while others can: what water is left
   !! between two faces that lie on one another may have any pressure, and it would push the blocks
   !! apart wherever they touch.
-  subroutine extend_pressure(grid, gravity, rho, alpha, active, known, cell, p)
+  subroutine extend_pressure(grid, gravity, alpha, flow, self)
     type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: gravity(3)
-    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+    real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
       !! solid share
-    logical, intent(in), contiguous :: active(grid%first(1):, grid%first(2):, grid%first(3):)
-    integer, intent(inout), contiguous :: known(grid%first(1):, grid%first(2):, grid%first(3):)
-                                                  !! work: pass in which p was found, 0 unknown
-    integer, allocatable, intent(inout) :: cell(:, :)   !! work: those without open faces, grows
-    real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! [Pa]
+    type(flow_t), intent(inout) :: flow      !! its pressure
+    type(pressure_t), intent(inout) :: self
     real(wp), parameter :: min_fluid = 0.1_wp   ! share of a cell that lends its pressure
     integer :: k, l, n, pass, n_found, round
     integer(i8) :: left(1)
@@ -38,33 +35,35 @@ contains
 
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
-      known(:, :, k) = merge(0, 1, active(:, :, k))
+      self%known(:, :, k) = merge(0, 1, self%system%active(:, :, k))
     end do
-    call list_marked(grid, lbound(known), known, cell, n)
-    !$omp parallel do schedule(static)
-    do k = grid%first(3), grid%last(3)
-      known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - min_fluid)
-    end do
-    sideways = .true.
-    round = 1
-    pass = 1
-    do
-      call halo_exchange(p, n_halo, layers=1)
-      call halo_exchange(known, n_halo, layers=1)
-      pass = pass + 1
-      n_found = 0
-      do l = 1, n
-        if (known(cell(1, l), cell(2, l), cell(3, l)) == 0) call from_neighbours(cell(:, l))
+    call list_marked(grid, grid%first, self%known, self%closed, n)
+    associate (known => self%known, cell => self%closed, active => self%system%active)
+      !$omp parallel do schedule(static)
+      do k = grid%first(3), grid%last(3)
+        known(:, :, k) = merge(1, 0, active(:, :, k) .and. alpha(:, :, k) <= 1.0_wp - min_fluid)
       end do
-      left = n_found
-      call global_sum(left)
-      if (left(1) > 0_i8) cycle
-      if (round == 3) exit
-      round = round + 1
-      sideways = .false.
-      if (round == 3) where (active) known = 1
-    end do
-    call fill_scalar_halo(grid, p, layers=1)
+      sideways = .true.
+      round = 1
+      pass = 1
+      do
+        call halo_exchange(flow%p, n_halo, layers=1)
+        call halo_exchange(known, n_halo, layers=1)
+        pass = pass + 1
+        n_found = 0
+        do l = 1, n
+          if (known(cell(1, l), cell(2, l), cell(3, l)) == 0) call from_neighbours(cell(:, l))
+        end do
+        left = n_found
+        call global_sum(left)
+        if (left(1) > 0_i8) cycle
+        if (round == 3) exit
+        round = round + 1
+        sideways = .false.
+        if (round == 3) where (active) known = 1
+      end do
+    end associate
+    call fill_scalar_halo(grid, flow%p, layers=1)
   contains
     !> Mean over the neighbours known before this pass.
     subroutine from_neighbours(c)
@@ -79,15 +78,15 @@ contains
         do s = -1, 1, 2
           o = c + s*unit_step(:, d)
           if (any((o < 1 .or. o > grid%n) .and. .not. grid%periodic)) cycle
-          if (known(o(1), o(2), o(3)) == 0 .or. known(o(1), o(2), o(3)) == pass) cycle
+          if (any(self%known(o(1), o(2), o(3)) == [0, pass])) cycle
           count = count + 1
-          total = total + p(o(1), o(2), o(3)) - real(s, wp)*gravity(d)*grid%h(d) &
-                  *face_mean(rho(o(1), o(2), o(3)), rho(c(1), c(2), c(3)))
+          total = total + flow%p(o(1), o(2), o(3)) - real(s, wp)*gravity(d)*grid%h(d) &
+                  *face_mean(flow%rho(o(1), o(2), o(3)), flow%rho(c(1), c(2), c(3)))
         end do
       end do
       if (count == 0) return
-      p(c(1), c(2), c(3)) = total/real(count, wp)
-      known(c(1), c(2), c(3)) = pass
+      flow%p(c(1), c(2), c(3)) = total/real(count, wp)
+      self%known(c(1), c(2), c(3)) = pass
       n_found = n_found + 1
     end subroutine from_neighbours
   end subroutine extend_pressure

@@ -350,8 +350,7 @@ contains
     where (.not. pressure%system%active) box%flow%p = 1.0e9_wp
     box%solid%alpha(9, 4:6, 5) = 0.99_wp   ! next to no water
     box%flow%p(9, 4:6, 5) = 5.0e4_wp
-    call extend_pressure(box%grid, g, box%flow%rho, box%solid%alpha, pressure%system%active, &
-                         pressure%known, pressure%closed, box%flow%p)
+    call extend_pressure(box%grid, g, box%solid%alpha, box%flow, pressure)
     call check('closed cells: next to no water keeps its pressure', box%flow%p(9, 5, 5), &
                5.0e4_wp, 0.0_wp)
     box%flow%p(9, 4:6, 5) = hydrostatic(5)
