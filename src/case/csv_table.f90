@@ -40,6 +40,7 @@ contains
     character(1) :: separator
     integer :: at, last, line, n, n_lines
     integer :: first(max_columns), final(max_columns)
+    logical :: quoted
 
     allocate (table%name(0), table%line(0), table%first(0, 0), table%last(0, 0))
     call read_whole(file, words)
@@ -61,7 +62,11 @@ contains
       last = end_of_line(table%text, at)
       if (.not. is_empty(table%text(at:last), separator)) then
         if (size(table%name) == 0) separator = separator_of(table%text(at:last))
-        call cut_line(table%text, at, last, separator, line, n, first, final, problems)
+        call cut_line(table%text(at:last), separator, n, first, final, quoted)
+        if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
+          //': no second " closes the text on this line')
+        first(:n) = first(:n) + at - 1
+        final(:n) = final(:n) + at - 1
         if (size(table%name) == 0) then
           call set_names(table, line, n, first, final, problems)
           if (size(table%name) == 0) return
@@ -125,42 +130,38 @@ contains
   end function separator_of
 
   !> The cells of a line: first and last character of each, quotes included.
-  subroutine cut_line(text, at, last, separator, line, n, first, final, problems)
-    character(*), intent(in) :: text
-    integer, intent(in) :: at, last, line
+  pure subroutine cut_line(line, separator, n, first, final, quoted)
+    character(*), intent(in) :: line
     character(1), intent(in) :: separator
     integer, intent(out) :: n                    !! cells; what is beyond `max_columns` is cut off
     integer, intent(out) :: first(:), final(:)
-    type(problems_t), intent(inout) :: problems
+    logical, intent(out) :: quoted               !! the last one has no second "
     character(*), parameter :: blank = ' '//achar(9)
     integer :: i, begin
-    logical :: quoted
 
     n = 0
-    begin = at
+    begin = 1
     quoted = .false.
-    do i = at, last + 1
-      if (i <= last) then
-        if (text(i:i) == '"') quoted = .not. quoted
-        if (quoted .or. text(i:i) /= separator) cycle
+    do i = 1, len(line) + 1
+      if (i <= len(line)) then
+        if (line(i:i) == '"') quoted = .not. quoted
+        if (quoted .or. line(i:i) /= separator) cycle
       end if
       n = n + 1
       if (n > size(first)) exit
       first(n) = begin
       final(n) = i - 1
       do while (first(n) <= final(n))
-        if (verify(text(first(n):first(n)), blank) /= 0) exit
+        if (verify(line(first(n):first(n)), blank) /= 0) exit
         first(n) = first(n) + 1
       end do
       do while (final(n) >= first(n))
-        if (verify(text(final(n):final(n)), blank) /= 0) exit
+        if (verify(line(final(n):final(n)), blank) /= 0) exit
         final(n) = final(n) - 1
       end do
       begin = i + 1
     end do
     n = min(n, size(first))
-    if (quoted) call problems%add_message('line '//to_text(line)//', column '//to_text(n) &
-      //': no second " closes the text on this line')
   end subroutine cut_line
 
   !> The names of the columns, in small letters; a unit in brackets after a name is left away.
