@@ -12,6 +12,8 @@ module boundary_m
   private
   public :: fill_scalar_halo, fill_velocity_halo, set_side_velocity
 
+  integer, parameter :: depth(n_halo) = [1, 2, 3]   !! of the layers outside a side and inside it
+
 contains
 
   !> Normal velocity at the sides where it is given: none through walls, that of an inflow.
@@ -35,17 +37,19 @@ contains
     type(grid_t), intent(in) :: grid
     real(wp), intent(inout), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in), optional :: layers   !! that are read; all by default
-    integer :: d, s, l, n_filled
+    integer :: d, s, l, n_filled, last(n_halo)
 
     n_filled = n_halo
     if (present(layers)) n_filled = layers
     do d = 1, 3
       call halo_exchange(a, n_halo, d, layers)
       if (grid%periodic(d)) cycle
-      !$omp parallel do private(s) schedule(static)
+      !$omp parallel do private(s, last) schedule(static)
       do l = 1, size(a, shared_by(d))
         do s = 1, 2
-          if (grid%at_side(s, d)) call mirror(grid, s, d, n_filled, .false., 1.0_wp, 0.0_wp, l, a)
+          if (.not. grid%at_side(s, d)) cycle
+          last = inner_layer(grid, s, d, 1)
+          call fill_layers(d, l, ghost_layer(grid, s, d, depth), last(:n_filled), 1.0_wp, 0.0_wp, a)
         end do
       end do
     end do
@@ -90,6 +94,7 @@ contains
     integer, intent(in) :: s, d, c, layers, l
     real(wp), intent(inout), contiguous :: u(:, :, :)
     real(wp) :: factor, shift
+    integer :: from(n_halo)
 
     factor = 1.0_wp
     shift = 0.0_wp
@@ -100,45 +105,40 @@ contains
       factor = 0.0_wp
       shift = grid%side_velocity(c, s, d)
     end if
-    call mirror(grid, s, d, layers, is_wall(grid%side(s, d)), factor, shift, l, u)
+    from = inner_layer(grid, s, d, merge(depth, 1, is_wall(grid%side(s, d))))
+    call fill_layers(d, l, ghost_layer(grid, s, d, depth), from(:layers), factor, shift, u)
   end subroutine fill_component
 
-  !> Layers outside side s of direction d in plane l: a(outside) = factor*a(inside) + shift, inside
-  !! the cell as deep, or the last cell.
-  pure subroutine mirror(grid, s, d, layers, as_deep, factor, shift, l, a)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: s, d, layers
-    logical, intent(in) :: as_deep
-    real(wp), intent(in) :: factor, shift
+  !> Layers outside a side of direction d in plane l: a(to) = factor*a(from) + shift.
+  pure subroutine fill_layers(d, l, to, from, factor, shift, a)
+    integer, intent(in) :: d
     integer, intent(in) :: l
       !! place of the plane in the local array with its halo, in direction `shared_by(d)`
+    integer, intent(in) :: to(n_halo), from(:)   !! outside; inside, of those that are filled
+    real(wp), intent(in) :: factor, shift
     real(wp), intent(inout), contiguous :: a(:, :, :)
-    integer :: to(n_halo), from(n_halo), j, m
+    integer :: j, m
 
-    do m = 1, layers
-      to(m) = ghost_layer(grid, s, d, m)
-      from(m) = mirror_layer(grid, s, d, merge(m, 1, as_deep))
-    end do
     select case (d)
     case (1)
       do j = 1, size(a, 2)
-        do m = 1, layers
+        do m = 1, size(from)
           a(to(m), j, l) = factor*a(from(m), j, l) + shift
         end do
       end do
     case (2)
-      do m = 1, layers
+      do m = 1, size(from)
         a(:, to(m), l) = factor*a(:, from(m), l) + shift
       end do
     case default
-      do m = 1, layers
+      do m = 1, size(from)
         a(:, l, to(m)) = factor*a(:, l, from(m)) + shift
       end do
     end select
-  end subroutine mirror
+  end subroutine fill_layers
 
   !> Position of halo layer m outside side s, counted in the local array with its halo (first = 1).
-  pure function ghost_layer(grid, s, d, m) result(layer)
+  elemental function ghost_layer(grid, s, d, m) result(layer)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d, m
     integer :: layer
@@ -147,7 +147,7 @@ contains
   end function ghost_layer
 
   !> Position of the m-th layer of cells inside side s; a thin domain repeats its last layer.
-  pure function mirror_layer(grid, s, d, m) result(layer)
+  elemental function inner_layer(grid, s, d, m) result(layer)
     type(grid_t), intent(in) :: grid
     integer, intent(in) :: s, d, m
     integer :: layer, cells, inner
@@ -155,6 +155,6 @@ contains
     cells = grid%hi(d) - grid%lo(d) + 1
     inner = min(m, cells)
     layer = merge(n_halo + inner, n_halo + cells + 1 - inner, s == 1)
-  end function mirror_layer
+  end function inner_layer
 
 end module boundary_m
