@@ -62,19 +62,18 @@ contains
   end subroutine new_column
 
   !> Create a column that is compressed; a row must be written whole.
-  subroutine new_compressed_column(self, name, units, kind, row, chunk_rows, chunk_layers, column)
+  subroutine new_compressed_column(self, name, units, kind, row, chunk, column)
     class(h5_file_t), intent(inout) :: self
     character(*), intent(in) :: name, units
     integer, intent(in) :: kind           !! file_real64, ...
     integer, intent(in) :: row(:)         !! shape of a row, not empty
-    integer, intent(in) :: chunk_rows
-    integer, intent(in) :: chunk_layers   !! a chunk has this many of the `row(size(row))` layers
+    integer, intent(in) :: chunk(2)       !! of the `row(size(row))` layers of a row, rows
     type(h5_column_t), intent(out) :: column
 
     if (self%info /= 0) return
-    column = empty_column(name, kind, row, chunk_rows)
+    column = empty_column(name, kind, row, chunk(2))
     column%compressed = .true.
-    column%chunk(size(row)) = int(min(chunk_layers, row(size(row))), hsize_t)
+    column%chunk(size(row)) = int(min(chunk(1), row(size(row))), hsize_t)
     call create_column(self, units, column)
   end subroutine new_compressed_column
 

@@ -75,7 +75,8 @@ contains
     if (self%mode == reopening) then
       call self%file%open_column(name, kind, new%column)
     else if (present(layers)) then
-      call self%file%new_compressed_column(name, units, kind, row, new%per_row, layers, new%column)
+      call self%file%new_compressed_column(name, units, kind, row, [layers, new%per_row], &
+                                           new%column)
     else
       call self%file%new_column(name, units, kind, row, chunk, new%column)
     end if

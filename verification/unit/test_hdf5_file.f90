@@ -121,7 +121,7 @@ contains
     call file%new_column('/place', 'm', file_real64, [3, 2], 4, place)
     call file%new_column('/touched', '1', file_integer32, [2], 4, touched)
     call file%new_column('/nobody', 'm', file_real64, [3, 0], 4, nobody)
-    call file%new_compressed_column('/field', 'Pa', file_real32, [2, 3, 4], 1, 2, field)
+    call file%new_compressed_column('/field', 'Pa', file_real32, [2, 3, 4], [2, 1], field)
     do step = 1, 11
       call file%append(time, [real(step, wp)])
       call file%append(place, step + [0.1_wp, 0.2_wp, 0.3_wp, 0.4_wp, 0.5_wp, 0.6_wp])
@@ -191,7 +191,7 @@ contains
     call file%attribute('/', 'note', 'shared')
     call file%new_blocks('/blocks', 'm', [2, layers])
     call file%write_block('/blocks', [1, first], [2, last - first + 1], mine(2*first - 1:2*last))
-    call file%new_compressed_column('/field', 'm', file_real32, [2, layers], 1, 5, field)
+    call file%new_compressed_column('/field', 'm', file_real32, [2, layers], [5, 1], field)
     call file%new_column('/count', '1', file_real64, [integer ::], 8, count)
     do i = 1, 3
       call file%append_block(field, [1, first], [2, last - first + 1], real(i*mine(2*first &
@@ -237,7 +237,7 @@ contains
     a = [(sqrt(real(i, sp)), i=1, layers)]
     if (is_root()) then
       call file%create(path, .false.)
-      call file%new_compressed_column('/field', 'm', file_real32, [layers], 1, layers, field)
+      call file%new_compressed_column('/field', 'm', file_real32, [layers], [layers, 1], field)
       do i = 1, 3
         call file%append_block(field, [1], [layers], -a)
       end do
@@ -271,7 +271,7 @@ contains
     if (.not. is_root()) return
     call file%create(path, .false.)
     call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
-    call file%new_compressed_column('/field', 'm', file_real32, [3, n/3], 1, 9, field)
+    call file%new_compressed_column('/field', 'm', file_real32, [3, n/3], [9, 1], field)
     call file%new_column('/place', 'm', file_real64, [3, 400], 8, place)
     call file%flush()
     too_large = 0
