@@ -30,7 +30,7 @@ module momentum_conservative_m
     integer :: scheme = mp_scheme                   !! of the carried velocity
     real(wp), allocatable :: momentum(:, :, :, :)   !! of the fluid in the cell [kg m/s]
     !> Momentum through the lower faces of two planes, work of each thread [kg m/s].
-    real(wp), allocatable :: carried(:, :, :, :, :)   !! (i, j, component, 0:1, thread)
+    real(wp), allocatable :: carried(:, :, :, :, :)   !! (i, j, component, parity of k, thread)
     logical, allocatable :: mixed_near(:, :, :)     !! within one cell of the interface
     real(wp), allocatable :: implicit_flux(:), implicit_mass(:)
       !! momentum and mass through the faces of small cells
@@ -133,11 +133,9 @@ contains
     do k = grid%lo(3), grid%hi(3)
       low = modulo(k, 2)
       high = modulo(k + e(3), 2)
-      if (at_hand < k) call carry_plane(grid, fluid, self%scheme, d, k, volumes, u, &
-                                        self%mixed_near, self%carried(:, :, :, low, me))
+      if (at_hand < k) call carry_plane(grid, fluid, d, k, volumes, u, self)
       at_hand = k + e(3)
-      if (e(3) == 1) call carry_plane(grid, fluid, self%scheme, d, k + 1, volumes, u, &
-                                      self%mixed_near, self%carried(:, :, :, high, me))
+      if (e(3) == 1) call carry_plane(grid, fluid, d, k + 1, volumes, u, self)
       call exchange_in_plane(grid, e, k, self%carried(:, :, :, low, me), &
                              self%carried(:, :, :, high, me), self%momentum)
     end do
@@ -166,66 +164,63 @@ contains
 
   !> Momentum through the lower faces of plane k in direction d: mass times the mean velocity of the
   !! slab that leaves the donor.
-  subroutine carry_plane(grid, fluid, scheme, d, k, volumes, u, near, carried)
+  subroutine carry_plane(grid, fluid, d, k, volumes, u, self)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: scheme, d, k
+    integer, intent(in) :: d, k
     type(carried_volumes_t), intent(in) :: volumes
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-    logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)   !! [kg m/s]
+    type(momentum_t), intent(inout) :: self   !! its momentum carried, of plane k and this thread
     real(wp), dimension(grid%lo(1):grid%hi(1) + 1) :: mass, keep   ! of a line
-    integer :: j, m, e(3)
+    real(wp) :: donor
+    integer :: i, j, m, e(3), low, me
 
     e = unit_step(:, d)
-    associate (q => volumes%q(:, :, :, d), g => volumes%g(:, :, :, d))
+    low = modulo(k, 2)
+    me = omp_get_thread_num()
+    associate (a => grid%lo(1), b => grid%hi(1) + e(1))
       do j = grid%lo(2), grid%hi(2) + e(2)
+        mass(a:b) = mass_through(fluid, volumes%q(a:b, j, k, d), volumes%g(a:b, j, k, d))
+        call share_beyond_donor(grid, d, j, k, volumes, self%mixed_near, keep)
         do m = 1, 3
-          call face_row(grid, scheme, e, j, k, q, u(:, :, :, m), &
-                        carried(:grid%hi(1) + e(1), j, m))
+          call face_row(grid, self%scheme, e, [a, j, k], volumes%q(:, :, :, d), u(:, :, :, m), &
+                        self%carried(:b, j, m, low, me))
+          !$omp simd private(donor)
+          do i = a, b
+            donor = merge(u(i - e(1), j - e(2), k - e(3), m), u(i, j, k, m), &
+                          volumes%q(i, j, k, d) > 0.0_wp)
+            self%carried(i, j, m, low, me) = &
+              mass(i)*(donor + keep(i)*(self%carried(i, j, m, low, me) - donor))
+          end do
         end do
-        call carry_slabs(grid, fluid, e, j, k, q, g, volumes%v_before, u, near, mass, keep, &
-                         carried)
       end do
     end associate
   end subroutine carry_plane
 
-  !> The same of one line of faces, from the values on them.
-  subroutine carry_slabs(grid, fluid, e, j, k, q, g, v, u, near, mass, keep, carried)
+  !> Share of the value on the faces of line j, k that the mean of the slab has beside the donor's:
+  !! 1 - |Q|/V of the donor, none at the interface.
+  pure subroutine share_beyond_donor(grid, d, j, k, volumes, near, keep)
     type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
-    integer, intent(in) :: e(3), j, k
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
-      contiguous :: q, g, v   !! volume and liquid through the faces, open volume [m3]
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
+    integer, intent(in) :: d, j, k
+    type(carried_volumes_t), intent(in) :: volumes
     logical, intent(in), contiguous :: near(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(inout), contiguous :: mass(grid%lo(1):), keep(grid%lo(1):)
-      !! work: through the face [kg]; share of the value on it that lies beyond the donor's
-    real(wp), intent(inout), contiguous :: carried(grid%lo(1):, grid%lo(2):, :)
-      !! value on the face [m/s], on return momentum through it [kg m/s]
-    real(wp) :: volume, donor
-    integer :: i, m
+    real(wp), intent(inout), contiguous :: keep(grid%lo(1):)
+    real(wp) :: volume
+    integer :: i, e(3)
     logical :: forward, mixed
 
+    e = unit_step(:, d)
     !$omp simd private(volume, forward, mixed)
     do i = grid%lo(1), grid%hi(1) + e(1)
-      forward = q(i, j, k) > 0.0_wp
-      volume = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
-      mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
-      keep(i) = merge(0.0_wp, max(0.0_wp, 1.0_wp - abs(q(i, j, k))/max(volume, tiny(volume))), &
-                      mixed)
-      mass(i) = mass_through(fluid, q(i, j, k), g(i, j, k))
+      associate (q => volumes%q(i, j, k, d), v => volumes%v_before)
+        forward = q > 0.0_wp
+        volume = merge(v(i - e(1), j - e(2), k - e(3)), v(i, j, k), forward)
+        mixed = merge(near(i - e(1), j - e(2), k - e(3)), near(i, j, k), forward)
+        keep(i) = merge(0.0_wp, max(0.0_wp, 1.0_wp - abs(q)/max(volume, tiny(volume))), mixed)
+      end associate
     end do
-    do m = 1, 3
-      !$omp simd private(donor)
-      do i = grid%lo(1), grid%hi(1) + e(1)
-        donor = merge(u(i - e(1), j - e(2), k - e(3), m), u(i, j, k, m), q(i, j, k) > 0.0_wp)
-        carried(i, j, m) = mass(i)*(donor + keep(i)*(carried(i, j, m) - donor))
-      end do
-    end do
-  end subroutine carry_slabs
+  end subroutine share_beyond_donor
 
   !> Velocity after the small cells have given what they hold, with the same implicit donor value as
   !! their liquid; moves the volumes of the small cells too (`small_cells`).

@@ -52,63 +52,56 @@ contains
     !$omp parallel do private(j) schedule(static)
     do k = grid%lo(3), grid%hi(3) + e(3)
       do j = grid%lo(2), grid%hi(2) + e(2)
-        call face_row(grid, scheme, e, j, k, q, u, face(grid%lo(1):grid%hi(1) + e(1), j, k))
+        call face_row(grid, scheme, e, [grid%lo(1), j, k], q, u, &
+                      face(grid%lo(1):grid%hi(1) + e(1), j, k))
       end do
     end do
   end subroutine face_values
 
-  !> The same for the faces of one line, j and k.
-  subroutine face_row(grid, scheme, e, j, k, q, u, face)
+  !> The same for the lower faces of the cells of a line from cell c on. `mp5` is called here only:
+  !! so the compiler puts it into the loop, which then is one over vectors.
+  subroutine face_row(grid, scheme, e, c, q, u, face)
     type(grid_t), intent(in) :: grid
-    integer, intent(in) :: scheme, e(3), j, k
+    integer, intent(in) :: scheme, e(3), c(3)
     real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):), &
       contiguous :: q, u
-    real(wp), intent(inout), contiguous :: face(:)   !! lo(1)..hi(1) + e(1)
-    integer :: i, n
-
-    i = grid%lo(1)
-    n = grid%hi(1) + e(1)
-    associate (u_1 => u(i - e(1):n - e(1), j - e(2), k - e(3)), v_1 => u(i:n, j, k))
-      if (scheme == upwind_scheme) then
-        face = merge(u_1, v_1, q(i:n, j, k) > 0.0_wp)
-      else
-        call fifth_order_row(n - i + 1, scheme, q(i:n, j, k), &
-                             u(i - 3*e(1):n - 3*e(1), j - 3*e(2), k - 3*e(3)), &
-                             u(i - 2*e(1):n - 2*e(1), j - 2*e(2), k - 2*e(3)), u_1, v_1, &
-                             u(i + e(1):n + e(1), j + e(2), k + e(3)), &
-                             u(i + 2*e(1):n + 2*e(1), j + 2*e(2), k + 2*e(3)), face)
-      end if
-    end associate
-  end subroutine face_row
-
-  !> Values on n faces, each between the cells u_3, u_2, u_1 below and v_1, v_2, v_3 above it.
-  !! `mp5` is called here only: so the compiler puts it into the loop, which then is one over
-  !! vectors.
-  pure subroutine fifth_order_row(n, scheme, q, u_3, u_2, u_1, v_1, v_2, v_3, face)
-    integer, intent(in) :: n, scheme
-    real(wp), intent(in), dimension(n) :: q, u_3, u_2, u_1, v_1, v_2, v_3
-    real(wp), intent(inout) :: face(n)
-    integer :: i
+    real(wp), intent(inout), contiguous :: face(:)
+    integer :: i, j, k, a, b
     logical :: forward
 
-    if (scheme == tvd_scheme) then
-      !$omp simd private(forward)
-      do i = 1, n
-        forward = q(i) > 0.0_wp
-        face(i) = tvd5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
-                       merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
-                       merge(v_2(i), u_2(i), forward))
-      end do
-    else
-      !$omp simd private(forward)
-      do i = 1, n
-        forward = q(i) > 0.0_wp
-        face(i) = mp5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
-                      merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
-                      merge(v_2(i), u_2(i), forward))
-      end do
-    end if
-  end subroutine fifth_order_row
+    a = c(1)
+    j = c(2)
+    k = c(3)
+    b = a + size(face) - 1
+    associate (flux => q(a:b, j, k), &
+               u_3 => u(a - 3*e(1):b - 3*e(1), j - 3*e(2), k - 3*e(3)), &
+               u_2 => u(a - 2*e(1):b - 2*e(1), j - 2*e(2), k - 2*e(3)), &
+               u_1 => u(a - e(1):b - e(1), j - e(2), k - e(3)), &
+               v_1 => u(a:b, j, k), &
+               v_2 => u(a + e(1):b + e(1), j + e(2), k + e(3)), &
+               v_3 => u(a + 2*e(1):b + 2*e(1), j + 2*e(2), k + 2*e(3)))
+      select case (scheme)
+      case (upwind_scheme)
+        face = merge(u_1, v_1, flux > 0.0_wp)
+      case (tvd_scheme)
+        !$omp simd private(forward)
+        do i = 1, size(face)
+          forward = flux(i) > 0.0_wp
+          face(i) = tvd5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
+                         merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
+                         merge(v_2(i), u_2(i), forward))
+        end do
+      case default
+        !$omp simd private(forward)
+        do i = 1, size(face)
+          forward = flux(i) > 0.0_wp
+          face(i) = mp5(merge(u_3(i), v_3(i), forward), merge(u_2(i), v_2(i), forward), &
+                        merge(u_1(i), v_1(i), forward), merge(v_1(i), u_1(i), forward), &
+                        merge(v_2(i), u_2(i), forward))
+        end do
+      end select
+    end associate
+  end subroutine face_row
 
   !> Value on the downstream face of cell 0, from the cells -2..2 counted along the flow.
   !!

@@ -55,7 +55,7 @@ contains
     flux = 1.0_wp
     u = 0.0_wp
     u(-1:3, 1, 1) = q
-    call face_row(grid, scheme, [1, 0, 0], 1, 1, flux, u, face)
+    call face_row(grid, scheme, [1, 0, 0], grid%lo, flux, u, face)
     value = face(2)
   end function face_value
 
