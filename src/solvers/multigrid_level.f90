@@ -311,33 +311,25 @@ contains
   subroutine relax_plane(self, colour, k)
     type(level_t), intent(inout) :: self
     integer, intent(in) :: colour, k
-
-    call relax_lines(self%a, self%z, colour, k, self%line(:, :, k), self%c, self%b, self%x)
-  end subroutine relax_plane
-
-  subroutine relax_lines(a, z, colour, k, line, c, b, x)
-    integer, intent(in) :: a(3), z(3), colour, k
-    integer, intent(in) :: line(2, a(2):z(2))
-    real(sp), intent(in) :: c(a(1):z(1), 2, a(2):z(2), a(3):z(3), 3)
-    real(sp), intent(in) :: b(a(1):z(1), 2, a(2):z(2), a(3):z(3))
-    real(sp), intent(inout) :: x(a(1):z(1), 2, a(2):z(2), a(3):z(3))
     integer :: p, q, m, o, j
 
-    do j = a(2) + 1, z(2) - 1
-      m = 1 + modulo(j + k + colour, 2)
-      o = 3 - m
-      do q = line(1, j), line(2, j), vector
-        !$omp simd
-        do p = q, q + vector - 1
-          x(p, m, j, k) = b(p, m, j, k) &
-            + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
-            + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
-            + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
-            + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1)
+    associate (c => self%c, b => self%b, x => self%x)
+      do j = self%a(2) + 1, self%z(2) - 1
+        m = 1 + modulo(j + k + colour, 2)
+        o = 3 - m
+        do q = self%line(1, j, k), self%line(2, j, k), vector
+          !$omp simd
+          do p = q, q + vector - 1
+            x(p, m, j, k) = b(p, m, j, k) &
+              + c(p, m, j, k, 1)*x(p + m - 2, o, j, k) &
+              + c(p + m - 1, o, j, k, 1)*x(p + m - 1, o, j, k) &
+              + c(p, m, j, k, 2)*x(p, m, j - 1, k) + c(p, m, j + 1, k, 2)*x(p, m, j + 1, k) &
+              + c(p, m, j, k, 3)*x(p, m, j, k - 1) + c(p, m, j, k + 1, 3)*x(p, m, j, k + 1)
+          end do
         end do
       end do
-    end do
-  end subroutine relax_lines
+    end associate
+  end subroutine relax_plane
 
   !> Add the residual of a line, unscaled, at the cells m of its pairs.
   subroutine add_residual(self, m, j, k, r)
