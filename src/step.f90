@@ -34,8 +34,8 @@ module step_m
   use solid_geometry_m, only: solid_geometry_t, hand_over_faces
   use solid_fraction_m, only: update_solid
   use liquid_fill_m, only: raise_surface
-  use fluid_transport_m, only: fit_fluxes, carry_fluid, finish_carrying, fluxes_of_step, &
-                               time_step_t
+  use fluid_transport_m, only: begin_carrying, fit_fluxes, carry_fluid, finish_carrying, &
+                               fluxes_of_step, time_step_t
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
   use rigid_body_m, only: fastest_point, follow_motions, look_ahead
@@ -94,7 +94,8 @@ contains
         ! 6 fluxes
         call tic(sim%timer_transport)
         time_step = time_step_t(dt, report%cfl_carried, sim%clock%step)
-        call fit_fluxes(grid, sim%before, sim%solid, time_step, flow, scratch, &
+        call begin_carrying(time_step, scratch, sim%transport)
+        call fit_fluxes(grid, sim%before, sim%solid, time_step, flow, &
                         coupling%pressure%system%solver, sim%transport)
         ! 7 advection
         call carry_fluid(case%fluid, grid, sim%before, time_step, flow, sim%transport)

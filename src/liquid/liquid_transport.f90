@@ -17,7 +17,7 @@ module liquid_transport_m
   use solid_geometry_m, only: solid_geometry_t
   use carried_volumes_m, only: carried_volumes_t, carried_volumes_init
   use elliptic_solver_m, only: elliptic_solver_t
-  use open_flux_m, only: open_flux_t, open_flux_init, find_open_flux
+  use open_flux_m, only: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
   use liquid_sweep_m, only: liquid_sweep_t, liquid_sweep_init, sweep_volumes
   use small_cells_m, only: small_cells_t, small_cells_init, find_small_cells, give_small_cells, &
                            renew_shares
@@ -74,7 +74,8 @@ contains
     type(flow_t), intent(in) :: flow   !! liquid, fluid volume, c (halo filled) and uf of the begin
     integer :: k
 
-    call find_open_flux(grid, old, new, dt, flow, solver, self%flux, self%volumes%q)
+    call flux_of_velocity(grid, old, new, flow%uf, dt, self%volumes%q)
+    call fit_to_bodies(grid, old, new, flow%fluid_volume, solver, self%flux, self%volumes%q)
     !$omp parallel do schedule(static)
     do k = grid%first(3), grid%last(3)
       self%volumes%w(:, :, k) = flow%liquid(:, :, k)

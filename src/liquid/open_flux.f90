@@ -18,7 +18,6 @@ module open_flux_m
   use kinds_m, only: wp, i8
   use grid_m, only: grid_t, unit_step
   use boundary_kinds_m, only: is_wall, gives_pressure
-  use fields_m, only: flow_t
   use solid_geometry_m, only: solid_geometry_t
   use narrow_band_m, only: narrow_band_t, narrow_band_init, reserve, reserve_for_all, &
                          find_parts, sum_by_part, drop_part, find_open_lines
@@ -29,7 +28,7 @@ module open_flux_m
   use parallel_m, only: halo_exchange, global_max
   implicit none
   private
-  public :: open_flux_t, open_flux_init, find_open_flux
+  public :: open_flux_t, open_flux_init, flux_of_velocity, fit_to_bodies
 
   real(wp), parameter :: min_open = 1.0e-9_wp   !! mean open share below which a face is closed
 
@@ -56,36 +55,36 @@ contains
     call narrow_band_init(grid, self%band, pooled)
   end subroutine open_flux_init
 
-  !> Volumes Q through the lower faces, positive in the direction of the axis, faces lo..hi+1 [m3].
-  subroutine find_open_flux(grid, old, new, dt, flow, solver, self, q)
+  !> Make the volumes Q through the lower faces, positive in the direction of the axis, faces
+  !! lo..hi+1, fit the bodies: in each cell of the band their sum is the loss of fluid volume.
+  subroutine fit_to_bodies(grid, old, new, fluid_volume, solver, self, q)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: old, new   !! bodies before and after the step
-    real(wp), intent(in) :: dt   !! [s]
-    type(flow_t), intent(in) :: flow   !! carried `fluid_volume`, velocity `uf` of the open part
+    real(wp), intent(in), contiguous :: &
+      fluid_volume(grid%first(1):, grid%first(2):, grid%first(3):)   !! carried [m3]
     type(elliptic_solver_t), intent(inout) :: solver   !! of the potential for the rests r [V]
     type(open_flux_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m3]
+      !! those of the velocity on entry [m3]
     logical :: balanced
 
     self%iterations = 0
     self%residual = 0.0_wp
     self%unmatched = 0.0_wp
-    call flux_of_velocity(grid, old, new%aperture, flow%uf, dt, q)
     call find_band(grid, old, new, self%band)
     if (self%band%parts == 0) return
-    call find_balances(grid, new, flow%fluid_volume, q, self%band)
+    call find_balances(grid, new, fluid_volume, q, self%band)
     call sum_by_part(grid, self%band)
-    if (excess_stays(grid, flow%fluid_volume, self%band)) then
+    if (excess_stays(grid, fluid_volume, self%band)) then
       call widen_to_domain(grid, old, new, self%band)
-      call find_balances(grid, new, flow%fluid_volume, q, self%band)
+      call find_balances(grid, new, fluid_volume, q, self%band)
       call sum_by_part(grid, self%band)
     end if
     call balance_parts(self, balanced)
     if (balanced) return
     call solve_potential(solver, self)
     call correct_flux(grid, self%band, solver%x, q)
-  end subroutine find_open_flux
+  end subroutine fit_to_bodies
 
   !> The narrow band, its conductances and parts; no parts without solids. If the bodies are where
   !! they were in the last step only the conductances are found again, which stand in a work array.
@@ -173,13 +172,14 @@ contains
   end subroutine widen
 
   !> Volumes of the velocity through the faces as they are at the begin of the step.
-  subroutine flux_of_velocity(grid, old, new_open, uf, dt, q)
+  subroutine flux_of_velocity(grid, old, new, uf, dt, q)
     type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: old
-    real(wp), intent(in), dimension(grid%first(1):, grid%first(2):, grid%first(3):, :), &
-      contiguous :: new_open, uf
-    real(wp), intent(in) :: dt
+    type(solid_geometry_t), intent(in) :: old, new
+    real(wp), intent(in), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! of the open part [m/s]
+    real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(inout), contiguous :: q(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [m3]
     integer :: d, s, i, j, k, a(3), b(3)
     real(wp) :: open_area
 
@@ -192,7 +192,7 @@ contains
         do j = a(2), b(2)
           do i = a(1), b(1)
             q(i, j, k, d) = merge(open_area*old%aperture(i, j, k, d)*uf(i, j, k, d), 0.0_wp, &
-              0.5_wp*(old%aperture(i, j, k, d) + new_open(i, j, k, d)) >= min_open)
+              0.5_wp*(old%aperture(i, j, k, d) + new%aperture(i, j, k, d)) >= min_open)
           end do
         end do
       end do

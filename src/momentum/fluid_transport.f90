@@ -13,8 +13,8 @@ module fluid_transport_m
   use elliptic_solver_m, only: elliptic_solver_t
   implicit none
   private
-  public :: fluid_transport_t, fluid_transport_init, time_step_t, fit_fluxes, carry_fluid, &
-            finish_carrying, fluxes_of_step
+  public :: fluid_transport_t, fluid_transport_init, time_step_t, begin_carrying, fit_fluxes, &
+            carry_fluid, finish_carrying, fluxes_of_step
 
   real(wp), parameter :: subcycle_courant = 0.9_wp
     !! of one subcycle at most: a cell gives less than it has
@@ -88,18 +88,25 @@ contains
     if (self%carries_momentum) call give(scratch, self%momentum%momentum)
   end subroutine give_arrays
 
-  !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
-  subroutine fit_fluxes(grid, before, after, time_step, flow, scratch, solver, self)
-    type(grid_t), intent(in) :: grid
-    type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
+  !> The subcycles of a step and its work arrays.
+  subroutine begin_carrying(time_step, scratch, self)
     type(time_step_t), intent(in) :: time_step
-    type(flow_t), intent(in) :: flow   !! halos filled
     type(scratch_t), intent(inout) :: scratch
-    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
     type(fluid_transport_t), intent(inout) :: self
 
     self%liquid%subcycles = subcycles_of_step(time_step%courant)
     call take_arrays(scratch, self)
+  end subroutine begin_carrying
+
+  !> Stage 6: the volumes that pass the faces, made to fit the moving bodies.
+  subroutine fit_fluxes(grid, before, after, time_step, flow, solver, self)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: before, after   !! at the start and the end of the step
+    type(time_step_t), intent(in) :: time_step
+    type(flow_t), intent(in) :: flow   !! halos filled
+    type(elliptic_solver_t), intent(inout) :: solver   !! of the volume balances; keeps nothing
+    type(fluid_transport_t), intent(inout) :: self
+
     call begin_transport(grid, before, after, time_step%dt, solver, self%liquid, flow)
   end subroutine fit_fluxes
 
