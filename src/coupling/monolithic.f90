@@ -52,7 +52,6 @@ module monolithic_m
     type(half_kick_t) :: half_kick
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
-    real(wp), allocatable :: wall_speed(:)         !! at the ends of links (`wall_layer_m`) [m/s]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
@@ -89,7 +88,6 @@ contains
     call merged_cells_init(grid, self%merged)
     call half_kick_init(grid, self%half_kick, pooled=.true.)
     call wall_balance_init(self%balance)
-    allocate (self%wall_speed(0))
     allocate (self%defect(6, 3, n), source=0.0_wp)
     allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
               self%extrapolated, source=self%total)
@@ -182,7 +180,7 @@ contains
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &
                         flow%u, self%balance%to_wall)
-    call find_wall_speeds(grid, solid, self%at_start, flow%u, self%wall_speed)
+    call find_wall_speeds(grid, solid, self%at_start, flow%u, self%merged)
     associate (system => self%pressure%system)
       call take_faces(scratch, system%operator%cf)
       call set_pressure_system(grid, solid%effective, self%rho, system, flow%sides)
@@ -294,8 +292,7 @@ contains
         call find_centres(grid, solid, self%at_start, flow%u, merged)
         call to_centres(grid, merged, self%at_start, flow%u)
       end if
-      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged, &
-                         self%wall_speed)
+      call build_viscous(grid, solid, bodies, self%rho, flow%mu, dt, viscous, merged)
       call predict_velocity(grid, self%rho, flow, self)
       call to_centres(grid, merged, self%at_start, flow%u, back=.true.)
       call fill_velocity_halo(grid, flow%u, layers=1)

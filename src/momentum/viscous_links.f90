@@ -30,7 +30,7 @@ module viscous_links_m
 contains
 
   !> Assemble masses, links and wall links for the geometry and the fluid at the end of the step.
-  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, merged, wall_speed)
+  subroutine build_viscous(grid, solid, bodies, rho, mu, dt, self, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -38,9 +38,8 @@ contains
       contiguous :: rho, mu      !! [kg/m3], [Pa s]
     real(wp), intent(in) :: dt   !! [s]
     type(viscous_t), intent(inout) :: self
-    type(merged_cells_t), intent(in), optional :: merged   !! none where there are no small cells
-    real(wp), intent(in), optional :: wall_speed(:)
-      !! past the walls at the ends of the links, with `merged` [m/s]; absent: no rough layers
+    type(merged_cells_t), intent(in), optional :: merged
+      !! none where there are no small cells and no rough layers
     integer :: d, k
 
     self%dt = dt
@@ -56,7 +55,7 @@ contains
       call ordinary_links(grid, solid, mu, d, self%link(:, :, :, d))
       call links_to_sides(grid, solid, mu, d, self)
     end do
-    call links_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
+    call links_to_bodies(grid, solid, bodies, rho, mu, self, merged)
     call group_by_body(bodies%n, self)
     call bodies_seen_by_links(solid, bodies, mu, grid, self)
     call finish_diagonal(grid, self%link, self%mass, self%diagonal, self%spread)
@@ -187,7 +186,7 @@ contains
   end subroutine ordinary_links
 
   !> Wall links, of one or both cells of each face through which a link meets a surface.
-  subroutine links_to_bodies(grid, solid, bodies, rho, mu, self, merged, wall_speed)
+  subroutine links_to_bodies(grid, solid, bodies, rho, mu, self, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies
@@ -195,7 +194,6 @@ contains
       contiguous :: rho, mu
     type(viscous_t), intent(inout) :: self
     type(merged_cells_t), intent(in), optional :: merged
-    real(wp), intent(in), optional :: wall_speed(:)
     real(wp) :: spacing
     integer :: m, f(3)
 
@@ -229,7 +227,7 @@ contains
       end do
       x_wall(d) = x_wall(d) + real(sense, wp)*t*grid%h(d)
       viscosity = mu(c(1), c(2), c(3))
-      if (present(wall_speed)) viscosity = max(viscosity, viscosity_at_wall(n, c))
+      if (present(merged)) viscosity = max(viscosity, viscosity_at_wall(n, c))
       call set_wall(n, c, body, viscosity*grid%area(d)/(grid%h(d)*t), &
                     nearest_arm(grid, x_wall, bodies%x(:, body)), self%walls)
     end subroutine wall_link
@@ -241,12 +239,12 @@ contains
       real(wp) :: at_centre   ! velocity there over the mean
 
       mu_w = 0.0_wp
-      if (mu(c(1), c(2), c(3)) <= 0.0_wp .or. wall_speed(n) <= 0.0_wp) return
+      if (mu(c(1), c(2), c(3)) <= 0.0_wp .or. merged%wall_speed(n) <= 0.0_wp) return
       at_centre = 1.0_wp
       associate (m => merged%number(c(1), c(2), c(3)))
         if (m > 0) at_centre = merged%centre(m)
       end associate
-      mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*wall_speed(n), &
+      mu_w = rough_viscosity(rho(c(1), c(2), c(3)), at_centre*merged%wall_speed(n), &
                              distance_of_links(grid, solid, c), spacing)
     end function viscosity_at_wall
   end subroutine links_to_bodies

@@ -42,6 +42,8 @@ module merged_cells_m
     real(wp), allocatable :: middle(:), ratio(:)
     !> Of a wall cell: share of its velocity, seen from the wall, that its centre has.
     real(wp), allocatable :: centre(:)
+    real(wp), allocatable :: wall_speed(:)
+      !! (at least 2 n_link) of the fluid past the wall at the ends of the links [m/s]
     integer :: n_groups = 0                      !! with a target beside an own cell
     integer, allocatable :: leader(:)            !! (groups) number of the target
     integer, allocatable :: first(:)             !! (groups + 1) of its parts in `part`
@@ -60,7 +62,7 @@ contains
     b = grid%last
     allocate (self%cell(3, 0), self%body(0), self%by_body(0), self%first_of_body(0))
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
-    allocate (self%middle(0), self%ratio(0), self%centre(0))
+    allocate (self%middle(0), self%ratio(0), self%centre(0), self%wall_speed(0))
     allocate (self%target(max_targets, 0), self%share(max_targets, 0))
     allocate (self%r(max_targets, 0), self%distance(max_targets, 0))
     allocate (self%first(1), source=1)
@@ -95,6 +97,8 @@ contains
     call group_small_cells(grid, self)
     call ensure_capacity(self%n, self%centre)
     self%centre(:self%n) = 1.0_wp
+    call ensure_capacity(2*solid%n_link, self%wall_speed)
+    self%wall_speed = 0.0_wp
   end subroutine find_merged_cells
 
   !> Is a cut cell a small cell of this process or of the halo that matters?

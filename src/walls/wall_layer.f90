@@ -7,7 +7,6 @@
 !! slip, as without viscosity.
 module wall_layer_m
   use kinds_m, only: wp
-  use growing_m, only: ensure_capacity
   use grid_m, only: grid_t, n_halo, unit_step
   use solid_geometry_m, only: solid_geometry_t, centre_in_fluid
   use rigid_motion_m, only: rigid_motion_t
@@ -187,28 +186,27 @@ contains
     end do
   end subroutine to_centres
 
-  !> Speed of the fluid past the wall at either end of each line between centres that a surface
-  !! cuts; 0 where the end is no own cell with its centre in the fluid. Taken before the forces of
-  !! the step: fluid and body that fall together do not rub.
-  subroutine find_wall_speeds(grid, solid, bodies, u, speed)
+  !> Speed of the fluid past the wall at either end of each line between centres that a surface cuts
+  !! (`merged%wall_speed`); 0 where the end is no own cell with its centre in the fluid. It is that
+  !! before the forces of the step: fluid and body that fall together do not rub.
+  subroutine find_wall_speeds(grid, solid, bodies, u, merged)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: bodies   !! at their new place, as they moved at the start
     real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
       !! [m/s]
-    real(wp), intent(inout), allocatable :: speed(:)   !! (at least 2 n_link) [m/s]
+    type(merged_cells_t), intent(inout) :: merged
     integer :: m, s, c(3)
 
-    call ensure_capacity(2*solid%n_link, speed)
     !$omp parallel do private(s, c) schedule(static)
     do m = 1, solid%n_link
       do s = 1, 2
         c = solid%link(1:3, m)
         if (s == 1) c = c - unit_step(:, solid%link(4, m))
-        speed(2*m - 2 + s) = 0.0_wp
+        merged%wall_speed(2*m - 2 + s) = 0.0_wp
         if (.not. grid%owns(c)) cycle
         if (solid%inside(c(1), c(2), c(3)) /= 0) cycle
-        speed(2*m - 2 + s) = norm2(u(c(1), c(2), c(3), :) &
+        merged%wall_speed(2*m - 2 + s) = norm2(u(c(1), c(2), c(3), :) &
           - velocity_in_cell(grid, bodies, solid%link_body(s, m), c))
       end do
     end do
