@@ -23,8 +23,9 @@ module monolithic_m
   use effective_aperture_m, only: hold_in_cells
   use wall_faces_m, only: face_velocity_at_walls, shorten_at_walls
   use old_time_correction_m, only: store_correction
-  use half_kick_m, only: half_kick_t, half_kick_init, add_first_half, find_liquid, &
-                         add_second_half, add_whole, force_of_half_kick
+  use advected_pressure_m, only: advect_pressure
+  use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole, &
+                         force_of_half_kick
   use buoyancy_m, only: displaced_force, mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
@@ -49,7 +50,8 @@ module monolithic_m
       !! (6, n) change of the motion in this step if the acceleration of the last one goes on
     type(merged_cells_t), allocatable :: merged_before, merged
       !! of the surface at the start and at the end of the step
-    type(half_kick_t) :: half_kick
+    real(wp), allocatable :: given(:, :, :, :)
+      !! momentum of the first half kick, from `begin` to `add_forces` [kg m/s]
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
@@ -86,7 +88,6 @@ contains
     allocate (self%merged_before, self%merged)
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
-    call half_kick_init(grid, self%half_kick, pooled=.true.)
     call wall_balance_init(self%balance)
     allocate (self%defect(6, 3, n), source=0.0_wp)
     allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
@@ -109,17 +110,23 @@ contains
     call extrapolate_motion(self%fluid%gravity, dt, blocks, self)
     self%lagged(:, :blocks%n) = blocks%lagged_force
     call find_merged_before(grid, solid, self)
+    call find_liquid(grid, flow, self%acceleration%given)
     if (self%implicit_momentum) then
       call find_surface_force(self%fluid, grid, solid, flow%c, scratch, self)
-      call find_liquid(grid, flow, self%half_kick%takes_part)
       call keep_acceleration(grid, self%fluid%gravity, solid%aperture, flow%rho, flow, self)
       call give(scratch, self%tension%force)
     else
       call take(scratch, self%correction)
-      call take(scratch, self%half_kick%given)
+      call take(scratch, self%given)
       call store_correction(grid, solid%alpha, flow%rho, flow%u, flow%uf, self%correction)
-      call add_first_half(grid, self%fluid, solid, self%merged_before, self%bodies, &
-                          self%extrapolated, dt, flow, self%acceleration, self%half_kick)
+      associate (fluid => self%fluid, a => self%acceleration)
+        call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, self%bodies, &
+                             dt, a, flow%p)
+        call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
+        call find_first_half(grid, solid, self%merged_before, self%bodies, self%extrapolated/dt, &
+                             flow%rho, a)
+        call add_first_half(grid, fluid, dt, a, flow, self%given)
+      end associate
     end if
   end subroutine begin
 
@@ -226,10 +233,10 @@ contains
       if (self%implicit_momentum) then
         call accelerate_cells(grid, dt, flow, self)
       else
-        call add_second_half(grid, dt, a%cell, self%half_kick, flow%u)
-        call force_of_half_kick(grid, self%fluid, self%merged_before, self%merged, self%bodies, &
-                                dt, flow, a%cell, self%half_kick, self%from_half_kick)
-        call give(scratch, self%half_kick%given)
+        call add_second_half(grid, dt, a, flow%u)
+        self%from_half_kick = force_of_half_kick(grid, self%fluid, self%merged_before, &
+                                                 self%merged, self%bodies, dt, flow, a, self%given)
+        call give(scratch, self%given)
       end if
       call add_product(grid, dt, by_stress, flow%u)
     end associate
@@ -318,22 +325,21 @@ contains
     self%predicted%motion = self%at_start%motion + self%extrapolated
     call fill_velocity_halo(grid, flow%u, layers=1)
     call halo_exchange(self%acceleration%cell, n_halo, layers=1)
-    associate (a => self%acceleration, merged => self%merged, &
-               given => self%half_kick%takes_part, in_liquid => self%half_kick%in_liquid)
-      call find_liquid(grid, flow, in_liquid, among=given)   ! the surface may have come
+    associate (a => self%acceleration, merged => self%merged)
+      call find_liquid(grid, flow, a%in_liquid, among=a%given)   ! the surface may have come
       if (self%implicit_momentum) then
         call predict_face_velocity(grid, dt, self%rho, a, flow)
       else
-        call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction, given, in_liquid)
+        call predict_face_velocity(grid, dt, self%rho, a, flow, self%correction)
         call give(scratch, self%correction)
-        call shorten_at_walls(grid, dt, self%bodies, merged, in_liquid, self%rho, a, flow)
+        call shorten_at_walls(grid, dt, self%bodies, merged, self%rho, a, flow)
       end if
       call face_velocity_at_walls(grid, solid, self%at_start, self%predicted, merged, dt, &
-                                  self%implicit_momentum, given, in_liquid, self%rho, a, flow)
+                                  self%implicit_momentum, self%rho, a, flow)
       if (self%implicit_momentum) then
         call renew_acceleration(dt, flow, self)
       else
-        call add_whole(grid, dt, a%cell, self%half_kick, flow%u)
+        call add_whole(grid, dt, a, flow%u)
       end if
     end associate
   end subroutine predict_faces

@@ -28,78 +28,62 @@ module half_kick_m
   use wall_balance_m, only: add_to_bodies
   use solid_geometry_m, only: solid_geometry_t
   use rigid_motion_m, only: rigid_motion_t
-  use face_velocity_m, only: acceleration_t, face_acceleration, cell_mean_of_faces
-  use advected_pressure_m, only: advect_pressure
+  use face_velocity_m, only: acceleration_t, cell_mean_of_faces
   use mixture_m, only: pure_share, mass_through
   use exact_sum_m, only: exact_totals, accumulator_size, no_terms
   use parallel_m, only: halo_exchange
   implicit none
   private
-  public :: half_kick_t, half_kick_init, add_first_half, find_liquid
-  public :: add_second_half, add_whole, force_of_half_kick
+  public :: find_liquid, find_first_half, add_first_half, add_second_half, add_whole
+  public :: force_of_half_kick
 
   real(wp), parameter :: full = 1.0_wp - pure_share   !! liquid share of a cell without gas [-]
 
-  type :: half_kick_t
-    logical, allocatable :: takes_part(:, :, :)
-      !! cells whose neighbours are all full of liquid at the start of the step
-    logical, allocatable :: in_liquid(:, :, :)     !! those of them that are so at its end, too
-    real(wp), allocatable :: given(:, :, :, :)     !! momentum given before the transport [kg m/s]
-  end type half_kick_t
-
 contains
 
-  !> Allocate for a grid; nothing given.
-  subroutine half_kick_init(grid, self, pooled)
+  !> Acceleration of the cells that take part from that of the faces, by weight and old pressure;
+  !! halo filled, small cells as their targets.
+  subroutine find_first_half(grid, solid, merged, bodies, held, rho, a)
     type(grid_t), intent(in) :: grid
-    type(half_kick_t), intent(out) :: self
-    logical, intent(in), optional :: pooled   !! arrays over the cells come from `scratch_m` later
-    integer :: a(3), b(3)
-
-    a = grid%first
-    b = grid%last
-    allocate (self%takes_part(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
-    allocate (self%in_liquid, source=self%takes_part)
-    if (.not. present(pooled)) then
-      allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
-    end if
-  end subroutine half_kick_init
-
-  !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
-  subroutine add_first_half(grid, fluid, solid, merged, bodies, extrapolated, dt, flow, a, self)
-    type(grid_t), intent(in) :: grid
-    type(fluid_t), intent(in) :: fluid
     type(solid_geometry_t), intent(in) :: solid   !! at the start of the step
     type(merged_cells_t), intent(in) :: merged     !! likewise
     type(rigid_motion_t), intent(in) :: bodies    !! likewise
-    real(wp), intent(in) :: extrapolated(:, :)   !! (6, bodies) change of motion that goes on
+    real(wp), intent(in) :: held(:, :)
+      !! (6, bodies) acceleration of what they hold of the fluid [m/s2, rad/s2]
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
+    type(acceleration_t), intent(inout) :: a
+
+    call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
+    call hold_in_cells(grid, solid, bodies, held, a%face, a%cell)
+    call change_where(grid, a%given, .false., a%cell)
+    call halo_exchange(a%cell, n_halo)
+    call share_acceleration(grid, solid%aperture, rho, merged, a%cell)
+  end subroutine find_first_half
+
+  !> Add half a step of weight and old pressure to the velocity of the liquid, halo filled.
+  subroutine add_first_half(grid, fluid, dt, a, flow, given)
+    type(grid_t), intent(in) :: grid
+    type(fluid_t), intent(in) :: fluid
     real(wp), intent(in) :: dt            !! [s]
+    type(acceleration_t), intent(in) :: a
     type(flow_t), intent(inout) :: flow   !! of the start of the step
-    type(acceleration_t), intent(inout) :: a      !! work
-    type(half_kick_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! momentum that the cells get [kg m/s]
     integer :: i, j, k
     real(wp) :: mass
 
-    call find_liquid(grid, flow, self%takes_part)
-    call advect_pressure(grid, fluid%liquid_density*fluid%gravity, solid%alpha, bodies, &
-                        self%takes_part, dt, a, flow%p)
-    call face_acceleration(grid, fluid%gravity, flow%rho, flow%rho, flow%p, a%face, flow%sides)
-    call cell_mean_of_faces(grid, solid%aperture, a%face, a%cell)
-    call hold_in_cells(grid, solid, bodies, extrapolated/dt, a%face, a%cell)
-    call change_where(grid, self%takes_part, .false., a%cell)
-    call halo_exchange(a%cell, n_halo)
-    call share_acceleration(grid, solid%aperture, flow%rho, merged, a%cell)
     !$omp parallel do private(i, j, mass) schedule(static)
     do k = grid%lo(3), grid%hi(3)
       do j = grid%lo(2), grid%hi(2)
         do i = grid%lo(1), grid%hi(1)
-          if (.not. self%takes_part(i, j, k)) then
-            self%given(i, j, k, :) = 0.0_wp
+          if (.not. a%given(i, j, k)) then
+            given(i, j, k, :) = 0.0_wp
             cycle
           end if
           mass = mass_through(fluid, flow%fluid_volume(i, j, k), flow%liquid(i, j, k))
           flow%u(i, j, k, :) = flow%u(i, j, k, :) + 0.5_wp*dt*a%cell(i, j, k, :)
-          self%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+          given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
@@ -107,27 +91,23 @@ contains
   end subroutine add_first_half
 
   !> The second half of weight and old pressure in the cells that take part.
-  subroutine add_second_half(grid, dt, a, self, u)
+  subroutine add_second_half(grid, dt, a, u)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s2]
-    type(half_kick_t), intent(in) :: self
+    type(acceleration_t), intent(in) :: a
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call change_where(grid, self%takes_part, .true., u, 0.5_wp*dt, a)
+    call change_where(grid, a%given, .true., u, 0.5_wp*dt, a%cell)
   end subroutine add_second_half
 
   !> Weight and old pressure in all other cells.
-  subroutine add_whole(grid, dt, a, self, u)
+  subroutine add_whole(grid, dt, a, u)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s2]
-    type(half_kick_t), intent(in) :: self
+    type(acceleration_t), intent(in) :: a
     real(wp), intent(inout), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):, :)
 
-    call change_where(grid, self%takes_part, .false., u, dt, a)
+    call change_where(grid, a%given, .false., u, dt, a%cell)
   end subroutine add_whole
 
   !> u += time a, or u = 0 without a, in the own cells that take part or in those that do not.
@@ -190,19 +170,19 @@ contains
   end subroutine find_liquid
 
   !> Force and torque on each body by which the impulses of the old pressure on the surface of the
-  !! start (`self%given`) and on that of the end differ [N, N m]; `a` is the acceleration on the
-  !! surface of the end, of groups.
-  subroutine force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, self, force)
+  !! start (`given`) and on that of the end differ [N, N m].
+  function force_of_half_kick(grid, fluid, before, merged, bodies, dt, flow, a, given) &
+    result(force)
     type(grid_t), intent(in) :: grid
     type(fluid_t), intent(in) :: fluid
     type(merged_cells_t), intent(in) :: before, merged   !! of the start and of the end
     type(rigid_motion_t), intent(in) :: bodies
     real(wp), intent(in) :: dt   !! [s]
     type(flow_t), intent(in) :: flow
-    real(wp), intent(in), contiguous :: a(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s2]
-    type(half_kick_t), intent(in) :: self
-    real(wp), intent(out) :: force(:, :)   !! (6, bodies)
+    type(acceleration_t), intent(in) :: a   !! on the surface of the end, of groups
+    real(wp), intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):, :)
+      !! [kg m/s]
+    real(wp) :: force(6, bodies%n)
     integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     real(wp) :: total(6*bodies%n), owed(3, max(before%n, merged%n))
     integer :: m
@@ -222,7 +202,7 @@ contains
     end do
     call add_to_bodies(grid, before, bodies, owed, accumulator)
     call exact_totals(accumulator, total)
-    force(:, :bodies%n) = reshape(total, [6, bodies%n])
+    force = reshape(total, [6, bodies%n])
   contains
     !> Force that own cell c owes the body of its wall [N].
     pure function of_cell(c) result(f)
@@ -232,14 +212,14 @@ contains
 
       f = 0.0_wp
       if (.not. grid%owns(c)) return
-      f = -self%given(c(1), c(2), c(3), :)
-      if (self%takes_part(c(1), c(2), c(3))) then
+      f = -given(c(1), c(2), c(3), :)
+      if (a%given(c(1), c(2), c(3))) then
         mass = mass_through(fluid, flow%fluid_volume(c(1), c(2), c(3)), &
                             flow%liquid(c(1), c(2), c(3)))
-        f = f + 0.5_wp*dt*mass*a(c(1), c(2), c(3), :)
+        f = f + 0.5_wp*dt*mass*a%cell(c(1), c(2), c(3), :)
       end if
       f = f/dt
     end function of_cell
-  end subroutine force_of_half_kick
+  end function force_of_half_kick
 
 end module half_kick_m

@@ -28,30 +28,29 @@ contains
 
   !> Carry the pressure of the liquid, less that of its weight at rest, by the way of the bodies in
   !! a step; halo filled.
-  subroutine advect_pressure(grid, weight, alpha, bodies, takes_part, dt, work, p)
+  subroutine advect_pressure(grid, weight, alpha, bodies, dt, a, p)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: weight(3)            !! of the liquid, rho g [N/m3]
     real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
       !! solid share, at the start of the step
     type(rigid_motion_t), intent(in) :: bodies   !! likewise
-    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! cells full of liquid with all cells around
     real(wp), intent(in) :: dt                   !! [s]
-    type(acceleration_t), intent(inout) :: work  !! room for what is found here
+    type(acceleration_t), intent(inout) :: a
+      !! its cells `given` in liquid take part; the rest is room for what is found here
     real(wp), intent(inout), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
       !! halo filled [Pa]
     integer :: k
 
     if (.not. any(abs(bodies%motion) > 0.0_wp)) return
-    ! A plane of `work%face` is free for the change once its way is known.
+    ! A plane of `a%face` is free for the change once its way is known.
     !$omp parallel do schedule(dynamic)
     do k = grid%lo(3), grid%hi(3)
-      call find_way(grid, bodies, dt, k, work%face(:, :, :, 1), work%cell)
-      call find_change(grid, weight, alpha, takes_part, work%cell, p, k, work%face(:, :, :, 1))
+      call find_way(grid, bodies, dt, k, a%face(:, :, :, 1), a%cell)
+      call find_change(grid, weight, alpha, p, k, a)
     end do
     !$omp parallel do schedule(static)
     do k = grid%lo(3), grid%hi(3)
-      p(:, :, k) = p(:, :, k) + work%face(:, :, k, 1)
+      p(:, :, k) = p(:, :, k) + a%face(:, :, k, 1)
     end do
     call fill_scalar_halo(grid, p, layers=1)
   end subroutine advect_pressure
@@ -110,29 +109,26 @@ contains
     z = min(z, grid%hi)
   end subroutine cells_around
 
-  !> What the pressure in plane k changes by, to second order in the way; beside a cell without
+  !> What the pressure in plane k changes by, `a%face(:, :, k, 1)` [Pa], to second order in the way
+  !! `a%cell` [cells]; beside a cell without
   !! fluid by the slope on the other side. At the sides of the tank it has no slope but by weight,
   !! as beside a plane wall.
-  pure subroutine find_change(grid, weight, alpha, takes_part, way, p, k, change)
+  pure subroutine find_change(grid, weight, alpha, p, k, a)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: weight(3)   !! [N/m3]
     real(wp), intent(in), contiguous :: alpha(grid%first(1):, grid%first(2):, grid%first(3):)
-    logical, intent(in), contiguous :: takes_part(grid%first(1):, grid%first(2):, grid%first(3):)
-    real(wp), intent(in), contiguous :: way(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [cells]
     real(wp), intent(in), contiguous :: p(grid%first(1):, grid%first(2):, grid%first(3):)
     integer, intent(in) :: k
-    real(wp), intent(inout), contiguous :: change(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! [Pa]
+    type(acceleration_t), intent(inout) :: a
     real(wp) :: up(3), down(3), twist(3)   !! differences to the cells around [Pa]
     integer :: i, j
 
-    change(:, :, k) = 0.0_wp
+    a%face(:, :, k, 1) = 0.0_wp
     do j = grid%lo(2), grid%hi(2)
       do i = grid%lo(1), grid%hi(1)
-        if (.not. takes_part(i, j, k)) cycle
-        if (.not. any(abs(way(i, j, k, :)) > 0.0_wp)) cycle
-        associate (q => p(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1), w => way(i, j, k, :))
+        if (.not. a%given(i, j, k)) cycle
+        if (.not. any(abs(a%cell(i, j, k, :)) > 0.0_wp)) cycle
+        associate (q => p(i - 1:i + 1, j - 1:j + 1, k - 1:k + 1), w => a%cell(i, j, k, :))
           up = [q(3, 2, 2), q(2, 3, 2), q(2, 2, 3)] - q(2, 2, 2) - weight*grid%h
           down = q(2, 2, 2) - [q(1, 2, 2), q(2, 1, 2), q(2, 2, 1)] - weight*grid%h
           where ([i, j, k] == grid%n .and. .not. grid%periodic) up = 0.0_wp
@@ -145,7 +141,7 @@ contains
             where ([alpha(i - 1, j, k), alpha(i, j - 1, k), alpha(i, j, k - 1)] >= 1.0_wp) down = up
             twist = 0.0_wp
           end if
-          change(i, j, k) = 0.5_wp*sum(w**2*(up - down)) - 0.5_wp*sum(w*(up + down)) &
+          a%face(i, j, k, 1) = 0.5_wp*sum(w**2*(up - down)) - 0.5_wp*sum(w*(up + down)) &
             + w(2)*w(3)*twist(1) + w(3)*w(1)*twist(2) + w(1)*w(2)*twist(3)
         end associate
       end do

@@ -18,6 +18,10 @@ module face_velocity_m
   type :: acceleration_t
     real(wp), allocatable :: face(:, :, :, :)   !! of the lower faces, along their normal [m/s2]
     real(wp), allocatable :: cell(:, :, :, :)   !! mean of the two faces of each direction [m/s2]
+    logical, allocatable :: given(:, :, :)
+      !! cells that have it in their velocity before the faces: all cells around them were full of
+      !! liquid at the start of the step (`half_kick_m`)
+    logical, allocatable :: in_liquid(:, :, :)  !! those of them that are so at its end, too
   end type acceleration_t
 
 contains
@@ -32,6 +36,8 @@ contains
     b = grid%last
     allocate (self%face(a(1):b(1), a(2):b(2), a(3):b(3), 3), source=0.0_wp)
     allocate (self%cell, source=self%face)
+    allocate (self%given(a(1):b(1), a(2):b(2), a(3):b(3)), source=.false.)
+    allocate (self%in_liquid, source=self%given)
   end subroutine acceleration_init
 
   !> Acceleration at the faces: a_f = (rho_w,f g - (p_high - p_low)/h)/rho_f [m/s2].
@@ -190,26 +196,24 @@ contains
   !! At sides with a given pressure it is the cell's; at an outflow the part of the length
   !! `side_distance` beyond half a cell has the mean velocity of the side. This drag is an
   !! acceleration of the face that `a_face` does not hold, so half of it goes to the cell, too.
-  subroutine predict_face_velocity(grid, dt, rho, a, flow, correction, given, in_liquid)
+  subroutine predict_face_velocity(grid, dt, rho, a, flow, correction)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt   !! [s]
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
-    type(acceleration_t), intent(in) :: a   !! already in `flow%u`, halo of cells filled
+    type(acceleration_t), intent(in) :: a   !! halo of cells filled
     type(flow_t), intent(inout) :: flow   !! halo of u filled
     real(wp), intent(in), contiguous, optional :: &
       correction(grid%first(1):, grid%first(2):, grid%first(3):, :)
-      !! [m/s]
-    logical, intent(in), contiguous, optional, &
-      dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: given, in_liquid
-      !! has the cell its acceleration in `flow%u`, is it away from gas; absent: everywhere
+      !! [m/s]; absent: all cells have their acceleration in `flow%u`, beside gas, too
     integer :: i, j, k, d
 
     do d = 1, 3
       call interpolate(grid, dt, d, rho, a, flow)
-      if (present(given)) call interpolate_beside_gas(grid, dt, d, flow%u(:, :, :, d), a, given, &
-                                                      in_liquid, flow%uf(:, :, :, d))
-      if (present(correction)) call add_correction(grid, dt, d, rho, correction, flow)
+      if (present(correction)) then
+        call interpolate_beside_gas(grid, dt, d, a, flow)
+        call add_correction(grid, dt, d, rho, correction, flow)
+      end if
       call sides_of_direction()
     end do
     call set_side_velocity(grid, flow%uf)
@@ -265,9 +269,7 @@ contains
       real(wp) :: u
 
       u = flow%u(c(1), c(2), c(3), d)
-      if (present(given)) then
-        if (.not. given(c(1), c(2), c(3))) return
-      end if
+      if (present(correction) .and. .not. a%given(c(1), c(2), c(3))) return
       u = u - dt*a%cell(c(1), c(2), c(3), d)
     end function without_acceleration
   end subroutine predict_face_velocity
@@ -305,15 +307,12 @@ contains
   !> Velocity of the lower faces in direction d between cells of which one is at or in gas: whatever
   !! the cells have of the old pressure is taken from them, and the face gets it as a whole,
   !! $$ u_f = \overline{u - \Delta t\, a} + \Delta t\, a_f $$
-  subroutine interpolate_beside_gas(grid, dt, d, u, a, given, in_liquid, uf)
+  subroutine interpolate_beside_gas(grid, dt, d, a, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt
     integer, intent(in) :: d
-    real(wp), intent(in), contiguous :: u(grid%first(1):, grid%first(2):, grid%first(3):)
     type(acceleration_t), intent(in) :: a
-    logical, intent(in), contiguous, dimension(grid%first(1):, grid%first(2):, grid%first(3):) :: &
-      given, in_liquid
-    real(wp), intent(inout), contiguous :: uf(grid%first(1):, grid%first(2):, grid%first(3):)
+    type(flow_t), intent(inout) :: flow
     integer :: i, j, k, e(3)
     real(wp) :: low, high
 
@@ -323,10 +322,10 @@ contains
       do j = grid%lo(2), grid%hi(2) + e(2)
         do i = grid%lo(1), grid%hi(1) + e(1)
           associate (p => i - e(1), q => j - e(2), r => k - e(3))
-            if (in_liquid(p, q, r) .and. in_liquid(i, j, k)) cycle
-            low = u(p, q, r) - merge(dt, 0.0_wp, given(p, q, r))*a%cell(p, q, r, d)
-            high = u(i, j, k) - merge(dt, 0.0_wp, given(i, j, k))*a%cell(i, j, k, d)
-            uf(i, j, k) = face_mean(low, high) + dt*a%face(i, j, k, d)
+            if (a%in_liquid(p, q, r) .and. a%in_liquid(i, j, k)) cycle
+            low = flow%u(p, q, r, d) - merge(dt, 0.0_wp, a%given(p, q, r))*a%cell(p, q, r, d)
+            high = flow%u(i, j, k, d) - merge(dt, 0.0_wp, a%given(i, j, k))*a%cell(i, j, k, d)
+            flow%uf(i, j, k, d) = face_mean(low, high) + dt*a%face(i, j, k, d)
           end associate
         end do
       end do

@@ -21,12 +21,11 @@ contains
   !> Faces of the cells at walls: their Rhie-Chow acceleration counts for `rhie_chow_time` by the
   !! Courant number of the flow past the wall instead of for dt; in liquid alone, since gas needs
   !! all of its damping and has no drag worth the name.
-  subroutine shorten_at_walls(grid, dt, bodies, merged, in_liquid, rho, a, flow)
+  subroutine shorten_at_walls(grid, dt, bodies, merged, rho, a, flow)
     type(grid_t), intent(in) :: grid
     real(wp), intent(in) :: dt                   !! [s]
     type(rigid_motion_t), intent(in) :: bodies
     type(merged_cells_t), intent(in) :: merged
-    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
@@ -54,8 +53,8 @@ contains
       if (any(f < grid%lo) .or. any(f > grid%hi + unit_step(:, d))) return
       if (grid%side_of_face(f(d), d) /= no_side) return
       low = f - unit_step(:, d)
-      if (.not. (in_liquid(low(1), low(2), low(3)) .and. in_liquid(f(1), f(2), f(3)))) return
       associate (i => f(1), j => f(2), k => f(3), p => low(1), q => low(2), r => low(3))
+        if (.not. (a%in_liquid(p, q, r) .and. a%in_liquid(i, j, k))) return
         past = 0.5_wp*(flow%u(p, q, r, :) + flow%u(i, j, k, :)) &
           - velocity_in_cell(grid, bodies, b, f)
         time = rhie_chow_time(dt, dt*sum(abs(past)/grid%h))
@@ -80,8 +79,8 @@ contains
   !! In liquid both cell and wall have the old pressure in their velocity. Next to gas neither has:
   !! a cell of gas accelerates up to 830 times as much as the wall, and the old pressure is only a
   !! guess there, which the solve must be free to replace (docs/decisions/cavity.md).
-  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, merged, dt, c_ismac, given, &
-                                    in_liquid, rho, a, flow)
+  subroutine face_velocity_at_walls(grid, solid, at_start, predicted, merged, dt, c_ismac, rho, &
+                                    a, flow)
     type(grid_t), intent(in) :: grid
     type(solid_geometry_t), intent(in) :: solid
     type(rigid_motion_t), intent(in) :: at_start   !! motion when the step began
@@ -90,10 +89,6 @@ contains
     real(wp), intent(in) :: dt                   !! [s]
     logical, intent(in) :: c_ismac
       !! all cells are given their acceleration, and the compact one counts for dt
-    logical, intent(in), contiguous :: given(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! the cell has its acceleration in `flow%u`
-    logical, intent(in), contiguous :: in_liquid(grid%first(1):, grid%first(2):, grid%first(3):)
-      !! neither the cell nor those around it hold gas, at the start and at the end of the step
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
       !! that of the system [kg/m3]
     type(acceleration_t), intent(in) :: a
@@ -157,14 +152,14 @@ contains
       n = wall_area(grid, solid, f - unit_step(:, d)) + wall_area(grid, solid, f)
       n = n/max(norm2(n), tiny(1.0_wp))
       u = flow%u(c(1), c(2), c(3), :)
-      if (in_liquid(c(1), c(2), c(3))) then
+      if (a%in_liquid(c(1), c(2), c(3))) then
         wall = wall_velocity(predicted%motion(:, body), arm)
         gain = time_in_liquid(c, sum(abs(u - wall)/grid%h)) &
                *(a%face(f(1), f(2), f(3), d) - a%cell(c(1), c(2), c(3), d))
       else
         wall = wall_velocity(at_start%motion(:, body), arm)
         gain = dt*a%face(f(1), f(2), f(3), d)
-        if (c_ismac .or. given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
+        if (c_ismac .or. a%given(c(1), c(2), c(3))) u = u - dt*a%cell(c(1), c(2), c(3), :)
       end if
       r = middle_of_face(theta, n, d, solid%aperture(f(1), f(2), f(3), d))
       o = c + sense*unit_step(:, d)

@@ -77,9 +77,9 @@ contains
   !> Nothing has been given before the transport, and the faces are as their cells.
   subroutine begin_without_past()
     call take(scratch, coupling%correction)
-    call take(scratch, coupling%half_kick%given)
+    call take(scratch, coupling%given)
     coupling%correction = 0.0_wp
-    coupling%half_kick%given = 0.0_wp
+    coupling%given = 0.0_wp
   end subroutine begin_without_past
 
   !> The stages of a step after the transport, of which `begin` may have gone before.

@@ -26,10 +26,8 @@ program test_face_velocity
   type(one_body_t) :: box
   type(merged_cells_t) :: merged
   type(acceleration_t) :: a
-  logical, dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                     1 - n_halo:cells(3) + n_halo) :: given, in_liquid
   real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                      1 - n_halo:cells(3) + n_halo, 3) :: before
+                      1 - n_halo:cells(3) + n_halo, 3) :: before, none = 0.0_wp
   integer :: seed = 13, j, k, d
 
   call describe(cells, tank, sides, 'box', edges, middle, box%case)
@@ -49,8 +47,8 @@ program test_face_velocity
     end do
   end do
   call fill_velocity_halo(box%grid, box%flow%u)
-  given = .true.
-  in_liquid = .true.
+  a%given = .true.
+  a%in_liquid = .true.
   call short_times()
   call normal_to_the_wall()
   call next_to_gas()
@@ -64,10 +62,10 @@ contains
   subroutine short_times()
     integer :: i
 
-    in_liquid(7, 4, 5) = .false.
+    a%in_liquid(7, 4, 5) = .false.
     call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
     before = box%flow%uf
-    call shorten_at_walls(box%grid, dt, box%bodies, merged, in_liquid, box%flow%rho, a, box%flow)
+    call shorten_at_walls(box%grid, dt, box%bodies, merged, box%flow%rho, a, box%flow)
     do d = 1, 3
       do k = 2, cells(3)
         do j = 2, cells(2)
@@ -80,7 +78,7 @@ contains
       end do
     end do
     call check('some change', maxval(abs(box%flow%uf - before)) > 1.0e-3_wp)
-    in_liquid = .true.
+    a%in_liquid = .true.
   end subroutine short_times
 
   !> Does a cell beside the lower face of cell f belong to a wall, both in liquid?
@@ -89,7 +87,7 @@ contains
 
     associate (low => f - unit_step(:, d))
       at_wall = max(merged%number(f(1), f(2), f(3)), merged%number(low(1), low(2), low(3))) > 0 &
-        .and. in_liquid(f(1), f(2), f(3)) .and. in_liquid(low(1), low(2), low(3))
+        .and. a%in_liquid(f(1), f(2), f(3)) .and. a%in_liquid(low(1), low(2), low(3))
     end associate
   end function at_wall
 
@@ -131,20 +129,20 @@ contains
     real(wp), parameter :: x(3) = [0.57_wp, 0.35_wp, 0.45_wp]
     real(wp) :: wall(3), expected
 
-    in_liquid(7, 4, 5) = .false.
+    a%in_liquid(7, 4, 5) = .false.
     wall = wall_velocity(last, x - middle)
     expected = wall(1) + share*(stream(1) - wall(1)) + dt*a%face(7, 4, 5, 1)
     a%cell(7, 4, 5, :) = 1.0e3_wp*a%cell(7, 4, 5, :)
     box%flow%u(7, 4, 5, :) = stream + dt*a%cell(7, 4, 5, :)
     call at_walls()
     call check('next to gas: by the face alone', box%flow%uf(7, 4, 5, 1), expected, 1.0e-11_wp)
-    given(7, 4, 5) = .false.
+    a%given(7, 4, 5) = .false.
     box%flow%u(7, 4, 5, :) = stream
     call at_walls()
     call check('next to gas: not given yet', box%flow%uf(7, 4, 5, 1), expected, 1.0e-11_wp)
-    given(7, 4, 5) = .true.
+    a%given(7, 4, 5) = .true.
     box%flow%u(7, 4, 5, :) = stream
-    in_liquid(7, 4, 5) = .true.
+    a%in_liquid(7, 4, 5) = .true.
   end subroutine next_to_gas
 
   !> Away from walls: a face with gas on one side depends on what its cells have without the old
@@ -153,20 +151,18 @@ contains
     integer, parameter :: f(3) = [8, 2, 2]
     real(wp) :: expected
 
-    in_liquid(f(1), f(2), f(3)) = .false.
+    a%in_liquid(f(1), f(2), f(3)) = .false.
     expected = stream(1) + dt*a%face(f(1), f(2), f(3), 1)
     box%flow%u(8, 2, 2, :) = stream + dt*a%cell(8, 2, 2, :)
     box%flow%u(7, 2, 2, :) = stream + dt*a%cell(7, 2, 2, :)
-    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, given=given, &
-                               in_liquid=in_liquid)
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, none)
     call check('beside gas: given', box%flow%uf(8, 2, 2, 1), expected, tolerance)
-    given(8, 2, 2) = .false.
+    a%given(8, 2, 2) = .false.
     box%flow%u(8, 2, 2, :) = stream
-    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, given=given, &
-                               in_liquid=in_liquid)
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow, none)
     call check('beside gas: not yet given', box%flow%uf(8, 2, 2, 1), expected, tolerance)
-    in_liquid(f(1), f(2), f(3)) = .true.
-    given(8, 2, 2) = .true.
+    a%in_liquid(f(1), f(2), f(3)) = .true.
+    a%given(8, 2, 2) = .true.
     box%flow%u(7, 2, 2, :) = stream
   end subroutine between_gas
 
@@ -207,7 +203,7 @@ contains
 
   subroutine at_walls()
     call face_velocity_at_walls(box%grid, box%solid, at_start(), box%bodies, merged, dt, &
-                                .false., given, in_liquid, box%flow%rho, a, box%flow)
+                                .false., box%flow%rho, a, box%flow)
   end subroutine at_walls
 
   !> Velocity in x at a share of the way from the wall at x to the cell [m/s].

@@ -25,8 +25,6 @@ program test_pressure
   real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
   real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
   real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
-  logical, dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
-                     1 - n_halo:cells(3) + n_halo) :: takes_part   !! in `carry`
   type(one_body_t) :: box
   type(pressure_t) :: pressure
   type(acceleration_t) :: a
@@ -371,8 +369,8 @@ contains
 
     call build(tank, .false.)
     alpha = box%solid%alpha
-    takes_part = .true.
-    takes_part(5, 4, 6) = .false.
+    a%given = .true.
+    a%given(5, 4, 6) = .false.
     box%solid%alpha = 0.0_wp
     call set_bowl(1.0e5_wp)
     before = box%flow%p
@@ -386,7 +384,7 @@ contains
     call carry()
     call check('carried pressure: continued into the body', worst(0.0_wp), 0.0_wp, 1.0e-9_wp)
     box%solid%alpha = 0.0_wp
-    takes_part = .true.
+    a%given = .true.
     box%bodies%x(3, 1) = 0.02_wp   ! the floor is near
     call set_bowl(0.0_wp)
     box%flow%p = box%flow%p - slope()
@@ -404,8 +402,7 @@ contains
 
   !> One call, of the case as it is.
   subroutine carry()
-    call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, takes_part, dt, a, &
-                        box%flow%p)
+    call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, dt, a, box%flow%p)
   end subroutine carry
 
   !> What a bowl without curvature adds to the pressure of the weight [Pa].
@@ -439,7 +436,7 @@ contains
           x = ([i, j, k] - 0.5_wp)*box%grid%h
           arm = x - box%bodies%x(:, 1)
           share = min(1.0_wp, max(0.0_wp, 3.0_wp - 2.0_wp*norm2(arm)/box%bodies%radius(1)))
-          if (.not. takes_part(i, j, k)) share = 0.0_wp
+          if (.not. a%given(i, j, k)) share = 0.0_wp
           way = share*dt*wall_velocity(box%bodies%motion(:, 1), arm)
           error = max(error, abs(box%flow%p(i, j, k) - dot_product(weight, x) &
                                  - bowl(x - way, curvature)))

@@ -14,7 +14,7 @@ program test_wall_balance
   use buoyancy_m, only: mass_defect
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
   use merged_momentum_m, only: share_acceleration
-  use half_kick_m, only: half_kick_t, half_kick_init, force_of_half_kick
+  use half_kick_m, only: force_of_half_kick
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
     force_of_walls
   use one_body_m, only: one_body_t, describe, place, random_numbers
@@ -33,6 +33,7 @@ program test_wall_balance
   type(wall_balance_t) :: balance
   type(rigid_motion_t) :: at_start
   type(acceleration_t) :: a
+  real(wp), allocatable :: given(:, :, :, :)   !! momentum of the first half [kg m/s]
   real(wp) :: force(6, 1)
   integer :: seed = 91, m
 
@@ -43,6 +44,7 @@ program test_wall_balance
   call merged_cells_init(box%grid, merged)
   call find_merged_cells(box%grid, box%solid, merged)
   call acceleration_init(box%grid, a)
+  allocate (given, mold=a%cell)
   call wall_balance_init(balance)
   at_start = box%bodies
   call still_water()
@@ -218,52 +220,49 @@ contains
   !! the surface of the start less what would be on that of the end, wherever there was a wall.
   subroutine two_halves()
     type(merged_cells_t) :: before
-    type(half_kick_t) :: half_kick
     real(wp) :: sums(3), mass
     integer :: i, j, k
 
     before = merged
-    call half_kick_init(box%grid, half_kick)
-    half_kick%takes_part = .true.
+    a%given = .true.
     call begin()
     call fill(a%cell)
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
           mass = box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k)
-          half_kick%given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
+          given(i, j, k, :) = 0.5_wp*dt*mass*a%cell(i, j, k, :)
         end do
       end do
     end do
-    call find_halves(before, half_kick)
+    call find_halves(before)
     call check('equal halves: no force', norm2(force), 0.0_wp, 1.0e-9_wp)
 
     ! The box was elsewhere; a cell gets no second half.
     call move_box(0.13_wp, before)
-    half_kick%takes_part(6, 4, 5) = .false.
+    a%given(6, 4, 5) = .false.
     sums = 0.0_wp
     do k = 1, cells(3)
       do j = 1, cells(2)
         do i = 1, cells(1)
-          call random_numbers(seed, half_kick%given(i, j, k, :))
+          call random_numbers(seed, given(i, j, k, :))
           if (max(before%number(i, j, k), merged%number(i, j, k)) == 0) cycle
-          sums = sums - half_kick%given(i, j, k, :)
-          if (.not. half_kick%takes_part(i, j, k)) cycle
+          sums = sums - given(i, j, k, :)
+          if (.not. a%given(i, j, k)) cycle
           sums = sums + 0.5_wp*dt*box%case%fluid%liquid_density*box%flow%fluid_volume(i, j, k) &
                         *a%cell(i, j, k, :)
         end do
       end do
     end do
-    call find_halves(before, half_kick)
+    call find_halves(before)
     call check('momentum of the halves goes to the body', dt*force(1:3, 1), sums, 1.0e-11_wp)
   end subroutine two_halves
 
-  subroutine find_halves(before, half_kick)
+  subroutine find_halves(before)
     type(merged_cells_t), intent(in) :: before
-    type(half_kick_t), intent(in) :: half_kick
 
-    call force_of_half_kick(box%grid, box%case%fluid, before, merged, box%bodies, dt, box%flow, &
-                           a%cell, half_kick, force)
+    force = force_of_half_kick(box%grid, box%case%fluid, before, merged, box%bodies, dt, box%flow, &
+                               a, given)
   end subroutine find_halves
 
   !> The merged cells of the box lifted by `way`.
