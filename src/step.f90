@@ -41,7 +41,7 @@ module step_m
   use rigid_body_m, only: fastest_point, follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
-  use deep_overlaps_m, only: store_points, forget_overlaps, warn_of_overlaps, reported_share
+  use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
   use release_m, only: release_due_blocks, let_go_lowered, next_release, none_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
@@ -57,8 +57,6 @@ module step_m
   public :: take_step, measure_overlap
 
   real(wp), parameter :: growth_max = 2.0_wp   !! of a step over the one before
-  real(wp), parameter :: worth_measuring = 0.5_wp
-    !! depth of a contact point over the reported one [-]
 
 contains
 
@@ -128,15 +126,10 @@ contains
     report%overlap_known = .false.
     if (sim%clock%row_due() .or. sim%clock%finished()) then
       call measure_overlap(sim, report)
-    else if (sim%contacts%detected%exact &
-             .and. contact%deepest > worth_measuring*reported_share) then
-      call look_for_overlaps(.true., sim, report)
-    else
-      call forget_overlaps(sim%deep)
+    else if (sim%contacts%detected%exact) then
+      call look_for_deep(sim)
     end if
-    associate (detected => sim%contacts%detected)
-      if (.not. detected%exact) call store_points(detected%points, sim%deep)
-    end associate
+    if (.not. sim%contacts%detected%exact) call store_points(sim%contacts%detected%points, sim%deep)
     call warn_of_overlaps(sim%clock%t, sim%deep, report%warnings)
   end subroutine take_step
 
@@ -146,20 +139,23 @@ contains
     type(step_report_t), intent(inout) :: report
 
     if (report%overlap_known) return
-    call look_for_overlaps(.false., sim, report)
+    call tic(sim%timer_blocks)
+    call ask_for_all(sim%deep)
+    call max_overlap(sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
+    call toc(sim%timer_blocks)
     report%overlap_known = .true.
   end subroutine measure_overlap
 
-  !> The same of all bodies, or of those that move and what these touch: where contacts are deep.
-  subroutine look_for_overlaps(moving, sim, report)
-    logical, intent(in) :: moving
+  !> The same only where bodies have deep contacts: for warnings and faults between rows.
+  subroutine look_for_deep(sim)
     type(simulation_t), intent(inout) :: sim
-    type(step_report_t), intent(inout) :: report
+    real(wp) :: depth
 
     call tic(sim%timer_blocks)
-    call max_overlap(moving, sim%walls, sim%blocks, sim%overlap, report%max_overlap, sim%deep)
+    call ask_for_deep(sim%contacts%detected%points, sim%blocks, sim%deep)
+    call max_overlap(sim%walls, sim%blocks, sim%overlap, depth, sim%deep)
     call toc(sim%timer_blocks)
-  end subroutine look_for_overlaps
+  end subroutine look_for_deep
 
   !> What the parts of the step found out, in one report.
   subroutine describe(sim, contact, stage, report)

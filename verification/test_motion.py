@@ -1,12 +1,15 @@
 """Fixed bodies moved by a table: where they are, what they push, restarts, and damaged tables."""
 
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+from measures.budget import Budget
+from micstools.reading.reader import Run
 from run_cases import ROOT
 
 MICS = ROOT / "mics"
@@ -98,6 +101,49 @@ def test_steady_rows_are_a_given_velocity(tmp_path: Path) -> None:
             scale = np.abs(b[name][:]).max()
             assert np.abs(a[name][:] - b[name][:]).max() < 1e-7 * scale, name
         assert np.abs(a["series/liquid_volume_drift"][:]).max() < 1e-12
+
+
+def way(pose: Callable[[float], tuple[float, float, float]]) -> str:
+    """A table of x, z and turn about y."""
+    rows = ["time,x,y,z,qw,qx,qy,qz"]
+    for t in np.linspace(0, 0.4, 41):
+        x, z, turn = pose(t)
+        attitude = f"{np.cos(turn / 2):.17g},0,{np.sin(turn / 2):.17g},0"
+        rows.append(f"{t:.17g},{x:.17g},0.08,{z:.17g},{attitude}")
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    "poses",
+    [
+        [lambda t: (0.2 + 1.5 * t**2, 0.3, 0)],
+        [lambda t: (0.2 + 0.3 * t, 0.3, 2 * t)],
+        [lambda t, s=s: (0.25 - s * 0.103 * np.cos(2 * t), 0.3 - 0.1 * np.sin(2 * t), 2 * s * t)
+         for s in (-1, 1)],
+    ],
+    ids=["pushed", "pushed and turned", "two doors"],
+)  # fmt: skip
+def test_momentum_of_what_moves(
+    poses: list[Callable[[float], tuple[float, float, float]]], tmp_path: Path
+) -> None:
+    """The force on bodies that accelerate by a table is what the fluid gains and the walls bear."""
+    case = (
+        "&run t_end = 0.2  dt = 0.01  field_interval = 1e-5 /\n"
+        "&grid cells = 25, 8, 30  length = 0.5, 0.16, 0.6 /\n"
+        "&boundary x_min = 'slip'  x_max = 'slip'  y_min = 'slip'  y_max = 'slip'"
+        "  z_min = 'slip' /\n"
+        "&fluid water_level = 0.55 /\n"
+        "&shape name = 'plate'  kind = 'box'  size = 0.19, 0.12, 0.013 /\n"
+    )
+    for b, pose in enumerate(poses):
+        (tmp_path / f"{b}.csv").write_text(way(pose))
+        case += f"&body shape = 'plate'  fixed = T  motion = '{b}.csv' /\n"
+    run(tmp_path, case, "").close()
+    budget = Budget(Run(tmp_path / "mics-out"))
+    error = budget.momentum - budget.momentum[0] - budget.impulse
+    force = budget.bodies.fluid_force[1:]
+    exchanged = np.abs(force * np.diff(budget.time)[:, None, None]).sum()
+    assert np.abs(error).max() < 2e-5 * exchanged
 
 
 @pytest.mark.parametrize("coupling", ["monolithic", "mics"])

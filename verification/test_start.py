@@ -167,5 +167,5 @@ def test_a_split_hopper(tmp_path: Path) -> None:
     budget = Budget(Run(tmp_path / "open"))
     under_water = (1.0 - 998.2 / 2650.0) * 9.81 * mass.sum() * budget.time[-1]
     error = budget.momentum - budget.momentum[0] - budget.impulse
-    # 1e-3 is asked; three fillings gave 0.46, 0.93 and 1.13e-3, the cause is not known
-    assert np.abs(error).max() < 2e-3 * under_water
+    # three fillings gave 0.11, 0.12 and 0.14e-3, half of it the friction at the walls
+    assert np.abs(error).max() < 3e-4 * under_water

@@ -8,7 +8,6 @@ module contact_forces_m
   use contact_law_m, only: stored_energy, normal_force, tangential_force, tangential_slip
   use counterparts_m, only: motion_t, wrench_t, motion_between, relative_velocity, act
   use contact_response_m, only: opening_speed, push_apart
-  use contact_load_m, only: give_share
   implicit none
   private
   public :: loads_t, contact_report_t, match_displacements, integrate_displacements, sum_forces, &
@@ -27,8 +26,7 @@ module contact_forces_m
     integer :: info = 0                 !! 1: it would take more than `max_substeps`, or NaN
     real(wp) :: energy = 0.0_wp         !! elastic, at the end [J]
     real(wp) :: courant_max = 0.0_wp    !! largest C_s = |v_r.n| dt_b/d_s of a contact point [-]
-    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m],
-    real(wp) :: deepest = 0.0_wp        !! and over the smallest edge of the smaller block [-]
+    real(wp) :: overlap_max = 0.0_wp    !! largest overlap d_n of a contact point [m]
   end type contact_report_t
 
   !> What the contact points of one group do along their normals.
@@ -176,8 +174,6 @@ contains
           call push_apart(point, law%gamma_n, force_n, wrench)
           report%courant_max = max(report%courant_max, abs(v_n)*dt/point%length)
           report%overlap_max = max(report%overlap_max, point%depth)
-          report%deepest = max(report%deepest, give_share*point%depth &
-            /min(detected%counterparts%give(point%a), detected%counterparts%give(point%b)))
         end associate
         push%force = push%force + force_n
         decay = max(decay, r%decay(t))

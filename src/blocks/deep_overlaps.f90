@@ -10,13 +10,17 @@ module deep_overlaps_m
   implicit none
   private
   public :: deep_overlaps_t, deep_overlaps_init, forget_overlaps, store_overlap, store_points
+  public :: ask_for_all, ask_for_deep
   public :: size_of_pair, warn_of_overlaps, overlap_fault, reported_share
 
   real(wp), parameter :: reported_share = 0.05_wp   !! overlap over size to report a body
   real(wp), parameter :: fault_share = 0.2_wp    !! likewise, from which the run ends
+  real(wp), parameter :: asked_share = 0.5_wp*reported_share
+    !! depth of a contact point over size from which the overlap is asked for
 
   !> The deepest overlap of each body, (n), where it is above `reported_share`.
   type :: deep_overlaps_t
+    logical, allocatable :: asked(:)     !! its overlaps are to be measured
     real(wp), allocatable :: size(:)     !! smallest edge [m]
     real(wp), allocatable :: depth(:)    !! overlap; 0 if none is noted [m]
     real(wp), allocatable :: share(:)    !! of the size of the smaller of the two [-]
@@ -34,9 +38,37 @@ contains
 
     allocate (deep%depth(blocks%n), deep%share(blocks%n), source=0.0_wp)
     allocate (deep%counterpart(blocks%n), source=0)
-    allocate (deep%warned(blocks%n), source=.false.)
+    allocate (deep%warned(blocks%n), deep%asked(blocks%n), source=.false.)
     deep%size = [(blocks%shapes(blocks%shape(b))%smallest_edge, b=1, blocks%n)]
   end subroutine deep_overlaps_init
+
+  !> Ask for the overlaps of all bodies.
+  pure subroutine ask_for_all(deep)
+    type(deep_overlaps_t), intent(inout) :: deep
+
+    deep%asked = .true.
+  end subroutine ask_for_all
+
+  !> Ask for the overlaps of bodies that move with a deep contact, and of their counterparts.
+  pure subroutine ask_for_deep(points, blocks, deep)
+    type(contact_points_t), intent(in) :: points
+    type(blocks_t), intent(in) :: blocks
+    type(deep_overlaps_t), intent(inout) :: deep
+    logical :: still
+    integer :: t
+
+    deep%asked = .false.
+    do t = 1, points%n
+      associate (a => points%item(t)%a, b => points%item(t)%b)
+        if (points%item(t)%depth <= asked_share*size_of_pair(a, b, deep)) cycle
+        still = blocks%still(a)
+        if (b > 0) still = still .and. blocks%still(b)
+        if (still) cycle
+        deep%asked(a) = .true.
+        if (b > 0) deep%asked(b) = .true.
+      end associate
+    end do
+  end subroutine ask_for_deep
 
   !> Forget the overlaps of the step before.
   pure subroutine forget_overlaps(deep)

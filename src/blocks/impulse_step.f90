@@ -12,7 +12,6 @@ module impulse_step_m
   use contact_surface_m, only: contact_surface_t, find_surface_points, cover_way, renew_pairs
   use counterparts_m, only: update_motion, update_inertia
   use contact_forces_m, only: contact_report_t
-  use contact_load_m, only: give_share
   use contact_state_m, only: contacts_t
   use substep_limits_m, only: equal_substep
   use impulse_rows_m, only: rows_t, make_rows, store_memory, sum_loads
@@ -249,14 +248,12 @@ contains
     logical :: touched(contacts%rows%n_pairs)
     integer :: k, r
 
-    associate (rows => contacts%rows, give => contacts%detected%counterparts%give)
+    associate (rows => contacts%rows)
       do k = 1, rows%n_pairs
         associate (first => rows%first(k), last => rows%first(k + 1) - 1)
           touched(k) = any(rows%largest(first:last) > 0.0_wp)
           do r = first, last
             report%overlap_max = max(report%overlap_max, -rows%row(r)%gap)
-            report%deepest = max(report%deepest, -give_share*rows%row(r)%gap &
-              /min(give(rows%a(k)), give(rows%b(k))))
             if (rows%largest(r) > 0.0_wp) report%courant_max = max(report%courant_max, &
               abs(rows%closing(r))*step/contacts%detected%points%item(rows%point(r))%length)
           end do

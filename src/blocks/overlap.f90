@@ -142,13 +142,11 @@ contains
     end associate
   end function body_overlap
 
-  !> Largest depth of the present bodies in one another, in the walls and in the bed [m], and those
-  !! that reach deep for their size.
+  !> Largest depth of the bodies that are asked for in one another, in the walls and in the bed [m],
+  !! and those that reach deep for their size.
   !!
-  !! Pairs of bodies that are both held or moved are left out, and where only `moving` bodies are
-  !! asked for, those that are both still.
-  subroutine max_overlap(moving, walls, blocks, overlap, depth, deep)
-    logical, intent(in) :: moving
+  !! Pairs of bodies that are both held or moved are left out.
+  subroutine max_overlap(walls, blocks, overlap, depth, deep)
     type(walls_t), intent(in) :: walls
     type(blocks_t), intent(in) :: blocks
     type(overlap_t), intent(inout) :: overlap
@@ -160,12 +158,12 @@ contains
 
     depth = 0.0_wp
     call forget_overlaps(deep)
+    if (.not. any(deep%asked)) return
     do a = 1, blocks%n
       overlap%turn(:, :, a) = rotation_matrix(blocks%q(:, a))
       associate (solid => overlap%solid(blocks%shape(a)))
         overlap%radius(a) = solid%radius
-        if (.not. blocks%present(a) .or. blocks%fixed(a)) cycle
-        if (moving .and. blocks%still(a)) cycle
+        if (.not. blocks%present(a) .or. blocks%fixed(a) .or. .not. deep%asked(a)) cycle
         found = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           overlap%turn(:, :, a), walls, found)
@@ -180,7 +178,7 @@ contains
       a = overlap%pairs%a(p)
       b = overlap%pairs%b(p)
       if (blocks%fixed(a) .and. blocks%fixed(b)) cycle
-      if (moving .and. blocks%still(a) .and. blocks%still(b)) cycle
+      if (.not. (deep%asked(a) .and. deep%asked(b))) cycle
       found = worth_finding(a, b, depth, deep)
       call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
         overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &

@@ -29,7 +29,7 @@ module buoyancy_m
     terms_at_once
   implicit none
   private
-  public :: displaced_t, displaced_force, displaced_fluid, mass_defect
+  public :: displaced_t, displaced_force, displaced_fluid, mass_defect, held_mass
 
   !> Fluid in the true place of a body.
   type :: displaced_t
@@ -75,7 +75,7 @@ contains
     integer :: b, d
 
     displaced = displaced_fluid(grid, fluid, solid, bodies, flow%c, bodies%present)
-    counted = mass_at_faces(grid, bodies, flux, flow%rho)
+    counted = mass_at_faces(grid, bodies, flux, flux%first_face, flow%rho)
     defect = 0.0_wp
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
@@ -86,6 +86,25 @@ contains
       end do
     end do
   end function mass_defect
+
+  !> Mass and first moment of the fluid that each body holds at its faces, as `mass_defect`.
+  function held_mass(grid, bodies, flux, rho) result(held)
+    type(grid_t), intent(in) :: grid
+    type(rigid_motion_t), intent(in) :: bodies
+    type(rigid_flux_t), intent(in) :: flux
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! [kg/m3]
+    real(wp) :: held(6, 3, bodies%n)   !! [kg, kg m]
+    real(wp) :: counted(4, 3, bodies%n)
+    integer :: d
+
+    counted = mass_at_faces(grid, bodies, flux, flux%held_from, rho)
+    held = 0.0_wp
+    do d = 1, 3
+      held(d, d, :) = counted(1, d, :)
+      held(4:6, d, :) = counted(2:4, d, :)
+    end do
+  end function held_mass
 
   !> Fluid in the true place of each body asked for.
   function displaced_fluid(grid, fluid, solid, bodies, c, wanted) result(displaced)
@@ -189,12 +208,13 @@ contains
     end if
   end subroutine liquid_part
 
-  !> What the faces count of the fluid in the place of each body present, rho_f h times the flux of
-  !! the unit motions: for an acceleration along each direction mass and torque.
-  function mass_at_faces(grid, bodies, flux, rho) result(counted)
+  !> What the faces from `first_face` on count of the fluid in the place of each body present, rho_f
+  !! h times the flux of the unit motions: for an acceleration along each direction mass and torque.
+  function mass_at_faces(grid, bodies, flux, first_face, rho) result(counted)
     type(grid_t), intent(in) :: grid
     type(rigid_motion_t), intent(in) :: bodies
     type(rigid_flux_t), intent(in) :: flux
+    integer, intent(in) :: first_face(:)   !! (bodies) in `flux`
     real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
     real(wp) :: counted(4, 3, bodies%n)   !! [kg, kg m]
     integer(i8) :: accumulator(accumulator_size, 12*bodies%n)
@@ -206,7 +226,7 @@ contains
     do b = 1, bodies%n
       if (.not. bodies%present(b)) cycle
       !$omp do schedule(dynamic)
-      do from = flux%first_face(b), flux%first_face(b + 1) - 1, terms_at_once
+      do from = first_face(b), flux%first_face(b + 1) - 1, terms_at_once
         do d = 1, 3
           n = 0
           do m = from, min(from + terms_at_once, flux%first_face(b + 1)) - 1

@@ -26,7 +26,7 @@ module monolithic_m
   use advected_pressure_m, only: advect_pressure
   use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole, &
                          force_of_half_kick
-  use buoyancy_m, only: displaced_force, mass_defect
+  use buoyancy_m, only: displaced_force, mass_defect, held_mass
   use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use wall_layer_m, only: find_slip, find_centres, to_centres, find_wall_speeds
@@ -55,6 +55,7 @@ module monolithic_m
     type(wall_balance_t) :: balance
     real(wp), allocatable :: rho(:, :, :)          !! density that has inertia [kg/m3]
     real(wp), allocatable :: defect(:, :, :)         !! (6, 3, n) displaced fluid no face counts
+    real(wp), allocatable :: held(:, :, :)           !! (6, 3, n) fluid held at faces
     real(wp), allocatable :: from_half_kick(:, :)   !! (6, n) what its two halves differ by
     real(wp), allocatable :: lagged(:, :)            !! (6, n) force of the walls of the step before
     real(wp), allocatable :: counted(:, :)         !! (6, n) motion that held fluid has got
@@ -89,7 +90,7 @@ contains
     call merged_cells_init(grid, self%merged_before)
     call merged_cells_init(grid, self%merged)
     call wall_balance_init(self%balance)
-    allocate (self%defect(6, 3, n), source=0.0_wp)
+    allocate (self%defect(6, 3, n), self%held(6, 3, n), source=0.0_wp)
     allocate (self%unforced_motion, self%from_half_kick, self%lagged, self%counted, &
               self%extrapolated, source=self%total)
     allocate (self%rho(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -275,6 +276,7 @@ contains
       call force_from_faces(grid, bodies, flux, flow%p, self%from_pressure, flow%sides)
       call force_from_tension(grid, bodies, flux, self%tension, self%from_pressure)
       self%defect = mass_defect(grid, self%fluid, solid, bodies, flux, flow)
+      self%held = held_mass(grid, bodies, flux, flow%rho)
       call count_fluid(self%fluid%gravity, dt, self)
       self%from_level = self%from_level + self%from_half_kick + self%lagged
       call push_bodies(dt, self%from_pressure + self%from_level, bodies)
@@ -370,6 +372,7 @@ contains
                               from_faces)
         self%total = self%total + from_faces
         call force_of_walls(grid, merged, bodies, self%at_start, dt, balance, from_walls)
+        call leave_counted(dt, self, from_walls)
         if (solve == 1) then
           self%lagged = from_walls
           if (.not. any(bodies%free)) exit
@@ -405,6 +408,22 @@ contains
     call all_fluid_of_faces(grid, solid, self%bodies, self%pressure%system%operator%flux, &
                             flow%uf, flow%solid_flux)
   end subroutine close_faces
+
+  !> Take from the forces of the walls what they bear as the fluid that no aperture counts moves
+  !! with the bodies: `count_fluid` has given them that.
+  subroutine leave_counted(dt, self, from_walls)
+    real(wp), intent(in) :: dt   !! [s]
+    class(monolithic_t), intent(in) :: self
+    real(wp), intent(inout) :: from_walls(:, :)   !! (6, bodies) [N, N m]
+    real(wp) :: inertia(6, 6)
+    integer :: b
+
+    do b = 1, size(self%defect, 3)
+      inertia = symmetric(self%defect(:, :, b) + self%held(:, :, b))
+      from_walls(1:3, b) = from_walls(1:3, b) - matmul(inertia(1:3, :), &
+        self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
+    end do
+  end subroutine leave_counted
 
   !> Report of two solves of a step.
   pure function added(first, second) result(both)
@@ -451,28 +470,37 @@ contains
     end associate
   end subroutine sum_forces
 
-  !> Give the bodies the inertia of the fluid that the faces do not count, and `from_level` its
-  !! force as far as it is known before the solve: -defect (g - a), a by weight and contact.
+  !> Give free bodies the inertia of the fluid that the faces do not count, and `from_level` its
+  !! force as far as it is known before the solve: -defect (g - a), a by weight and contact, or by
+  !! the given motion.
   subroutine count_fluid(gravity, dt, self)
     real(wp), intent(in) :: gravity(3)   !! [m/s2]
     real(wp), intent(in) :: dt           !! [s]
     class(monolithic_t), intent(inout) :: self
-    real(wp) :: defect(6, 6)
+    real(wp) :: inertia(6, 6)
     integer :: b
 
     self%bodies%clipped = .false.
     do b = 1, size(self%defect, 3)
-      self%from_level(:, b) = -matmul(self%defect(:, :, b), gravity)
-      if (.not. self%bodies%free(b)) cycle
-      defect = 0.0_wp
-      defect(:, 1:3) = self%defect(:, :, b)
-      defect(1:3, 4:6) = transpose(defect(4:6, 1:3))
-      call set_inertia(b, self%bodies, defect)
-      self%from_level(:, b) = self%from_level(:, b) + &
-        matmul(self%bodies%defect(:, :, b), &
-               self%bodies%motion(:, b) - self%at_start%motion(:, b))/dt
+      inertia = symmetric(self%defect(:, :, b))
+      if (self%bodies%free(b)) then
+        call set_inertia(b, self%bodies, inertia)
+        inertia = self%bodies%defect(:, :, b)
+      end if
+      self%from_level(:, b) = matmul(inertia, self%bodies%motion(:, b) &
+        - self%at_start%motion(:, b))/dt - matmul(self%defect(:, :, b), gravity)
     end do
   end subroutine count_fluid
+
+  !> A defect as an inertia, without that of rotations.
+  pure function symmetric(defect) result(inertia)
+    real(wp), intent(in) :: defect(6, 3)   !! [kg, kg m]
+    real(wp) :: inertia(6, 6)
+
+    inertia = 0.0_wp
+    inertia(:, 1:3) = defect
+    inertia(1:3, 4:6) = transpose(defect(4:6, :))
+  end function symmetric
 
   !> Force and torque of the fluid on bodies that are let go, with the pressure by which they
   !! accelerate it, which is added to the pressure: (M + M_a) a = (M - M_displaced) g.

@@ -184,21 +184,23 @@ contains
       !! [kg m/s]
     real(wp) :: force(6, bodies%n)
     integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
-    real(wp) :: total(6*bodies%n), owed(3, max(before%n, merged%n))
+    real(wp) :: total(6*bodies%n), owed(6, max(before%n, merged%n))
     integer :: m
 
     accumulator = spread(no_terms, 2, 6*bodies%n)
     !$omp parallel do schedule(static)
     do m = 1, merged%n
-      owed(:, m) = of_cell(merged%cell(:, m))
+      owed(1:3, m) = of_cell(merged%cell(:, m))
+      owed(4:6, m) = owed(1:3, m)
     end do
     call add_to_bodies(grid, merged, bodies, owed, accumulator)
     !$omp parallel do schedule(static)
     do m = 1, before%n
-      owed(:, m) = 0.0_wp   ! what is a wall cell at the end is there already
+      owed(1:3, m) = 0.0_wp   ! what is a wall cell at the end is there already
       associate (c => before%cell(:, m))
-        if (merged%number(c(1), c(2), c(3)) == 0) owed(:, m) = of_cell(c)
+        if (merged%number(c(1), c(2), c(3)) == 0) owed(1:3, m) = of_cell(c)
       end associate
+      owed(4:6, m) = owed(1:3, m)
     end do
     call add_to_bodies(grid, before, bodies, owed, accumulator)
     call exact_totals(accumulator, total)

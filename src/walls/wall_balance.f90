@@ -6,7 +6,7 @@
 !! bears: `to_wall`. Fluid and bodies together keep their momentum.
 module wall_balance_m
   use kinds_m, only: wp, i8
-  use vectors_m, only: wrench
+  use vectors_m, only: cross
   use growing_m, only: ensure_capacity
   use case_types_m, only: fluid_t
   use grid_m, only: grid_t
@@ -117,8 +117,8 @@ contains
     end do
   end subroutine store_velocity
 
-  !> Force and torque on each body of what its walls bear, less the part of the fluid that moves
-  !! with them, which `mass_defect` counts [N, N m].
+  !> Force and torque on each body of what its walls bear; the torque less that of the part of the
+  !! fluid that moves with them, cell by cell [N, N m].
   subroutine force_of_walls(grid, merged, bodies, at_start, dt, self, force)
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
@@ -126,7 +126,7 @@ contains
     real(wp), intent(in) :: dt   !! [s]
     type(wall_balance_t), intent(in) :: self
     real(wp), intent(out) :: force(:, :)   !! (6, bodies)
-    real(wp) :: owed(3, merged%n), total(6*bodies%n)
+    real(wp) :: owed(6, merged%n), total(6*bodies%n)
     real(wp) :: wall(3)   ! change of its velocity in the step [m/s]
     integer(i8) :: accumulator(accumulator_size, 6*bodies%n)
     integer :: m
@@ -135,7 +135,8 @@ contains
     do m = 1, merged%n
       if (.not. grid%owns(merged%cell(:, m))) cycle
       wall = velocity_at_wall(grid, merged, m, bodies) - velocity_at_wall(grid, merged, m, at_start)
-      owed(:, m) = (self%to_wall(:, m) - (self%moved(:, m) - self%mass(m))*wall)/dt
+      owed(1:3, m) = self%to_wall(:, m)/dt
+      owed(4:6, m) = (self%to_wall(:, m) - (self%moved(:, m) - self%mass(m))*wall)/dt
     end do
     accumulator = spread(no_terms, 2, 6*bodies%n)
     call add_to_bodies(grid, merged, bodies, owed, accumulator)
@@ -148,7 +149,7 @@ contains
     type(grid_t), intent(in) :: grid
     type(merged_cells_t), intent(in) :: merged
     type(rigid_motion_t), intent(in) :: bodies
-    real(wp), intent(in) :: f(:, :)                     !! (3, wall cells) [N]
+    real(wp), intent(in) :: f(:, :)   !! (6, wall cells) force, and that which makes the torque [N]
     integer(i8), intent(inout) :: accumulator(:, :)   !! (accumulator_size, 6 bodies)
     real(wp) :: term(terms_at_once, 6)
     integer :: b, e, n, from
@@ -163,7 +164,8 @@ contains
           associate (m => merged%by_body(e))
             if (.not. grid%owns(merged%cell(:, m))) cycle
             n = n + 1
-            term(n, :) = wrench(f(:, m), arm_to_cell(grid, merged%cell(:, m), bodies%x(:, b)))
+            term(n, 1:3) = f(1:3, m)
+            term(n, 4:6) = cross(arm_to_cell(grid, merged%cell(:, m), bodies%x(:, b)), f(4:6, m))
           end associate
         end do
         call exact_add_columns(term(:n, :), accumulator(:, 6*b - 5:6*b))

@@ -17,7 +17,7 @@ program test_bed
   use random_counter_m, only: uniform, random_rotation
   use surface_search_m, only: found_t, nowhere
   use walls_m, only: walls_t, walls_init
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, has_place, max_overlap
   use contact_points_m, only: contact_points_t
   use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
@@ -545,7 +545,8 @@ contains
       call blocks_init(case, shapes, blocks)
       call overlap_init(shapes, 1, overlap)
       call deep_overlaps_init(blocks, deep)
-      call max_overlap(.false., walls, blocks, overlap, depth, deep)
+      call ask_for_all(deep)
+      call max_overlap(walls, blocks, overlap, depth, deep)
       exact = overlap_depth(shapes(1), blocks%x(:, 1), blocks%q(:, 1), shapes(1), x, &
         [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
       if (exact > 0.004_wp) cycle   ! deeper, points inside faces decide: the bed has none
@@ -558,7 +559,7 @@ contains
     call set_bed(case, form, walls%bed, message)
     blocks%q(:, 1) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
     blocks%x(:, 1) = [0.018_wp, 0.05_wp, 0.0699_wp]
-    call max_overlap(.false., walls, blocks, overlap, depth, deep)
+    call max_overlap(walls, blocks, overlap, depth, deep)
     call check('a foot in the bed', depth, 1.0e-4_wp, 1.0e-12_wp)
     call check('has room', has_place(walls, blocks, 1, overlap))
     blocks%x(3, 1) = 0.0697_wp
@@ -566,7 +567,7 @@ contains
     blocks%x(3, 1) = -0.05_wp
     call check('deep in the bed has no room', .not. has_place(walls, blocks, 1, overlap))
     blocks%x(:, 1) = [0.05_wp, 0.05_wp, 0.0501_wp]   ! the foot stands in the trench, just as wide
-    call max_overlap(.false., walls, blocks, overlap, depth, deep)
+    call max_overlap(walls, blocks, overlap, depth, deep)
     call check('a foot in the trench', depth, 0.0_wp, 1.0e-12_wp)
   end subroutine depth_in_bed
 

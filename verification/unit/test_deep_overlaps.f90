@@ -8,13 +8,14 @@ program test_deep_overlaps
   use rigid_body_m, only: blocks_t, blocks_init
   use contact_points_m, only: contact_point_t, contact_points_t, add_point
   use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, store_overlap, store_points, &
-    warn_of_overlaps, overlap_fault, size_of_pair
+    warn_of_overlaps, overlap_fault, size_of_pair, ask_for_all, ask_for_deep
   implicit none
 
   real(wp), parameter :: size(2) = [0.02_wp, 0.3_wp]
   integer, parameter :: floor = -5
   type(deep_overlaps_t) :: deep
   type(contact_points_t) :: points
+  type(blocks_t) :: blocks
   integer :: warnings
 
   call make_cubes()
@@ -41,15 +42,35 @@ program test_deep_overlaps
     0.205_wp], 1.0e-12_wp)
   call check('a fault from a fifth on', index(overlap_fault(deep), &
     'body 2 and body 3 reach 0.0041 m into one another, 20.5 % of the size of the smaller') == 1)
+  call check_asked()
   call finish_checks()
 
 contains
+
+  !> Between rows, overlaps of the bodies that move with a contact deeper than 2.5 % of the smaller.
+  subroutine check_asked()
+    call ask_for_all(deep)
+    call check('all', all(deep%asked))
+    points%n = 0
+    call add_point(contact_point_t(2, 1, 1, depth=0.00049_wp), points)
+    call ask_for_deep(points, blocks, deep)
+    call check('2.45 % is not deep', .not. any(deep%asked))
+    call add_point(contact_point_t(2, 1, 2, depth=0.00051_wp), points)
+    call ask_for_deep(points, blocks, deep)
+    call check('2.55 % is', all(deep%asked .eqv. [.true., .true., .false.]))
+    blocks%still(:2) = .true.
+    call add_point(contact_point_t(3, floor, 1, depth=0.00051_wp), points)
+    call ask_for_deep(points, blocks, deep)
+    call check('but not of two still ones', all(deep%asked .eqv. [.false., .false., .true.]))
+    blocks%still(2) = .false.
+    call ask_for_deep(points, blocks, deep)
+    call check('of one still one', all(deep%asked))
+  end subroutine check_asked
 
   !> Three cubes, small, large, small.
   subroutine make_cubes()
     character(:), allocatable :: message
     type(shape_t) :: shapes(2)
-    type(blocks_t) :: blocks
     type(case_t) :: case
     integer :: s
 

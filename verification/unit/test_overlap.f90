@@ -11,7 +11,7 @@ program test_overlap
   use rigid_body_m, only: blocks_t, blocks_init
   use walls_m, only: walls_t, walls_init
   use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
-  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
   use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place
   implicit none
 
@@ -148,7 +148,7 @@ contains
     type(overlap_t) :: overlap
     type(deep_overlaps_t) :: deep
     real(wp) :: depth, expected, x(3), one, share(n + 1)
-    integer :: a, b, deepest
+    integer :: a, b, deepest, counterpart
 
     allocate (case%body(n + 1), case%drop(0))
     case%grid%length = 0.2_wp
@@ -164,6 +164,7 @@ contains
     call walls_init(case%grid, case%boundary, walls)
     call overlap_init(shapes, blocks%n, overlap)
     call deep_overlaps_init(blocks, deep)
+    call ask_for_all(deep)
     expected = 0.0_wp
     share = 0.0_wp
     do a = 1, n
@@ -178,22 +179,22 @@ contains
         share([a, b]) = max(share([a, b]), one/min(deep%size(a), deep%size(b)))
       end do
     end do
-    call max_overlap(.false., walls, blocks, overlap, depth, deep)
+    call max_overlap(walls, blocks, overlap, depth, deep)
     call check('some overlap', expected > 1.0e-3_wp)
     call check('largest overlap', depth, expected, 1.0e-15_wp)
     call check('that of the body with the deepest', maxval(deep%depth), expected, 1.0e-15_wp)
+    counterpart = deep%counterpart(maxloc(share, 1))
     where (share <= 0.05_wp) share = 0.0_wp
     call check('several reach deep', count(share > 0.0_wp) > 3)
     call check('all that reach deep are noted', deep%share, share, 1.0e-12_wp)
-    blocks%still = .true.
-    call max_overlap(.true., walls, blocks, overlap, depth, deep)
-    call check('nothing moves', depth <= 0.0_wp .and. all(deep%share <= 0.0_wp))
+    deep%asked = .false.
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('nothing is asked for', depth <= 0.0_wp .and. all(deep%share <= 0.0_wp))
     deepest = maxloc(share, 1)
-    blocks%still(deepest) = .false.
-    call max_overlap(.true., walls, blocks, overlap, depth, deep)
-    call check('of one that moves', deep%share(deepest), share(deepest), 1.0e-12_wp)
-    call check('and of what it touches alone', count(deep%share > 0.0_wp) &
-      < count(share > 0.0_wp))
+    deep%asked([deepest, counterpart]) = .true.
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('of two', deep%share(deepest), share(deepest), 1.0e-12_wp)
+    call check('and of no more', count(deep%share > 0.0_wp), 2)
     blocks%present = .false.
     blocks%present(1) = .true.
     blocks%q = spread(upright, 2, n + 1)
