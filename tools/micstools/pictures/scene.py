@@ -14,11 +14,11 @@ import numpy as np
 from PIL import Image
 
 from micstools import extras
-from micstools.pictures import labels
+from micstools.pictures import labels, vtk_data
 from micstools.pictures.vtk_data import shares_at_points, triangles_of, water_surface
 from micstools.piles import pile
 from micstools.reading import units
-from micstools.reading.overlap import present_bodies
+from micstools.reading.overlap import Placed, present_bodies
 from micstools.reading.reader import Fields, Run
 from micstools.shapes.geometry import Array, IntArray
 from micstools.shapes.shape import Shape
@@ -194,9 +194,12 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
     plotter.clear_actors()
     plotter.disable_anti_aliasing()
     flat = {"lighting": False, "smooth_shading": False}
-    for k, body in present_bodies(run, row).items():
-        colour = [(k + 1) % 256, (k + 1) // 256 % 256, (k + 1) // 65536]
-        plotter.add_mesh(triangles_of(body.points, body.shape.triangles), color=colour, **flat)
+    blocks = vtk_data.blocks(run, row)
+    if blocks:
+        faces = vtk_data.joined(list(blocks.values()))
+        number = faces.cell_data["body"].astype(np.int64)
+        colour = np.stack([number % 256, number // 256 % 256, number // 65536], axis=1)
+        plotter.add_mesh(faces, scalars=colour.astype(np.uint8), rgb=True, preference="cell", **flat)
     add_bed(plotter, run, color="white", **flat)
     look(plotter, camera)
     seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
@@ -228,23 +231,34 @@ def block_colours(run: Run) -> list[str]:
 
 
 def _add_blocks(plotter: Plotter, run: Run, row: int) -> None:
+    """One actor for all blocks of a colour: thousands are drawn in seconds."""
     colours = block_colours(run)
+    alike: dict[str, list[Placed]] = {}
     for k, body in present_bodies(run, row).items():
-        add_block(plotter, body.points, body.shape, colours[k])
+        alike.setdefault(colours[k], []).append(body)
+    for colour, bodies in alike.items():
+        faces = [triangles_of(body.points, body.shape.triangles) for body in bodies]
+        edges = [_edges(body.points, body.shape) for body in bodies]
+        _add_solid(plotter, vtk_data.joined(faces), vtk_data.joined(edges), colour)
 
 
 def add_block(plotter: Plotter, points: Array, shape: Shape, colour: str) -> tuple[Any, Any]:
     """Add the faces and the edges of a block whose corners are at `points` (n, 3) [m]; returns
     both actors."""
-    faces = plotter.add_mesh(
-        triangles_of(points, shape.triangles),
+    faces = triangles_of(points, shape.triangles)
+    return _add_solid(plotter, faces, _edges(points, shape), colour)
+
+
+def _add_solid(plotter: Plotter, faces: Any, edges: Any, colour: str) -> tuple[Any, Any]:
+    surface = plotter.add_mesh(
+        faces,
         color=colour,
         smooth_shading=False,
         ambient=0.35,
         diffuse=0.75,
         specular=0.1,
     )
-    return faces, plotter.add_mesh(_edges(points, shape), color="#303030", line_width=1.5)
+    return surface, plotter.add_mesh(edges, color="#303030", line_width=1.5)
 
 
 def _edges(points: Array, shape: Shape) -> Any:

@@ -24,6 +24,11 @@ def triangles_of(points: Array, triangles: IntArray) -> PolyData:
     return pv.PolyData(points, faces=np.hstack([threes, triangles]).ravel())
 
 
+def joined(surfaces: list[PolyData]) -> PolyData:
+    """One surface of several, with their data."""
+    return surfaces[0].append_polydata(*surfaces[1:])
+
+
 def blocks(run: Run, row: int) -> dict[int, PolyData]:
     """The surface of each block that is released at a row, by its number from 0; on each face
     `body`, the number from 1."""
