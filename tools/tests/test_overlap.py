@@ -124,3 +124,18 @@ def test_walls_give_signed_gaps_and_open_sides_none() -> None:
     body = at(hexapod(0.02), 0.15, 0.029, 0.0305)
     gaps = wall_gaps(body, low, high, WALLS | {"z_max": "open", "x_max": "periodic"})
     assert gaps == pytest.approx({"x_min": 0.12, "y_min": -1e-3, "y_max": 0.041, "z_min": 5e-4})
+
+
+def test_gap_is_exact_up_to_its_reach() -> None:
+    """Of hexapods at random attitudes beside one another: the same with and without, else more."""
+    draw, h = np.random.default_rng(3), hexapod(0.02)
+    within = 0
+    for _ in range(60):
+        turns = draw.normal(size=(2, 4))
+        one, other = (q / np.linalg.norm(q) for q in turns)
+        way = draw.normal(size=3)
+        a, b = at(h, 0, 0, 0, one), at(h, *(0.064 * way / np.linalg.norm(way)), other)
+        exact, found = gap(a, b), gap(a, b, 5e-3)
+        within += exact <= 5e-3
+        assert found == exact if exact <= 5e-3 else found > 5e-3
+    assert 5 < within < 55

@@ -23,9 +23,19 @@ def porosity(bodies: list[Placed], low: Array, high: Array, bed: float = 0.0) ->
     """Share of the box between `low` and `high` (3) [m] that no block fills, of what the `bed`
     leaves of it: the volume of bed in the box [m3]. Exact; where blocks overlap they count twice.
     nan where the bed leaves nothing."""
-    filled = sum(volume_in_box(body.tets, low, high) for body in bodies)
+    filled = sum(_volume_within(body, low, high) for body in bodies)
     room = float(np.prod(high - low)) - bed
     return float(1 - filled / room) if room > 0 else float("nan")
+
+
+def _volume_within(body: Placed, low: Array, high: Array) -> float:
+    """Volume of a block between `low` and `high` (3) [m3]; only a block across a side is cut."""
+    first, last = body.points.min(axis=0), body.points.max(axis=0)
+    if (first >= low).all() and (last <= high).all():
+        return body.shape.volume
+    if (first > high).any() or (last < low).any():
+        return 0.0
+    return volume_in_box(body.tets, low, high)
 
 
 def layer(top: Array, ground: Array) -> tuple[float, float]:

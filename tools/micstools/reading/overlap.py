@@ -138,18 +138,32 @@ def apart(a: Placed, b: Placed) -> float:
     return float(gaps.max())
 
 
-def gap(a: Placed, b: Placed) -> float:
-    """Least distance between the surfaces of two blocks [m]; exact where they do not overlap.
+def gap(a: Placed, b: Placed, reach: float = np.inf) -> float:
+    """Least distance between the surfaces of two blocks [m], exact up to `reach` where they do not
+    overlap; beyond it the distance or more.
 
     Between two polyhedra that do not overlap the nearest points are a corner and a face or two
-    edges, and only corners and edges at which the surface bends count.
+    edges, and only corners and edges at which the surface bends count. What lies within `reach` of
+    the other block meets a box.
     """
-    pa, pb = a.points, b.points
-    return min(
-        float(distance_to_triangles(pa[a.shape.corners], b.triangles).min()),
-        float(distance_to_triangles(pb[b.shape.corners], a.triangles).min()),
-        distance_between_segments(pa[a.shape.edges], pb[b.shape.edges]),
-    )
+    low = np.maximum(a.points.min(axis=0), b.points.min(axis=0)) - reach
+    high = np.minimum(a.points.max(axis=0), b.points.max(axis=0)) + reach
+
+    def in_box(parts: Array) -> Array:
+        """The points, edges or triangles (n, corners, 3) that may meet the box."""
+        meets = (parts.min(axis=1) <= high) & (parts.max(axis=1) >= low)
+        return np.asarray(parts[meets.all(axis=1)])
+
+    found = [np.inf]
+    for one, other in ((a, b), (b, a)):
+        corners = in_box(one.points[one.shape.corners][:, None])
+        triangles = in_box(other.triangles)
+        if len(corners) and len(triangles):
+            found.append(float(distance_to_triangles(corners[:, 0], triangles).min()))
+    edges = [in_box(body.points[body.shape.edges]) for body in (a, b)]
+    if len(edges[0]) and len(edges[1]):
+        found.append(distance_between_segments(*edges))
+    return min(found)
 
 
 def depth(a: Placed, b: Placed) -> float:
@@ -239,7 +253,7 @@ def find_contacts(run: Run, row: int) -> Contacts:
         a = bodies[i]
         b = nearest(run, bodies[j], a)
         far = apart(a, b)
-        distance = far if far > reach else gap(a, b)
+        distance = far if far > reach else gap(a, b, reach)
         if far <= reach < distance and depth(a, b) > 0:
             distance = 0.0
         if distance > reach and i in balls and j in balls:
