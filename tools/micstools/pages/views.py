@@ -93,12 +93,11 @@ def ground(bed: Array, view: str, low: Array, high: Array, step: float) -> Image
 
 def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Image:
     """The picture: colours by the number of the block from 1, edges dark, nothing elsewhere."""
-    pixels = np.zeros((*seen.block.shape, 4))
+    colour = np.zeros((int(seen.block.max(initial=0)) + 1, 4))
     for number in np.unique(seen.block[seen.block > 0]):
-        here = seen.block == number
-        rgb = [int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)]
-        pixels[here] = [*rgb, 255]
-        pixels[here, :3] = 255 - (255 - pixels[here, :3]) * 0.92
+        rgb = np.array([int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)])
+        colour[number] = [*(255 - (255 - rgb) * 0.92), 255]
+    pixels = colour[seen.block]
     pixels[..., :3] *= seen.light[..., None]
     if edges:
         pixels[_edges(seen)] = (28, 32, 38, 255)
