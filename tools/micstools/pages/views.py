@@ -55,21 +55,19 @@ def look(surfaces: dict[int, Array], view: str, low: Array, high: Array, step: f
     n = np.maximum(1, np.ceil((far[:2] - corner[:2]) / step - 1e-9).astype(int))
     depth = np.full((n[1], n[0]), -np.inf)
     block, light = np.zeros(depth.shape, dtype=np.int64), np.zeros(depth.shape)
-    towards = _LIGHT / np.linalg.norm(_LIGHT)
-    for number, surface in surfaces.items():
-        triangles = surface @ axes.T
+    if surfaces:
+        triangles = np.concatenate(list(surfaces.values())) @ axes.T
+        number = np.repeat(np.array(list(surfaces)) + 1, [len(s) for s in surfaces.values()])
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals *= np.sign(normals[:, 2:])  # an open surface is seen from behind, too
-        for triangle, normal in zip(triangles, normals, strict=True):
-            patch = under(triangle, corner, step, depth.shape)
-            if patch is None:
-                continue
-            rows, columns, heights = patch
-            here = heights > depth[rows, columns]
-            depth[rows, columns][here] = heights[here]
-            block[rows, columns][here] = number + 1
-            shade = float(normal @ towards / np.linalg.norm(normal))
-            light[rows, columns][here] = 0.5 + 0.5 * max(0.0, shade)
+        square, height, above = under(triangles, corner, step, depth.shape)
+        order = np.lexsort((-above, height, square))
+        top = order[np.append(np.diff(square[order]) > 0, True)] if len(order) else order
+        seen, which = square[top], above[top]
+        depth.flat[seen], block.flat[seen] = height[top], number[which]
+        towards = _LIGHT / np.linalg.norm(_LIGHT)
+        shade = normals[which] @ towards / np.linalg.norm(normals[which], axis=1)
+        light.flat[seen] = 0.5 + 0.5 * np.maximum(0.0, shade)
     return Seen(block, light, depth, corner[:2], step)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from micstools.reading.overlap import Placed, images, present_bodies
 from micstools.reading.reader import Run
-from micstools.shapes.geometry import Array
+from micstools.shapes.geometry import Array, IntArray
 
 
 def usual_step(run: Run) -> float:
@@ -22,8 +22,9 @@ def height_map(bodies: list[Placed], low: Array, high: Array, step: float) -> Ar
     """Top of the blocks (ny, nx) [m] above the middle of each square; nan where there is none."""
     n = np.maximum(1, np.round((high[:2] - low[:2]) / step).astype(int))
     top = np.full((n[1], n[0]), -np.inf)
-    for body in bodies:
-        _raise(top, _facing_up(body.triangles), low, step)
+    if bodies:
+        triangles = np.concatenate([body.triangles for body in bodies])
+        _raise(top, _facing_up(triangles), low, step)
     return np.where(np.isfinite(top), top, np.nan)
 
 
@@ -35,13 +36,8 @@ def _facing_up(triangles: Array) -> Array:
 
 def _raise(top: Array, triangles: Array, low: Array, step: float) -> None:
     """Raise a map (ny, nx) to triangles (m, 3, 3) where these are higher."""
-    high = low[:2] + step * np.array(top.shape[::-1])
-    over = (triangles[..., :2].max(axis=1) >= low[:2]) & (triangles[..., :2].min(axis=1) <= high)
-    for triangle in triangles[over.all(axis=1)]:
-        patch = under(triangle, low, step, top.shape)
-        if patch is not None:
-            rows, columns, heights = patch
-            np.maximum(top[rows, columns], heights, out=top[rows, columns])
+    square, height, _ = under(triangles, low, step, top.shape)
+    np.maximum.at(top.reshape(-1), square, height)
 
 
 def ground_map(run: Run, low: Array, high: Array, step: float) -> Array:
@@ -66,23 +62,32 @@ def bed_volume(run: Run, low: Array, high: Array, step: float) -> float:
 
 
 def under(
-    triangle: Array, low: Array, step: float, shape: tuple[int, ...]
-) -> tuple[slice, slice, Array] | None:
-    """Rows and columns of the squares of `step` [m] from the corner `low` whose middles lie below
-    or above a triangle (3, 3), and its height above each; -inf beside it, None for an upright
-    one."""
-    a, u, v = triangle[0], triangle[1] - triangle[0], triangle[2] - triangle[0]
-    area = u[0] * v[1] - u[1] * v[0]
-    if area == 0:
-        return None
-    first = np.ceil((triangle[:, :2].min(axis=0) - low[:2]) / step - 0.5).astype(int)
-    last = np.floor((triangle[:, :2].max(axis=0) - low[:2]) / step - 0.5).astype(int)
+    triangles: Array, low: Array, step: float, shape: tuple[int, ...]
+) -> tuple[IntArray, Array, IntArray]:
+    """What lies below or above triangles (m, 3, 3), of the squares of `step` [m] from the corner
+    `low`, `shape` rows and columns of them: for each triangle and square whose middle it covers the
+    number of the square, the height of the triangle [m] and its number. Upright ones cover none."""
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    first = np.ceil((triangles[..., :2].min(axis=1) - low[:2]) / step - 0.5).astype(int)
+    last = np.floor((triangles[..., :2].max(axis=1) - low[:2]) / step - 0.5).astype(int)
     first, last = np.maximum(first, 0), np.minimum(last, np.array(shape)[::-1] - 1)
-    if (last < first).any():
-        return None
-    x = low[0] + (np.arange(first[0], last[0] + 1) + 0.5) * step - a[0]
-    y = low[1] + (np.arange(first[1], last[1] + 1) + 0.5)[:, None] * step - a[1]
-    s, t = (x * v[1] - y * v[0]) / area, (y * u[0] - x * u[1]) / area
-    inside = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1 + 1e-12)
-    heights = np.where(inside, a[2] + s * u[2] + t * v[2], -np.inf)
-    return slice(first[1], last[1] + 1), slice(first[0], last[0] + 1), heights
+    covers = np.flatnonzero((area != 0) & (last >= first).all(axis=1))
+    size = last[covers] - first[covers] + 1
+    found: list[tuple[Array, ...]] = [(np.empty(0, int), np.empty(0), np.empty(0, int))]
+    for wide, high in np.unique(size, axis=0):
+        alike = covers[(size == (wide, high)).all(axis=1)]
+        per = max(1, 2_000_000 // int(wide * high))
+        for k in (alike[start : start + per] for start in range(0, len(alike), per)):
+            column = first[k, 0, None, None] + np.arange(wide)
+            row = first[k, 1, None, None] + np.arange(high)[:, None]
+            x = low[0] + (column + 0.5) * step - a[k, 0, None, None]
+            y = low[1] + (row + 0.5) * step - a[k, 1, None, None]
+            (ux, uy, uz), (vx, vy, vz) = u[k].T[..., None, None], v[k].T[..., None, None]
+            s, t = (x * vy - y * vx) / area[k, None, None], (y * ux - x * uy) / area[k, None, None]
+            inside = (s >= -1e-12) & (t >= -1e-12) & (s + t <= 1 + 1e-12)
+            height = a[k, 2, None, None] + s * uz + t * vz
+            which = np.broadcast_to(k[:, None, None], inside.shape)
+            found.append(((row * shape[1] + column)[inside], height[inside], which[inside]))
+    square, height, which = (np.concatenate(part) for part in zip(*found, strict=True))
+    return square, height, which
