@@ -303,7 +303,8 @@ def overlap(run: Run, row: int = -1) -> Overlap:
     bodies = present_bodies(run, row)
     blocks = {}
     for i, j in near_pairs(run, bodies):
-        found = depth(bodies[i], nearest(run, bodies[j], bodies[i]))
+        other = nearest(run, bodies[j], bodies[i])
+        found = 0.0 if apart(bodies[i], other) > 0 else depth(bodies[i], other)
         if found > 0:
             blocks[i, j] = found
     gaps = _all_wall_gaps(run, bodies)
