@@ -153,17 +153,20 @@ contains
     real(wp), intent(out) :: depth
     type(deep_overlaps_t), intent(inout) :: deep
     integer, parameter :: wall = 0
+    logical :: asked(blocks%n)
     real(wp) :: found
     integer :: a, b, p
 
     depth = 0.0_wp
     call forget_overlaps(deep)
     if (.not. any(deep%asked)) return
+    asked = deep%asked .and. blocks%present
     do a = 1, blocks%n
+      if (.not. asked(a)) cycle
       overlap%turn(:, :, a) = rotation_matrix(blocks%q(:, a))
       associate (solid => overlap%solid(blocks%shape(a)))
         overlap%radius(a) = solid%radius
-        if (.not. blocks%present(a) .or. blocks%fixed(a) .or. .not. deep%asked(a)) cycle
+        if (blocks%fixed(a)) cycle
         found = worth_finding(a, wall, depth, deep)
         call deepen_wall(solid%corner, solid%ball, solid%radius, blocks%x(:, a), &
           overlap%turn(:, :, a), walls, found)
@@ -173,12 +176,11 @@ contains
         depth = max(depth, found)
       end associate
     end do
-    call near_pairs(blocks%x, overlap%radius, blocks%present, walls%period, 0.0_wp, overlap%pairs)
+    call near_pairs(blocks%x, overlap%radius, asked, walls%period, 0.0_wp, overlap%pairs)
     do p = 1, overlap%pairs%n
       a = overlap%pairs%a(p)
       b = overlap%pairs%b(p)
       if (blocks%fixed(a) .and. blocks%fixed(b)) cycle
-      if (.not. (deep%asked(a) .and. deep%asked(b))) cycle
       found = worth_finding(a, b, depth, deep)
       call deepen_pair(overlap%solid(blocks%shape(a)), overlap%turn(:, :, a), &
         overlap%solid(blocks%shape(b)), overlap%turn(:, :, b), &
