@@ -199,7 +199,9 @@ def _block_numbers(plotter: Plotter, run: Run, row: int, camera: Camera) -> labe
         faces = vtk_data.joined(list(blocks.values()))
         number = faces.cell_data["body"].astype(np.int64)
         colour = np.stack([number % 256, number // 256 % 256, number // 65536], axis=1)
-        plotter.add_mesh(faces, scalars=colour.astype(np.uint8), rgb=True, preference="cell", **flat)
+        plotter.add_mesh(
+            faces, scalars=colour.astype(np.uint8), rgb=True, preference="cell", **flat
+        )
     add_bed(plotter, run, color="white", **flat)
     look(plotter, camera)
     seen = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
