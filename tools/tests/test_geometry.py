@@ -109,8 +109,9 @@ def test_distance_between_segments() -> None:
 
 def test_samples_are_dense_and_on_the_surface() -> None:
     shape = box((0.03, 0.02, 0.05))
-    samples = g.surface_samples(shape.points, shape.triangles, 1.5e-3)
-    assert np.abs(g.distance_to_triangles(samples, shape.points[shape.triangles])).max() < 1e-15
+    triangles = shape.points[shape.triangles]
+    samples = g.surface_samples(triangles, 1.5e-3)
+    assert np.abs(g.distance_to_triangles(samples, triangles)).max() < 1e-15
     probe = np.array([[0.0151, y, z] for y in (-0.0061, 0.0033) for z in (-0.02, 0.0111)])
     nearest = np.linalg.norm(probe[:, None] - samples[None], axis=2).min(axis=1)
     assert nearest.max() < 1.5e-3

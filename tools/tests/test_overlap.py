@@ -9,7 +9,12 @@ import pytest
 
 from micstools.reading import overlap
 from micstools.reading.overlap import Placed, apart, bed_gap, depth, gap, near_pairs, wall_gaps
-from micstools.shapes.geometry import quaternion_from_axis
+from micstools.shapes.geometry import (
+    distance_to_triangles,
+    inside_tets,
+    quaternion_from_axis,
+    surface_samples,
+)
 from micstools.shapes.shape import cube, hexapod
 
 UPRIGHT = np.array([1.0, 0, 0, 0])
@@ -53,6 +58,26 @@ def test_depth_of_faces_and_of_a_leg() -> None:
     assert depth(at(c, 0, 0, 0), at(c, 0.001, 0.002, 0.0197)) == pytest.approx(3e-4)
     assert depth(at(h, 0, 0, 0), at(h, 0, 0.05999, 0)) == pytest.approx(1e-5)
     assert depth(at(h, 0, 0, 0), at(h, 0, 0.0601, 0)) == 0.0
+
+
+def test_depth_of_a_corner_and_of_blocks_anywhere() -> None:
+    """A corner is sampled itself: exact; elsewhere as with every surface point of either block."""
+    c, h, d = cube(0.02), hexapod(0.02), 0.02
+    turn = np.degrees(np.arccos(1 / np.sqrt(3)))
+    on_corner = quaternion_from_axis(np.array([1.0, -1, 0]), turn)
+    lowest = d / 2 + np.sqrt(3) / 2 * d
+    found = depth(at(c, 0, 0, 0), at(c, 0.001, 0.002, lowest - 2e-4, on_corner))
+    assert found == pytest.approx(2e-4, rel=1e-9)
+    chance = np.random.default_rng(5)
+    for _ in range(20):
+        q = chance.normal(size=4)
+        a, b = at(h, 0, 0, 0), at(h, *chance.uniform(-0.03, 0.03, 3), q / np.linalg.norm(q))
+        deepest = 0.0
+        for one, other in ((a, b), (b, a)):
+            points = surface_samples(one.triangles, h.radius / 30)
+            inside = points[inside_tets(points, other.tets)]
+            deepest = max(deepest, distance_to_triangles(inside, other.triangles).max(initial=0.0))
+        assert depth(a, b) == pytest.approx(deepest, rel=1e-12)
 
 
 def test_hexapods_lying_in_one_anothers_notches_are_apart() -> None:

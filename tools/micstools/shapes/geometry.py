@@ -67,6 +67,8 @@ def tet_volumes(corner: Array) -> Array:
 def inside_tets(points: Array, corner: Array, tolerance: float = 1e-12) -> NDArray[np.bool_]:
     """Which of `points` (n, 3) lie in any of the tetrahedra `corner` (k, 4, 3)."""
     inside = np.zeros(len(points), bool)
+    if not len(corner):
+        return inside
     low, high = corner.min(axis=1), corner.max(axis=1)
     near = np.all((points >= low.min(axis=0)) & (points <= high.max(axis=0)), axis=1)
     left = np.flatnonzero(near)
@@ -237,14 +239,12 @@ def feature_edges(points: Array, triangles: IntArray, cosine: float = 0.9999) ->
     return np.array(kept, dtype=np.int64).reshape(-1, 2)
 
 
-def surface_samples(points: Array, triangles: IntArray, spacing: float) -> Array:
-    """Points on every triangle no farther apart than `spacing` [m], corners and edges included."""
-    corner = points[triangles]
-    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max()
-    n = max(1, int(np.ceil(longest / spacing)))
+def surface_samples(triangles: Array, spacing: float) -> Array:
+    """Points (n, 3) on triangles (m, 3, 3), no farther apart than `spacing` [m], corners and edges
+    included; what triangles share comes once for each of them."""
+    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2)
+    n = max(1, int(np.ceil(sides.max(initial=0.0) / spacing)))
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
     keep = i + j <= n
     weight = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
-    samples = np.einsum("wk,mkj->mwj", weight, corner).reshape(-1, 3)
-    _, first = np.unique(np.round(samples / (1e-9 * longest)), axis=0, return_index=True)
-    return np.asarray(samples[first])
+    return np.asarray(np.einsum("wk,mkj->mwj", weight, triangles).reshape(-1, 3))

@@ -10,7 +10,7 @@ from itertools import permutations
 
 import numpy as np
 
-from micstools.shapes.geometry import Array, IntArray, feature_edges, surface_samples, tet_volumes
+from micstools.shapes.geometry import Array, IntArray, feature_edges, tet_volumes
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,6 @@ class Shape:
     def length(self) -> float:
         """The longest edge of the box around it in body axes [m]."""
         return float(np.ptp(self.points, axis=0).max())
-
-    @cached_property
-    def samples(self) -> Array:
-        """Surface points (n, 3) in body axes, at most a thirtieth of the radius apart [m]."""
-        return surface_samples(self.points, self.triangles, self.radius / 30)
 
 
 def hexapod(edge: float = 0.02, refinement: int = 2, density: float = 2300.0) -> Shape:
