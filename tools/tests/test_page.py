@@ -246,6 +246,16 @@ def test_views_show_what_stands_in_front() -> None:
     assert top.depth[60, 50] == pytest.approx(0.03)
 
 
+def test_lines_do_not_hide_small_blocks() -> None:
+    """Cubes of 20 pixels have dark edges; the same of 8 pixels show their colour only."""
+    cube, low, high = shapes.cube(0.02), np.zeros(3), np.array([0.1, 0.1, 0.1])
+    bodies = views.surfaces_of({0: Placed(cube, np.array([0.05, 0.05, 0.05]), UPRIGHT)})
+    for step, lines in ((0.001, 76), (0.0025, 0)):
+        picture = views.paint(views.look(bodies, "top", low, high, step), {1: "#ff8000"})
+        red = np.asarray(picture)[..., 0][np.asarray(picture)[..., 3] > 0]
+        assert (red < 100).sum() == lines
+
+
 def test_a_bed_is_an_outline_from_the_side() -> None:
     """A ramp from 0 to 0.1 m along x, a quarter of a square higher: of the squares of the front
     view those on and below the diagonal; all of the side view."""

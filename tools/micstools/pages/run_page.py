@@ -149,7 +149,8 @@ def _pile(run: Run, shown: Units) -> Markup:
         sheet.drawing(bodies, colours, view, shown.length, level)
         for view in ("front", "side", "top")
     ]
-    words = "All views have one scale; blocks bear their numbers, fixed ones are grey."
+    words = "All views have one scale; blocks bear their numbers where enough of them is seen, "
+    words += "fixed ones are grey."
     words += " The dashed line is the water level." if level is not None else ""
     return section("pile", "The pile at the end", tag("div", *drawn, class_="views"),
                    tag("p", words, class_="note"))  # fmt: skip

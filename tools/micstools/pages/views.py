@@ -33,6 +33,7 @@ _LIGHT = np.array([-0.35, 0.55, 0.76])  # from the viewer's upper left
 FIXED = "#8d8d8d"
 BED = "#b7a78c"
 _MANY = 20  # blocks: more have smaller numbers
+_LINED = 300  # pixels that a block must show on average to have lines
 
 
 @dataclass(frozen=True)
@@ -90,14 +91,16 @@ def ground(bed: Array, view: str, low: Array, high: Array, step: float) -> Image
 
 
 def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Image:
-    """The picture: colours by the number of the block from 1, edges dark, nothing elsewhere."""
+    """The picture: colours by the number of the block from 1, edges dark unless blocks are so small
+    that lines would hide them, nothing elsewhere."""
     colour = np.zeros((int(seen.block.max(initial=0)) + 1, 4))
     for number in np.unique(seen.block[seen.block > 0]):
         rgb = np.array([int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)])
         colour[number] = [*(255 - (255 - rgb) * 0.92), 255]
     pixels = colour[seen.block]
     pixels[..., :3] *= seen.light[..., None]
-    if edges:
+    pixels_each = (seen.block > 0).sum() / max(1, len(np.unique(seen.block)) - 1)
+    if edges and pixels_each >= _LINED:
         pixels[_edges(seen)] = (28, 32, 38, 255)
     flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
     return Image.fromarray(flipped, "RGBA")
