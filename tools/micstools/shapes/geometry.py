@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-
 
 def rotation_matrix(q: Array) -> Array:
     """Rotations (..., 3, 3) from body axes to space of quaternions `q` (..., 4) = w, x, y, z."""
@@ -133,28 +131,11 @@ def distance_between_segments(first: Array, second: Array) -> float:
 
 
 def below_plane(corner: Array, level: float) -> tuple[float, Array]:
-    """Volume [m3] and first moment [m4] about the origin of the part of tets below z = `level`.
-
-    `corner` (k, 4, 3) are tetrahedra of positive volume. A cut tetrahedron is split into the
-    cone from one of its low corners over the parts of its faces below the plane and the cut.
-    """
-    volume, moment = 0.0, np.zeros(3)
-    height = corner[..., 2] - level
-    whole = height.max(axis=1) <= 0
-    v = tet_volumes(corner[whole])
-    volume += v.sum()
-    moment += (v[:, None] * corner[whole].mean(axis=1)).sum(axis=0)
-    for tet, h in zip(corner, height, strict=True):
-        if h.min() < 0 < h.max():
-            apex = tet[np.argmin(h)]
-            polygons = [_cut_polygon(tet[face], h[face]) for face in _TET_FACES]
-            for polygon in [*polygons, _lid(polygons, level)]:
-                for b, c in zip(polygon[1:-1], polygon[2:], strict=True):
-                    piece = np.array([[apex, polygon[0], b, c]])
-                    piece_volume = abs(float(tet_volumes(piece)[0]))
-                    volume += piece_volume
-                    moment += piece_volume * piece[0].mean(axis=0)
-    return float(volume), moment
+    """Volume [m3] and first moment [m4] about the origin of the part of tets `corner` (k, 4, 3)
+    below z = `level`; exact."""
+    pieces = _below(corner, corner[..., 2] - level)
+    volume = np.abs(tet_volumes(pieces))
+    return float(volume.sum()), np.asarray(volume @ pieces.mean(axis=1))
 
 
 def volume_in_box(corner: Array, low: Array, high: Array) -> float:
@@ -193,32 +174,6 @@ def _below(corner: Array, height: Array) -> Array:
 def _prism(*corner: Array) -> list[Array]:
     """Three tetrahedra (k, 4, 3) of prisms; corners 0, 1, 2 of one end lie along 3, 4, 5."""
     return [np.stack([corner[m] for m in c], 1) for c in ((0, 1, 2, 5), (0, 1, 5, 4), (0, 3, 4, 5))]
-
-
-def _cut_polygon(points: Array, height: Array) -> list[Array]:
-    """The part of a polygon where `height` <= 0, corners in order."""
-    kept: list[Array] = []
-    for k in range(len(points)):
-        n = (k + 1) % len(points)
-        if height[k] <= 0:
-            kept.append(points[k])
-        if height[k] * height[n] < 0:
-            share = height[k] / (height[k] - height[n])
-            kept.append(points[k] + share * (points[n] - points[k]))
-    return kept if len(kept) >= 3 else []
-
-
-def _lid(polygons: list[list[Array]], level: float) -> list[Array]:
-    """Corners of the cut face, in order around it."""
-    found = [p for polygon in polygons for p in polygon if abs(p[2] - level) < 1e-12]
-    unique: list[Array] = []
-    for p in found:
-        if all(np.linalg.norm(p - other) > 1e-13 for other in unique):
-            unique.append(p)
-    if len(unique) < 3:
-        return []
-    centre = np.mean(unique, axis=0)
-    return sorted(unique, key=lambda p: np.arctan2(p[1] - centre[1], p[0] - centre[0]))
 
 
 def feature_edges(points: Array, triangles: IntArray, cosine: float = 0.9999) -> IntArray:
