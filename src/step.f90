@@ -38,7 +38,7 @@ module step_m
                                fluxes_of_step, time_step_t
   use mixture_m, only: mix_fluid
   use outflow_m, only: update_outflow
-  use rigid_body_m, only: fastest_point, follow_motions, look_ahead
+  use rigid_body_m, only: follow_motions, look_ahead
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
@@ -176,7 +176,7 @@ contains
     do b = 1, sim%blocks%n
       if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
       any_free = .true.
-      speed = max(speed, fastest_point(sim%blocks, b))
+      speed = max(speed, sim%blocks%speed(b))
     end do
     call sim%clock%store_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return

@@ -21,7 +21,7 @@ module rigid_body_m
   public :: to_come, lowering, let_go, left_out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
-  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point
+  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point, store_speeds
   public :: follow_motions, look_ahead, change_by_motion, haste
 
   real(wp), parameter :: turning_share = 0.02_wp
@@ -70,6 +70,9 @@ module rigid_body_m
     real(wp), allocatable :: v(:, :)             !! (3, n) velocity [m/s]
     real(wp), allocatable :: l(:, :)             !! (3, n) angular momentum, space frame [kg m2/s]
     real(wp), allocatable :: omega(:, :)         !! (3, n) angular velocity, space frame [rad/s]
+    real(wp), allocatable :: speed(:)
+      !! (n) of the fastest point, by what moved the body; rest is judged by it, for `v` has a push
+      !! of the fluid that contact has still to answer [m/s]
     !> (3, n) v and l at the start of the fluid step.
     real(wp), allocatable :: v_start(:, :), l_start(:, :)
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
@@ -220,7 +223,7 @@ contains
     allocate (blocks%fixed(n), blocks%present(n), blocks%asleep(n), blocks%still(n), &
       source=.false.)
     allocate (blocks%mass(n), blocks%added_mass(n), blocks%release_time(n), blocks%entry_time(n), &
-      blocks%raised(n), blocks%goal(n), source=0.0_wp)
+      blocks%raised(n), blocks%goal(n), blocks%speed(n), source=0.0_wp)
     allocate (blocks%name(n), blocks%handling(n))
     allocate (blocks%planned(2, n), source=0.0_wp)
     allocate (blocks%on_ground(n), source=.false.)
@@ -560,6 +563,17 @@ contains
       energy = energy - own_mass(blocks, b)*dot_product(gravity, blocks%x(:, b))
     end do
   end function potential_energy
+
+  !> The speeds at which the bodies were moved in a fluid step, from their velocities at its end.
+  pure subroutine store_speeds(blocks)
+    type(blocks_t), intent(inout) :: blocks
+    integer :: b
+
+    do b = 1, blocks%n
+      blocks%speed(b) = 0.0_wp
+      if (blocks%present(b) .and. .not. blocks%asleep(b)) blocks%speed(b) = fastest_point(blocks, b)
+    end do
+  end subroutine store_speeds
 
   !> Bound of the speed of all points of body b: that of the centre, and by rotation that of the
   !! point furthest from it [m/s].

@@ -115,7 +115,7 @@ contains
   !> Note the largest speed of the blocks after a step, for a run that ends when all have settled.
   pure subroutine store_speed(self, speed, all_there)
     class(clock_t), intent(inout) :: self
-    real(wp), intent(in) :: speed       !! largest of all points of free blocks [m/s]
+    real(wp), intent(in) :: speed       !! largest of free blocks (`blocks%speed`) [m/s]
     logical, intent(in) :: all_there
       !! there are free blocks, and none is still to be released, but for lack of room
 

@@ -142,13 +142,9 @@ contains
   pure function count_moving(rest_speed, blocks) result(n)
     real(wp), intent(in) :: rest_speed   !! [m/s]
     type(blocks_t), intent(in) :: blocks
-    integer :: n, b
+    integer :: n
 
-    n = 0
-    do b = 1, blocks%n
-      if (blocks%present(b) .and. .not. blocks%fixed(b) &
-          .and. norm2(blocks%v(:, b)) > rest_speed) n = n + 1
-    end do
+    n = count(blocks%present .and. .not. blocks%fixed .and. blocks%speed > rest_speed)
   end function count_moving
 
   !> Wall time to the end at the mean speed so far, as h:mm:ss.

@@ -18,6 +18,7 @@ from micstools.reading import units
 from micstools.reading.reader import Run
 from micstools.reading.units import figure
 from micstools.serve.living import State, clock
+from micstools.shapes.geometry import Array
 
 SCRIPTS = ("live",)
 _ROWS = 8  # of the table of the step
@@ -168,14 +169,20 @@ def _facts(run: Run, found: State) -> Markup:
     ]
     if b.n and b.time.size:
         here = b.present(-1)
-        moving = (np.linalg.norm(b.velocity[-1], axis=1) > _rest_speed(run)) & here & ~b.fixed
+        moving = (_speeds(run) > float(run.value("run", "rest_speed", 1e-3))) & here & ~b.fixed
         said = run_words.count(int(moving.sum()), "block moves", "blocks move")
         pairs.append(("released", f"{int(here.sum())} of {b.n}", said))
     return facts(pairs)
 
 
-def _rest_speed(run: Run) -> float:
-    return float(run.value("run", "rest_speed", 1e-3))
+def _speeds(run: Run) -> Array:
+    """Mean speed of each block since the last row but one [m/s]; velocities of resting blocks have
+    a noise of some mm/s."""
+    b = run.bodies
+    if b.time.size < 2:
+        return np.asarray(np.linalg.norm(b.velocity[-1], axis=1))
+    way = np.linalg.norm(b.position[-1] - b.position[-2], axis=1)
+    return np.asarray(way / (b.time[-1] - b.time[-2]))
 
 
 def _step(run: Run) -> Markup:
