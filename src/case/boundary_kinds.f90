@@ -20,7 +20,7 @@ module boundary_kinds_m
     logical :: drag                  !! along the side the fluid moves with it
   end type boundary_kind_t
 
-  type(boundary_kind_t), parameter :: kind_of(0:6) = [ &
+  type(boundary_kind_t), parameter :: kind_of(0:*) = [ &
     !                            wall     pressure velocity drag
     boundary_kind_t('',          .false., .false., .false., .false.), &
     boundary_kind_t('no_slip',   .true.,  .false., .true.,  .true.), &

@@ -36,11 +36,11 @@ module solid_geometry_m
     !! number of one that meets a surface in the lists, 0 where it is free.
     integer, allocatable :: link_number(:, :, :, :)
     integer :: n_link = 0
-    integer, allocatable :: link(:, :)           !! (4, n_leg) cell index and direction of the face
+    integer, allocatable :: link(:, :)           !! (4, n_link) cell index and direction of the face
     !> Distances from the lower cell (i-1) up to the first surface and from the upper cell (i) down
     !! to the first surface, in units of h(d), 0..1, and the bodies that are hit there.
-    real(wp), allocatable :: link_length(:, :)   !! (2, n_leg)
-    integer, allocatable :: link_body(:, :)      !! (2, n_leg)
+    real(wp), allocatable :: link_length(:, :)   !! (2, n_link)
+    integer, allocatable :: link_body(:, :)      !! (2, n_link)
 
     type(solid_tets_t) :: tets
     !> Cut cells (0 < alpha < 1): `cut(i,j,k)` is the number m of the cell in the lists, or 0.

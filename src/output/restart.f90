@@ -9,12 +9,15 @@
 !!     /            @format = 'mics-restart' @format_version @checksum @version @git_revision
 !!                  @namelist @parameters
 !!     /clock       t dt step n_rows n_frames rest_began
+!!     /energy      what the energy balance has summed
 !!     /flow        u (3,nz,ny,nx)  p liquid fluid_volume c alpha (1,nz,ny,nx)
-!!                  uf open (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
+!!                  uf aperture (3,nz+1,ny+1,nx+1) [m/s, 1]  solid_flux (3,nz+1,ny+1,nx+1) [m3/s]
+!!                  liquid_initial liquid_inflow, and of each outflow its velocity
 !!     /blocks      position quaternion velocity angular_momentum ... (N,..)
+!!     /light       with physics = 'light' the level, and of each block wet volume and force
 !!     /contacts    the tangential displacements
 !!
-!! The volume flux through a face is open*area*uf + solid_flux.
+!! `visit_state` lists all of it. The volume flux through a face is aperture*area*uf + solid_flux.
 module restart_m
   use kinds_m, only: wp
   use parallel_m, only: is_root, nproc, broadcast, halo_exchange

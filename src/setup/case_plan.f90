@@ -464,6 +464,7 @@ contains
     class(contact_law_t), allocatable :: law
     type(load_t) :: heaviest
     type(contact_input_t) :: contact
+    character(:), allocatable :: units
     real(wp) :: ratio_step, time_step, courant_step, mass, k
     integer :: s
 
@@ -483,8 +484,10 @@ contains
       if (.not. extreme_of_family(shapes, s)) cycle
       mass = shapes(s)%density*shapes(s)%volume
       k = law%normal_constant(mass, heaviest, give_share*shapes(s)%smallest_edge)
-      call entry(unit, 'stiffness on a wall', brief(k)//' N/m for '//trim(shapes(s)%name))
-      if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) cycle
+      units = ' N/m'
+      if (abs(law%gamma_n - 1.0_wp) > 0.0_wp) units = ' N/m^'//brief(law%gamma_n)
+      call entry(unit, 'stiffness on a wall', brief(k)//units//' for '//trim(shapes(s)%name))
+      if (units /= ' N/m') cycle
       call entry(unit, '', 'gives way '//brief(speed*sqrt(mass/k))//' m at '//brief(speed) &
                  //' m/s, '//brief(mass*norm2(case%fluid%gravity)/k)//' m at rest')
     end do
