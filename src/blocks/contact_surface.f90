@@ -493,6 +493,7 @@ contains
       end associate
       point%depth = guest%ball - apart
       if (point%depth <= -now%gap) cycle
+      if (now%margin > 0.0_wp .and. .not. may_face(guest, i, matmul(outward, view%turn))) cycle
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
       outward = matmul(turn_host, outward)
       point%weight = guest%weight(i)
@@ -511,6 +512,20 @@ contains
       call add_point(point, points)
     end do
   end subroutine add_vertex_points
+
+  !> May a vertex of the guest come to a surface of that outward direction? A point inside a flat
+  !! face only to one that the face looks at: else, level with the edge of a face ahead, it would
+  !! hold a body that slides over it.
+  pure function may_face(guest, i, outward) result(yes)
+    type(surface_t), intent(in) :: guest
+    integer, intent(in) :: i                  !! number of the vertex
+    real(wp), intent(in) :: outward(3)        !! of the host, axes of the guest [-]
+    logical :: yes
+    real(wp), parameter :: max_cosine = -0.2_wp
+
+    yes = guest%ball > 0.0_wp .or. i <= guest%n_corners
+    if (.not. yes) yes = dot_product(guest%facing(:, i), outward) < max_cosine
+  end function may_face
 
   !> Contact points of the chosen pairs of edges that cross.
   subroutine add_edge_points(now, surface_a, surface_b, pair, points)

@@ -282,7 +282,7 @@ contains
     do f = 1, size(shape%facet) - 1
       if (norm(area_vector(shape, f)) > large*whole) n = n + size(corners(shape, f))
     end do
-    allocate (surface%vertex(3, n), surface%weight(n))
+    allocate (surface%vertex(3, n), surface%weight(n), surface%facing(3, surface%n_corners + 1:n))
     n = 0
     do c = 1, size(is_corner)
       if (.not. is_corner(c)) cycle
@@ -298,6 +298,7 @@ contains
         n = n + 1
         surface%vertex(:, n) = (1.0_wp - inset)*shape%point(:, shape%facet_point(c)) + inset*middle
         surface%weight(n) = face_sum/real(m, wp)
+        surface%facing(:, n) = surface%normal(:, f)
       end do
     end do
   end subroutine make_vertices

@@ -21,6 +21,8 @@ module surface_search_m
     real(wp), allocatable :: vertex(:, :)        !! (3, n) points that touch; sphere: its centre [m]
     real(wp), allocatable :: weight(:)           !! (n) share of the stiffness [-]
     integer :: n_corners = 0                     !! the first vertices are corners
+    real(wp), allocatable :: facing(:, :)
+      !! (3, n_corners+1:n) normals of the flat faces in which the others lie
     !> Facets: normal.x = offset; inside where side_normal.x >= side_offset for all of its sides.
     real(wp), allocatable :: normal(:, :), offset(:)              !! (3, n) outward, (n) [m]
     integer, allocatable :: side(:)              !! (n + 1) first side of each facet
