@@ -163,22 +163,15 @@ contains
     type(contact_report_t), intent(in) :: contact
     type(coupling_report_t), intent(in) :: stage
     type(step_report_t), intent(inout) :: report
-    real(wp) :: speed
     logical :: any_free
-    integer :: b
 
     report%contact_energy = contact%energy
     report%contact_courant_max = contact%courant_max
     report%substeps = contact%substeps
     report%contacts_solved = contact%info == 0
-    speed = 0.0_wp
-    any_free = .false.
-    do b = 1, sim%blocks%n
-      if (.not. sim%blocks%present(b) .or. sim%blocks%fixed(b)) cycle
-      any_free = .true.
-      speed = max(speed, sim%blocks%speed(b))
-    end do
-    call sim%clock%store_speed(speed, any_free .and. none_to_come(sim%clock%t, sim%blocks))
+    any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
+    call sim%clock%store_speed(maxval(sim%blocks%speed), &
+                               any_free .and. none_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes

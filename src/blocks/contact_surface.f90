@@ -493,7 +493,7 @@ contains
       end associate
       point%depth = guest%ball - apart
       if (point%depth <= -now%gap) cycle
-      if (now%margin > 0.0_wp .and. .not. may_face(guest, i, matmul(outward, view%turn))) cycle
+      if (now%margin > 0.0_wp .and. .not. may_face(guest, i, view, outward)) cycle
       arm = matmul(turn_host, place - (guest%ball - 0.5_wp*point%depth)*outward)
       outward = matmul(turn_host, outward)
       point%weight = guest%weight(i)
@@ -516,15 +516,16 @@ contains
   !> May a vertex of the guest come to a surface of that outward direction? A point inside a flat
   !! face only to one that the face looks at: else, level with the edge of a face ahead, it would
   !! hold a body that slides over it.
-  pure function may_face(guest, i, outward) result(yes)
+  pure function may_face(guest, i, view, outward) result(yes)
     type(surface_t), intent(in) :: guest
-    integer, intent(in) :: i                  !! number of the vertex
-    real(wp), intent(in) :: outward(3)        !! of the host, axes of the guest [-]
+    integer, intent(in) :: i             !! number of the vertex
+    type(view_t), intent(in) :: view     !! of the guest, host axes
+    real(wp), intent(in) :: outward(3)   !! of the host, its axes [-]
     logical :: yes
-    real(wp), parameter :: max_cosine = -0.2_wp
+    real(wp), parameter :: max_cosine = -0.2_wp   !! of both directions [-]
 
     yes = guest%ball > 0.0_wp .or. i <= guest%n_corners
-    if (.not. yes) yes = dot_product(guest%facing(:, i), outward) < max_cosine
+    if (.not. yes) yes = dot_product(matmul(view%turn, guest%facing(:, i)), outward) < max_cosine
   end function may_face
 
   !> Contact points of the chosen pairs of edges that cross.

@@ -5,7 +5,7 @@
 module contacts_m
   use kinds_m, only: wp
   use rigid_body_m, only: blocks_t, begin_step, drift, kick_body, hold_sleepers, look_ahead, &
-    follow_motions, store_speeds
+    follow_motions, find_speeds
   use walls_m, only: walls_t
   use sleep_m, only: update_stillness, store_poses, store_quiet, stop_sleepers, all_still
   use lubrication_m, only: lubricate
@@ -78,7 +78,7 @@ contains
       report%substeps = report%substeps + 1
     end do
     call follow_motions(began + dt, blocks)
-    call store_speeds(blocks)
+    call find_speeds(blocks)
     blocks%contact_force = contacts%loads%impulse(:, 1:)/dt
     blocks%contact_torque = contacts%loads%twist(:, 1:)/dt
     if (contacts%sleep%active) call store_quiet(gravity, dt, blocks, contacts%sleep)

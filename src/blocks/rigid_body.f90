@@ -21,7 +21,7 @@ module rigid_body_m
   public :: to_come, lowering, let_go, left_out
   public :: begin_step, drift, drift_body, turn_to_attitude, kick, kick_body, place_body
   public :: hold_sleepers, set_velocity_after_fluid
-  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point, store_speeds
+  public :: space_tensor, own_mass, kinetic_energy, potential_energy, fastest_point, find_speeds
   public :: follow_motions, look_ahead, change_by_motion, haste
 
   real(wp), parameter :: turning_share = 0.02_wp
@@ -71,8 +71,8 @@ module rigid_body_m
     real(wp), allocatable :: l(:, :)             !! (3, n) angular momentum, space frame [kg m2/s]
     real(wp), allocatable :: omega(:, :)         !! (3, n) angular velocity, space frame [rad/s]
     real(wp), allocatable :: speed(:)
-      !! (n) of the fastest point, by what moved the body; rest is judged by it, for `v` has a push
-      !! of the fluid that contact has still to answer [m/s]
+      !! (n) of the fastest point of a free body at the end of its motion, 0 of others; rest is
+      !! judged by it, for `v` has a push of the fluid that contact has still to answer [m/s]
     !> (3, n) v and l at the start of the fluid step.
     real(wp), allocatable :: v_start(:, :), l_start(:, :)
     !> Means over the last fluid step, space frame, torques about the centre of mass [N], [N m].
@@ -564,16 +564,17 @@ contains
     end do
   end function potential_energy
 
-  !> The speeds at which the bodies were moved in a fluid step, from their velocities at its end.
-  pure subroutine store_speeds(blocks)
+  !> The speeds at which free bodies end their motion (`blocks%speed`).
+  pure subroutine find_speeds(blocks)
     type(blocks_t), intent(inout) :: blocks
     integer :: b
 
     do b = 1, blocks%n
       blocks%speed(b) = 0.0_wp
-      if (blocks%present(b) .and. .not. blocks%asleep(b)) blocks%speed(b) = fastest_point(blocks, b)
+      if (blocks%fixed(b) .or. blocks%asleep(b) .or. .not. blocks%present(b)) cycle
+      blocks%speed(b) = fastest_point(blocks, b)
     end do
-  end subroutine store_speeds
+  end subroutine find_speeds
 
   !> Bound of the speed of all points of body b: that of the centre, and by rotation that of the
   !! point furthest from it [m/s].

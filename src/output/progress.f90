@@ -144,7 +144,7 @@ contains
     type(blocks_t), intent(in) :: blocks
     integer :: n
 
-    n = count(blocks%present .and. .not. blocks%fixed .and. blocks%speed > rest_speed)
+    n = count(blocks%speed > rest_speed)
   end function count_moving
 
   !> Wall time to the end at the mean speed so far, as h:mm:ss.

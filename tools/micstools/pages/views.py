@@ -94,13 +94,14 @@ def paint(seen: Seen, colours: dict[int, str], edges: bool = True) -> Image.Imag
     """The picture: colours by the number of the block from 1, edges dark unless blocks are so small
     that lines would hide them, nothing elsewhere."""
     colour = np.zeros((int(seen.block.max(initial=0)) + 1, 4))
-    for number in np.unique(seen.block[seen.block > 0]):
+    covered = seen.block[seen.block > 0]
+    shown = np.unique(covered)
+    for number in shown:
         rgb = np.array([int(colours[int(number)][k : k + 2], 16) for k in (1, 3, 5)])
         colour[number] = [*(255 - (255 - rgb) * 0.92), 255]
     pixels = colour[seen.block]
     pixels[..., :3] *= seen.light[..., None]
-    pixels_each = (seen.block > 0).sum() / max(1, len(np.unique(seen.block)) - 1)
-    if edges and pixels_each >= _LINED:
+    if edges and covered.size >= _LINED * len(shown):
         pixels[_edges(seen)] = (28, 32, 38, 255)
     flipped = np.round(pixels[::-1]).clip(0, 255).astype(np.uint8)
     return Image.fromarray(flipped, "RGBA")
