@@ -66,8 +66,7 @@ help:
 	@echo 'make verify   every verification case; writes verification/report (QUICK=1, FULL=1)'
 	@echo 'make mutate   break formulas one by one; each must turn a test red'
 	@echo 'make soak     faults many times: kills, full disks, broken files, all builds, ranks; many hours'
-	@echo 'make bench    time jobs, growth and the pressure system; writes build/bench.json'
-	@echo '               PEERS=1: other programs too; FULL=1: whole jobs; AGAINST=old.json'
+	@echo 'make bench    time jobs and growth; writes build/bench.json; FULL=1: whole jobs; AGAINST=old.json'
 	@echo 'make bench-contact  time the dry pile of N=64 hexapods, THREADS=1'
 	@echo 'make paper-ensemble  the fifty drops of the paper, their shares and their page; 20 minutes.'
 	@echo '               RUNS=50; MOVES=20: besides, what moves the shares, 20 coarse runs of each'
@@ -182,10 +181,9 @@ soak:
 	  echo "$$script"; $(PYTHON) $$script || status=1; done; exit $$status
 
 bench: deps
-	@$(MAKE) --no-print-directory all build/serial/solve_dump
+	@$(MAKE) --no-print-directory all
 	@$(MAKE) --no-print-directory MPI=1
-	@$(PYTHON) tools/bench.py --out build/bench.json $(if $(PEERS),--peers) $(if $(FULL),--whole) \
-	  $(if $(AGAINST),--against $(AGAINST))
+	@$(PYTHON) tools/bench.py --out build/bench.json $(if $(FULL),--whole) $(if $(AGAINST),--against $(AGAINST))
 
 N := 64
 THREADS := 1

@@ -1,12 +1,11 @@
-"""Time the program and write the table: jobs, growth, the pressure system, other programs.
+"""Time the program and write the table: jobs, growth, whole runs.
 
 usage: python tools/bench.py [--out build/bench.json] [--repeat 3] [--threads N] [--only PART ...]
-                             [--whole] [--peers] [--against OLD.json] [--program ./mics]
+                             [--whole] [--against OLD.json] [--program ./mics]
 
 Parts: `jobs` (the start of the main job, a dam break, a dry pile; on one thread, on all, on as many
-ranks), `growth` (ever more cells and blocks: time and memory of each), `pressure` (the pressure
-system alone), and, when asked for, `whole` (the tanks of the paper to their end: minutes) and
-`peers` (other programs at the same work, where installed).
+ranks), `growth` (ever more cells and blocks: time and memory of each) and, when asked for, `whole`
+(the tanks of the paper to their end: minutes).
 
 Each job is run `--repeat` times; the table shows the fastest and how much longer the slowest took,
 reading and writing included. `each` is the CPU time of a cell and step, or of a block and substep.
@@ -27,9 +26,8 @@ from micstools.bench import parts, table  # noqa: E402
 from micstools.bench.timing import bandwidth, processor, work_at_once  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
-PARTS = {"jobs": parts.short_jobs, "growth": parts.growth, "pressure": parts.pressure,
-         "whole": parts.whole_jobs, "peers": parts.peers}  # fmt: skip
-USUAL, EXTRA = ("jobs", "growth", "pressure"), ("whole", "peers")
+PARTS = {"jobs": parts.short_jobs, "growth": parts.growth, "whole": parts.whole_jobs}
+USUAL = ("jobs", "growth")
 
 
 def main() -> None:
@@ -41,14 +39,12 @@ def main() -> None:
     add("--threads", type=int, default=os.cpu_count() or 1)
     add("--only", nargs="+", choices=PARTS, default=USUAL, help=f"default: {' '.join(USUAL)}")
     add("--whole", action="store_true", help="besides: the tanks of the paper to their end")
-    add("--peers", action="store_true", help=f"besides: {parts.PEERS}")
     add("--against", type=Path, metavar="OLD.json", help="an older bench to put this one beside")
     add("--program", type=Path, default=ROOT / "mics", help="mics_mpi is taken from its folder")
     given = parser.parse_args()
     program = given.program.resolve()
     means = parts.Means(
         (program, program.with_name("mics_mpi")),
-        ROOT / "build" / "serial" / "solve_dump",
         given.repeat,
         given.threads,
     )
@@ -70,7 +66,7 @@ def main() -> None:
     )
     rows: list[parts.Row] = []
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    for name in dict.fromkeys([*given.only, *(name for name in EXTRA if vars(given)[name])]):
+    for name in dict.fromkeys([*given.only, *(["whole"] if given.whole else [])]):
         for row in PARTS[name](means):
             print(table.line(row), flush=True)
             rows.append(row)

@@ -1,37 +1,17 @@
-"""The bench: its system is the one that others publish, its figures add up, an old one compares."""
+"""The bench: its figures add up, an old one compares."""
 
 import json
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from micstools.bench import jobs, parts, peer_interfoam, pressure_dump, table
+from micstools.bench import jobs, parts, table
 from micstools.bench.jobs import DAM, Job
 from micstools.bench.timing import Timing, timed
 from micstools.cases import program
 from micstools.reading.reader import BadRun
-
-
-def test_the_pressure_system_is_the_published_one() -> None:
-    """Mean density and length of the right side, from another program that writes the same."""
-    assert pressure_dump.density((60, 20, 40)).mean() == pytest.approx(867.1087731, abs=1e-7)
-    assert np.linalg.norm(pressure_dump.right_side((60, 20, 40))) == pytest.approx(137.870097729)
-
-
-def test_a_system_that_was_written_is_symmetric_and_open_at_the_top(tmp_path: Path) -> None:
-    path = pressure_dump.write(tmp_path / "system.bin", (6, 4, 5))
-    cells, (cx, cy, cz), right = pressure_dump.read(path)
-    assert cells == [6, 4, 5] and right.shape == (5, 4, 6)
-    assert not cx[:, :, [0, -1]].any() and not cy[:, [0, -1]].any() and not cz[0].any()
-    rho, h = pressure_dump.density((6, 4, 5)), pressure_dump.LENGTH / cells
-    assert cz[-1] == pytest.approx(2 / (rho[-1] * h[2] ** 2))
-    assert cx[2, 1, 3] == pytest.approx(2 / ((rho[2, 1, 2] + rho[2, 1, 3]) * h[0] ** 2))
-    (tmp_path / "other.bin").write_bytes(b"something else")
-    with pytest.raises(ValueError, match="holds no pressure system"):
-        pressure_dump.read(tmp_path / "other.bin")
 
 
 def test_a_job_of_the_program(tmp_path: Path) -> None:
@@ -84,11 +64,3 @@ def test_what_is_no_bench_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_program_that_fails_is_named(tmp_path: Path) -> None:
     with pytest.raises(subprocess.SubprocessError, match="sh ended with 3: too bad"):
         timed(["sh", "-c", "echo fine; echo too bad; exit 3"], tmp_path)
-
-
-def test_the_dam_break_of_interfoam_holds_the_same_water(tmp_path: Path) -> None:
-    peer_interfoam.write_case(tmp_path)
-    text = (tmp_path / "0" / "alpha.water").read_text()
-    shares = [float(v) for v in text[text.index("> ") :].split("(")[1].split(")")[0].split()]
-    volume = sum(shares) / len(shares) * np.prod(DAM.length)
-    assert volume == pytest.approx(np.prod(DAM.column))

@@ -1,8 +1,6 @@
 """The parts of the bench: each gives rows, dictionaries of what was run and what it took."""
 
-import importlib.util
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,18 +8,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from micstools.bench import dry_pile, jobs, peer_hypre, peer_interfoam, pressure_dump
+from micstools.bench import dry_pile, jobs
 from micstools.bench.jobs import Job
-from micstools.bench.timing import Timing, mpirun, timed
+from micstools.bench.timing import Timing
 
 Row = dict[str, Any]
 KEYS = ("part", "job", "by", "threads", "ranks", "size")
 """What tells rows apart."""
-TOLERANCE = 1e-6  # of the pressure systems
-SYSTEMS = ((60, 20, 40), (120, 40, 80))
 PILE = 64  # blocks
 PILE_SECONDS = 2.0
-PEERS = "interFoam (openfoam), hypre (libhypre-dev), pybullet (pip)"
 
 
 @dataclass(frozen=True)
@@ -29,7 +24,6 @@ class Means:
     """What the bench works with."""
 
     programs: tuple[Path, Path]  # serial and parallel; the latter may not be there
-    solver: Path  # solve_dump
     repeat: int
     threads: int
 
@@ -74,45 +68,6 @@ def growth(means: Means) -> Iterator[Row]:
         yield _pile("growth", n, 0.5, 1, 1, means)
 
 
-def pressure(means: Means) -> Iterator[Row]:
-    """The pressure system alone, set-up included."""
-    with tempfile.TemporaryDirectory() as folder:
-        for cells in SYSTEMS:
-            path = pressure_dump.write(Path(folder) / "system.bin", cells)
-            for threads in sorted({1, means.threads}):
-                words = [means.solver, path, TOLERANCE, 5 * means.repeat, threads]
-                yield _solved("mics", words, threads)
-
-
-def peers(means: Means) -> Iterator[Row]:
-    """Other programs at the same work, of those that are installed."""
-    if peer_interfoam.installed():
-        runs = [_fresh(peer_interfoam.dam_break)]
-        yield row("jobs", "dam_break", runs, by="interFoam")
-    if peer_hypre.installed():
-        yield from _hypre(means)
-    if importlib.util.find_spec("pybullet"):
-        yield _bullet(means)
-
-
-def _hypre(means: Means) -> Iterator[Row]:
-    module = [sys.executable, "-m", "micstools.bench.peer_hypre"]
-    with tempfile.TemporaryDirectory() as folder:
-        for cells in SYSTEMS:
-            path = pressure_dump.write(Path(folder) / "system.bin", cells)
-            for ranks in sorted({1, means.threads}):
-                for smoother in ("jacobi", "red_black"):
-                    words = [*mpirun(ranks), *module, path, TOLERANCE, 5 * means.repeat, smoother]
-                    yield _solved(f"hypre {smoother}", words, 1, ranks)
-
-
-def _bullet(means: Means) -> Row:
-    words = [sys.executable, "-m", "micstools.bench.peer_bullet", PILE, PILE_SECONDS]
-    wall, cpu, steps, depth = timed(words, Path.cwd())[3].split()[-1].split(",")
-    runs = [Timing(float(wall), float(cpu), float("nan"), PILE_SECONDS, int(steps), PILE)]
-    return row("jobs", "pile", runs, by="pybullet") | {"depth_mm": float(depth)}
-
-
 def _pile(part: str, n: int, seconds: float, threads: int, repeat: int, means: Means) -> Row:
     def work(folder: Path) -> tuple[Timing, float]:
         timing = jobs.pile(n, seconds, means.programs[0], threads, folder)
@@ -122,16 +77,6 @@ def _pile(part: str, n: int, seconds: float, threads: int, repeat: int, means: M
     runs = [_fresh(work) for _ in range(repeat)]
     found = row(part, "pile", [timing for timing, _ in runs], threads=threads)
     return found | ({"depth_mm": round(runs[0][1], 3)} if part == "jobs" else {})
-
-
-def _solved(by: str, words: list[Any], threads: int, ranks: int = 1) -> Row:
-    """A row of what a solver printed."""
-    said = timed(words, Path.cwd())[3].strip().splitlines()[-1].split(",")
-    nx, ny, nz, _, iterations = map(int, said[:5])
-    setup, solve, cpu, residual = map(float, said[5:])
-    return {"part": "pressure", "job": "1e-6", "by": by, "threads": threads, "ranks": ranks,
-            "size": nx * ny * nz, "wall": setup + solve, "cpu": cpu, "setup": setup,
-            "iterations": iterations, "residual": residual}  # fmt: skip
 
 
 def _fresh(work: Callable[[Path], Any]) -> Any:
