@@ -27,7 +27,7 @@ module monolithic_m
   use half_kick_m, only: find_liquid, find_first_half, add_first_half, add_second_half, add_whole, &
                          force_of_half_kick
   use buoyancy_m, only: displaced_force, mass_defect, held_mass
-  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells
+  use merged_cells_m, only: merged_cells_t, merged_cells_init, find_merged_cells, match_densities
   use merged_momentum_m, only: share_momentum, share_acceleration, follow_targets
   use wall_layer_m, only: find_slip, find_centres, to_centres, find_wall_speeds
   use wall_balance_m, only: wall_balance_t, wall_balance_init, begin_balance, add_push, &
@@ -184,6 +184,7 @@ contains
     call find_merged_cells(grid, solid, self%merged)
     call copy_density(flow%rho, self%rho)
     call begin_balance(grid, self%fluid, solid, self%merged, flow, self%rho, self%balance)
+    call match_densities(grid, self%rho, self%merged)
     call find_slip(grid, solid, self%at_start, flow%u, self%merged)
     call store_velocity(grid, self%merged, flow%u, self%balance%before)
     call share_momentum(grid, self%merged, self%balance%mass, self%at_start, self%balance%before, &

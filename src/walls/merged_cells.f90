@@ -16,7 +16,7 @@ module merged_cells_m
   implicit none
   private
   public :: merged_cells_t, merged_cells_init, find_merged_cells, order_by_body
-  public :: max_targets, is_unmerged, velocity_at_wall
+  public :: max_targets, is_unmerged, velocity_at_wall, match_densities
 
   integer, parameter :: halo_layers = 2      !! layers of the halo with small cells that are needed
   integer, parameter :: max_targets = 3  !! of a small cell
@@ -34,7 +34,8 @@ module merged_cells_m
     real(wp), allocatable :: normal(:, :)        !! (3, *) of the wall, into the fluid
     integer, allocatable :: target(:, :)         !! (max_targets, n_small) numbers, 0: none
     real(wp), allocatable :: share(:, :)         !! likewise: of the small cell, sum 1
-    real(wp), allocatable :: r(:, :)             !! likewise: distance from the wall over theirs
+    real(wp), allocatable :: r_wall(:, :)        !! likewise: distance from the wall over theirs
+    real(wp), allocatable :: r(:, :)             !! likewise: nearer to 1 beside light targets
     real(wp), allocatable :: distance(:, :)      !! likewise: of their fluid from the wall [m]
     real(wp), allocatable :: slip(:, :, :)       !! of the layer at the small cell in a cell, 0 to 1
     !> Of a cut cell with its centre in the fluid: distance from the wall of the middle of its fluid
@@ -64,7 +65,7 @@ contains
     allocate (self%normal(3, 0), self%leader(0), self%part(2, 0))
     allocate (self%middle(0), self%ratio(0), self%centre(0), self%wall_speed(0))
     allocate (self%target(max_targets, 0), self%share(max_targets, 0))
-    allocate (self%r(max_targets, 0), self%distance(max_targets, 0))
+    allocate (self%r_wall(max_targets, 0), self%r(max_targets, 0), self%distance(max_targets, 0))
     allocate (self%first(1), source=1)
     allocate (self%number(a(1):b(1), a(2):b(2), a(3):b(3)), source=0)
     allocate (self%slip(a(1):b(1), a(2):b(2), a(3):b(3)), source=0.0_wp)
@@ -222,11 +223,13 @@ contains
     call ensure_capacity(self%n_small, self%normal)
     call ensure_capacity(self%n_small, self%target)
     call ensure_capacity(self%n_small, self%share)
+    call ensure_capacity(self%n_small, self%r_wall)
     call ensure_capacity(self%n_small, self%r)
     call ensure_capacity(self%n_small, self%distance)
     !$omp parallel do schedule(static)
     do m = 1, self%n_small
       call find_wall(grid, solid, m, self, step(:, :, m))
+      self%r(:, m) = self%r_wall(:, m)
     end do
     do m = 1, self%n_small
       body = self%body(m)
@@ -254,7 +257,7 @@ contains
     integer :: n
 
     associate (c => self%cell(:, m), normal => self%normal(:, m), share => self%share(:, m), &
-               r => self%r(:, m), distance => self%distance(:, m))
+               r => self%r_wall(:, m), distance => self%distance(:, m))
       normal = wall_normal(grid, solid, c)
       r = 1.0_wp
       distance = 0.0_wp
@@ -269,6 +272,35 @@ contains
       end do
     end associate
   end subroutine find_wall
+
+  !> r of each small cell and target by their densities,
+  !! $$ 1 - r = (1 - r_w) \min(1, \rho_t/\rho_s). $$
+  !!
+  !! A small cell of momentum excess e changes its target by p e/(m + r p) (`share_momentum`). With
+  !! r_w that is up to e/r_w where gas lies beside water, and still water begins to move; with r a
+  !! group of water and gas is conditioned as one of gas alone: p/(m + r p) <= 1 for a target of no
+  !! less volume. A single phase has r = r_w.
+  subroutine match_densities(grid, rho, self)
+    type(grid_t), intent(in) :: grid
+    real(wp), intent(in), contiguous :: rho(grid%first(1):, grid%first(2):, grid%first(3):)
+      !! of the fluid, halo filled [kg/m3]
+    type(merged_cells_t), intent(inout) :: self
+    integer :: m, n
+
+    !$omp parallel do private(n) schedule(static)
+    do m = 1, self%n_small
+      associate (s => self%cell(:, m))
+        do n = 1, max_targets
+          self%r(n, m) = self%r_wall(n, m)
+          if (self%target(n, m) == 0) cycle
+          associate (t => self%cell(:, self%target(n, m)), r_wall => self%r_wall(n, m))
+            if (rho(s(1), s(2), s(3)) > rho(t(1), t(2), t(3))) self%r(n, m) = 1.0_wp &
+              - (1.0_wp - r_wall)*rho(t(1), t(2), t(3))/rho(s(1), s(2), s(3))
+          end associate
+        end do
+      end associate
+    end do
+  end subroutine match_densities
 
   !> Of the own cut cells with their centre in the fluid the normal of the wall, and how far from it
   !! their fluid and their centre are.
