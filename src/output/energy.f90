@@ -64,8 +64,8 @@ contains
     if (.not. self%known) return
     g = norm2(case%fluid%gravity)
     d = maxloc(abs(case%fluid%gravity), 1)
-    self%floor = floor_surface*(case%fluid%liquid_density - case%fluid%gas_density)*g*grid%h(d)**2 &
-                 *product(grid%length)/grid%length(d)
+    self%floor = floor_surface*case%fluid%liquid_density*g*grid%h(d)**2*product(grid%length) &
+                 /grid%length(d)
     do b = 1, blocks%n
       if (.not. blocks%fixed(b)) self%floor = self%floor + floor_fall*blocks%mass(b)*g &
         *blocks%shapes(blocks%shape(b))%radius

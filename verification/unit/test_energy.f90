@@ -13,6 +13,7 @@ program test_energy
   call falling_liquid()
   call release()
   call when_it_is_known()
+  call nothing_set_free()
   call finish_checks()
 
 contains
@@ -75,6 +76,25 @@ contains
     fresh%case%fluid%gravity = [1.0_wp, 0.0_wp, -9.0_wp]
     call check('gravity along a period', .not. knows(fresh, 'periodic', 'slip'))
   end subroutine when_it_is_known
+
+  !> A tank of liquids of one density has no energy to set free: round-off is no excess.
+  subroutine nothing_set_free()
+    type(one_body_t) :: box
+    type(energy_t) :: book
+    real(wp), parameter :: weight = 0.8_wp**4*1000.0_wp*9.81_wp   !! times a height of the tank [J]
+
+    call describe([8, 8, 8], [0.8_wp, 0.8_wp, 0.8_wp], sides, 'box', [0.2_wp, 0.2_wp, 0.2_wp], &
+                  [0.4_wp, 0.4_wp, 0.4_wp], box%case)
+    box%case%fluid%gas_density = box%case%fluid%liquid_density
+    box%case%fluid%gravity = [0.0_wp, 0.0_wp, -9.81_wp]
+    call place(box)
+    box%blocks%fixed = .true.
+    call energy_init(box%case, box%grid, box%blocks, book)
+    call begin_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), 0.0_wp, book)
+    call store_energy(energy_parts_t(0.0_wp, 0.0_wp, weight), book)
+    call store_energy(energy_parts_t(0.0_wp, 0.0_wp, weight*(1.0_wp + 1.0e-15_wp)), book)
+    call check('round-off is no excess', energy_excess(book), 0.0_wp, 1.0e-12_wp)
+  end subroutine nothing_set_free
 
   logical function knows(settings, x, top)
     type(one_body_t), intent(in) :: settings
