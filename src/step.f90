@@ -42,7 +42,7 @@ module step_m
   use contacts_m, only: contact_report_t, move_blocks
   use overlap_m, only: max_overlap
   use deep_overlaps_m, only: ask_for_all, ask_for_deep, store_points, warn_of_overlaps
-  use release_m, only: release_due_blocks, let_go_lowered, next_release, none_to_come
+  use release_m, only: release_due_blocks, let_go_lowered, next_release, nothing_to_come
   use diagnostics_m, only: step_report_t, fluid_sums_t, measure_fluid
   use energy_m, only: store_energy, store_release, energy_excess
   use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
@@ -171,7 +171,7 @@ contains
     report%contacts_solved = contact%info == 0
     any_free = any(sim%blocks%present .and. .not. sim%blocks%fixed)
     call sim%clock%store_speed(maxval(sim%blocks%speed), &
-                               any_free .and. none_to_come(sim%clock%t, sim%blocks))
+                               any_free .and. nothing_to_come(sim%clock%t, sim%blocks))
     if (.not. sim%wet) return
     report%divergence_max = stage%pressure%divergence
     report%pressure_passes = stage%pressure%passes

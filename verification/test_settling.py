@@ -60,6 +60,37 @@ def test_waits_for_those_to_come(tmp_path: Path) -> None:
     assert 2.3 < end < 3.0
 
 
+DOOR = """&shape name = 'd'  kind = 'box'  size = 0.2, 0.2, 0.02  density = 2300 /
+&body shape = 'd'  fixed = .true.  motion = 'door.csv' /
+&drop shape = 'c'  position = 0.12, 0.2, 0.2601  count = 1 /
+"""
+
+
+def test_waits_for_a_door_to_open(tmp_path: Path) -> None:
+    """A cube rests on a shut door, which is drawn from under it after 2 s."""
+    (tmp_path / "door.csv").write_text(
+        "time,x,y,z\n0,0.12,0.2,0.2\n2,0.12,0.2,0.2\n2.1,0.3,0.2,0.2\n"
+    )
+    code, said, end = run(tmp_path, CASE.format(stop="T", count=1).split("&drop")[0] + DOOR)
+    with h5py.File(tmp_path / "mics-out" / "run.h5") as h5:
+        height = h5["bodies/position"][-1, 1, 2]
+    assert (code, said) == (0, "")
+    assert 2.4 <= end < 4.0 and height == pytest.approx(0.05, abs=1e-3)
+
+
+def test_waits_while_a_fixed_body_moves(tmp_path: Path) -> None:
+    """A plate that goes on at its given speed may still meet the cube that rests."""
+    plate = (
+        DOOR.split("&drop")[0].replace("motion = 'door.csv'", "{}")
+        + "&drop"
+        + DOOR.split("&drop")[1]
+    )
+    given = "position = 0.3, 0.3, 0.35  velocity = -0.01, 0, 0"
+    text = CASE.format(stop="T", count=1).split("&drop")[0].replace("t_end = 5", "t_end = 2")
+    code, said, end = run(tmp_path, text + plate.format(given).replace("0.2601", "0.06"))
+    assert (code, said, end) == (0, "", 2.0)
+
+
 SLOSHING = """&run t_end = 3  dt = 0.02  stop_when_settled = T /
 &grid cells = 20, 4, 12  length = 0.4, 0.08, 0.24 /
 &fluid water_level = 0.12  gravity = 0.8, 0.0, -9.8 /

@@ -19,7 +19,7 @@ module release_m
   use ground_m, only: way_down, height_on_top, ground_gap, nothing_below
   implicit none
   private
-  public :: release_due_blocks, let_go_lowered, next_release, n_pending, none_to_come
+  public :: release_due_blocks, let_go_lowered, next_release, n_pending, nothing_to_come
 
   real(wp), parameter :: same_time = 1.0e-12_wp   !! times this close are one [s]
   real(wp), parameter :: slack_share = 0.05_wp
@@ -253,15 +253,27 @@ contains
                                 .and. blocks%release_time < time - same_time)
   end function n_pending
 
-  !> Is every block let go, left out, or tried before this moment and without room? Once all blocks
-  !! rest nobody makes room any more.
-  pure function none_to_come(time, blocks) result(yes)
+  !> Does nothing but the free blocks move from now on? Every block is let go, left out, or tried
+  !! before this moment and without room (once all blocks rest nobody makes room any more), no fixed
+  !! body moves, and no row of a motion is to come.
+  pure function nothing_to_come(time, blocks) result(yes)
     real(wp), intent(in) :: time   !! [s]
     type(blocks_t), intent(in) :: blocks
     logical :: yes
+    integer :: b
 
     yes = count(blocks%status == to_come .and. .not. blocks%present) == n_pending(time, blocks) &
       .and. .not. any(blocks%status == lowering)
-  end function none_to_come
+    do b = 1, blocks%n
+      if (.not. blocks%fixed(b)) cycle
+      associate (path => blocks%path(b))
+        if (path%n > 0) then
+          yes = yes .and. time >= path%time(path%n)
+        else
+          yes = yes .and. all(abs([blocks%v(:, b), blocks%omega(:, b)]) <= 0.0_wp)
+        end if
+      end associate
+    end do
+  end function nothing_to_come
 
 end module release_m

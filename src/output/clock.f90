@@ -117,7 +117,7 @@ contains
     class(clock_t), intent(inout) :: self
     real(wp), intent(in) :: speed       !! largest of free blocks (`blocks%speed`) [m/s]
     logical, intent(in) :: all_there
-      !! there are free blocks, and none is still to be released, but for lack of room
+      !! there are free blocks, and nothing else moves or is to come, but for lack of room
 
     if (.not. all_there .or. speed >= self%run%rest_speed) then
       self%rest_began = -1.0_wp
