@@ -52,8 +52,8 @@ contains
       not_negative('s', zero='0 means only at the end'), &
       'simulated time between restart files', example='0.5')
     call v%logical('stop_when_settled', run%stop_when_settled, 'ends the run before t_end, when ' &
-      //'all blocks are released or find no room, no motion is to come, and all blocks are slower ' &
-      //'than rest_speed during rest_time')
+      //'all blocks are released or find no room, no motion is to come, and all blocks are ' &
+      //'slower than rest_speed during rest_time')
     call v%real('rest_speed', run%rest_speed, positive('m/s'), &
       'speed below which a block counts as at rest', example='5e-4')
     call v%without_meaning(.not. run%stop_when_settled .and. v%good('stop_when_settled'), &
