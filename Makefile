@@ -194,7 +194,7 @@ bench-contact: deps
 RUNS := 50
 MOVES := 0
 paper-ensemble:
-	@$(deps) ensemble
+	@$(deps)
 	@$(MAKE) --no-print-directory
 	@$(PYTHON) tools/paper_ensemble.py --runs $(RUNS) --moves $(MOVES)
 

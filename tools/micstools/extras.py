@@ -11,7 +11,7 @@ from micstools.reading.reader import BadRun
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
     "shape": ("gmsh", "manifold3d", "networkx", "trimesh"),
-    "ensemble": ("dask_jobqueue", "distributed"),
+    "ensemble": ("cryptography", "dask_jobqueue", "distributed"),
     "survey": ("ezdxf",),
     "pictures": ("pyvista", "vtk"),
     "serve": ("aiohttp",),

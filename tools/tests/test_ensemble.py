@@ -5,10 +5,15 @@ import fcntl
 import json
 import os
 import signal
+import socket
+import ssl
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import h5py
@@ -372,26 +377,86 @@ def test_a_queue_gives_the_same_table(
     assert "Traceback" not in capfd.readouterr().err
 
 
-@pytest.mark.cost(10)
-def test_ctrl_c_reaches_the_runs_of_a_queue(tmp_path: Path, program: Path, queue: Path) -> None:
+@contextmanager
+def slow_runs(program: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
+    """An ensemble whose first run has begun and takes long."""
     slow = program.read_text().replace("import h5py", "import time; time.sleep(50)\nimport h5py")
     program.write_text(slow)
-    out = tmp_path / "out"
-    words = [sys.executable, "-m", "micstools.cli", "ensemble", str(tmp_path / "case.nml"),
-             "--program", str(program), "--runs", "2", "--jobs", "1", "--out", str(out),
-             "--cluster", "slurm"]  # fmt: skip
-    running = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
+    folder = program.parent
+    call = [sys.executable, "-m", "micstools.cli", "ensemble", str(folder / "case.nml"),
+            "--program", str(program), "--runs", "2", "--jobs", "1", "--out", str(folder / "out"),
+            *words]  # fmt: skip
+    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, preexec_fn=ctrl_c_counts)
     try:
-        wait_until((out / "0001" / "log.txt").exists)
+        wait_until((folder / "out" / "0001" / "log.txt").exists)
         time.sleep(0.5)
-        running.send_signal(signal.SIGINT)
-        _, said = running.communicate(timeout=40)
+        yield running
+        if running.poll() is None:
+            running.send_signal(signal.SIGINT)
+            running.wait(40)
     finally:
         running.kill()
+
+
+@pytest.mark.cost(10)
+def test_ctrl_c_reaches_the_runs_of_a_queue(tmp_path: Path, program: Path, queue: Path) -> None:
+    with slow_runs(program, "--cluster", "slurm") as running:
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=40)
     assert running.returncode == 130
     assert said.splitlines()[-1] == "stopped; the same command goes on where each run stood"
     assert "Traceback" not in said
-    assert "KeyboardInterrupt" in (out / "0001" / "log.txt").read_text()
+    assert "KeyboardInterrupt" in (tmp_path / "out" / "0001" / "log.txt").read_text()
+
+
+def listeners(said: Path) -> set[tuple[str, int]]:
+    """Where those processes listen whose command line or environment has a path."""
+    sockets = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended
+            words = (process / "cmdline").read_bytes() + (process / "environ").read_bytes()
+            if str(said).encode() in words:
+                sockets |= {os.readlink(end) for end in (process / "fd").iterdir()}
+    lines = [line.split() for name in ("tcp", "tcp6")
+             for line in Path("/proc/net", name).read_text().splitlines()[1:]]  # fmt: skip
+    found = [line[1].split(":") for line in lines
+             if line[3] == "0A" and f"socket:[{line[9]}]" in sockets]  # fmt: skip
+    return {(socket.inet_ntoa(bytes.fromhex(address)[::-1]) if len(address) == 8 else "::1",
+             int(port, 16)) for address, port in found}  # fmt: skip
+
+
+def asks_for_a_certificate(address: tuple[str, int]) -> bool:
+    """Does it talk TLS, and only to who has the key?"""
+    stranger = ssl.create_default_context()
+    stranger.check_hostname, stranger.verify_mode = False, ssl.CERT_NONE
+    with socket.create_connection(address, 10) as link:
+        try:
+            stranger.wrap_socket(link).read()
+        except ssl.SSLError as refused:
+            return "CERTIFICATE_REQUIRED" in str(refused)
+    return False
+
+
+def test_runs_on_this_machine_listen_nowhere(tmp_path: Path, program: Path) -> None:
+    with slow_runs(program):
+        assert listeners(tmp_path) == set()
+
+
+@pytest.mark.cost(10)
+def test_a_queue_lets_nobody_in(tmp_path: Path, program: Path, queue: Path) -> None:
+    """Scheduler and worker want a certificate whose key lies in private files; they show nothing."""
+    with slow_runs(program, "--cluster", "slurm"):
+        found = listeners(tmp_path)
+        outside = {place for place in found if place[0] != "127.0.0.1"}
+        assert len({port for _, port in outside}) == 2  # of scheduler and worker
+        assert all(asks_for_a_certificate(place) for place in outside)
+        for _, port in found - outside:
+            for path in ("/", "/status", "/info/main/workers.html", "/json/identity.json"):
+                with pytest.raises(urllib.error.HTTPError, match="404"):
+                    urllib.request.urlopen(f"http://127.0.0.1:{port}{path}")
+        keys = list((tmp_path / "out" / "jobs").glob(".*key*"))
+        assert keys and all(path.stat().st_mode & 0o777 == 0o600 for path in keys)
+    assert not list((tmp_path / "out" / "jobs").glob(".*key*"))
 
 
 def test_a_queue_that_takes_no_job_is_one_line(
@@ -421,27 +486,6 @@ def test_a_queue_that_is_not_here_is_one_line(
     words = ("--runs", "2", "--out", str(tmp_path / "out"), "--cluster", "slurm")
     assert call(program, *words) == 2
     assert "there is no sbatch on this machine" in capsys.readouterr().err
-
-
-@pytest.mark.cost(20)
-def test_an_ensemble_that_slept_goes_on(tmp_path: Path, program: Path) -> None:
-    """As a laptop does over lunch: stopped for longer than the engine waits for a sign of life."""
-    words = [sys.executable, "-m", "micstools.cli", "ensemble", str(program.parent / "case.nml"),
-             "--program", str(program), "--runs", "6", "--jobs", "1", "--seed", "3",
-             "--out", str(tmp_path / "out")]  # fmt: skip
-    settings = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "1s"}
-    running = subprocess.Popen(words, env=settings, stdout=subprocess.PIPE, text=True)
-    assert running.stdout is not None
-    while "1 of 6 done" not in running.stdout.readline():
-        assert running.poll() is None
-    running.send_signal(signal.SIGSTOP)
-    time.sleep(12)
-    running.send_signal(signal.SIGCONT)
-    try:
-        said, _ = running.communicate(timeout=60)
-    finally:
-        running.kill()
-    assert "6 of 6 done" in said
 
 
 def test_another_file_of_the_same_name_is_refused(tmp_path: Path, program: Path, capsys) -> None:

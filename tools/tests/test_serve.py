@@ -5,12 +5,16 @@ import asyncio
 import fcntl
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
 import time
+import urllib.error
+import urllib.parse
+import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +29,7 @@ from aiohttp import web  # noqa: E402
 from browser import MISSING, Browser  # noqa: E402
 from micstools.cases import settings  # noqa: E402
 from micstools.reading.reader import BadRun, Run  # noqa: E402
-from micstools.serve import living, studio, watch  # noqa: E402
+from micstools.serve import living, server, studio, watch  # noqa: E402
 from micstools.serve.draft import Draft, typed  # noqa: E402
 from micstools.serve.server import ADDRESS, TOKEN, Site  # noqa: E402
 from synthetic import Motion, write_run  # noqa: E402
@@ -60,7 +64,7 @@ def serving(site: Site) -> Iterator[str]:
     thread = threading.Thread(target=loop.run_forever, daemon=True)
     thread.start()
     try:
-        yield site.address
+        yield site.address()
     finally:
         asyncio.run_coroutine_threadsafe(runner.cleanup(), loop).result(20)
         loop.call_soon_threadsafe(loop.stop)
@@ -74,7 +78,7 @@ def request(site: Site, path: str, *, method: str = "GET", body: Any = None,
     import http.client
 
     link = http.client.HTTPConnection(ADDRESS, site.port, timeout=120)
-    sent = {"Cookie": f"{site.cookie}={site.key}"} if known else {}
+    sent = {"Cookie": f"{site.cookie}={site.session}"} if known else {}
     sent |= {name.replace("_", "-"): value for name, value in headers.items()}
     link.request(method, path, json.dumps(body) if body is not None else None, sent)
     answer = link.getresponse()
@@ -119,7 +123,7 @@ def test_nobody_else_is_answered(run_site: Site) -> None:
         assert request(site, "/live", Origin=origin)[0] == 403, origin
     assert request(site, "/live", Sec_Fetch_Site="cross-site")[0] == 403
     stop = {"method": "POST", "body": {"how": "restart"}}
-    for headers in ({}, {TOKEN: "x"}, {TOKEN: site.key}):
+    for headers in ({}, {TOKEN: "x"}, {TOKEN: site.session}):
         assert request(site, "/stop", **stop, **headers)[0] == 403, headers
     assert request(site, "/stop", **stop, **{TOKEN: site.token}, Host="evil.example")[0] == 421
     assert request(site, "/stop", **stop, **{TOKEN: site.token})[0] == 422  # no run goes on
@@ -135,9 +139,6 @@ def site_folder(site: Site) -> Path:
 
 
 def test_answers_allow_nothing_from_outside(run_site: Site) -> None:
-    status, headers, _ = request(run_site, f"/?key={run_site.key}", known=False)
-    assert status == 303 and headers["Location"] == "/"
-    assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
     for path, wanted in (("/", 200), ("/live", 200), ("/nowhere", 404)):
         status, headers, text = request(run_site, path)
         assert status == wanted
@@ -147,6 +148,95 @@ def test_answers_allow_nothing_from_outside(run_site: Site) -> None:
         assert headers["Cache-Control"] == "no-store"
         assert "http://" not in text and "https://" not in text
     assert request(run_site, "/live", known=False)[1]["X-Frame-Options"] == "DENY"
+
+
+def path_of(address: str) -> str:
+    return address[address.index("/?") :]
+
+
+def test_a_key_lets_one_browser_in_once(run_site: Site) -> None:
+    """And not after a while; the cookie is another secret."""
+    site, late = run_site, path_of(run_site.address())
+    site.keys = dict.fromkeys(site.keys, time.monotonic() - 1)
+    first = path_of(site.address())
+    assert request(site, late, known=False)[0] == 403
+    status, headers, _ = request(site, first, known=False)
+    assert status == 303 and headers["Location"] == "/"
+    assert f"{site.cookie}={site.session};" in headers["Set-Cookie"]
+    assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
+    assert site.session not in first and site.token not in first
+    assert request(site, first, known=False)[0] == 403
+    assert request(site, path_of(site.address()), known=False)[0] == 303
+
+
+def test_the_browser_is_told_no_key(tmp_path: Path) -> None:
+    """Its command line names a file that nobody else can read, and which goes after its use."""
+    script, told = tmp_path / "browser", tmp_path / "told"
+    script.write_text(
+        f'#!/bin/sh\necho "$1" > {told}.new\nmv {told}.new {told}\n'
+        'while [ -e "${1#file://}" ]; do sleep 0.1; done\n'
+    )
+    script.chmod(0o755)
+    words = [sys.executable, "-m", "micstools.cli", "watch", str(write_run(tmp_path / "run"))]
+    environment = {**os.environ, "BROWSER": f"{script} %s &", "HOME": str(tmp_path)}
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE) as process:
+        try:
+            until(lambda: told.exists() or process.poll() is not None)
+            opened = urllib.parse.urlsplit(told.read_text().strip())
+            page = Path(opened.path)
+            assert opened.scheme == "file" and page.is_relative_to(tmp_path)
+            assert [path.stat().st_mode & 0o777 for path in (page, page.parent)] == [0o600, 0o700]
+            (address,) = re.findall(r"http://[^\"]*", page.read_text())
+            key = address.split("=")[1].encode()
+            for line in Path("/proc").glob("[0-9]*/cmdline"):
+                with suppress(OSError):  # it has ended
+                    assert key not in line.read_bytes()
+            keeping = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+            assert keeping.open(address).status == 200
+            with pytest.raises(urllib.error.HTTPError, match="403"):
+                urllib.request.urlopen(address)
+            until(lambda: not page.parent.exists())
+        finally:
+            process.kill()
+
+
+# Does with the session of the page what its buttons do.
+ATTACK = """<!doctype html><title>foreign</title><script>
+(async () => {
+  try {
+    const page = await (await fetch('/')).text();
+    const token = page.match(/mics-token" content="([^"]+)/)[1];
+    await fetch('/report', { method: 'POST', body: '{}', headers: { 'X-Mics-Token': token } });
+    document.title = 'let in';
+  } catch (problem) { document.title = 'refused'; }
+})();
+</script>
+"""
+
+
+@in_browser
+def test_a_foreign_report_reaches_nothing(run_site: Site, browser: Browser) -> None:
+    """Its scripts run, for ours do, but have no part in the session."""
+    report = site_folder(run_site) / "report.html"
+    report.write_text(ATTACK)
+    headers = request(run_site, "/report")[1]["Content-Security-Policy"]
+    assert "sandbox allow-scripts;" in headers and "connect-src 'none'" in headers
+    browser.visit(run_site.address())
+    browser.run("location.assign('/report')")
+    until(lambda: browser.run("location.pathname") == "/report")
+    until(lambda: browser.run("document.title") != "foreign")
+    assert browser.run("document.title") == "refused"
+    assert report.read_text() == ATTACK
+
+
+@in_browser
+def test_a_private_file_leads_to_the_page(run_site: Site, browser: Browser, tmp_path: Path) -> None:
+    """As a link of another page would, which must not keep the cookie back."""
+    page = tmp_path / "open.html"
+    page.write_text(server._forward(run_site.address()))
+    browser.visit(page.as_uri())
+    until(lambda: browser.run("location.pathname + location.search") == "/")
+    until(lambda: browser.run("live.player.stage.scene && true"))
 
 
 def test_only_loopback_listens(run_site: Site) -> None:
@@ -309,7 +399,7 @@ def outside(browser: Browser, address: str) -> list[str]:
 @in_browser
 @pytest.mark.parametrize(("width", "dark"), [(360, False), (1100, True)])
 def test_a_page_to_watch_fits(run_site: Site, browser: Browser, width: int, dark: bool) -> None:
-    browser.visit(run_site.address, width, 740, dark)
+    browser.visit(run_site.address(), width, 740, dark)
     until(lambda: browser.run("live.player.stage.scene && true"))
     assert browser.run("document.documentElement.scrollWidth") <= width
     assert browser.errors == []

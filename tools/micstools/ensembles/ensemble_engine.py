@@ -1,18 +1,16 @@
-"""Runs the members of an ensemble, several at once, on dask.distributed: on this machine, or on
-workers that the queue of a cluster starts."""
+"""Runs the members of an ensemble, several at once: in threads of this process, or by
+dask.distributed on workers that the queue of a cluster starts."""
 
 import contextlib
-import logging
 import os
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from micstools import extras
 from micstools.ensembles import ensemble_queue
 from micstools.ensembles.ensemble import Member, State, state
 from micstools.ensembles.ensemble_queue import Queue
@@ -22,6 +20,7 @@ NO_WAY_ON = "cannot go on"
 
 _living: set[subprocess.Popen[bytes]] = set()
 _stopping = threading.Event()
+_starting = threading.Lock()  # no run begins while those that live are told to stop
 
 
 @dataclass(frozen=True)
@@ -48,21 +47,22 @@ def execute(member: Member, program: Path, here: Path) -> int | None:
 
 
 def _call(member: Member, words: list[str], here: Path) -> int | None:
-    if _stopping.is_set():
-        return None
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     # In a group of its own: Ctrl-C reaches us alone, and we tell the runs.
     with member.log.open("wb") as log, Path(os.devnull).open("r+b") as nothing:
-        process = subprocess.Popen(
-            [words[0], "--quiet", *words[1:]],
-            stdin=nothing,
-            stdout=nothing,
-            stderr=log,
-            env=environment,
-            cwd=here,
-            process_group=0,
-        )
-        _living.add(process)
+        with _starting:
+            if _stopping.is_set():
+                return None
+            process = subprocess.Popen(
+                [words[0], "--quiet", *words[1:]],
+                stdin=nothing,
+                stdout=nothing,
+                stderr=log,
+                env=environment,
+                cwd=here,
+                process_group=0,
+            )
+            _living.add(process)
         code = process.wait()
         _living.discard(process)
         if code < 0:
@@ -75,53 +75,39 @@ def run_all(
 ) -> None:
     """Run all members and tell of each end. On KeyboardInterrupt every run writes its restart file
     before the exception goes on."""
-    extras.need("ensemble")
-    from dask.distributed import Client, as_completed
-
     _stopping.clear()
-    jobs = min(engine.jobs, len(waiting))
+    words = (engine.program, Path.cwd())
+    with _workers(engine, min(engine.jobs, len(waiting)), waiting[0].folder.parent) as workers:
+        futures = {workers.submit(execute, m, *words): m for m in waiting}
+        for future in as_completed(futures):
+            problem = future.exception()
+            member = futures[future]
+            ended(member, State("failed", reason=str(problem)) if problem else state(member))
+
+
+@contextlib.contextmanager
+def _workers(engine: Engine, jobs: int, folder: Path) -> Iterator[Executor]:
+    """What executes `jobs` members at once; on KeyboardInterrupt it stops them."""
     if engine.queue is None:
-        workers = _this_machine(jobs)
-    else:
-        workers = ensemble_queue.cluster(engine.queue, jobs, waiting[0].folder.parent / "jobs")
-    with workers, Client(workers) as client:
-        try:
-            words = (engine.program, Path.cwd())
-            futures = {client.submit(execute, m, *words, pure=False): m for m in waiting}
-            for future in as_completed(futures):
-                problem = future.exception()
-                if problem is not None:
-                    ended(futures[future], State("failed", reason=str(problem)))
-                else:
-                    ended(futures[future], state(futures[future]))
-        except KeyboardInterrupt:
-            if engine.queue is None:
+        with ThreadPoolExecutor(jobs) as workers:
+            try:
+                yield workers
+            except KeyboardInterrupt:
                 stop()
-            else:
-                client.run(stop)
+                raise
+        return
+    with ensemble_queue.client(engine.queue, jobs, folder) as client:
+        try:
+            yield client.get_executor(pure=False)
+        except KeyboardInterrupt:
+            client.run(stop)
             raise
-
-
-def _this_machine(jobs: int) -> Any:
-    """One worker with a thread for each job. A worker that was not heard of for minutes is given
-    up: so would be that of a laptop asleep."""
-    import dask
-    from dask.distributed import LocalCluster
-
-    dask.config.set({"distributed.scheduler.worker-ttl": None})
-    return LocalCluster(
-        n_workers=1,
-        threads_per_worker=jobs,
-        processes=False,
-        dashboard_address="127.0.0.1:0",  # any free port: ensembles may run side by side
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-    )
 
 
 def stop(patience: float = 60.0) -> None:
     """Let living runs write their restart files and end; after `patience` [s] end them."""
-    _stopping.set()
+    with _starting:
+        _stopping.set()
     for sent, wait in ((signal.SIGINT, patience), (signal.SIGKILL, 5.0)):
         left = list(_living)
         for process in left:

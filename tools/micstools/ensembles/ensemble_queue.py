@@ -1,22 +1,25 @@
 """Workers that an ensemble asks of a cluster's queue, by dask-jobqueue: a job of one core each."""
 
+import contextlib
 import logging
 import shlex
 import shutil
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from micstools import extras
 from micstools.reading.reader import BadRun
 
 SYSTEMS = {"slurm": ("SLURMCluster", "sbatch"), "pbs": ("PBSCluster", "qsub")}
 """Class of dask-jobqueue, and the program that takes jobs."""
 OPTIONS = ("walltime", "queue", "account", "memory", "interface")
 _USUAL = {"walltime": "12:00:00", "memory": "4GB"}
+_NO_PAGE = "127.0.0.1:0"  # dask listens for pages always: here, at any free port, without one
 OPTION = "--cluster"
 
 
@@ -45,12 +48,23 @@ def parse(words: Sequence[str]) -> Queue:
     return Queue(system, options)
 
 
-def cluster(queue: Queue, jobs: int, logs: Path) -> Any:
-    """A cluster of dask with `jobs` workers on their way; what they say goes to `logs`. Other
-    options are those of dask-jobqueue's own file, ~/.config/dask/jobqueue.yaml."""
+@contextlib.contextmanager
+def client(queue: Queue, jobs: int, folder: Path) -> Iterator[Any]:
+    """A client of dask with `jobs` workers on their way. Scheduler, workers and client know each
+    other by a certificate of this call alone; nothing of them is served beyond the loopback
+    address. Other options are those of dask-jobqueue's own file, ~/.config/dask/jobqueue.yaml."""
+    extras.need("ensemble")
     dask_jobqueue = _imported()
+    import dask
+    from dask.distributed import Client, Security
+
     kind, program = getattr(dask_jobqueue, SYSTEMS[queue.system][0]), SYSTEMS[queue.system][1]
-    path, answers = str(logs.resolve()), SimpleQueue[str]()
+    path, answers = str((folder / "jobs").resolve()), SimpleQueue[str]()
+    plain = shlex.quote(path) == path  # else it can stand in no directive of a job
+    more = dask.config.get(f"jobqueue.{queue.system}.worker-extra-args", [])
+    keys = Path(path) if plain else Path.home()
+    keys.mkdir(exist_ok=True)
+    dask.config.set({"distributed.scheduler.http.routes": []})
     try:
         found = kind(
             n_workers=jobs,
@@ -59,22 +73,26 @@ def cluster(queue: Queue, jobs: int, logs: Path) -> Any:
             processes=1,
             nanny=False,
             python=shlex.quote(sys.executable),
-            log_directory=None if " " in path else path,  # no directive of a job takes a blank
-            scheduler_options={"dashboard_address": ":0"},
+            log_directory=path if plain else None,
+            security=Security.temporary(),
+            shared_temp_directory=str(keys),
+            scheduler_options={"dashboard": False, "dashboard_address": _NO_PAGE},
+            worker_extra_args=[*more, "--no-dashboard", "--dashboard-address", _NO_PAGE],
             job_name="mics",
             silence_logs=logging.CRITICAL,
             **_USUAL | queue.options,
         )
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OSError) as error:
         raise BadRun(f"{OPTION} {queue.system}: {error}") from error
-    refused = [said for said in (answers.get() for _ in range(jobs)) if said]
-    if len(refused) == jobs:
-        found.close()
-        raise BadRun(f"{OPTION} {queue.system}: {program} takes no job: {refused[0]}")
-    if refused:
-        print(f"{program} refuses {len(refused)} of {jobs} jobs: {refused[0]}", file=sys.stderr)
-    found.adapt(minimum=jobs, maximum=jobs)  # new ones for those whose time is over
-    return found
+    with found:
+        refused = [said for said in (answers.get() for _ in range(jobs)) if said]
+        if len(refused) == jobs:
+            raise BadRun(f"{OPTION} {queue.system}: {program} takes no job: {refused[0]}")
+        if refused:
+            print(f"{program} refuses {len(refused)} of {jobs} jobs: {refused[0]}", file=sys.stderr)
+        found.adapt(minimum=jobs, maximum=jobs)  # new ones for those whose time is over
+        with Client(found) as client:
+            yield client
 
 
 def _imported() -> Any:

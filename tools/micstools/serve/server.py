@@ -1,21 +1,28 @@
-"""A server for the person at this machine: it listens on the loopback address, answers whoever has
-the key of its first address, and nobody whom another page sends.
+"""A server for the person at this machine: it listens on the loopback address, answers the browser
+that opened it, and nobody whom another page sends.
 
-A name in `Host` other than ours is refused, so no name of a foreign page can be bent to us; the
-key comes once in the address, then in a cookie that other pages cannot send along; what changes
-something needs a token in a header, which a foreign page can neither read nor set.
+A name in `Host` other than ours is refused, so no name of a foreign page can be bent to us. The key
+in the address lets one browser in, once and soon; others of this machine can read it in no command
+line, for the browser is sent to a private file. From then on it has a cookie that other pages
+cannot send along. What changes something needs a token in a header, which a foreign page can
+neither read nor set.
 """
 
 import asyncio
+import contextlib
 import hmac
 import json
+import os
 import secrets
 import sys
+import time
 import traceback
 import webbrowser
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from aiohttp import web
@@ -39,7 +46,14 @@ _SECURE = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
+_FOREIGN = {  # a page that somebody else may have written: its scripts run, and reach nothing
+    "Cross-Origin-Opener-Policy": "unsafe-none",  # no other goes with a sandbox
+    "Content-Security-Policy": "sandbox allow-scripts; default-src 'none'; img-src data:; "
+    "style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'none'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'",
+}
 _LARGEST = 8_000_000  # bytes of a request
+_SOON = 300.0  # that a key of the address lets somebody in [s]
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -48,8 +62,10 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Site:
     """What is served: handlers by method and path, and the secrets of one server."""
 
-    key: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    session: str = field(default_factory=lambda: secrets.token_urlsafe(24))  # of the cookie
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
+    keys: dict[str, float] = field(default_factory=dict)  # not used yet, and when they die [s]
+    entered: asyncio.Event = field(default_factory=asyncio.Event)
     routes: list[tuple[str, str, Handler]] = field(default_factory=list)
     port: int = 0
 
@@ -58,10 +74,11 @@ class Site:
         """Its name; cookies do not know ports."""
         return f"mics-{self.port}"
 
-    @property
     def address(self) -> str:
-        """Where the browser begins."""
-        return f"http://{ADDRESS}:{self.port}/?key={self.key}"
+        """Where a browser begins; each has a key of its own."""
+        key = secrets.token_urlsafe(24)
+        self.keys[key] = time.monotonic() + _SOON
+        return f"http://{ADDRESS}:{self.port}/?key={key}"
 
     def head(self) -> Markup:
         """What a page needs to be allowed to change something."""
@@ -93,7 +110,8 @@ class Site:
         except Exception as fault:  # of ours: told, and the page goes on
             traceback.print_exc()
             answer = json_answer({"error": f"a fault of mics-tools: {fault!r}"}, 500)
-        answer.headers.update(_SECURE)
+        for name, value in _SECURE.items():
+            answer.headers.setdefault(name, value)
         return answer
 
     def _refusal(self, request: web.Request) -> web.Response | None:
@@ -103,18 +121,36 @@ class Site:
             return web.Response(status=421, text="no such host")
         if origin is not None and origin not in [f"http://{host}" for host in hosts]:
             return web.Response(status=403, text="another page asks")
+        sent = request.headers.get("Sec-Fetch-Site", "none") not in _OURS
         entering = request.method == "GET" and request.path == "/" and "key" in request.query
-        if entering and _same(request.query["key"], self.key):
-            answer = web.Response(status=303, headers={"Location": "/"})
-            answer.set_cookie(self.cookie, self.key, httponly=True, samesite="Strict", path="/")
-            return answer
-        if request.headers.get("Sec-Fetch-Site", "none") not in _OURS:
+        if entering and self._lets_in(request.query["key"]):
+            return self._entrance(sent)
+        if sent:
             return web.Response(status=403, text="another page asks")
-        if not _same(request.cookies.get(self.cookie, ""), self.key):
-            return web.Response(status=403, text="open the address that mics-tools printed")
+        if not _same(request.cookies.get(self.cookie, ""), self.session):
+            words = "open the address that mics-tools printed; Enter in its window prints another"
+            return web.Response(status=403, text=words)
         if request.method != "GET" and not _same(request.headers.get(TOKEN, ""), self.token):
             return web.Response(status=403, text="no token")
         return None
+
+    def _lets_in(self, given: str) -> bool:
+        """Is it a key that nobody has used? It is used now."""
+        now = time.monotonic()
+        self.keys = {key: end for key, end in self.keys.items() if end > now}
+        found = [key for key in self.keys if _same(given, key)]
+        return bool(found and self.keys.pop(found[0]))
+
+    def _entrance(self, sent: bool) -> web.Response:
+        """The answer with the cookie, which leads to the page. A browser that was `sent` by the
+        private file would follow a redirect without the cookie, as for any other page."""
+        self.entered.set()
+        if sent:
+            answer = page_answer(_forward("/"))
+        else:
+            answer = web.Response(status=303, headers={"Location": "/"})
+        answer.set_cookie(self.cookie, self.session, httponly=True, samesite="Strict", path="/")
+        return answer
 
 
 def _same(given: str, wanted: str) -> bool:
@@ -130,6 +166,17 @@ def json_answer(content: Any, status: int = 200) -> web.Response:
 def page_answer(text: str) -> web.Response:
     """A page."""
     return web.Response(text=text, content_type="text/html", charset="utf-8")
+
+
+def foreign_answer(text: str) -> web.Response:
+    """A page that somebody else may have written."""
+    answer = page_answer(text)
+    answer.headers.update(_FOREIGN)
+    return answer
+
+
+def _forward(address: str) -> str:
+    return f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">\n'
 
 
 async def apart(work: Callable[..., T], *given: Any) -> T:
@@ -152,9 +199,36 @@ async def _serve(site: Site, port: int, browser: bool) -> None:
         listener = web.TCPSite(runner, ADDRESS, port)
         await listener.start()
         site.port = runner.addresses[0][1]
-        print(f"{site.address}\n(this machine only; Ctrl-C ends the page, not a run)", flush=True)
-        if browser and not webbrowser.open(site.address):
-            print("no browser here: open the address yourself", file=sys.stderr, flush=True)
+        print(site.address())
+        print("(this machine only, one browser; Ctrl-C ends the page, not a run)", flush=True)
+        if sys.stdin and sys.stdin.isatty():
+            asyncio.get_running_loop().add_reader(sys.stdin, _print_another, site)
+        if browser:
+            await _open(site)
         await asyncio.Event().wait()
     finally:
         await runner.cleanup()
+
+
+def _print_another(site: Site) -> None:
+    """After Enter, an address for another browser, or for one that has lost its cookie."""
+    if os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
+        return  # it was typed for a shell
+    if sys.stdin.readline():
+        print(site.address(), flush=True)
+    else:  # the terminal has gone
+        asyncio.get_running_loop().remove_reader(sys.stdin)
+
+
+async def _open(site: Site) -> None:
+    """Open the browser on a private file that sends it to us. The file lies in the home folder:
+    browsers in a sandbox of their own see no folder of temporary files."""
+    with TemporaryDirectory(prefix="mics-page-", dir=Path.home()) as folder:
+        page = Path(folder, "open.html")
+        page.touch(mode=0o600)
+        page.write_text(_forward(site.address()))
+        if not await apart(webbrowser.open, page.as_uri()):
+            print("no browser here: open the address yourself", file=sys.stderr, flush=True)
+            return
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(site.entered.wait(), _SOON)

@@ -14,7 +14,7 @@ from micstools.pages import ensemble_page, motion, run_page, run_words
 from micstools.piles import pile_ensemble
 from micstools.reading.reader import BadRun, Run
 from micstools.serve import living, watch_page
-from micstools.serve.server import Site, apart, json_answer, page_answer
+from micstools.serve.server import Site, apart, foreign_answer, json_answer, page_answer
 
 MOST = 600  # rows of blocks that are read of a run
 
@@ -206,7 +206,7 @@ class Watch:
     async def _report(self, _: web.Request) -> web.Response:
         if not self.report.is_file():
             raise web.HTTPNotFound(reason="no report yet")
-        return page_answer(self.report.read_text(encoding="utf-8"))
+        return foreign_answer(self.report.read_text(encoding="utf-8"))
 
 
 def site_of(folder: Path) -> Site:
