@@ -36,14 +36,17 @@ flags := $(FFLAGS) $(or $(checks),$(OPT) $(LTO))
 
 other_twin := src/base/parallel_$(if $(MPI),serial,mpi).f90
 sources := $(filter-out $(other_twin),$(wildcard src/*.f90 src/*/*.f90))
-unit_sources := $(wildcard verification/unit/*.f90)
-unit_objects := $(foreach folder,$(B) $(C),$(unit_sources:verification/unit/%.f90=$(folder)/%.o))
-tests := $(wildcard verification/unit/test_*.f90)
+tests := $(wildcard verification/unit/*/test_*.f90)
 drivers := $(wildcard verification/drivers/*.f90)
+# What verification/test_units.py runs of this variant: for each folder one program, test_FOLDER.
+run_here := $(if $(MPI),$(shell grep -l '^! ranks:' $(tests)),$(tests))
+folders := $(notdir $(patsubst %/,%,$(sort $(dir $(run_here)))))
+mains := $(folders:%=$(B)/units_$(parallel)_%.f90)
+unit_sources := $(wildcard verification/unit/*.f90) $(tests) $(mains)
+unit_objects := $(foreach folder,$(B) $(C),$(patsubst %.f90,$(folder)/%.o,$(notdir $(unit_sources))))
 unit_sources += $(drivers)
-program = $(patsubst %.f90,$(B)/%,$(notdir $(1)))
-# What verification/test_units.py and the cases run of this variant.
-run_here := $(if $(MPI),$(shell grep -l '^! ranks:' $(tests)),$(tests) $(if $(DEBUG),,$(drivers)))
+unit_programs := $(folders:%=$(B)/test_%)
+driver_programs := $(drivers:verification/drivers/%.f90=$(B)/%)
 vpath %.f90 $(sort $(dir $(sources) $(unit_sources))) $(C)
 
 .DELETE_ON_ERROR:
@@ -83,7 +86,7 @@ $(binary): $$(OBJECTS_mics)
 	$(if $(OBJECTS_mics),,$(error src/mics.f90, the main program, is missing))
 	$(call say,LD $@)$(compiler) $(flags) -o $@ $^
 
-units: $(call program,$(run_here))
+units: $(unit_programs) $(if $(MPI)$(DEBUG),,$(driver_programs))
 
 # Every variant that `make test` runs, side by side but for the two that share objects.
 variants := serial-variant mpi-variant debug-variant
@@ -97,8 +100,14 @@ mpi-variant:
 debug-variant:
 	@$(MAKE) --no-print-directory DEBUG=1 all units
 
-$(call program,$(tests) $(drivers)): $(B)/%: $$(OBJECTS_$$*)
+$(unit_programs): $(B)/test_%: $$(OBJECTS_units_$(parallel)_$$*)
 	$(call say,LD $@)$(compiler) $(flags) -fno-lto -o $@ $^
+$(driver_programs): $(B)/%: $$(OBJECTS_$$*)
+	$(call say,LD $@)$(compiler) $(flags) -fno-lto -o $@ $^
+
+# The main program of a folder of tests.
+$(mains): $(B)/units_$(parallel)_%.f90: $(B)/sources tools/unit_main.sh
+	@tools/unit_main.sh units_$(parallel)_$* $(filter verification/unit/$*/%,$(run_here)) > $@
 
 # The tests themselves need no speed, what they test does.
 flags_here = $(if $(filter $(unit_objects),$@),$(FFLAGS) $(or $(checks),-O0),$(flags))
@@ -131,7 +140,7 @@ $(C)/build_info.f90: FORCE
 	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
 
 $(B)/sources: FORCE
-	$(call keep,$(sources) $(unit_sources))
+	$(call keep,$(sources) $(unit_sources) $(run_here))
 
 $(B)/depend.mk: $(B)/sources $(sources) $(unit_sources) tools/depend.awk $(C)/build_info.f90
 	@awk -v B=$(B) -v C=$(C) -f tools/depend.awk $(sources) $(unit_sources) $(C)/build_info.f90 > $@

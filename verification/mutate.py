@@ -1,8 +1,8 @@
 """Breaks formulas one by one: each break must turn the named tests red.
 
 The list is mutations.toml. Work happens in a copy of the tree under build/mutate, which stays for
-the next call. A name without a slash in `tests` is a unit program; a name with one is a pytest
-item, like `verification/test_cases.py::test_case[water_ball]`. Exit code 1: a break that no test
+the next call. A name without a slash in `tests` is a unit test; a name with one is a pytest item,
+like `verification/test_cases.py::test_case[water_ball]`. Exit code 1: a break that no test
 noticed, a pattern that is not in its file exactly once, or a test that is red without any break.
 """
 
@@ -51,6 +51,9 @@ def mismatch(mutation: Mutation) -> str:
         return f"found {found} times in {mutation.file}, must be there once: {mutation.original!r}"
     if mutation.original == mutation.replacement:
         return "the replacement changes nothing"
+    units = {path.stem for path in (ROOT / "verification" / "unit").glob("*/test_*.f90")}
+    if lost := [test for test in mutation.tests if "/" not in test and test not in units]:
+        return f"no unit test is called {', '.join(lost)}"
     return "" if mutation.tests else "no tests are named"
 
 
@@ -97,9 +100,15 @@ def command(arguments: list[str | Path], patience: float = PATIENCE) -> tuple[bo
     return done.returncode == 0, done.stdout
 
 
+def unit(test: str) -> list[str]:
+    """The command that runs a unit test: its folder's program with its name."""
+    (source,) = (ROOT / "verification" / "unit").glob(f"*/{test}.f90")
+    return [f"build/serial/test_{source.parent.name}", test.removeprefix("test_")]
+
+
 def build(tests: tuple[str, ...], patience: float = PATIENCE) -> tuple[bool, str]:
     """Compile what the tests need, with little optimisation to save time."""
-    goals = [f"build/serial/{test}" for test in tests if "/" not in test]
+    goals = sorted({unit(test)[0] for test in tests if "/" not in test})
     if any("/" in test for test in tests):
         goals.append("mics")
     return command(["make", "OPT=-O1 -march=native", "LTO=", *goals], patience)
@@ -109,7 +118,7 @@ def green(test: str) -> bool:
     """Does the test pass in the scratch tree?"""
     if "/" in test:
         return command([".venv/bin/python", "-m", "pytest", "-x", "-q", test])[0]
-    return command([SCRATCH / "build" / "serial" / test])[0]
+    return command(unit(test))[0]
 
 
 def verdict(mutation: Mutation) -> tuple[bool, str]:

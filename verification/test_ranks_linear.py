@@ -1,6 +1,6 @@
 """The linear solver gives the same bits on any number of processes.
 
-`test_multigrid` prints one line `solution NAME CELLS ITERATIONS CHECKSUM` for each of its systems.
+`test_solvers multigrid` prints one line `solution NAME CELLS ITERATIONS CHECKSUM` for each of its systems.
 """
 
 import os
@@ -33,10 +33,10 @@ def solutions(*command: str) -> list[str]:
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_same_solutions(n: int) -> None:
     """Compare the parallel build on n processes with the serial build."""
-    serial = solutions(str(BUILD / "serial" / "test_multigrid"))
+    serial = solutions(str(BUILD / "serial" / "test_solvers"), "multigrid")
     parallel = solutions(
         *["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(n)],
-        str(BUILD / "mpi" / "test_multigrid"),
+        *[str(BUILD / "mpi" / "test_solvers"), "multigrid"],
     )
     assert len(serial) > 0
     assert parallel == serial

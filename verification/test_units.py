@@ -1,6 +1,7 @@
-"""Runs every unit program: optimised, with all run-time checks, and some on several processes.
+"""Runs every unit test: optimised, with all run-time checks, and some on several processes.
 
-A program that holds the comment line `! ranks: 2 4` is also run by mpirun on 2 and on 4 processes.
+The tests of a folder are one program, which runs that of its argument: `test_blocks sleep`. A test
+that holds the comment line `! ranks: 2 4` is also run by mpirun on 2 and on 4 processes.
 """
 
 import os
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SOURCES = sorted((ROOT / "verification" / "unit").glob("test_*.f90"))
+SOURCES = sorted((ROOT / "verification" / "unit").glob("*/test_*.f90"))
 THREADS = {"OMP_NUM_THREADS": "2", "OMP_WAIT_POLICY": "passive"}
 """Two threads, so that the loops of the modules are tested as they run."""
 
@@ -22,10 +23,11 @@ def ranks(source: Path) -> list[int]:
     return [int(word) for word in found[1].split()] if found else []
 
 
-def run(command: list[str | Path], folder: Path) -> None:
-    """Run a unit program; its output is shown when it fails."""
+def run(source: Path, build: str, folder: Path, launcher: tuple[str, ...] = ()) -> None:
+    """Run a unit test; its output is shown when it fails."""
+    program = ROOT / "build" / build / f"test_{source.parent.name}"
     done = subprocess.run(
-        command,
+        [*launcher, program, source.stem.removeprefix("test_")],
         cwd=folder,
         env={**os.environ, **THREADS},
         stdin=subprocess.DEVNULL,
@@ -41,7 +43,7 @@ def run(command: list[str | Path], folder: Path) -> None:
 @pytest.mark.parametrize("build", ["serial-debug", "serial"])
 @pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 def test_unit(source: Path, build: str, tmp_path: Path) -> None:
-    run([ROOT / "build" / build / source.stem], tmp_path)
+    run(source, build, tmp_path)
 
 
 @pytest.mark.xdist_group("ranks")
@@ -50,5 +52,4 @@ def test_unit(source: Path, build: str, tmp_path: Path) -> None:
     [pytest.param(source, n, id=f"{source.stem}-{n}") for source in SOURCES for n in ranks(source)],
 )
 def test_unit_on_ranks(source: Path, n: int, tmp_path: Path) -> None:
-    program = ROOT / "build" / "mpi" / source.stem
-    run(["mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(n), program], tmp_path)
+    run(source, "mpi", tmp_path, ("mpirun", "--bind-to", "none", "--oversubscribe", "-n", str(n)))

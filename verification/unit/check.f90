@@ -4,7 +4,7 @@ module check_m
   use kinds_m, only: wp
   implicit none
   private
-  public :: check, checked, finish_checks
+  public :: check, checked, wanted, finish_checks
 
   !> With run-time checks, some eight times as slow: fewer random poses and damaged places do.
   logical, parameter :: checked = index(compiler_options(), '-fcheck=all') > 0
@@ -16,6 +16,16 @@ module check_m
   end interface check
 
 contains
+
+  !> Is this part to run? All do, or the one that the command line names.
+  logical function wanted(part)
+    character(*), intent(in) :: part   !! test_PART is its procedure
+    character(64) :: argument
+
+    call get_command_argument(1, argument)
+    wanted = argument == '' .or. argument == part
+    if (wanted) write (output_unit, '(2a)') part, ':'
+  end function wanted
 
   subroutine check_condition(name, condition)
     character(*), intent(in) :: name

@@ -1,0 +1,71 @@
+!> Problems are kept in order with what, value, what is allowed and the line; numbers stay short.
+module test_errors_m
+  use kinds_m, only: wp
+  use check_m, only: check
+  use errors_m, only: problems_t, to_text
+  implicit none
+  private
+  public :: test_errors
+
+contains
+
+  subroutine test_errors()
+    call test_messages()
+    call test_number_text()
+  end subroutine test_errors
+
+  subroutine test_messages()
+    type(problems_t) :: problems
+    character(200) :: line
+    integer :: i, unit
+
+    call problems%add('&run dt', -1.0_wp, 'must be positive [s]', line=3)
+    call problems%add('&grid cells', 0, 'must be at least 1')
+    call problems%add('&body fixed', .true., 'not possible here', 12)
+    call problems%add('&shape kind', 'hexapot ', "must be 'hexapod'")
+    do i = 1, 30
+      call problems%add_message('more')
+    end do
+    call check('count', problems%n, 34)
+    call check('real', problems%message(1) == '&run dt = -1: must be positive [s] (line 3)')
+    call check('integer', problems%message(2) == '&grid cells = 0: must be at least 1')
+    call check('logical', &
+      problems%message(3) == '&body fixed = .true.: not possible here (line 12)')
+    call check('character', problems%message(4) == "&shape kind = 'hexapot': must be 'hexapod'")
+    call check('growth', problems%message(34) == 'more')
+    open (newunit=unit, status='scratch')
+    call problems%report(unit)
+    rewind (unit)
+    read (unit, '(a)') line
+    call check('report', line == 'mics: &run dt = -1: must be positive [s] (line 3)')
+    close (unit)
+  end subroutine test_messages
+
+  subroutine test_number_text()
+    real(wp) :: x, y
+    character(40) :: line
+    integer :: i, unequal
+
+    call check('zero', to_text(0.0_wp) == '0')
+    call check('a tenth', to_text(0.1_wp) == '0.1')
+    call check('hundredth', to_text(-0.01_wp) == '-0.01')
+    call check('many digits', to_text(998.2_wp) == '998.2')
+    call check('third', to_text(1/3.0_wp) == '0.3333333333333333')
+    call check('round', to_text(-2300.0_wp) == '-2300')
+    call check('small', to_text(1.5e-7_wp) == '1.5e-7')
+    call check('large', to_text(1.0e25_wp) == '1e25')
+    call check('largest', to_text(huge(x)) == '1.7976931348623157e308')
+    call check('integer', to_text(-42) == '-42')
+    call check('logical', to_text(.false.) == '.false.')
+    unequal = 0
+    do i = 1, 2000
+      call random_number(x)
+      x = (x - 0.5_wp)*10.0_wp**modulo(i, 40)/1.0e20_wp
+      line = to_text(x)
+      read (line, *) y
+      if (abs(y - x) > 0) unequal = unequal + 1
+    end do
+    call check('reading back gives the same number', unequal, 0)
+  end subroutine test_number_text
+
+end module test_errors_m

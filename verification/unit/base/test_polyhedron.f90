@@ -1,0 +1,227 @@
+!> Cutting of tetrahedra and boxes by planes against closed forms and against each other.
+module test_polyhedron_m
+  use kinds_m, only: wp
+  use check_m, only: check
+  use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, polyhedron_of_box, cut_polyhedron, &
+    polyhedron_moments, polyhedron_moments_below, tet_volume, tet_moments_below, &
+    clip_tet_to_box, box_clip_moments_below
+  use polyhedron_sections_m, only: polyhedron_section
+  implicit none
+  private
+  public :: test_polyhedron
+
+  integer :: seed_value = 12345
+
+contains
+
+  subroutine test_polyhedron()
+    call whole_bodies()
+    call tet_below_plane()
+    call plane_through_corners()
+    call cells_fill_the_tet()
+    call sections()
+    call volume_from_sections()
+  end subroutine test_polyhedron
+
+  !> Repeatable number in 0..1.
+  function draw() result(r)
+    real(wp) :: r
+
+    seed_value = mod(16807*mod(seed_value, 127773) - 2836*(seed_value/127773), 2147483647)
+    if (seed_value <= 0) seed_value = seed_value + 2147483647
+    r = real(seed_value, wp)/2147483647.0_wp
+  end function draw
+
+  function draw_points(m) result(x)
+    integer, intent(in) :: m
+    real(wp) :: x(3, m)
+    integer :: d, v
+
+    do v = 1, m
+      do d = 1, 3
+        x(d, v) = draw()
+      end do
+    end do
+  end function draw_points
+
+  subroutine whole_bodies()
+    type(polyhedron_t) :: p
+    real(wp) :: c(3, 4), volume, moment(3)
+
+    call polyhedron_of_box([1.0_wp, 2.0_wp, 3.0_wp], [2.0_wp, 4.0_wp, 6.0_wp], p)
+    call polyhedron_moments(p, volume, moment)
+    call check('volume of a box', volume, 6.0_wp, 1e-14_wp)
+    call check('moment of a box', moment, [9.0_wp, 18.0_wp, 27.0_wp], 1e-13_wp)
+    c = draw_points(4)
+    call polyhedron_of_tet(c, p)
+    call polyhedron_moments(p, volume, moment)
+    call check('volume of a tetrahedron', volume, abs(tet_volume(c)), 1e-16_wp)
+    call check('moment of a tetrahedron', moment, volume*sum(c, 2)/4.0_wp, 1e-16_wp)
+  end subroutine whole_bodies
+
+  !> Three ways to the same numbers, and the two sides of a plane add up.
+  subroutine tet_below_plane()
+    type(polyhedron_t) :: p
+    real(wp) :: c(3, 4), n(3), d, v1, m1(3), v2, m2(3), v3, m3(3), worst(3)
+    integer :: t
+
+    worst = 0.0_wp
+    do t = 1, 1000
+      c = draw_points(4)
+      n = 2.0_wp*reshape(draw_points(1), [3]) - 1.0_wp
+      d = dot_product(n, reshape(draw_points(1), [3]))
+      call tet_moments_below(c, n, d, v1, m1)
+      call polyhedron_of_tet(c, p)
+      call polyhedron_moments_below(p, n, d, v2, m2)
+      call tet_moments_below(c, -n, -d, v3, m3)
+      worst(1) = max(worst(1), abs(v1 - v2), maxval(abs(m1 - m2)))
+      worst(2) = max(worst(2), abs(v1 + v3 - abs(tet_volume(c))))
+      worst(3) = max(worst(3), maxval(abs(m1 + m3 - abs(tet_volume(c))*sum(c, 2)/4.0_wp)))
+    end do
+    call check('corner graph against closed form', worst(1), 0.0_wp, 1e-15_wp)
+    call check('both sides of a plane add up', worst(2:3), [0.0_wp, 0.0_wp], 1e-15_wp)
+  end subroutine tet_below_plane
+
+  !> Unit corner tetrahedron and unit box cut exactly through corners, edges and faces.
+  subroutine plane_through_corners()
+    type(polyhedron_t) :: p
+    real(wp) :: c(3, 4), n(3), volume, moment(3), lower, upper
+    integer :: a, b, e, d
+    logical :: good
+
+    c = 0.0_wp
+    c(1, 2) = 1.0_wp
+    c(2, 3) = 1.0_wp
+    c(3, 4) = 1.0_wp
+    call check('face on the plane, body above', &
+               volume_of_part(c, [0.0_wp, 0.0_wp, 1.0_wp], 0.0_wp), 0.0_wp, 0.0_wp)
+    call check('face on the plane, body below', &
+               volume_of_part(c, [0.0_wp, 0.0_wp, -1.0_wp], 0.0_wp), 1.0_wp/6.0_wp, 0.0_wp)
+    call check('half by a plane through an edge', &
+               volume_of_part(c, [1.0_wp, -1.0_wp, 0.0_wp], 0.0_wp), 1.0_wp/12.0_wp, 1e-17_wp)
+    good = .true.
+    do a = -1, 1
+      do b = -1, 1
+        do e = -1, 1
+          if (a == 0 .and. b == 0 .and. e == 0) cycle
+          n = real([a, b, e], wp)
+          do d = -3, 3
+            call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
+            call polyhedron_moments_below(p, n, real(d, wp), lower, moment)
+            call polyhedron_moments_below(p, -n, -real(d, wp), upper, moment)
+            good = good .and. abs(lower + upper - 1.0_wp) < 1e-15_wp .and. lower >= 0.0_wp
+          end do
+        end do
+      end do
+    end do
+    call check('box cut through its corners in all 26 directions', good)
+    call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp, 1.0_wp], p)
+    do d = 1, 3
+      n = 0.0_wp
+      n(d) = 1.0_wp
+      call cut_polyhedron(p, n, 1.0_wp)
+      call cut_polyhedron(p, n + 1.0_wp, 2.0_wp)
+    end do
+    call polyhedron_moments(p, volume, moment)
+    call check('box cut by three oblique planes through corners', volume, reference_cut(), 1e-15_wp)
+  end subroutine plane_through_corners
+
+  !> Volume of the part of a tetrahedron with n.x <= d.
+  function volume_of_part(corner, n, d) result(volume)
+    real(wp), intent(in) :: corner(3, 4), n(3), d
+    real(wp) :: volume
+    real(wp) :: moment(3)
+
+    call tet_moments_below(corner, n, d, volume, moment)
+  end function volume_of_part
+
+  !> Unit box below x + y + z + x_d <= 2 for d = 1..3, as the tetrahedra of its symmetric sixths.
+  function reference_cut() result(volume)
+    real(wp) :: volume
+    real(wp) :: c(3, 4)
+
+    ! In the sixth x >= y >= z only d = 1 matters: 2x + y + z <= 2 there.
+    c = 0.0_wp
+    c(1, 2:4) = 1.0_wp
+    c(2, 3:4) = 1.0_wp
+    c(3, 4) = 1.0_wp
+    volume = 6.0_wp*volume_of_part(c, [2.0_wp, 1.0_wp, 1.0_wp], 2.0_wp)
+  end function reference_cut
+
+  !> The parts of a tetrahedron in the cells of a box add up to it, also below a plane.
+  subroutine cells_fill_the_tet()
+    integer, parameter :: m = 4
+    real(wp) :: c(3, 4), lo(3), v, mom(3), total, moment(3), whole, whole_moment(3), n(3), worst(2)
+    integer :: t, i, j, k
+
+    worst = 0.0_wp
+    do t = 1, 20
+      c = draw_points(4)
+      if (t <= 10) c = anint(c*real(m, wp))/real(m, wp)   ! corners on the planes of the cells
+      n = 2.0_wp*reshape(draw_points(1), [3]) - 1.0_wp
+      call tet_moments_below(c, n, 0.1_wp, whole, whole_moment)
+      total = 0.0_wp
+      moment = 0.0_wp
+      do k = 1, m
+        do j = 1, m
+          do i = 1, m
+            lo = real([i, j, k] - 1, wp)/real(m, wp)
+            call box_clip_moments_below(c, lo, lo + 1.0_wp/real(m, wp), n, 0.1_wp, v, mom)
+            total = total + v
+            moment = moment + mom
+          end do
+        end do
+      end do
+      worst(1) = max(worst(1), abs(total - whole))
+      worst(2) = max(worst(2), maxval(abs(moment - whole_moment)))
+    end do
+    call check('cells fill the tetrahedron below a plane', worst, [0.0_wp, 0.0_wp], 1e-15_wp)
+  end subroutine cells_fill_the_tet
+
+  subroutine sections()
+    type(polyhedron_t) :: p
+    real(wp) :: area, x(3), c(3, 4)
+
+    call polyhedron_of_box([0.0_wp, 0.0_wp, 0.0_wp], [1.0_wp, 2.0_wp, 3.0_wp], p)
+    call polyhedron_section(p, [0.0_wp, 2.0_wp, 0.0_wp], 1.0_wp, area, x)
+    call check('section of a box', area, 3.0_wp, 1e-15_wp)
+    call check('its centroid', x, [0.5_wp, 0.5_wp, 1.5_wp], 1e-15_wp)
+    call polyhedron_section(p, [1.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, area, x)
+    call check('section in the lower face', area, 6.0_wp, 1e-15_wp)
+    call polyhedron_section(p, [1.0_wp, 0.0_wp, 0.0_wp], 1.0_wp, area, x)
+    call check('none in the upper face', area, 0.0_wp, 0.0_wp)
+    c = 0.0_wp
+    c(1, 2) = 1.0_wp
+    c(2, 3) = 1.0_wp
+    c(3, 4) = 1.0_wp
+    call clip_tet_to_box(c, [0.0_wp, 0.0_wp, 0.0_wp], [0.5_wp, 0.5_wp, 0.5_wp], p)
+    call polyhedron_section(p, [0.0_wp, 0.0_wp, 1.0_wp], 0.25_wp, area, x)
+    call check('section of a clipped tetrahedron', area, 0.25_wp - 0.125_wp*0.25_wp, 1e-15_wp)
+  end subroutine sections
+
+  !> The volume is the integral of the cross-section over the height (three Gauss points).
+  subroutine volume_from_sections()
+    real(wp), parameter :: node(3) = [-sqrt(0.6_wp), 0.0_wp, sqrt(0.6_wp)]
+    real(wp), parameter :: low = 0.2_wp, high = 0.9_wp
+    type(polyhedron_t) :: p
+    real(wp) :: c(3, 4), area(3), x(3), volume, moment(3), worst, z, sum_of_sections
+    integer :: t, g
+
+    worst = 0.0_wp
+    do t = 1, 50
+      c = draw_points(4)
+      c(3, 1:2) = low    ! two level edges: the section is one quadratic in between
+      c(3, 3:4) = high
+      call polyhedron_of_tet(c, p)
+      call polyhedron_moments(p, volume, moment)
+      do g = 1, 3
+        z = 0.5_wp*(low + high) + 0.5_wp*(high - low)*node(g)
+        call polyhedron_section(p, [0.0_wp, 0.0_wp, 1.0_wp], z, area(g), x)
+      end do
+      sum_of_sections = (high - low)*(5.0_wp*area(1) + 8.0_wp*area(2) + 5.0_wp*area(3))/18.0_wp
+      worst = max(worst, abs(sum_of_sections - volume))
+    end do
+    call check('volume is the integral of the sections', worst, 0.0_wp, 1e-15_wp)
+  end subroutine volume_from_sections
+
+end module test_polyhedron_m

@@ -1,0 +1,405 @@
+!> Contact points of exact surfaces: where they are, how deep, and forces that follow from an
+!! energy.
+module test_contact_surface_m
+  use kinds_m, only: wp, pi
+  use check_m, only: check
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use vectors_m, only: cross, quaternion_from_axis, quaternion_exp, quaternion_product, normalised
+  use random_counter_m, only: uniform, random_rotation
+  use rigid_body_m, only: blocks_t, blocks_init, release_body
+  use walls_m, only: walls_t, walls_init
+  use contact_points_m, only: contact_points_t
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
+  implicit none
+  private
+  public :: test_contact_surface
+
+  !> A small world of its own.
+  type :: world_t
+    type(case_t) :: case
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contact_surface_t) :: surface
+    type(contact_points_t) :: points
+  end type world_t
+
+  real(wp), parameter :: d = 0.02_wp         !! edge of the cubes, diameter of the ball [m]
+  real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  type(shape_t), allocatable :: shapes(:)
+
+contains
+
+  subroutine test_contact_surface()
+    call make_shapes()
+    call check_rest_heights()
+    call check_corner_in_face()
+    call check_crossing_edges()
+    call check_faces_on_one_another()
+    call check_points_to_come()
+    call check_balls()
+    call check_energy()
+    call check_lists()
+  end subroutine test_contact_surface
+
+  subroutine make_shapes()
+    character(:), allocatable :: message
+    type(case_t) :: case
+    integer :: s
+
+    allocate (case%shape(4), shapes(4))
+    case%shape%name = [character(8) :: 'hexapod', 'cube', 'ball', 'fine']
+    case%shape%kind = [character(8) :: 'hexapod', 'cube', 'sphere', 'hexapod']
+    case%shape%refinement = [1, 1, 1, 3]
+    do s = 1, 4
+      case%shape(s)%size = d
+      call make_shape(case%shape(s), shapes(s), message)
+    end do
+  end subroutine make_shapes
+
+  !> A tank of 1 m with bodies of the given shapes.
+  subroutine new_world(world, names)
+    type(world_t), intent(out) :: world
+    character(*), intent(in) :: names(:)
+    integer :: b
+
+    allocate (world%case%body(size(names)), world%case%drop(0))
+    world%case%grid%length = 1.0_wp
+    do b = 1, size(names)
+      world%case%body(b)%shape = names(b)
+      world%case%body(b)%position = 0.5_wp
+    end do
+    call blocks_init(world%case, shapes, world%blocks)
+    call walls_init(world%case%grid, world%case%boundary, world%walls)
+    call contact_surface_init(0.1_wp, 1.0e-4_wp, world%blocks, world%surface)
+  end subroutine new_world
+
+  subroutine find(world)
+    type(world_t), intent(inout) :: world
+
+    call find_surface_points(world%walls, world%blocks, 0.0_wp, world%surface, world%points)
+  end subroutine find
+
+  !> A hexapod on one, two and three legs: the heights 1.5 d, sqrt(2) d, 2.5 d/sqrt(3) and the
+  !! corners that stand.
+  subroutine check_rest_heights()
+    type(world_t) :: world
+    real(wp) :: height(3), q(4, 3)
+    integer :: corners(3), pose, shape
+    character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'fine']
+    real(wp), parameter :: sunk = 1.0e-5_wp
+
+    height = [1.5_wp, sqrt(2.0_wp), 2.5_wp/sqrt(3.0_wp)]*d
+    corners = [4, 4, 3]
+    q(:, 1) = upright
+    q(:, 2) = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.25_wp*pi)
+    q(:, 3) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
+                                                      atan(sqrt(0.5_wp))), q(:, 2))
+    do shape = 1, 2
+      do pose = 1, 3
+        call new_world(world, names(shape:shape))
+        world%blocks%q(:, 1) = q(:, pose)
+        world%blocks%x(3, 1) = height(pose) + sunk
+        call find(world)
+        call check('above its height it does not touch', world%points%n, 0)
+        world%blocks%x(3, 1) = height(pose) - sunk
+        call find(world)
+        call check('corners that stand', world%points%n, corners(pose))
+        call check('sunk', maxval(world%points%item(:world%points%n)%depth), sunk, 1.0e-15_wp)
+      end do
+    end do
+  end subroutine check_rest_heights
+
+  !> The corner of a cube in the face of another, from both sides.
+  subroutine check_corner_in_face()
+    type(world_t) :: world
+    real(wp) :: depth
+    integer :: upper
+
+    depth = 2.0e-4_wp
+    do upper = 1, 2
+      call new_world(world, ['cube', 'cube'])
+      world%blocks%q(:, upper) = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], &
+                                                      atan(sqrt(2.0_wp)))
+      world%blocks%x(1:2, upper) = [0.503_wp, 0.498_wp]
+      world%blocks%x(3, upper) = 0.5_wp + 0.5_wp*d*(1.0_wp + sqrt(3.0_wp)) - depth
+      call find(world)
+      call check('one corner in a face', world%points%n, 1)
+      call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
+      call check('normal from a to b', world%points%item(1)%normal(3), &
+                 merge(1.0_wp, -1.0_wp, upper == 1), 1.0e-14_wp)
+      call check('its arm', world%points%item(1)%arm_a + world%blocks%x(:, 2), &
+                 [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
+      call check('both arms meet', world%points%item(1)%arm_b + world%blocks%x(:, 1), &
+                 [0.503_wp, 0.498_wp, 0.51_wp - 0.5_wp*depth], 1.0e-15_wp)
+    end do
+  end subroutine check_corner_in_face
+
+  !> Two cubes on edge, crossed: the edges touch at one point, where no corner is near.
+  subroutine check_crossing_edges()
+    type(world_t) :: world
+    real(wp), parameter :: depth = 2.0e-4_wp
+
+    call new_world(world, ['cube', 'cube'])
+    world%blocks%q(:, 1) = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.25_wp*pi)
+    world%blocks%q(:, 2) = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], 0.25_wp*pi)
+    world%blocks%x(:, 2) = [0.503_wp, 0.496_wp, 0.5_wp + sqrt(2.0_wp)*d - depth]
+    call find(world)
+    call check('two edges cross', world%points%n, 1)
+    call check('depth between the edges', world%points%item(1)%depth, depth, 1.0e-15_wp)
+    call check('they count', world%points%item(1)%weight, 1.0_wp, 1.0e-15_wp)
+    call check('normal to both', world%points%item(1)%normal, [0.0_wp, 0.0_wp, -1.0_wp], &
+      1.0e-14_wp)
+    call check('where they cross', world%points%item(1)%arm_b(1:2), [0.003_wp, 0.0_wp], 1.0e-15_wp)
+    world%blocks%x(3, 2) = world%blocks%x(3, 2) + 2*depth
+    call find(world)
+    call check('apart', world%points%n, 0)
+  end subroutine check_crossing_edges
+
+  !> Cubes exactly on one another, and two beams crossed flat: carried without tilt.
+  subroutine check_faces_on_one_another()
+    type(world_t) :: world
+    real(wp), parameter :: depth = 1.0e-5_wp
+    real(wp) :: force, torque(3)
+    integer :: t, cross_laid
+
+    do cross_laid = 0, 1
+      if (cross_laid == 0) call new_world(world, ['cube', 'cube'])
+      if (cross_laid == 1) call new_world(world, ['hexapod', 'hexapod'])
+      world%blocks%x(3, 2) = 0.5_wp + d - depth
+      if (cross_laid == 1) then   ! the middle of a leg of each on that of the other
+        world%blocks%x(:, 2) = 0.5_wp + [d, d, d - depth]
+      end if
+      call find(world)
+      force = 0.0_wp
+      torque = 0.0_wp
+      do t = 1, world%points%n
+        if (abs(world%points%item(t)%normal(3)) < 0.5_wp) cycle
+        force = force + world%points%item(t)%weight*world%points%item(t)%depth
+        torque = torque + cross(world%points%item(t)%arm_b, world%points%item(t)%normal) &
+          *world%points%item(t)%weight*world%points%item(t)%depth
+      end do
+      call check('a face carries', force > 0.9_wp*depth)
+      if (cross_laid == 0) call check('without tilt', torque, [0.0_wp, 0.0_wp, 0.0_wp], &
+                                      1.0e-9_wp*d*force)
+    end do
+  end subroutine check_faces_on_one_another
+
+  !> A cube a gap above another: with a margin, as for impulses, it may touch soon if it comes down,
+  !! by its fall or its spin, not if it goes sideways. Without one all that are near may.
+  subroutine check_points_to_come()
+    real(wp), parameter :: ahead = 2.0e-3_wp, gap = 4.0e-4_wp, speed = 0.5_wp
+    type(world_t) :: world
+    real(wp) :: v(3, 4), spin(4)
+    integer :: m
+
+    v = reshape([0.0_wp, 0.0_wp, -speed, speed, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, speed, &
+                 0.0_wp, 0.0_wp, 0.0_wp], [3, 4])
+    spin = [0.0_wp, 0.0_wp, 0.0_wp, 2*speed/d]
+    do m = 1, 4
+      call new_world(world, ['cube', 'cube'])
+      world%blocks%x(3, 2) = 0.5_wp + d + gap
+      world%blocks%v(:, 2) = v(:, m)
+      world%blocks%omega(2, 2) = spin(m)
+      world%surface%search%margin = 1.0e-4_wp
+      call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
+      call check('comes', (world%points%n > 0) .eqv. (m == 1 .or. m == 4))
+      if (m == 4) call check('on the side that comes down', &
+        minval(world%points%item(:world%points%n)%arm_a(1)) > 0.0_wp)
+      world%surface%search%margin = 0.0_wp
+      call find_surface_points(world%walls, world%blocks, ahead, world%surface, world%points)
+      call check('near enough', world%points%n > 0)
+    end do
+  end subroutine check_points_to_come
+
+  !> A ball touches a ball, a face, an edge, a corner and a wall at one point each.
+  subroutine check_balls()
+    type(world_t) :: world
+    real(wp), parameter :: depth = 1.0e-4_wp
+    real(wp) :: way(3)
+    integer :: m
+
+    do m = 1, 5
+      way = [1.0_wp, 0.0_wp, 0.0_wp]
+      if (m == 1) call new_world(world, ['ball', 'ball'])
+      if (m > 1) call new_world(world, ['cube', 'ball'])
+      if (m == 1) world%blocks%x(:, 2) = 0.5_wp + way*(d - depth)
+      if (m == 2) world%blocks%x(:, 2) = 0.5_wp + way*(d - depth)
+      if (m == 3) then
+        way = [sqrt(0.5_wp), sqrt(0.5_wp), 0.0_wp]
+        world%blocks%x(:, 2) = 0.5_wp + 0.5_wp*d*[1, 1, 0] + way*(0.5_wp*d - depth)
+      else if (m == 4) then
+        way = sqrt(1.0_wp/3.0_wp)
+        world%blocks%x(:, 2) = 0.5_wp + 0.5_wp*d + way*(0.5_wp*d - depth)
+      else if (m == 5) then
+        world%blocks%x(:, 2) = [0.2_wp, 0.3_wp, 0.5_wp*d - depth]
+        way = [0.0_wp, 0.0_wp, 1.0_wp]
+      end if
+      call find(world)
+      call check('a ball touches once', world%points%n, 1)
+      call check('its depth', world%points%item(1)%depth, depth, 1.0e-15_wp)
+      call check('its normal', world%points%item(1)%normal, -way, 1.0e-12_wp)
+    end do
+  end subroutine check_balls
+
+  !> The forces of any pair in contact follow from the energy of its springs: the work of a small
+  !! motion, in any direction and about any axis, against the change of energy.
+  subroutine check_energy()
+    type(world_t) :: new, world, moved
+    real(wp), parameter :: step = 1.0e-8_wp
+    character(8), parameter :: names(2) = [character(8) :: 'hexapod', 'cube']
+    real(wp) :: force(3), torque(3), direction(3), axis(3), here, onward, back, work
+    real(wp) :: worst, scale
+    integer :: i, m, found, faded, detected, kinks, t
+
+    kinks = 0
+    found = 0
+    faded = 0
+    do m = 1, 2
+      worst = 0.0_wp
+      call new_world(new, [names(m), names(m)])
+      do i = 1, 400
+        world = new
+        world%blocks%q(:, 1) = random_rotation(1, i)
+        world%blocks%q(:, 2) = random_rotation(2, i)
+        direction = [uniform(3, i, 1), uniform(3, i, 2), uniform(3, i, 3)] - 0.5_wp
+        direction = direction/norm2(direction)
+        call bring_together(world, direction, 3.0e-4_wp, detected)
+        if (detected == 0) cycle
+        found = found + 1
+        call forces(world, force, torque)
+        associate (point => world%points%item(:world%points%n))
+          scale = sum(point%weight*point%depth)
+          if (any([(any(abs(point(t)%weight_shift) > 0.0_wp), t=1, size(point))])) faded = faded + 1
+        end associate
+        direction = [uniform(4, i, 1), uniform(4, i, 2), uniform(4, i, 3)] - 0.5_wp
+        axis = ([uniform(4, i, 4), uniform(4, i, 5), uniform(4, i, 6)] - 0.5_wp)/d
+        here = energy(world)
+        moved = world
+        call move(moved, step*direction, step*axis)
+        onward = energy(moved) - here
+        moved = world
+        call move(moved, -step*direction, -step*axis)
+        back = here - energy(moved)
+        if (abs(onward - back) > 1.0e-3_wp*step*scale) then   ! a kink: another facet is nearest
+          kinks = kinks + 1
+          cycle
+        end if
+        work = 2*step*(dot_product(force, direction) + dot_product(torque, axis))
+        worst = max(worst, abs(onward + back + work)/(2*step*scale))
+      end do
+      call check('force and energy of a pair', worst, 0.0_wp, 1.0e-4_wp)
+    end do
+    call check('pairs that touch', found > 600)
+    call check('some in part', faded > 20)
+    call check('hardly any at a kink', kinks < 5)
+  end subroutine check_energy
+
+  !> Move body 2 along a direction until the deepest contact has about the depth wanted.
+  subroutine bring_together(world, direction, depth, detected)
+    type(world_t), intent(inout) :: world
+    real(wp), intent(in) :: direction(3), depth
+    integer, intent(out) :: detected
+    real(wp) :: far, near, middle
+    integer :: m
+
+    far = 0.08_wp
+    near = 0.0_wp
+    do m = 1, 30
+      middle = 0.5_wp*(near + far)
+      world%blocks%x(:, 2) = 0.5_wp + middle*direction
+      call find(world)
+      if (world%points%n == 0) then
+        far = middle
+      else if (maxval(world%points%item(:world%points%n)%depth) < depth) then
+        far = middle
+      else
+        near = middle
+      end if
+    end do
+    detected = world%points%n
+  end subroutine bring_together
+
+  !> Force and torque on body 2 from its contact points with body 1, for springs of stiffness one.
+  subroutine forces(world, force, torque)
+    type(world_t), intent(in) :: world
+    real(wp), intent(out) :: force(3), torque(3)
+    real(wp) :: f(3)
+    integer :: t
+
+    force = 0.0_wp
+    torque = 0.0_wp
+    do t = 1, world%points%n
+      associate (point => world%points%item(t), w => world%points%item(t)%weight, &
+        depth => world%points%item(t)%depth)
+        f = -w*depth*point%normal - 0.5_wp*w*depth**2*point%weight_shift
+        force = force + f
+        torque = torque + cross(point%arm_a, f) - 0.5_wp*w*depth**2*point%weight_turn
+      end associate
+    end do
+  end subroutine forces
+
+  !> Energy of the springs of all contact points.
+  function energy(world)
+    type(world_t), intent(inout) :: world
+    real(wp) :: energy
+
+    call find(world)
+    energy = sum(0.5_wp*world%points%item(:world%points%n)%weight &
+                 *world%points%item(:world%points%n)%depth**2)
+  end function energy
+
+  !> Shift and turn body 2.
+  subroutine move(world, shift, turn)
+    type(world_t), intent(inout) :: world
+    real(wp), intent(in) :: shift(3), turn(3)   !! [m], [rad]
+
+    world%blocks%x(:, 2) = world%blocks%x(:, 2) + shift
+    world%blocks%q(:, 2) = normalised(quaternion_product(quaternion_exp(turn), &
+                                                         world%blocks%q(:, 2)))
+  end subroutine move
+
+  !> What is found does not depend on when the lists were made: a body carried past another, in
+  !! strides within which it trembles a little.
+  subroutine check_lists()
+    type(world_t), save :: new, world, fresh
+    integer :: step, tremble, differ, touched
+
+    call new_world(new, ['hexapod', 'hexapod'])
+    world = new
+    world%blocks%q(:, 2) = random_rotation(7, 1)
+    differ = 0
+    touched = 0
+    do step = 1, 400
+      world%blocks%x(:, 2) = 0.5_wp + [0.08_wp - 4.0e-4_wp*step, 0.03_wp, 0.035_wp]
+      call move(world, [0.0_wp, 0.0_wp, 0.0_wp], [0.0_wp, 0.002_wp, 0.001_wp])
+      do tremble = 1, 6
+        call move(world, [-5.0e-6_wp, 3.0e-6_wp, -4.0e-6_wp], [1.0e-4_wp, 0.0_wp, 0.0_wp])
+        call find(world)
+        fresh = new
+        fresh%blocks%x = world%blocks%x
+        fresh%blocks%q = world%blocks%q
+        call find(fresh)
+        if (world%points%n > 0) touched = touched + 1
+        if (.not. same_points(world, fresh)) differ = differ + 1
+      end do
+    end do
+    call check('lists of any age give the same', differ, 0)
+    call check('while the bodies touch', touched > 300)
+  end subroutine check_lists
+
+  !> Whether what touches is the same in two worlds, bit by bit.
+  function same_points(one, two) result(same)
+    type(world_t), intent(in) :: one, two
+    logical :: same
+    integer :: n
+
+    n = one%points%n
+    same = n == two%points%n
+    if (.not. same .or. n == 0) return
+    same = all(one%points%item(:n)%id == two%points%item(:n)%id) &
+      .and. .not. any(abs(one%points%item(:n)%depth - two%points%item(:n)%depth) > 0.0_wp)
+  end function same_points
+
+end module test_contact_surface_m

@@ -1,0 +1,142 @@
+!> Lists of contact points and displacements: order, parting, joining, and the groups that share
+!! one.
+module test_displacements_m
+  use kinds_m, only: wp
+  use check_m, only: check
+  use contact_points_m, only: contact_point_t, contact_points_t, add_point, set_apart
+  use contact_groups_m, only: groups_t, form_groups
+  use displacements_m, only: displacements_t, reserve_displacements, comes_before, begins_pair, &
+    move_displacements
+  use counterparts_met_m, only: met_t, store_counterparts
+  implicit none
+  private
+  public :: test_displacements
+
+contains
+
+  subroutine test_displacements()
+    call check_order()
+    call check_moving()
+    call check_points()
+    call check_groups()
+    call check_met()
+  end subroutine test_displacements
+
+  subroutine check_order()
+    call check('by body', comes_before(1, 9, 9, 2, 0, 0))
+    call check('then counterpart', comes_before(2, -7, 9, 2, -1, 0))
+    call check('then id', comes_before(2, 1, 3, 2, 1, 4))
+    call check('not before itself', .not. comes_before(2, 1, 3, 2, 1, 3))
+  end subroutine check_order
+
+  !> A list of displacements of bodies with counterpart 1; all else follows from its
+  !! body.
+  subroutine make(bodies, displacements)
+    integer, intent(in) :: bodies(:)
+    type(displacements_t), intent(inout) :: displacements
+    integer :: i
+
+    call reserve_displacements(size(bodies), displacements)
+    displacements%n = size(bodies)
+    do i = 1, displacements%n
+      displacements%a(i) = bodies(i)
+      displacements%b(i) = 1
+      displacements%id(i) = 2*bodies(i)
+      displacements%xi(:, i) = 3.0_wp*bodies(i)
+      displacements%k(i) = 4.0_wp*bodies(i)
+      displacements%force(:, i) = 5.0_wp*bodies(i)
+      displacements%torque_a(:, i) = 6.0_wp*bodies(i)
+      displacements%torque_b(:, i) = 7.0_wp*bodies(i)
+      displacements%energy(i) = 8.0_wp*bodies(i)
+    end do
+  end subroutine make
+
+  !> Whether a list is that of some bodies.
+  function is(displacements, bodies) result(yes)
+    type(displacements_t), intent(in) :: displacements
+    integer, intent(in) :: bodies(:)
+    logical :: yes
+    type(displacements_t) :: wanted
+    integer :: n
+
+    call make(bodies, wanted)
+    n = displacements%n
+    yes = n == wanted%n
+    if (.not. yes) return
+    yes = all(displacements%a(:n) == bodies) .and. all(displacements%b(:n) == 1) &
+      .and. all(displacements%id(:n) == wanted%id(:n)) &
+      .and. all(abs(displacements%xi(:, :n) - wanted%xi(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%k(:n) - wanted%k(:n)) <= 0.0_wp) &
+      .and. all(abs(displacements%force(:, :n) - wanted%force(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%torque_a(:, :n) - wanted%torque_a(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%torque_b(:, :n) - wanted%torque_b(:, :n)) <= 0.0_wp) &
+      .and. all(abs(displacements%energy(:n) - wanted%energy(:n)) <= 0.0_wp)
+  end function is
+
+  !> Chosen displacements go to the other list, whole and in order.
+  subroutine check_moving()
+    type(displacements_t) :: from, to
+
+    call make([2, 4, 5, 7, 9], from)
+    call make([3, 6], to)
+    call check('a pair begins', begins_pair(from, 1) .and. begins_pair(from, 2))
+    call move_displacements([.false., .true., .false., .true., .true.], from, to)
+    call check('those left', is(from, [2, 5]))
+    call check('those joined', is(to, [3, 4, 6, 7, 9]))
+    call move_displacements([.true., .true.], from, to)
+    call check('none left', from%n, 0)
+    call check('all joined', is(to, [2, 3, 4, 5, 6, 7, 9]))
+    from%a(2) = from%a(1)
+    from%n = 2
+    call check('one pair has two displacements', .not. begins_pair(from, 2))
+  end subroutine check_moving
+
+  !> Contact points that do not touch yet get a list of their own.
+  subroutine check_points()
+    type(contact_points_t) :: points, soon
+    integer :: i
+
+    do i = 1, 40
+      call add_point(contact_point_t(a=i, b=-i, depth=merge(1.0_wp, -1.0_wp, modulo(i, 3) == 0)), &
+        points)
+    end do
+    call set_apart(points, soon)
+    call check('those that touch', all(points%item(:points%n)%a == [(3*i, i=1, 13)]))
+    call check('the others', soon%n, 27)
+    call check('in order', all(soon%item(2:soon%n)%a > soon%item(:soon%n - 1)%a))
+    call check('whole', all(soon%item(:soon%n)%b == -soon%item(:soon%n)%a))
+  end subroutine check_points
+
+  !> Contact points of one id and counterpart have a mean normal and point, weighted by overlap.
+  subroutine check_groups()
+    type(contact_points_t) :: points
+    type(groups_t) :: groups
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], y(3) = [0.0_wp, 1.0_wp, 0.0_wp]
+
+    call add_point(contact_point_t(2, 1, 5, x, x - y, x, 2.0_wp, 1.0_wp), points)
+    call add_point(contact_point_t(2, 1, 6, x, x - y, x, 2.0_wp, 1.5_wp), points)
+    call add_point(contact_point_t(2, 1, 6, 3*y, 2*y, y, 8.0_wp, 0.5_wp), points)
+    call add_point(contact_point_t(3, 1, 6, y, y, x, 1.0_wp), points)
+    call add_point(contact_point_t(3, 1, 6, y, y, -x, 1.0_wp), points)
+    call form_groups(points, groups)
+    call check('ids and bodies', groups%n, 3)
+    call check('where they begin', all(groups%first(:4) == [1, 2, 4, 6]))
+    call check('one alone', groups%normal(:, 1), x, 0.0_wp)
+    call check('mean normal', groups%normal(:, 2), [0.6_wp, 0.8_wp, 0.0_wp], 1.0e-15_wp)
+    call check('mean point', groups%arm_a(:, 2), (3*x + 12*y)/7, 1.0e-15_wp)
+    call check('seen from b', groups%arm_b(:, 2), (3*x + 12*y)/7 - y, 1.0e-15_wp)
+    call check('opposite normals', groups%normal(:, 3), x, 0.0_wp)
+  end subroutine check_groups
+
+  !> Pairs met are noted once, sorted.
+  subroutine check_met()
+    type(met_t) :: met
+
+    call store_counterparts([3, 3, 4], [1, 1, -5], met)
+    call store_counterparts([2, 3, 3, 4, 5], [1, -1, 1, -5, 1], met)
+    call check('each pair once', met%n, 5)
+    call check('sorted', all(met%a(:5) == [2, 3, 3, 4, 5]))
+    call check('with their counterparts', all(met%b(:5) == [1, -1, 1, -5, 1]))
+  end subroutine check_met
+
+end module test_displacements_m

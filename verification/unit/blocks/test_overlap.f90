@@ -1,0 +1,275 @@
+!> True overlap of bodies and walls against depths known from geometry; pairs of near bodies.
+module test_overlap_m
+  use kinds_m, only: wp, pi
+  use check_m, only: check
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use vectors_m, only: quaternion_from_axis
+  use rotations_m, only: rotate
+  use random_counter_m, only: uniform, random_rotation
+  use rigid_body_m, only: blocks_t, blocks_init
+  use walls_m, only: walls_t, walls_init
+  use neighbours_m, only: pair_list_t, near_pairs, nearest_shift, bins_t, bins_build
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, wall_depth, max_overlap, has_place
+  implicit none
+  private
+  public :: test_overlap
+
+  real(wp), parameter :: upright(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  real(wp), parameter :: origin(3) = 0.0_wp
+  real(wp), parameter :: d = 0.02_wp   !! edge of the cube, diameter of the ball [m]
+  type(shape_t), allocatable :: shapes(:)
+
+contains
+
+  subroutine test_overlap()
+    call make_shapes()
+    call check_pairs_of_boxes()
+    call check_turned_pairs()
+    call check_balls()
+    call check_walls()
+    call check_run()
+    call check_near_pairs()
+    call check_bins()
+  end subroutine test_overlap
+
+  subroutine make_shapes()
+    character(:), allocatable :: message
+    type(case_t) :: case
+    integer :: s
+
+    allocate (case%shape(3), shapes(3))
+    case%shape%name = [character(8) :: 'cube', 'ball', 'hexapod']
+    case%shape%kind = [character(8) :: 'cube', 'sphere', 'hexapod']
+    do s = 1, 3
+      case%shape(s)%size = d
+      call make_shape(case%shape(s), shapes(s), message)
+    end do
+  end subroutine make_shapes
+
+  !> Cubes pushed into one another along a face normal, corner first, and edge across edge.
+  subroutine check_pairs_of_boxes()
+    real(wp), parameter :: deep = 1.3e-3_wp
+    real(wp) :: corner(4), edge(4), across(4)
+
+    corner = quaternion_from_axis([1.0_wp, -1.0_wp, 0.0_wp], atan(sqrt(2.0_wp)))
+    edge = quaternion_from_axis([1.0_wp, 0.0_wp, 0.0_wp], 0.25_wp*pi)
+    across = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], 0.25_wp*pi)
+    call check('face on face', overlap_depth(shapes(1), origin, upright, shapes(1), &
+      [2.0e-3_wp, 1.0e-3_wp, d - deep], upright), deep, 1.0e-15_wp)
+    call check('apart', overlap_depth(shapes(1), origin, upright, shapes(1), &
+      [0.0_wp, 0.0_wp, d + 1.0e-6_wp], upright), 0.0_wp, 0.0_wp)
+    call check('touching', overlap_depth(shapes(1), origin, upright, shapes(1), &
+      [0.0_wp, 0.0_wp, d], upright), 0.0_wp, 1.0e-15_wp)
+    call check('corner on face', overlap_depth(shapes(1), origin, upright, shapes(1), &
+      [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner), deep, 1.0e-14_wp)
+    call check('and the other way round', overlap_depth(shapes(1), &
+      [1.0e-3_wp, 2.0e-3_wp, 0.5_wp*d*(1 + sqrt(3.0_wp)) - deep], corner, shapes(1), origin, &
+      upright), &
+      deep, 1.0e-14_wp)
+    ! each edge lies below the ridge of the other and is nearest to one of its two faces
+    call check('edge across edge', overlap_depth(shapes(1), origin, edge, shapes(1), &
+      [0.0_wp, 0.0_wp, d*sqrt(2.0_wp) - deep], across), deep/sqrt(2.0_wp), 1.0e-14_wp)
+    call check('cube in the notch of a hexapod', &
+      overlap_depth(shapes(3), origin, upright, shapes(1), &
+      [d - deep, d - 2*deep, 0.0_wp], upright), sqrt(5.0_wp)*deep, 1.0e-15_wp)
+    call check('cube beside a leg', overlap_depth(shapes(3), origin, upright, shapes(1), &
+      [d, d, 0.0_wp], upright), 0.0_wp, 1.0e-15_wp)
+  end subroutine check_pairs_of_boxes
+
+  !> The depth does not depend on the place and attitude of the pair as a whole.
+  subroutine check_turned_pairs()
+    real(wp), parameter :: r(3) = [15.0e-3_wp, 22.0e-3_wp, -8.0e-3_wp]
+    real(wp) :: depth, other, q(4), x(3)
+    integer :: n
+
+    depth = overlap_depth(shapes(3), origin, upright, shapes(3), r, upright)
+    ! the deepest point lies on a face of one, 5 and 10 mm from an inner edge of the other
+    call check('hexapods overlap, no deeper', depth <= sqrt(125.0e-6_wp))
+    call check('and found by a sample near by', depth, sqrt(125.0e-6_wp), 0.07_wp*d)
+    do n = 1, 5
+      q = random_rotation(1, n)
+      x = [uniform(1, n, 11), uniform(1, n, 12), uniform(1, n, 13)]
+      other = overlap_depth(shapes(3), x, q, shapes(3), x + rotate(q, r), q)
+      call check('turned and moved', other, depth, 1.0e-14_wp)
+    end do
+  end subroutine check_turned_pairs
+
+  !> Balls are round, whatever their tetrahedra.
+  subroutine check_balls()
+    call check('ball on ball', overlap_depth(shapes(2), origin, upright, shapes(2), &
+      [0.0_wp, 0.6_wp*d, 0.7_wp*d], upright), d*(1.0_wp - sqrt(0.85_wp)), 1.0e-16_wp)
+    call check('ball on face', overlap_depth(shapes(2), [3.0e-3_wp, 0.0_wp, 0.9_wp*d], upright, &
+      shapes(1), &
+      origin, upright), 0.1_wp*d, 1.0e-16_wp)
+    call check('ball at corner', overlap_depth(shapes(1), origin, upright, shapes(2), &
+      0.5_wp*d + 0.25_wp*d*[1, 1, 1], upright), d*(0.5_wp - 0.25_wp*sqrt(3.0_wp)), 1.0e-16_wp)
+    call check('ball inside', overlap_depth(shapes(1), origin, upright, shapes(2), &
+      [0.0_wp, 0.1_wp*d, 0.2_wp*d], upright), 0.8_wp*d, 1.0e-16_wp)
+  end subroutine check_balls
+
+  !> Bodies behind walls.
+  subroutine check_walls()
+    type(case_t) :: case
+    type(walls_t) :: walls
+
+    case%grid%origin = [0.0_wp, 0.0_wp, 1.0_wp]
+    case%grid%length = [0.3_wp, 0.1_wp, 0.2_wp]
+    case%boundary%velocity(:, 1, 3) = [0.5_wp, 0.0_wp, 7.0_wp]
+    call walls_init(case%grid, case%boundary, walls)
+    call check('five walls, the top is open', all(walls%number(:5) == [-5, -4, -3, -2, -1]))
+    call check('the floor slides in its plane', &
+      maxval(abs(walls%velocity(:, 1) - [0.5_wp, 0.0_wp, 0.0_wp])), &
+      0.0_wp, 0.0_wp)
+    call check('cube in the floor', &
+      wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
+      2.0e-3_wp, 1.0e-15_wp)
+    call check('cube in the upper wall in x', &
+      wall_depth(shapes(1), [0.3_wp, 0.05_wp, 1.1_wp], upright, walls), &
+      0.01_wp, 1.0e-15_wp)
+    call check('out of the open top', &
+      wall_depth(shapes(1), [0.1_wp, 0.05_wp, 1.5_wp], upright, walls), 0.0_wp, 0.0_wp)
+    call check('ball in the floor', &
+      wall_depth(shapes(2), [0.1_wp, 0.05_wp, 1.008_wp], upright, walls), &
+      2.0e-3_wp, 1.0e-15_wp)
+    case%boundary%kind(:, 2) = 'periodic'
+    case%boundary%kind(2, 1) = 'slip'
+    call walls_init(case%grid, case%boundary, walls)
+    call check('three walls left', all(walls%number(:3) == [-5, -2, -1]) .and. walls%n == 3)
+    call check('one period', maxval(abs(walls%period - [0.0_wp, 0.1_wp, 0.0_wp])), 0.0_wp, 0.0_wp)
+  end subroutine check_walls
+
+  !> Largest overlap of a run: the largest of all pairs asked one by one; and the room for a new
+  !! body.
+  subroutine check_run()
+    integer, parameter :: n = 12
+    type(case_t) :: case
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(overlap_t) :: overlap
+    type(deep_overlaps_t) :: deep
+    real(wp) :: depth, expected, x(3), one, share(n + 1)
+    integer :: a, b, deepest, counterpart
+
+    allocate (case%body(n + 1), case%drop(0))
+    case%grid%length = 0.2_wp
+    case%boundary%kind(:, 1) = 'periodic'
+    do a = 1, n + 1
+      case%body(a)%shape = merge('hexapod', 'cube   ', mod(a, 2) == 0)
+      case%body(a)%position = 0.03_wp &
+        + 0.14_wp*[uniform(2, a, 11), uniform(2, a, 12), uniform(2, a, 13)]
+      case%body(a)%quaternion = random_rotation(2, a)
+    end do
+    case%body(n + 1)%release_time = 1.0_wp
+    call blocks_init(case, shapes, blocks)
+    call walls_init(case%grid, case%boundary, walls)
+    call overlap_init(shapes, blocks%n, overlap)
+    call deep_overlaps_init(blocks, deep)
+    call ask_for_all(deep)
+    expected = 0.0_wp
+    share = 0.0_wp
+    do a = 1, n
+      one = wall_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), walls)
+      expected = max(expected, one)
+      share(a) = max(share(a), one/deep%size(a))
+      do b = 1, a - 1
+        x = blocks%x(:, b) + nearest_shift(walls%period, blocks%x(:, b) - blocks%x(:, a))
+        one = overlap_depth(shapes(blocks%shape(a)), blocks%x(:, a), blocks%q(:, a), &
+          shapes(blocks%shape(b)), x, blocks%q(:, b))
+        expected = max(expected, one)
+        share([a, b]) = max(share([a, b]), one/min(deep%size(a), deep%size(b)))
+      end do
+    end do
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('some overlap', expected > 1.0e-3_wp)
+    call check('largest overlap', depth, expected, 1.0e-15_wp)
+    call check('that of the body with the deepest', maxval(deep%depth), expected, 1.0e-15_wp)
+    counterpart = deep%counterpart(maxloc(share, 1))
+    where (share <= 0.05_wp) share = 0.0_wp
+    call check('several reach deep', count(share > 0.0_wp) > 3)
+    call check('all that reach deep are noted', deep%share, share, 1.0e-12_wp)
+    deep%asked = .false.
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('nothing is asked for', depth <= 0.0_wp .and. all(deep%share <= 0.0_wp))
+    deepest = maxloc(share, 1)
+    deep%asked([deepest, counterpart]) = .true.
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('of two', deep%share(deepest), share(deepest), 1.0e-12_wp)
+    call check('and of no more', count(deep%share > 0.0_wp), 2)
+    blocks%present = .false.
+    blocks%present(1) = .true.
+    blocks%q = spread(upright, 2, n + 1)
+    blocks%x(:, 1) = [0.15_wp, 0.1_wp, 0.1_wp]
+    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.011_wp*d, 0.0_wp, 0.0_wp]
+    call check('no room', .not. has_place(walls, blocks, n + 1, overlap))
+    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.009_wp*d, 0.0_wp, 0.0_wp]
+    call check('room', has_place(walls, blocks, n + 1, overlap))
+    blocks%x(:, n + 1) = blocks%x(:, 1) + [d - 0.2_wp - 0.5_wp*d, 0.0_wp, 0.0_wp]
+    call check('no room beside the image', .not. has_place(walls, blocks, n + 1, overlap))
+    blocks%x(:, n + 1) = [0.05_wp, 0.1_wp, 0.5_wp*d - 0.011_wp*d]
+    call check('no room in the floor', .not. has_place(walls, blocks, n + 1, overlap))
+  end subroutine check_run
+
+  !> The list of near pairs against all pairs, with and without periods.
+  subroutine check_near_pairs()
+    integer, parameter :: n = 200
+    real(wp) :: x(3, n), radius(n), period(3), r(3)
+    logical :: active(n)
+    type(pair_list_t) :: pairs
+    integer :: a, b, k, m, expected(2, n*n)
+
+    do k = 1, 4
+      period = merge(1.0_wp, 0.0_wp, [k == 2 .or. k == 3, k == 3, k == 3])
+      radius = [(0.02_wp + 0.05_wp*uniform(3, a, 20), a=1, n)]
+      if (k == 4) radius = 0.2_wp
+      active = [(mod(a, 7) /= 0, a=1, n)]
+      do a = 1, n
+        x(:, a) = 1.6_wp*[uniform(3, a, 11), uniform(3, a, 12), uniform(3, a, 13)] - 0.3_wp
+      end do
+      m = 0
+      do a = 1, n
+        do b = 1, a - 1
+          r = x(:, b) - x(:, a)
+          r = r + nearest_shift(period, r)
+          if (.not. (active(a) .and. active(b))) cycle
+          if (norm2(r) >= radius(a) + radius(b) + 0.01_wp) cycle
+          m = m + 1
+          expected(:, m) = [a, b]
+        end do
+      end do
+      call near_pairs(x, radius, active, period, 0.01_wp, pairs)
+      call check('number of near pairs', pairs%n, m)
+      if (pairs%n == m) call check('near pairs in order', all(pairs%a(:m) == expected(1, :m)) &
+        .and. &
+        all(pairs%b(:m) == expected(2, :m)))
+    end do
+  end subroutine check_near_pairs
+
+  !> Every box is in the bins of all its points, and in no bin twice.
+  subroutine check_bins()
+    integer, parameter :: n = 60
+    real(wp) :: low(3, n), high(3, n), x(3)
+    type(bins_t) :: bins
+    logical :: found
+    integer :: i, c, k
+
+    do i = 1, n
+      low(:, i) = [uniform(4, i, 1), uniform(4, i, 2), uniform(4, i, 3)]
+      high(:, i) = low(:, i) + 0.3_wp*uniform(4, i, 4)
+    end do
+    call bins_build(low, high, 0.15_wp, bins)
+    found = .true.
+    do i = 1, n
+      do k = 0, 4
+        x = low(:, i) + 0.25_wp*real(k, wp)*(high(:, i) - low(:, i))
+        c = bins%number(bins%place(x))
+        found = found .and. count(bins%item(bins%first(c):bins%first(c + 1) - 1) == i) == 1
+      end do
+    end do
+    call check('boxes are in their bins', found)
+    call check('size of the bins', maxval(bins%size) <= 0.15_wp*(1 + 1.0e-12_wp))
+  end subroutine check_bins
+
+end module test_overlap_m

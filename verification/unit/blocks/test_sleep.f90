@@ -1,0 +1,474 @@
+!> Blocks at rest sleep, bear what lies on them, and wake by touch, by flow and with a support: the
+!! rules one by one, and worlds beside others without sleep.
+module test_sleep_m
+  use kinds_m, only: wp
+  use vectors_m, only: quaternion_from_axis, quaternion_product
+  use check_m, only: check
+  use case_types_m, only: case_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t, blocks_init, release_body, kinetic_energy, potential_energy, &
+    set_velocity_after_fluid
+  use walls_m, only: walls_t, walls_init
+  use displacements_m, only: reserve_displacements
+  use sleep_m, only: sleep_t, sleep_init, balanced, rest_tolerance, store_poses, store_quiet, &
+    may_sleep, update_loads
+  use contacts_m, only: contacts_t, contacts_init, contact_report_t, move_blocks
+  implicit none
+  private
+  public :: test_sleep
+
+  type :: world_t
+    type(case_t) :: case
+    real(wp) :: gravity(3) = [0.0_wp, 0.0_wp, -9.81_wp]
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contacts_t) :: contacts
+    type(contact_report_t) :: report
+  end type world_t
+
+  real(wp), parameter :: d = 0.02_wp         !! edge of the cube [m]
+  real(wp), parameter :: g = 9.81_wp         !! [m/s2]
+  real(wp), parameter :: mu = 0.4_wp         !! friction of all [-]
+  real(wp), parameter :: dt = 1.0e-2_wp      !! [s]
+  character(*), parameter :: models(2) = [character(7) :: 'spheres', 'surface']
+  type(shape_t) :: shapes(2)
+  integer :: model
+
+contains
+
+  subroutine test_sleep()
+    call make_shapes()
+    call check_balanced()
+    call check_loads()
+    do model = 1, 2
+      print '(a)', 'model '''//trim(models(model))//''''
+      call check_quiet()
+      call check_rest()
+      call check_hit()
+      call check_afloat()
+      call check_belt()
+      if (model == 1) cycle   ! the spheres of a cube stick out: it stands on few, and rolls
+      call check_support()
+      call check_slope()
+      call check_flow()
+      call check_chain()
+      call check_edge()
+    end do
+  end subroutine test_sleep
+
+  subroutine make_shapes()
+    character(:), allocatable :: message
+    type(case_t) :: case
+    integer :: s
+
+    allocate (case%shape(2))
+    case%shape%name = [character(4) :: 'cube', 'slab']
+    case%shape%kind = [character(4) :: 'cube', 'box']
+    case%shape%refinement = 1
+    do s = 1, 2
+      case%shape(s)%size = d
+      if (s == 2) case%shape(s)%size = [6*d, 6*d, d]
+      call make_shape(case%shape(s), shapes(s), message)
+    end do
+  end subroutine make_shapes
+
+  !> Contact balances all else within a tolerance of it, torques within that at the radius of the
+  !! body; without any load only in full.
+  subroutine check_balanced()
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp], none(3) = 0.0_wp, radius = 0.3_wp
+    real(wp), parameter :: load(3) = [0.0_wp, 6.0_wp, -8.0_wp]   !! of size 10
+    real(wp), parameter :: off(2) = [0.0999_wp, 0.1001_wp]
+
+    call check('force', all([balanced(0.01_wp, off(1)*x - load, none, load, none, radius), &
+      .not. balanced(0.01_wp, off(2)*x - load, none, load, none, radius)]))
+    call check('torque', all([balanced(0.01_wp, -load, off(1)*radius*x - 3*x, load, 3*x, radius), &
+      .not. balanced(0.01_wp, -load, off(2)*radius*x - 3*x, load, 3*x, radius)]))
+    call check('no load', all([balanced(0.01_wp, none, none, none, none, radius), &
+      .not. balanced(0.01_wp, 1.0e-30_wp*x, none, none, none, radius)]))
+  end subroutine check_balanced
+
+  !> A block is a candidate that has been slower than 5e-4 sqrt(g r) for sqrt(r/g) on end;
+  !! its turning counts, and one that is held or not there is never one.
+  subroutine check_quiet()
+    type(world_t) :: world
+    type(sleep_t) :: sleep
+    real(wp) :: way, fall
+    integer :: b, n
+    real(wp), parameter :: radius = 0.3_wp
+
+    call new_world(.true., 4, world)
+    call start(world)
+    call sleep_init(.true., spread(radius, 1, 4), sleep)
+    fall = sqrt(radius/g)
+    way = 5.0e-4_wp*sqrt(g*radius)*0.101_wp*fall
+    associate (blocks => world%blocks)
+      blocks%v = 1.0_wp   ! does not count, but how far it comes
+      blocks%fixed(3) = .true.
+      blocks%present(4) = .false.
+      do n = 1, 9
+        call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
+      end do
+      call check('not yet', .not. any([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)]))
+      call creep(world, way, [0.99_wp, 0.5_wp], 0.49_wp, sleep)
+      call check('candidates', all([(may_sleep(world%gravity, b, blocks, sleep), b=1, 4)] &
+        .eqv. [.true., .true., .false., .false.]))
+      call creep(world, way, [0.99_wp, 0.5_wp], 0.51_wp, sleep)
+      call check('turns too fast', sleep%quiet(:2), [11*0.101_wp*fall, 0.0_wp], 1.0e-13_wp)
+      call creep(world, way, [1.01_wp, 0.0_wp], 0.0_wp, sleep)
+      call check('moves too fast', sleep%quiet(1), 0.0_wp, 0.0_wp)
+    end associate
+  end subroutine check_quiet
+
+  !> A step in which two blocks come so far, by the way of a slow one, and the second turns too.
+  subroutine creep(world, way, share, turn, sleep)
+    type(world_t), intent(inout) :: world
+    real(wp), intent(in) :: way           !! of a slow block in this step [m]
+    real(wp), intent(in) :: share(2), turn
+    type(sleep_t), intent(inout) :: sleep
+
+    associate (blocks => world%blocks)
+      call store_poses(blocks, sleep)
+      blocks%x(1, 1:2) = blocks%x(1, 1:2) + share*way
+      blocks%q(:, 2) = quaternion_product(quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], &
+        turn*way/sleep%bounding_radius(2)), blocks%q(:, 2))
+      call store_quiet(world%gravity, 0.101_wp*sqrt(sleep%bounding_radius(2)/g), blocks, sleep)
+    end associate
+  end subroutine creep
+
+  !> What rests bears on body and counterpart, on the counterpart the other way, and on no wall.
+  subroutine check_loads()
+    type(sleep_t) :: sleep
+    real(wp), parameter :: x(3) = [1.0_wp, 0.0_wp, 0.0_wp]
+
+    call sleep_init(.true., [1.0_wp, 1.0_wp, 1.0_wp], sleep)
+    call reserve_displacements(3, sleep%rest)
+    sleep%rest%n = 3
+    sleep%rest%a(:3) = [1, 2, 3]
+    sleep%rest%b(:3) = [-5, 1, 1]
+    sleep%rest%force(:, :3) = reshape([5*x, 2*x, 3*x], [3, 3])
+    sleep%rest%torque_a(:, :3) = reshape([7*x, 20*x, 30*x], [3, 3])
+    sleep%rest%torque_b(:, :3) = reshape([1000*x, 100*x, 300*x], [3, 3])
+    call update_loads(sleep)
+    call check('forces at rest', sleep%load(1, :), [5.0_wp - 2 - 3, 2.0_wp, 3.0_wp], 0.0_wp)
+    call check('torques at rest', sleep%load_torque(1, :), [407.0_wp, 20.0_wp, 30.0_wp], 0.0_wp)
+  end subroutine check_loads
+
+  !> A tank of 1 m with n cubes above one another on its floor.
+  subroutine new_world(sleep, n, world)
+    logical, intent(in) :: sleep
+    integer, intent(in) :: n
+    type(world_t), intent(out) :: world
+    integer :: b
+
+    allocate (world%case%body(n), world%case%drop(0))
+    world%case%grid%length = 1.0_wp
+    world%case%contact%model = models(model)
+    world%case%contact%friction = mu
+    world%case%contact%wall_friction = mu
+    world%case%contact%sleep = sleep
+    do b = 1, n
+      world%case%body(b)%shape = 'cube'
+      world%case%body(b)%position = [0.5_wp, 0.5_wp, d*(real(b, wp) - 0.5_wp)]
+    end do
+  end subroutine new_world
+
+  subroutine start(world)
+    type(world_t), intent(inout) :: world
+
+    call blocks_init(world%case, shapes, world%blocks)
+    call walls_init(world%case%grid, world%case%boundary, world%walls)
+    call contacts_init(world%case%contact, world%blocks, world%contacts)
+  end subroutine start
+
+  !> Start a world, and another one with the same case but without sleep.
+  subroutine start_both(one, two)
+    type(world_t), intent(inout) :: one, two
+
+    call start(one)
+    two%case = one%case
+    two%case%contact%sleep = .false.
+    call start(two)
+  end subroutine start_both
+
+  !> Run both for the same time.
+  subroutine run_both(one, two, time)
+    type(world_t), intent(inout) :: one, two
+    real(wp), intent(in) :: time   !! [s]
+
+    call run(one, time)
+    call run(two, time)
+  end subroutine run_both
+
+  !> Run for a time.
+  subroutine run(world, time)
+    type(world_t), intent(inout) :: world
+    real(wp), intent(in) :: time   !! [s]
+    integer :: i
+
+    do i = 1, nint(time/dt)
+      call step(world)
+    end do
+  end subroutine run
+
+  subroutine step(world)
+    type(world_t), intent(inout) :: world
+
+    call move_blocks(world%walls, world%gravity, dt, world%contacts, world%blocks, world%report)
+  end subroutine step
+
+  !> Weight of a cube [N].
+  function weight(world)
+    type(world_t), intent(in) :: world
+    real(wp) :: weight
+
+    weight = world%blocks%mass(1)*g
+  end function weight
+
+  !> Cubes on a slab that is held (three; on contact spheres one) sleep where they stand, cost
+  !! nothing, and what is told of them is the same as of blocks that do not sleep.
+  subroutine check_rest()
+    type(world_t) :: one, two
+    integer :: n
+
+    n = merge(1, 3, model == 1)
+    call new_world(.true., n + 1, one)
+    one%case%body(1)%shape = 'slab'
+    one%case%body(1)%fixed = .true.
+    if (model == 1) one%case%body(2)%position(3) = 1.6826_wp*d   ! on the tips of its spheres
+    call start_both(one, two)
+    call run_both(one, two, 0.9_wp)
+    call check('all sleep', count(one%blocks%asleep), n)
+    call check('nobody sleeps without sleep', count(two%blocks%asleep), 0)
+    call check('no velocity', maxval(abs(one%blocks%v)) + maxval(abs(one%blocks%l)), 0.0_wp, 0.0_wp)
+    call check('no substeps', one%report%substeps, 0)
+    call check('same poses', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 1.0e-8_wp)
+    call check('same energy', one%report%energy/two%report%energy, 1.0_wp, 2*rest_tolerance)
+    call check('same counterparts', all(one%blocks%contacts == two%blocks%contacts))
+    call check('balance', maxval(abs(one%blocks%contact_force(3, 2:)/one%blocks%mass(2:) - g)), &
+      0.0_wp, 1.0e-12_wp)
+    call check('the slab bears all', one%blocks%contact_force(3, 1), -n*one%blocks%mass(2)*g, &
+      n*rest_tolerance*one%blocks%mass(2)*g)
+    call check('about its middle', maxval(abs(one%blocks%contact_torque(:, 1))), 0.0_wp, &
+      1.0e-4_wp*one%blocks%mass(2)*g*d)
+  end subroutine check_rest
+
+  !> A cube that slides into a sleeper pushes it as if it had been awake, momentum is kept, and both
+  !! come to rest.
+  subroutine check_hit()
+    type(world_t) :: one, two
+    real(wp) :: before(3), dropped
+    integer :: n
+
+    call new_world(.true., 3, one)
+    one%case%body(2)%release_time = 9.0_wp   ! never
+    one%case%body(3)%position = [0.5_wp - 1.2_wp*d, 0.5_wp, 0.51_wp*d]
+    one%case%body(3)%velocity = [0.5_wp, 0.0_wp, 0.0_wp]
+    one%case%body(3)%release_time = 1.0_wp
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
+    call check('sleeps', one%blocks%asleep(1))
+    call release_body(1.0_wp, 3, one%blocks)
+    call release_body(1.0_wp, 3, two%blocks)
+    call check('energy of the rest', kinetic_energy(one%blocks), one%blocks%mass(3)/8, &
+      1.0e-15_wp)
+    dropped = 0.0_wp
+    do n = 1, 10
+      before = momentum(one)
+      call step(one)
+      call step(two)
+      dropped = max(dropped, maxval(abs(momentum(one) - before &
+        - dt*(sum(one%blocks%contact_force, 2) + 2*one%blocks%mass(1)*one%gravity))))
+    end do
+    call check('awake', .not. one%blocks%asleep(1))
+    call check('momentum is kept', dropped, 0.0_wp, 1.0e-12_wp)
+    call check('pushed', two%blocks%x(1, 1) > 0.5_wp + 0.1_wp*d)
+    call check('as if awake', maxval(abs(one%blocks%x - two%blocks%x)), 0.0_wp, 5.0e-3_wp*d)
+    call check('as fast', maxval(abs(one%blocks%v - two%blocks%v)), 0.0_wp, 5.0e-3_wp*0.5_wp)
+    call run(one, 1.5_wp)
+    call check('both sleep again', count(one%blocks%asleep), 2)
+  end subroutine check_hit
+
+  !> Momentum of what moves [N s].
+  function momentum(world) result(p)
+    type(world_t), intent(in) :: world
+    real(wp) :: p(3)
+
+    p = world%blocks%mass(1)*world%blocks%v(:, 1) + world%blocks%mass(3)*world%blocks%v(:, 3)
+  end function momentum
+
+  !> A fixed body that is moved pushes a sleeper away under another: both wake, and move as without
+  !! sleep.
+  subroutine check_support()
+    type(world_t) :: one, two
+
+    call new_world(.true., 3, one)
+    one%case%body(2)%position = [0.5_wp + 0.3_wp*d, 0.5_wp, 1.5_wp*d]
+    one%case%contact%courant_max = 0.01_wp   ! impacts then do not depend on the substeps
+    one%case%body(3)%position = [0.5_wp - 4*d, 0.5_wp, 0.55_wp*d]
+    one%case%body(3)%fixed = .true.
+    one%case%body(3)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
+    one%case%body(3)%release_time = 1.0_wp
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
+    call check('both sleep', count(one%blocks%asleep), 2)
+    call release_body(1.0_wp, 3, one%blocks)
+    call release_body(1.0_wp, 3, two%blocks)
+    call run_both(one, two, 0.03_wp)
+    call check('sleep until touched', count(one%blocks%asleep), 2)
+    call run_both(one, two, 0.07_wp)
+    call check('both are awake', count(one%blocks%asleep), 0)
+    call check('pushed away', one%blocks%x(1, 1) - 0.5_wp > d)
+    call check('the upper one moves', norm2(one%blocks%v(:, 2)) > 0.05_wp)
+    call check('like the lower one without sleep', maxval(abs(one%blocks%x(:, 1) &
+      - two%blocks%x(:, 1))), 0.0_wp, 0.01_wp*d)
+    call check('like the upper one without sleep', maxval(abs(one%blocks%x(:, 2) &
+      - two%blocks%x(:, 2))), 0.0_wp, 0.01_wp*d)
+  end subroutine check_support
+
+  !> On a slope a little steeper than friction bears a cube never sleeps, on one less steep it does.
+  subroutine check_slope()
+    type(world_t) :: world
+    real(wp) :: slope, v, energy, x(3)
+
+    slope = atan(mu*1.002_wp)
+    call new_world(.true., 1, world)
+    world%case%body(1)%position(1) = 0.1_wp
+    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
+    call start(world)
+    call run(world, 0.5_wp)
+    v = world%blocks%v(1, 1)
+    call run(world, 1.0_wp)
+    call check('slides', world%blocks%v(1, 1) - v, g*(sin(slope) - mu*cos(slope)), 1.0e-4_wp)
+    call check('does not sleep on a slope too steep', .not. world%blocks%asleep(1))
+    slope = atan(mu*0.95_wp)
+    call new_world(.true., 1, world)
+    world%gravity = g*[sin(slope), 0.0_wp, -cos(slope)]
+    call start(world)
+    call run(world, 1.5_wp)
+    call check('sleeps on a slope less steep', world%blocks%asleep(1))
+    x = world%blocks%x(:, 1)
+    energy = world%report%energy
+    world%blocks%fluid_force(2, 1) = 0.03_wp*weight(world)
+    call step(world)
+    call check('awake on the slope', .not. world%blocks%asleep(1))
+    call check('keeps its displacements: place', norm2(world%blocks%x(:, 1) - x), 0.0_wp, 5.0e-7_wp)
+    call check('keeps its displacements: energy', world%report%energy/energy, 1.0_wp, 0.01_wp)
+  end subroutine check_slope
+
+  !> Fluid force on a sleeper grows: it slides once it passes friction, within 2 % of the load, and
+  !! not before; then it comes to rest when the force ends.
+  subroutine check_flow()
+    type(world_t) :: world
+    real(wp) :: force
+    integer :: n
+
+    call new_world(.true., 1, world)
+    call start(world)
+    call run(world, 1.0_wp)
+    call check('sleeps in still water', world%blocks%asleep(1))
+    do n = 1, 1000
+      force = 1.2_wp*mu*weight(world)*real(n, wp)/1000.0_wp
+      world%blocks%fluid_force(1, 1) = force
+      call step(world)
+      call set_velocity_after_fluid(world%gravity, dt, world%blocks%fluid_force, &
+        world%blocks%fluid_torque, world%blocks)
+      call check_balance(world)
+      if (world%blocks%v(1, 1) > 1.0e-3_wp) exit
+    end do
+    call check('slides at mu W', force/(mu*weight(world)), 1.0_wp, 0.015_wp)
+    call check('awake in the current', .not. world%blocks%asleep(1))
+    world%blocks%fluid_force = 0.0_wp
+    call run(world, 1.0_wp)
+    call check('sleeps again', world%blocks%asleep(1))
+    world%blocks%fluid_torque(2, 1) = 0.03_wp*weight(world)*d
+    call step(world)
+    call check('a torque wakes', .not. world%blocks%asleep(1))
+  end subroutine check_flow
+
+  !> Contact, weight and fluid make the change of velocity, asleep or awake.
+  subroutine check_balance(world)
+    type(world_t), intent(in) :: world
+    real(wp) :: rest(3)
+
+    associate (b => world%blocks)
+      rest = b%mass(1)*((b%v(:, 1) - b%v_start(:, 1))/dt - world%gravity) - b%contact_force(:, 1) &
+        - b%fluid_force(:, 1)
+    end associate
+    if (maxval(abs(rest)) > 1.0e-12_wp) call check('balance of forces', rest, 0*rest, 1.0e-12_wp)
+  end subroutine check_balance
+
+  !> What touches nothing never sleeps, nor does anything without gravity.
+  subroutine check_afloat()
+    type(world_t) :: world
+
+    call new_world(.true., 1, world)
+    world%case%body(1)%position(3) = 0.5_wp
+    call start(world)
+    world%blocks%fluid_force(:, 1) = -world%blocks%mass(1)*world%gravity
+    call run(world, 1.0_wp)
+    call check('afloat', .not. world%blocks%asleep(1))
+    call new_world(.true., 1, world)
+    world%gravity = 0.0_wp
+    call start(world)
+    call run(world, 1.0_wp)
+    call check('weightless', .not. world%blocks%asleep(1))
+  end subroutine check_afloat
+
+  !> Nobody sleeps on a floor that moves.
+  subroutine check_belt()
+    type(world_t) :: world
+
+    call new_world(.true., 1, world)
+    world%case%contact%wall_friction = 0.0_wp
+    world%case%boundary%velocity(1, 1, 3) = 0.1_wp
+    call start(world)
+    call run(world, 1.0_wp)
+    call check('awake on a belt', .not. world%blocks%asleep(1))
+    call check('that does not rub', abs(world%blocks%v(1, 1)), 0.0_wp, 1.0e-12_wp)
+  end subroutine check_belt
+
+  !> A cube on its edge that leans by 5e-4 falls over, though the torque on it is less than what a
+  !! sleeper is held by.
+  subroutine check_edge()
+    type(world_t) :: world
+    real(wp), parameter :: upright = atan(1.0_wp), up(2) = [sqrt(0.5_wp), 0.5_wp]
+
+    call new_world(.true., 1, world)
+    world%case%body(1)%position(3) = up(1)*d
+    call start(world)
+    world%blocks%q(:, 1) = quaternion_from_axis([0.0_wp, 1.0_wp, 0.0_wp], upright + 5.0e-4_wp)
+    call run(world, 1.5_wp)
+    call check('falls from its edge', world%blocks%x(3, 1), up(2)*d, 1.0e-3_wp*d)
+    call check('sleeps on its face', world%blocks%asleep(1))
+  end subroutine check_edge
+
+  !> A push at one end of a row of sleepers reaches the other end, as if all were awake.
+  subroutine check_chain()
+    type(world_t) :: one, two
+    integer :: b, n
+
+    n = 5
+    call new_world(.true., n + 1, one)
+    do b = 1, n
+      one%case%body(b)%position = [0.4_wp + d*real(b, wp), 0.5_wp, 0.5_wp*d]
+    end do
+    one%case%body(n + 1)%position = [0.4_wp - 0.1_wp*d, 0.5_wp, 0.52_wp*d]
+    one%case%body(n + 1)%velocity = [1.0_wp, 0.0_wp, 0.0_wp]
+    one%case%body(n + 1)%release_time = 1.0_wp
+    call start_both(one, two)
+    call run_both(one, two, 1.0_wp)
+    call check('all of the row sleep', count(one%blocks%asleep), n)
+    call release_body(1.0_wp, n + 1, one%blocks)
+    call release_body(1.0_wp, n + 1, two%blocks)
+    call run_both(one, two, 0.04_wp)
+    call check('all of the row are awake', count(one%blocks%asleep), 0)
+    call check('the last one moves', two%blocks%v(1, n) > 0.1_wp)
+    call check('row as fast', maxval(abs(one%blocks%v(1, :) - two%blocks%v(1, :))), 0.0_wp, 0.02_wp)
+    call check('energy of the row', (kinetic_energy(one%blocks) &
+      + potential_energy(one%gravity, one%blocks) + one%report%energy) &
+      /(kinetic_energy(two%blocks) + potential_energy(two%gravity, two%blocks) &
+        + two%report%energy), 1.0_wp, 0.01_wp)
+  end subroutine check_chain
+
+end module test_sleep_m

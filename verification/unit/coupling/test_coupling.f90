@@ -1,0 +1,428 @@
+!> One monolithic step of a free block in liquid: momentum, divergence, added mass, free fall.
+module test_coupling_m
+  use kinds_m, only: wp
+  use vectors_m, only: quaternion_from_axis
+  use rigid_body_m, only: begin_step
+  use scratch_m, only: scratch_t, scratch_init, take
+  use monolithic_m, only: monolithic_t, monolithic_init
+  use flow_start_m, only: start_flow
+  use rigid_motion_m, only: set_inertia
+  use coupling_m, only: coupling_report_t, copy_motion, start_of_stages, motion_after_fluid
+  use boundary_m, only: fill_velocity_halo
+  use one_body_m, only: one_body_t, describe, place
+  use check_m, only: check
+  implicit none
+  private
+  public :: test_coupling
+
+  character(8), parameter :: tank(2, 3) = reshape([character(8) :: &
+    'slip', 'slip', 'slip', 'slip', 'slip', 'open'], [2, 3])
+  real(wp), parameter :: dt = 1.0e-3_wp, g = 9.81_wp
+  type(one_body_t) :: block
+  type(monolithic_t) :: coupling
+  type(coupling_report_t) :: report
+  type(scratch_t) :: scratch
+
+contains
+
+  subroutine test_coupling()
+    call released_sphere(2.3_wp)
+    call released_sphere(1.1_wp)
+    call let_go(2.3_wp)
+    call let_go(0.1_wp)
+    call moving_box()
+    call held_box()
+    call block_of_water()
+    call block_at_rest()
+    call fall_together('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    call fall_together('box', [0.043_wp, 0.031_wp, 0.037_wp], 600.0_wp)
+    call fall_together('sphere', [0.05_wp, 0.0_wp, 0.0_wp], 2300.0_wp, across_the_corner=.true.)
+    call wherever_it_lies()
+    call momentum_kept('in the open', spread(0.06_wp, 1, 3))
+    call momentum_kept('at a wall', [0.033_wp, 0.06_wp, 0.06_wp])   ! it turns
+    call goes_on_as_before()
+    call gas_in_a_cut_cell()
+    call limited()
+  end subroutine test_coupling
+
+  !> A block in the middle of a tank full of liquid that is at rest, pressure in balance.
+  subroutine build(cells, kind, size, density)
+    integer, intent(in) :: cells
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3), density
+    type(one_body_t) :: fresh
+
+    block = fresh
+    call describe(spread(cells, 1, 3), spread(0.01_wp*cells, 1, 3), tank, kind, size, &
+                  spread(0.005_wp*cells, 1, 3) + [0.0013_wp, -0.0007_wp, 0.0021_wp], block%case)
+    block%case%run%dt = dt
+    block%case%fluid%single_phase = .true.
+    block%case%fluid%liquid_density = 1000.0_wp
+    block%case%shape(1)%density = density
+    block%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
+    block%case%numerics%divergence_tolerance = 1.0e-8_wp
+  end subroutine build
+
+  subroutine ready()
+    logical :: converged
+
+    call place(block)
+    block%flow%fluid_volume = (1.0_wp - block%solid%alpha)*block%grid%volume
+    block%flow%liquid = block%flow%fluid_volume
+    call scratch_init(block%grid, scratch)
+    call monolithic_init(block%grid, 1, block%case, coupling)
+    call copy_motion(block%blocks, coupling%bodies)
+    call start_flow(block%case, block%grid, block%solid, block%flow, scratch, coupling, &
+                    converged)
+    call check('the start converged', converged)
+    call fill_velocity_halo(block%grid, block%flow%u)
+  end subroutine ready
+
+  !> Nothing has been given before the transport, and the faces are as their cells.
+  subroutine begin_without_past()
+    call take(scratch, coupling%correction)
+    call take(scratch, coupling%given)
+    coupling%correction = 0.0_wp
+    coupling%given = 0.0_wp
+  end subroutine begin_without_past
+
+  !> The stages of a step after the transport, of which `begin` may have gone before.
+  subroutine advance()
+    if (.not. allocated(coupling%correction)) call begin_without_past()
+    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call stages()
+    call motion_after_fluid(block%case%fluid%gravity, dt, block%blocks, coupling)
+    call coupling%close(block%grid, block%solid, block%flow, block%blocks, report)
+  end subroutine advance
+
+  !> Those between two looks at the motion of the block.
+  subroutine stages()
+    report = coupling_report_t()
+    call coupling%merge_cells(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_forces(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%add_viscosity(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%predict_faces(block%grid, block%solid, dt, block%flow, scratch)
+    call coupling%project(block%grid, block%solid, dt, block%flow, scratch, report)
+  end subroutine stages
+
+  !> Before its first step the sphere has the force of that fall, and the fluid the pressure of it,
+  !! at which its next step starts; nothing moves yet.
+  subroutine let_go(s)
+    real(wp), intent(in) :: s   !! density ratio
+    real(wp), parameter :: dipole = 0.5_wp*0.025_wp**3*(1.0_wp/0.0471_wp**2 + 1.0_wp/0.0429_wp**2)
+      !! R^3/(2 r^2) below and above the sphere [m]
+    real(wp) :: force(6, 1), a(3), expected
+    real(wp), allocatable :: p(:, :, :), uf(:, :, :, :)
+
+    call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
+    call ready()
+    allocate (p, source=block%flow%p)
+    allocate (uf, source=block%flow%uf)
+    call coupling%force_at_release(block%grid, block%solid, [.true.], block%flow, scratch, force)
+    a(1:3) = force(1:3, 1)/block%blocks%mass(1) - [0.0_wp, 0.0_wp, g]
+    expected = (s - 1.0_wp)/(s + 0.5_wp)
+    call check('let go: acceleration', -a(3)/g, expected, 0.02_wp*abs(expected))
+    call check('let go: no velocity yet', maxval(abs(block%flow%uf - uf)) &
+               + maxval(abs(coupling%bodies%motion)), 0.0_wp, 0.0_wp)
+    p = block%flow%p - p
+    print '(a, 2f8.4)', 'let go: acceleration over theory, pressure over that of a dipole ', &
+      -a(3)/(g*expected), (p(8, 8, 4) - p(8, 8, 13))/(-1000.0_wp*a(3)*dipole)
+    call check('let go: the pressure of a dipole, more between walls', (p(8, 8, 4) - p(8, 8, 13)) &
+               /(-1000.0_wp*a(3)*dipole), 1.0_wp, 0.3_wp)
+    if (s < 1.0_wp) return   ! 12 cells instead of 5 are needed: case free_sphere
+    block%blocks%fluid_force(:, 1) = force(1:3, 1)
+    block%blocks%fluid_torque(:, 1) = force(4:6, 1)
+    call begin_step(block%blocks)
+    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
+    call advance()
+    call check('let go: the first step is the same', -block%blocks%v(3, 1)/(dt*g), expected, &
+               0.02_wp*abs(expected))
+  end subroutine let_go
+
+  !> A sphere let go falls by a/g = (s - 1)/(s + Ca) with Ca = 1/2, a few per cent more in a tank of
+  !! 16/5 diameters.
+  subroutine released_sphere(s)
+    real(wp), intent(in) :: s   !! density ratio
+    real(wp) :: a(3), force(3)
+
+    call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1000.0_wp*s)
+    call ready()
+    call begin_step(block%blocks)
+    call advance()
+    a = block%blocks%v(:, 1)/dt
+    force = block%blocks%fluid_force(:, 1) - block%blocks%mass(1)*[0.0_wp, 0.0_wp, g]
+    call check('sphere: converged', report%pressure%converged .and. report%viscous_converged)
+    call check('sphere: divergence', report%pressure%divergence < 1.0e-8_wp)
+    call check('sphere: M a is fluid force and weight', force, block%blocks%mass(1)*a, &
+               1.0e-13_wp*block%blocks%mass(1)*g)
+    call check('sphere: acceleration', -a(3)/g, (s - 1.0_wp)/(s + 0.5_wp), &
+               0.02_wp*(s - 1.0_wp)/(s + 0.5_wp))
+    print '(a, 2f8.4)', 'sphere: a/g and without walls ', -a(3)/g, (s - 1.0_wp)/(s + 0.5_wp)
+    call check('sphere: hardly sideways', norm2(a(1:2)) < 2.0e-3_wp*g)
+  end subroutine released_sphere
+
+  !> A box that moves and spins: the motion found with the pressure is that of the forces.
+  subroutine moving_box()
+    real(wp) :: motion(6), gain(6), arm(3)
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
+    block%case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
+    block%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
+    call ready()
+    call begin_step(block%blocks)
+    call begin_without_past()
+    call start_of_stages(block%case%fluid%gravity, dt, block%blocks, coupling)
+    motion = coupling%bodies%motion(:, 1)
+    coupling%at_start = coupling%bodies
+    call stages()
+    gain(1:3) = block%blocks%mass(1)*(coupling%bodies%motion(1:3, 1) - motion(1:3))
+    gain(4:6) = matmul(coupling%bodies%inertia(:, :, 1), &
+                       coupling%bodies%motion(4:6, 1) - motion(4:6))
+    call check('box: converged', report%pressure%converged .and. report%viscous_converged)
+    call check('box: divergence', report%pressure%divergence < 1.0e-8_wp)
+    ! To the tolerance of the viscous solver.
+    call check('box: momentum by the solve is that of the force', gain(1:3), &
+               dt*coupling%total(1:3, 1), 1.0e-9_wp*norm2(gain(1:3)))
+    call check('box: spin by the solve is that of the torque', gain(4:6), &
+               dt*coupling%total(4:6, 1), 1.0e-7_wp*norm2(gain(4:6)))
+    call check('box: torque acts', norm2(gain(4:6)) > 1.0e-8_wp)
+    arm = block%grid%centre(6, [1, 2, 3]) - block%blocks%x(:, 1)
+    call check('box: closed cells move with it', block%flow%u(6, 6, 6, 1), &
+               coupling%bodies%motion(1, 1) + coupling%bodies%motion(5, 1)*arm(3) &
+               - coupling%bodies%motion(6, 1)*arm(2), 1.0e-14_wp)
+  end subroutine moving_box
+
+  !> Around a held box still water stays still, and carries it by Archimedes' force.
+  subroutine held_box()
+    real(wp) :: weight
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
+    block%case%body(1)%fixed = .true.
+    call ready()
+    call begin_step(block%blocks)
+    call advance()
+    weight = 1000.0_wp*g*product([0.043_wp, 0.031_wp, 0.037_wp])
+    call check('held box: buoyancy', block%blocks%fluid_force(:, 1), [0.0_wp, 0.0_wp, weight], &
+               1.0e-6_wp*weight)
+    call check('held box: no torque', norm2(block%blocks%fluid_torque(:, 1)), 0.0_wp, &
+               1.0e-6_wp*weight*0.04_wp)
+    call check('held box: still', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :))), 0.0_wp, &
+               1.0e-8_wp)
+    call check('held box: it does not move', maxval(abs(block%blocks%v)), 0.0_wp, 0.0_wp)
+  end subroutine held_box
+
+  !> A block as heavy as the liquid hovers.
+  subroutine block_of_water()
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 1000.0_wp)
+    call ready()
+    call begin_step(block%blocks)
+    call advance()
+    call check('block of water: hovers', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
+    call check('block of water: does not turn', maxval(abs(block%blocks%omega)), 0.0_wp, 1.0e-7_wp)
+  end subroutine block_of_water
+
+  !> A block that a contact carries, with its weight under water, stays at rest; so does the water.
+  subroutine block_at_rest()
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    block%case%fluid%liquid_viscosity = 10.0_wp
+    call ready()
+    call begin_step(block%blocks)
+    block%blocks%contact_force(3, 1) = 1300.0_wp*coupling%bodies%volume(1)*g
+    call advance()
+    call check('block at rest: stays', maxval(abs(block%blocks%v)), 0.0_wp, 1.0e-8_wp)
+    call check('block at rest: the water too', maxval(abs(block%flow%u(1:12, 1:12, 1:12, :))), &
+               0.0_wp, 1.0e-8_wp)
+  end subroutine block_at_rest
+
+  !> Where nothing holds block and water, they fall together, whatever their densities: no force
+  !! acts between them. Across the corner walls of its images stand in the last halo layers.
+  subroutine fall_together(kind, size, density, across_the_corner)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3), density
+    logical, intent(in), optional :: across_the_corner
+    integer :: d
+
+    call build(12, kind, size, density)
+    if (present(across_the_corner)) block%case%body(1)%position = 0.119_wp
+    block%case%boundary%kind = 'periodic'
+    block%case%fluid%gravity = [1.7_wp, -0.9_wp, -9.5_wp]
+    block%case%fluid%liquid_viscosity = 1.0e-9_wp   ! faces at walls take dt', see `face_velocity_m`
+    call ready()
+    block%flow%p = 0.0_wp
+    coupling%extrapolated(1:3, 1) = dt*block%case%fluid%gravity   ! it has fallen before
+    call begin_step(block%blocks)
+    call advance()
+    associate (fall => dt*block%case%fluid%gravity)
+      call check(kind//' in free fall: velocity', block%blocks%v(:, 1), fall, 1.0e-8_wp*norm2(fall))
+      call check(kind//' in free fall: it does not turn', norm2(block%blocks%omega(:, 1)), 0.0_wp, &
+                 1.0e-8_wp*norm2(fall)/0.05_wp)
+      do d = 1, 3
+        call check(kind//' in free fall: the water too', &
+                   maxval(abs(block%flow%u(1:12, 1:12, 1:12, d) - fall(d))), 0.0_wp, &
+                   1.0e-8_wp*norm2(fall))
+      end do
+    end associate
+  end subroutine fall_together
+
+  !> The added mass of a sphere five cells wide hardly depends on its place between the cells; the
+  !! volume that its faces count does, by 8 %.
+  subroutine wherever_it_lies()
+    real(wp), parameter :: place(3) = [0.0_wp, 0.25_wp, 0.5_wp]   !! [cells]
+    real(wp) :: a(3)
+    integer :: n
+
+    do n = 1, 3
+      call build(16, 'sphere', [0.05_wp, 0.0_wp, 0.0_wp], 1100.0_wp)
+      block%case%body(1)%position = 0.08_wp + 0.01_wp*place(n)
+      call ready()
+      call begin_step(block%blocks)
+      call advance()
+      a(n) = -block%blocks%v(3, 1)/dt
+    end do
+    print '(a, 3f8.4)', 'sphere between the cells: a/g ', a/g
+    call check('sphere: the same wherever it lies', maxval(a)/minval(a) - 1.0_wp, 0.0_wp, 0.01_wp)
+  end subroutine wherever_it_lies
+
+  !> A hexapod with corners of few cells starts to move in still water, between two slip walls in a
+  !! periodic box: along the walls fluid and block keep their momentum, after one step and after
+  !! two, if what the next step adds is counted. That is little.
+  subroutine momentum_kept(name, position)
+    character(*), intent(in) :: name
+    real(wp), intent(in) :: position(3)
+    real(wp), parameter :: rest = 1.0e-10_wp   !! that may be missing, of what is exchanged
+    real(wp) :: before(3), after(3), motion(3), late
+
+    call build(12, 'hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2300.0_wp)
+    block%case%boundary%kind = 'periodic'
+    block%case%boundary%kind(:, 1) = 'slip'
+    block%case%fluid%gravity = 0.0_wp
+    block%case%body(1)%position = position
+    block%case%body(1)%velocity = [0.0_wp, 0.3_wp, -0.4_wp]
+    call ready()
+    call begin_step(block%blocks)
+    motion = block%blocks%v(:, 1)
+    before = momentum()
+    call advance()
+    late = dt*norm2(block%blocks%lagged_force(2:3, 1))
+    after = momentum() + dt*block%blocks%lagged_force(1:3, 1)
+    motion = block%blocks%v(:, 1) - motion
+    call check('momentum '//name//': the water took some', norm2(motion) > 0.05_wp)
+    call check('momentum '//name//': fluid and block keep it', after(2:3), before(2:3), &
+               rest*block%blocks%mass(1)*norm2(motion))
+    print '(a, 3es10.2)', 'momentum '//name//': gained over exchanged ', &
+      (after - before)/(block%blocks%mass(1)*norm2(motion))
+    call check('momentum '//name//': something is late', &
+               late > 1.0e-5_wp*block%blocks%mass(1)*norm2(motion))
+    call check('momentum '//name//': a ten-thousandth at most', &
+               late < 1.0e-4_wp*block%blocks%mass(1)*norm2(motion))
+    call begin_step(block%blocks)
+    call advance()
+    after = momentum() + dt*block%blocks%lagged_force(1:3, 1)
+    call check('momentum '//name//': what is late comes', after(2:3), before(2:3), &
+               rest*block%blocks%mass(1)*norm2(motion))
+  end subroutine momentum_kept
+
+  !> The motion predicted for the end of the step is that of the last forces, for this step.
+  subroutine goes_on_as_before()
+    real(wp), parameter :: spin(3) = [2.0_wp, 1.0_wp, -3.0_wp]
+    real(wp), parameter :: forces(3, 4) = reshape([0.02_wp, -0.03_wp, 0.5_wp, 0.01_wp, 0.02_wp, &
+      0.03_wp, 2.0e-6_wp, 1.0e-6_wp, -3.0e-6_wp, 1.0e-6_wp, 4.0e-6_wp, 1.0e-6_wp], [3, 4])
+      !! of fluid and contact [N], torque of fluid and contact [N m]
+    real(wp) :: gain(6)
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
+    block%case%body(1)%velocity = [0.3_wp, -0.2_wp, 0.1_wp]
+    block%case%body(1)%angular_velocity = spin
+    call ready()
+    block%blocks%fluid_force(:, 1) = forces(:, 1)
+    block%blocks%contact_force(:, 1) = forces(:, 2)
+    block%blocks%fluid_torque(:, 1) = forces(:, 3)
+    block%blocks%contact_torque(:, 1) = forces(:, 4)
+    gain(1:3) = block%case%fluid%gravity + (forces(:, 1) + forces(:, 2))/block%blocks%mass(1)
+    gain(4:6) = matmul(coupling%bodies%inverse_inertia(:, :, 1), forces(:, 3) + forces(:, 4))
+    call coupling%begin(block%grid, block%solid, dt, block%flow, block%blocks, scratch)
+    call check('predicted: dt times the last acceleration', coupling%extrapolated(:, 1), dt*gain, &
+               1.0e-12_wp)
+  end subroutine goes_on_as_before
+
+  !> A cut cell weighs by its level, but gas in its open part has the inertia of gas.
+  subroutine gas_in_a_cut_cell()
+    integer :: c(3)
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 1700.0_wp)
+    block%case%body(1)%fixed = .true.
+    call ready()
+    c = findloc(block%solid%alpha(1:12, 1:12, 1:12) > 0.3_wp &
+                .and. block%solid%alpha(1:12, 1:12, 1:12) < 0.7_wp, .true.)
+    block%flow%liquid(c(1), c(2), c(3)) = 0.0_wp
+    call begin_step(block%blocks)
+    call advance()
+    associate (fluid => block%case%fluid)
+      call check('inertia: of the gas that is there', coupling%rho(c(1), c(2), c(3)), &
+                 fluid%gas_density, 1.0e-12_wp*fluid%gas_density)
+      coupling%rho(c(1), c(2), c(3)) = fluid%liquid_density
+      call check('inertia: of the liquid elsewhere', &
+                 maxval(abs(coupling%rho(1:12, 1:12, 1:12) - fluid%liquid_density)), 0.0_wp, &
+                 1.0e-9_wp*fluid%liquid_density)
+    end associate
+  end subroutine gas_in_a_cut_cell
+
+  !> Momentum of fluid and block [kg m/s].
+  function momentum() result(p)
+    real(wp) :: p(3)
+    integer :: d
+
+    associate (n => block%case%grid%cells)
+      do d = 1, 3
+        p(d) = sum(block%flow%fluid_volume(1:n(1), 1:n(2), 1:n(3)) &
+                   *block%flow%u(1:n(1), 1:n(2), 1:n(3), d))
+      end do
+    end associate
+    p = block%case%fluid%liquid_density*p + block%blocks%mass(1)*block%blocks%v(:, 1)
+  end function momentum
+
+  !> However much the faces miss of a light body, its inertia stays positive.
+  subroutine limited()
+    real(wp) :: defect(6, 6), z(6)
+    integer :: d
+
+    call build(12, 'box', [0.043_wp, 0.031_wp, 0.037_wp], 30.0_wp)
+    call place(block)
+    defect = 0.0_wp
+    do d = 1, 3
+      defect(d, d) = (-1.0_wp)**d*10.0_wp*block%blocks%mass(1)
+      defect(d, 4:6) = [0.02_wp, -0.01_wp, 0.03_wp]*block%blocks%mass(1)
+      defect(4:6, d) = defect(d, 4:6)
+    end do
+    call set_inertia(1, block%bodies, defect)
+    call check('limited: counted', block%bodies%clipped(1))
+    call set_inertia(1, block%bodies, 0.01_wp*defect)
+    call check('a small part is not cut', .not. block%bodies%clipped(1))
+    call set_inertia(1, block%bodies, defect)
+    associate (m => block%bodies%apparent(:, :, 1))
+      z = matmul(m, [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp])
+      call check('limited: symmetric', maxval(abs(m - transpose(m))), 0.0_wp, &
+                 1.0e-15_wp*m(1, 1))
+      call check('limited: inverse', matmul(block%bodies%mobility(:, :, 1), z), &
+                 [1.0_wp, -2.0_wp, 0.5_wp, 30.0_wp, 70.0_wp, -50.0_wp], 1.0e-9_wp)
+      call check('limited: positive', smallest_pivot(m) > 0.0_wp)
+    end associate
+  end subroutine limited
+
+  !> Smallest pivot of the elimination; a symmetric matrix is positive if it is.
+  pure real(wp) function smallest_pivot(matrix)
+    real(wp), intent(in) :: matrix(6, 6)
+    real(wp) :: a(6, 6)
+    integer :: i, p
+
+    a = matrix
+    smallest_pivot = a(1, 1)
+    do p = 1, 6
+      smallest_pivot = min(smallest_pivot, a(p, p))
+      do i = p + 1, 6
+        a(i, :) = a(i, :) - a(i, p)/a(p, p)*a(p, :)
+      end do
+    end do
+  end function smallest_pivot
+
+end module test_coupling_m

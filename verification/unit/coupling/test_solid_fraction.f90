@@ -1,0 +1,914 @@
+!> Bodies in the grid: volumes, shares against cut tetrahedra, degenerate poses, links, pockets,
+!! periods, and the same bits for any part of the grid.
+module test_solid_fraction_m
+  use kinds_m, only: wp, pi
+  use check_m, only: check
+  use case_types_m, only: shape_input_t
+  use vectors_m, only: normalised, quaternion_from_axis, quaternion_product, rotation_matrix
+  use boundary_kinds_m, only: side_no_slip, side_open, side_periodic
+  use grid_m, only: grid_t, n_halo, unit_step
+  use polyhedron_m, only: polyhedron_t, polyhedron_of_tet, cut_polyhedron_by_box, polyhedron_moments
+  use polyhedron_sections_m, only: polyhedron_section
+  use shapes_builtin_m, only: make_shape
+  use rigid_body_m, only: blocks_t
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use links_on_grid_m, only: links_t, links_on_grid
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  implicit none
+  private
+  public :: test_solid_fraction
+
+  real(wp), parameter :: d = 0.02_wp   !! cube edge of the hexapod [m]
+  real(wp), parameter :: identity(4) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+  integer :: seed_value = 4711
+
+contains
+
+  subroutine test_solid_fraction()
+    call random_poses('hexapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 100)
+    call random_poses('hexapod', [60, 10, 25], [0.3_wp, 0.1_wp, 0.2_wp], 100)
+    call random_poses('cylinder', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+    call random_poses('tetrapod', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+    call random_poses('dolos', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+    call random_poses('reef_cube', [60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp], 40)
+    call against_tetrahedra()
+    call faces_on_grid_planes()
+    call both_sides_alike()
+    call degenerate_poses()
+    call three_links_on_the_floor()
+    call links_of_a_box()
+    call links_of_a_sphere()
+    call partly_outside()
+    call bodies_in_contact()
+    call sealed_pocket()
+    call periods()
+    call any_part_of_the_grid()
+    call clean_after_moving()
+    call filled_if_moved()
+  end subroutine test_solid_fraction
+
+  !> Repeatable number in 0..1.
+  function draw() result(r)
+    real(wp) :: r
+
+    seed_value = 16807*mod(seed_value, 127773) - 2836*(seed_value/127773)
+    if (seed_value <= 0) seed_value = seed_value + 2147483647
+    r = real(seed_value, wp)/2147483647.0_wp
+  end function draw
+
+  function draw_attitude() result(q)
+    real(wp) :: q(4)
+    integer :: i
+
+    do i = 1, 4
+      q(i) = draw() - 0.5_wp
+    end do
+    q = normalised(q)
+  end function draw_attitude
+
+  function make_grid(n, length, origin) result(grid)
+    integer, intent(in) :: n(3)
+    real(wp), intent(in) :: length(3)
+    real(wp), intent(in), optional :: origin(3)
+    type(grid_t) :: grid
+
+    grid%n = n
+    call grid%own([1, 1, 1], n)
+    grid%length = length
+    grid%h = length/real(n, wp)
+    if (present(origin)) grid%origin = origin
+    grid%volume = product(grid%h)
+    grid%area = grid%volume/grid%h
+    grid%side = side_no_slip
+  end function make_grid
+
+  !> Bodies of one shape, all present.
+  subroutine make_bodies(kind, size, x, q, blocks)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3), x(:, :), q(:, :)
+    type(blocks_t), intent(out) :: blocks
+    type(shape_input_t) :: input
+    character(:), allocatable :: message
+    integer :: n
+
+    n = ubound(x, 2)
+    input%kind = kind
+    input%size = size
+    blocks%n = n
+    allocate (blocks%shapes(1), blocks%shape(n), blocks%present(n))
+    blocks%shape = 1
+    blocks%present = .true.
+    allocate (blocks%x(3, n), source=x)
+    allocate (blocks%q(4, n), source=q)
+    call make_shape(input, blocks%shapes(1), message)
+    call check('the '//kind//' is built', message == '')
+  end subroutine make_bodies
+
+  subroutine fill(grid, blocks, solid)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(solid_geometry_t), intent(out) :: solid
+    type(solid_fraction_t) :: fraction
+
+    call solid_geometry_init(grid, solid, blocks%n)
+    call solid_fraction_init(grid, blocks, fraction)
+    call update_solid(fraction, grid, blocks, solid)
+  end subroutine fill
+
+  !> Shares times cell volumes give the volume and the centroid, in one object moved many times.
+  subroutine random_poses(kind, n, length, poses)
+    character(*), intent(in) :: kind
+    integer, intent(in) :: n(3), poses
+    real(wp), intent(in) :: length(3)
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    type(solid_fraction_t) :: fraction
+    real(wp) :: worst(3, 2), centroid(3), size_m(3)   ! 2: with a corner moved onto a plane
+    integer :: p, m, k
+
+    grid = make_grid(n, length)
+    size_m = [merge(d, 2*d, kind == 'hexapod'), 2*d, 0.0_wp]
+    call make_bodies(kind, size_m, reshape(0.5_wp*length, [3, 1]), &
+                         reshape(identity, [4, 1]), blocks)
+    call solid_geometry_init(grid, solid, 1)
+    call solid_fraction_init(grid, blocks, fraction)
+    worst = 0.0_wp
+    do p = 1, poses
+      blocks%x(:, 1) = 0.5_wp*length + (0.5_wp*length - 0.035_wp)*(2*[draw(), draw(), draw()] - 1)
+      if (mod(p, 4) == 0) blocks%x(:, 1) = grid%h*anint(blocks%x(:, 1)/grid%h)
+      blocks%q(:, 1) = draw_attitude()
+      if (mod(p, 8) == 0) blocks%q(:, 1) = quarter_turns(p/8)
+      call update_solid(fraction, grid, blocks, solid)
+      associate (whole => blocks%shapes(1)%volume, last => solid%body_cell(2) - 1)
+        centroid = 0.0_wp
+        do m = 1, last
+          centroid = centroid + solid%cell_alpha(m)*(solid%cell_centroid(:, m) - blocks%x(:, 1))
+        end do
+        k = merge(2, 1, is_moved(grid, blocks))
+        worst(:, k) = max(worst(:, k), [abs(sum(solid%alpha)*grid%volume/whole - 1.0_wp), &
+          maxval(abs(centroid))*grid%volume/(whole*d), &
+          abs(sum(solid%cell_alpha(:last))*grid%volume/whole - 1.0_wp)])
+      end associate
+    end do
+    call check(kind//': shares add up to the volume', worst([1, 3], 1), [0.0_wp, 0.0_wp], 1e-12_wp)
+    call check(kind//': centroids add up to the centroid', worst(2, 1), 0.0_wp, 1e-12_wp)
+    call check(kind//': with corners moved onto planes', worst(:, 2), spread(0.0_wp, 1, 3), 1e-6_wp)
+  end subroutine random_poses
+
+  !> Does the body have a corner that is moved by more than round-off, by 1e-5 of a cell at most?
+  function is_moved(grid, blocks) result(yes)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    logical :: yes
+    real(wp) :: at(3), r(3, 3)
+    integer :: v
+
+    yes = .false.
+    r = rotation_matrix(blocks%q(:, 1))
+    associate (point => blocks%shapes(1)%point)
+      do v = 1, size(point, 2)
+        at = (blocks%x(:, 1) + matmul(r, point(:, v)))/grid%h
+        yes = yes .or. any(abs(at - anint(at)) > 1e-13_wp .and. abs(at - anint(at)) < 1.1e-5_wp)
+      end do
+    end associate
+  end function is_moved
+
+  !> One of the attitudes that turn the axes into each other, with the round-off of real numbers.
+  function quarter_turns(m) result(q)
+    integer, intent(in) :: m
+    real(wp) :: q(4)
+    real(wp), parameter :: axis(3, 3) = real(unit_step, wp)
+
+    q = quaternion_product(quaternion_from_axis(axis(:, 1), real(mod(m, 4), wp)*pi/2), &
+                           quaternion_from_axis(axis(:, 3), real(mod(m/4, 4), wp)*pi/2))
+  end function quarter_turns
+
+  !> Every cell and face against the sum of the clipped tetrahedra of the fine mesh.
+  subroutine against_tetrahedra()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp) :: worst(4)
+    integer :: p
+
+    grid = make_grid([14, 16, 18], [0.07_wp, 0.08_wp, 0.081_wp])
+    worst = 0.0_wp
+    do p = 1, 4
+      call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
+                           reshape([0.035_wp, 0.04_wp, 0.04_wp], [3, 1]), &
+                           reshape(identity, [4, 1]), blocks)
+      if (p > 1) blocks%q(:, 1) = draw_attitude()
+      if (p > 2) blocks%x(:, 1) = blocks%x(:, 1) + 0.005_wp*[draw(), draw(), draw()]
+      if (p == 4) call make_bodies('sphere', [0.05_wp, 0.0_wp, 0.0_wp], blocks%x, blocks%q, blocks)
+      call fill(grid, blocks, solid)
+      call compare_with_tets(grid, blocks, solid, worst)
+    end do
+    call check('shares of cells as by the tetrahedra', worst(1), 0.0_wp, 1e-14_wp)
+    call check('centroids of cells as by the tetrahedra', worst(2), 0.0_wp, 1e-13_wp)
+    call check('shares of faces as by the tetrahedra', worst(3), 0.0_wp, 1e-13_wp)
+    call check('centroids of faces as by the tetrahedra', worst(4), 0.0_wp, 1e-13_wp)
+  end subroutine against_tetrahedra
+
+  !> Largest differences of shares, first moments, face shares, face moments (in cells).
+  subroutine compare_with_tets(grid, blocks, solid, worst)
+    type(grid_t), intent(in) :: grid
+    type(blocks_t), intent(in) :: blocks
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp), intent(inout) :: worst(4)
+    real(wp), allocatable :: cell(:, :, :, :), face(:, :, :, :, :, :)
+    real(wp) :: r(3, 3), corner(3, 4), v, moment(3), area, x(3), low(3)
+    type(polyhedron_t) :: p
+    integer :: t, c, i, j, k, e, m, side, from(3), to(3)
+
+    associate (n => grid%n, s => blocks%shapes(1))
+      allocate (cell(4, n(1), n(2), n(3)), source=0.0_wp)
+      allocate (face(4, n(1), n(2), n(3), 3, 2), source=0.0_wp)
+      r = rotation_matrix(blocks%q(:, 1))
+      do t = 1, size(s%tet, 2)
+        do c = 1, 4   ! in cells
+          corner(:, c) = (blocks%x(:, 1) + matmul(r, s%point(:, s%tet(c, t))))/grid%h
+        end do
+        where (abs(corner - anint(corner)) < 1e-12_wp) corner = anint(corner)
+        from = max(floor(minval(corner, 2)) + 1, 1)
+        to = min(floor(maxval(corner, 2)) + 1, n)
+        do k = from(3), to(3)
+          do j = from(2), to(2)
+            do i = from(1), to(1)
+              low = real([i, j, k] - 1, wp)
+              call polyhedron_of_tet(corner, p)
+              call cut_polyhedron_by_box(p, low, low + 1)
+              call polyhedron_moments(p, v, moment)
+              cell(:, i, j, k) = cell(:, i, j, k) + [v, moment - v*low]
+              do e = 1, 3
+                do side = 1, 2
+                  call face_of_tet(corner, low, e, real(3 - 2*side, wp), area, x)
+                  face(:, i, j, k, e, side) = face(:, i, j, k, e, side) + area*[1.0_wp, x - low]
+                end do
+              end do
+            end do
+          end do
+        end do
+      end do
+      do k = 1, n(3)
+        do j = 1, n(2)
+          do i = 1, n(1)
+            worst(1) = max(worst(1), abs(solid%alpha(i, j, k) - cell(1, i, j, k)))
+            do e = 1, 3
+              worst(3) = max(worst(3), &
+                             abs(1 - solid%aperture(i, j, k, e) - maxval(face(1, i, j, k, e, :))))
+            end do
+          end do
+        end do
+      end do
+      do m = 1, solid%body_cell(2) - 1
+        associate (c => solid%cell(:, m))
+          if (any(c < 1) .or. any(c > n)) cycle
+          low = real(c - 1, wp)
+          worst(2) = max(worst(2), maxval(abs( &
+            solid%cell_alpha(m)*(solid%cell_centroid(:, m)/grid%h - low) - &
+            cell(2:4, c(1), c(2), c(3)))))
+        end associate
+      end do
+      do m = 1, solid%body_face(2) - 1
+        associate (c => solid%face(:, m))
+          if (any(c(1:3) < 1) .or. any(c(1:3) > n)) cycle
+          low = real(c(1:3) - 1, wp)
+          side = maxloc(face(1, c(1), c(2), c(3), c(4), :), 1)
+          worst(4) = max(worst(4), maxval(abs( &
+            solid%face_beta(m)*(solid%face_centroid(:, m)/grid%h - low) - &
+            face(2:4, c(1), c(2), c(3), c(4), side))))
+        end associate
+      end do
+    end associate
+  end subroutine compare_with_tets
+
+  !> Section of a tetrahedron with the lower face e of a unit cell, just above it (side = 1) or just
+  !! below it (side = -1): the tetrahedron is first cut to the column of the face.
+  subroutine face_of_tet(corner, low, e, side, area, x)
+    real(wp), intent(in) :: corner(3, 4), low(3), side
+    integer, intent(in) :: e
+    real(wp), intent(out) :: area, x(3)
+    type(polyhedron_t) :: p
+    real(wp) :: from(3), to(3)
+
+    from = low
+    to = low + 1
+    from(e) = -1e3_wp
+    to(e) = 1e3_wp
+    call polyhedron_of_tet(corner, p)
+    call cut_polyhedron_by_box(p, from, to)
+    call polyhedron_section(p, side*real(unit_step(:, e), wp), side*low(e), area, x)
+  end subroutine face_of_tet
+
+  !> All axis-parallel poses on the grid: whole cells, whole faces, nothing cut, everything closed.
+  subroutine faces_on_grid_planes()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    integer :: p, i, j, k, e, n(3)
+    real(wp) :: want
+    logical :: whole, fits, counted, beta
+
+    grid = make_grid([20, 20, 40], [0.1_wp, 0.1_wp, 0.2_wp])
+    whole = .true.
+    fits = .true.
+    counted = .true.
+    beta = .true.
+    do p = 0, 15
+      call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
+                           reshape([0.05_wp, 0.05_wp, 0.16_wp], [3, 1]), &
+                           reshape(quarter_turns(p), [4, 1]), blocks)
+      call fill(grid, blocks, solid)
+      whole = whole .and. solid%n_cut == 0 .and. abs(sum(solid%alpha) - 7*64) <= 0.0_wp
+      counted = counted .and. solid%body_cell(2) - 1 == 448 .and. count(solid%inside == 1) == 448
+      ! Along each direction one bar of 12 and four of 4 cells, 4 x 4 wide.
+      beta = beta .and. solid%body_face(2) - 1 == 3*(16*13 + 4*16*5) .and. &
+             all(abs(solid%face_beta(:solid%body_face(2) - 1) - 1) <= 0.0_wp)
+      do e = 1, 3
+        do k = 1, grid%n(3)
+          do j = 1, grid%n(2)
+            do i = 1, grid%n(1)
+              n = [i, j, k] - unit_step(:, e)
+              want = 1.0_wp
+              if (max(solid%alpha(i, j, k), solid%alpha(n(1), n(2), n(3))) > 0.5_wp) want = 0.0_wp
+              fits = fits .and. abs(solid%aperture(i, j, k, e) - want) <= 0.0_wp
+            end do
+          end do
+        end do
+      end do
+    end do
+    call check('on grid planes: cells are full or empty', whole)
+    call check('on grid planes: 448 cells, all with the centre inside', counted)
+    call check('on grid planes: all faces of full cells are closed, no other', fits)
+    call check('on grid planes: each of them by the body', beta)
+  end subroutine faces_on_grid_planes
+
+  !> A cube with its sides on planes of the grid or of centres, a little to the left or right of
+  !! them: the same cells are inside, the same faces open, the same links end at it on either side.
+  subroutine both_sides_alike()
+    real(wp), parameter :: edges(2) = [0.04_wp, 0.035_wp]   !! in cells of 5 mm
+    real(wp), parameter :: little(3) = [0.0_wp, 3.0e-6_wp, -3.0e-6_wp]   !! [cells]
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp) :: x(3)
+    logical :: inside, open, links
+    integer :: e, m, i
+
+    grid = make_grid([20, 20, 20], [0.1_wp, 0.1_wp, 0.1_wp])
+    inside = .true.
+    open = .true.
+    links = .true.
+    do e = 1, 2
+      do m = 1, 3
+        x = [0.05_wp + 0.005_wp*little(m), 0.05_wp, 0.05_wp]
+        call make_bodies('cube', [edges(e), 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
+                         reshape(identity, [4, 1]), blocks)
+        call fill(grid, blocks, solid)
+        do i = 1, 20
+          inside = inside .and. all(solid%inside(i, 1:20, 1:20) &
+                                    == solid%inside(21 - i, 1:20, 1:20))
+          open = open .and. all(abs(solid%aperture(i, 1:20, 1:20, 1) &
+                                    - solid%aperture(22 - i, 1:20, 1:20, 1)) <= 0.0_wp)
+          links = links .and. all((solid%link_number(i, 1:20, 1:20, 1) > 0) &
+                                .eqv. (solid%link_number(22 - i, 1:20, 1:20, 1) > 0))
+        end do
+      end do
+    end do
+    call check('both sides alike: centres inside', inside)
+    call check('both sides alike: open faces', open)
+    call check('both sides alike: links', links)
+  end subroutine both_sides_alike
+
+  !> Corners, edges and sides on grid planes and cell centres, or nearly: volume, open and solid
+  !! share of each face, a hit on every link between inside and outside.
+  subroutine degenerate_poses()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp), parameter :: angle(8) = [pi*[0.0_wp, 0.25_wp, 0.5_wp, 0.75_wp, 1.0_wp, 0.2_wp], &
+                                       pi/6, atan(sqrt(0.5_wp))]
+    real(wp), parameter :: shift(8) = [0.0_wp, 0.5_wp, 0.25_wp, 1e-13_wp, -1e-12_wp, 1e-10_wp, &
+                                       1.0_wp/3, -1e-7_wp]
+    real(wp) :: q(4), x(3), worst(2)
+    integer :: p, i, complete
+    logical :: closed
+
+    grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
+    worst = 0.0_wp
+    complete = 0
+    closed = .true.
+    do p = 1, 90
+      q = identity
+      do i = 1, 3
+        q = quaternion_product(quaternion_from_axis(real(unit_step(:, 1 + int(3*draw())), wp), &
+                                                    angle(1 + int(8*draw()))), q)
+        x(i) = 0.005_wp*(8 + shift(1 + int(8*draw())))
+      end do
+      select case (mod(p, 3))
+      case (0)
+        call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      case (1)
+        call make_bodies('box', [0.02_wp, 0.03_wp, 0.0075_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      case default
+        call make_bodies('sphere', [0.04_wp, 0.0_wp, 0.0_wp], reshape(x, [3, 1]), &
+                         reshape(q, [4, 1]), blocks)
+      end select
+      call fill(grid, blocks, solid)
+      worst(1) = max(worst(1), abs(sum(solid%alpha)*grid%volume/blocks%shapes(1)%volume - 1))
+      worst(2) = max(worst(2), largest_gap(solid))
+      complete = complete + links_without_hit(grid, solid)
+      closed = closed .and. full_cells_closed(grid, solid)
+    end do
+    ! Corners within 1e-5 of a cell of a plane are put on it: at most that times area h/volume.
+    call check('degenerate: volume', worst(1), 0.0_wp, 1e-5_wp)
+    call check('degenerate: open and solid share of each face fill it', worst(2), 0.0_wp, 1e-14_wp)
+    call check('degenerate: full cells are closed all round', closed)
+    call check('degenerate: links between inside and outside without a hit', complete, 0)
+  end subroutine degenerate_poses
+
+  !> Largest |1 - open - sum of the shares of the bodies| of a face.
+  function largest_gap(solid) result(gap)
+    type(solid_geometry_t), intent(in) :: solid
+    real(wp) :: gap
+    real(wp), allocatable :: rest(:, :, :, :)
+    integer :: m
+
+    allocate (rest, source=solid%aperture)
+    do m = 1, solid%body_face(size(solid%body_face)) - 1
+      associate (f => solid%face(:, m))
+        rest(f(1), f(2), f(3), f(4)) = rest(f(1), f(2), f(3), f(4)) + solid%face_beta(m)
+      end associate
+    end do
+    gap = maxval(abs(rest - 1))
+  end function largest_gap
+
+  pure logical function full_cells_closed(grid, solid)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: i, j, k
+
+    full_cells_closed = .true.
+    do k = 1, grid%n(3)
+      do j = 1, grid%n(2)
+        do i = 1, grid%n(1)
+          if (solid%alpha(i, j, k) < 1) cycle
+          full_cells_closed = full_cells_closed .and. all(solid%aperture(i, j, k, :) <= 0) .and. &
+                              solid%aperture(i + 1, j, k, 1) <= 0 .and. &
+                              solid%aperture(i, j + 1, k, 2) <= 0 .and. &
+                              solid%aperture(i, j, k + 1, 3) <= 0
+        end do
+      end do
+    end do
+  end function full_cells_closed
+
+  function links_without_hit(grid, solid) result(n)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer :: n, i, j, k, m, low(3)
+
+    n = 0
+    do m = 1, 3
+      do k = 2, grid%n(3)
+        do j = 2, grid%n(2)
+          do i = 2, grid%n(1)
+            low = [i, j, k] - unit_step(:, m)
+            if (solid%link_number(i, j, k, m) > 0) cycle
+            if (solid%inside(i, j, k) /= solid%inside(low(1), low(2), low(3))) n = n + 1
+          end do
+        end do
+      end do
+    end do
+  end function links_without_hit
+
+  !> The pose of the fixed blocks: three corners on the floor, nothing below it.
+  subroutine three_links_on_the_floor()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp) :: q(4)
+
+    grid = make_grid([60, 20, 40], [0.3_wp, 0.1_wp, 0.2_wp])
+    q = normalised([0.540625_wp, 0.455768_wp, -0.060003_wp, -0.704554_wp])
+    call make_bodies('hexapod', [d, 0.0_wp, 0.0_wp], &
+                     reshape([0.15_wp, 0.05_wp, 2.5_wp*d/sqrt(3.0_wp)], [3, 1]), &
+                     reshape(q, [4, 1]), blocks)
+    call fill(grid, blocks, solid)
+    call check('three links: whole volume in the tank', sum(solid%alpha)*grid%volume, 7*d**3, &
+               1e-7_wp*d**3)
+    call check('three links: the floor is open', minval(solid%aperture(1:60, 1:20, 1, 3)), 1.0_wp, &
+               1e-6_wp)
+    call check('three links: no pockets', solid%n_sealed, 0)
+  end subroutine three_links_on_the_floor
+
+  !> Hits against the exact intersections of grid lines with a turned box.
+  subroutine links_of_a_box()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    type(links_t) :: links
+    real(wp) :: worst, r(3, 3), a(3), b(3), enter, leave, e(3)
+    integer :: p, i, j, k, m, n(3)
+    logical :: same, flags
+    real(wp), parameter :: size_m(3) = [0.012_wp, 0.025_wp, 0.033_wp]
+
+    grid = make_grid([16, 14, 12], [0.08_wp, 0.056_wp, 0.072_wp])
+    worst = 0.0_wp
+    same = .true.
+    flags = .true.
+    do p = 1, 20
+      call make_bodies('box', size_m, reshape([0.04_wp, 0.028_wp, 0.036_wp] + &
+                                                  0.004_wp*[draw(), draw(), draw()], [3, 1]), &
+                           reshape(draw_attitude(), [4, 1]), blocks)
+      if (p > 15) blocks%shapes(1)%point(1, :) = 0.1_wp*blocks%shapes(1)%point(1, :)   ! a sheet
+      e = maxval(blocks%shapes(1)%point, 2)
+      call fill(grid, blocks, solid)
+      links = links_on_grid(solid)
+      r = transpose(rotation_matrix(blocks%q(:, 1)))
+      do k = 1, grid%n(3)
+        do j = 1, grid%n(2)
+          do i = 1, grid%n(1)
+            b = matmul(r, grid%centre([i, j, k], [1, 2, 3]) - blocks%x(:, 1))
+            flags = flags .and. (all(abs(b) <= e) .eqv. solid%inside(i, j, k) == 1)
+            do m = 1, 3
+              n = [i, j, k] - unit_step(:, m)
+              if (n(m) < 1) cycle
+              a = matmul(r, grid%centre(n, [1, 2, 3]) - blocks%x(:, 1))
+              call cross_box(a, b, e, enter, leave)
+              same = same .and. ((enter <= 1) .eqv. (links%low(i, j, k, m) <= 1)) .and. &
+                     ((enter <= 1) .eqv. (links%body_high(i, j, k, m) == 1))
+              if (enter > 1 .or. links%low(i, j, k, m) > 1) cycle
+              worst = max(worst, abs(links%low(i, j, k, m) - max(enter, 1e-3_wp)), &
+                          abs(links%high(i, j, k, m) - max(1 - leave, 1e-3_wp)))
+            end do
+          end do
+        end do
+      end do
+    end do
+    call check('box: a link is cut where the line meets the box', same)
+    call check('box: centres inside', flags)
+    call check('box: places of the first hits', worst, 0.0_wp, 1e-12_wp)
+  end subroutine links_of_a_box
+
+  !> First and last place, 0..1 from a to b, where a line meets the surface of a box of half
+  !! edges e; both 2 if it does not.
+  subroutine cross_box(a, b, e, first, last)
+    real(wp), intent(in) :: a(3), b(3), e(3)
+    real(wp), intent(out) :: first, last
+    real(wp) :: enter, leave, t(2)
+    integer :: m
+
+    enter = -huge(1.0_wp)
+    leave = huge(1.0_wp)
+    do m = 1, 3
+      t = ([-e(m), e(m)] - a(m))/(b(m) - a(m))
+      enter = max(enter, minval(t))
+      leave = min(leave, maxval(t))
+    end do
+    first = 2
+    last = 2
+    if (enter > leave) return
+    if (enter >= 0 .and. enter <= 1) then
+      first = enter
+      last = enter
+      if (leave <= 1) last = leave
+    else if (leave >= 0 .and. leave <= 1) then
+      first = leave
+      last = leave
+    end if
+  end subroutine cross_box
+
+  !> A sphere: hits within the distance between its polyhedron and the sphere; no link without a hit
+  !! between inside and outside.
+  subroutine links_of_a_sphere()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    type(links_t) :: links
+    real(wp) :: x(3), worst
+    integer :: i, j, k, m, n(3)
+    logical :: complete
+
+    grid = make_grid([16, 16, 16], [0.08_wp, 0.08_wp, 0.08_wp])
+    call make_bodies('sphere', [0.05_wp, 0.0_wp, 0.0_wp], &
+                     reshape([0.041_wp, 0.0405_wp, 0.039_wp], [3, 1]), &
+                     reshape(identity, [4, 1]), blocks)
+    call fill(grid, blocks, solid)
+    links = links_on_grid(solid)
+    worst = 0.0_wp
+    complete = .true.
+    do m = 1, 3
+      do k = 2, 16
+        do j = 2, 16
+          do i = 2, 16
+            n = [i, j, k] - unit_step(:, m)
+            if (links%low(i, j, k, m) > 1) then
+              complete = complete .and. (solid%inside(i, j, k) == solid%inside(n(1), n(2), n(3)))
+            else
+              x = grid%centre(n, [1, 2, 3]) - blocks%x(:, 1)
+              x(m) = x(m) + links%low(i, j, k, m)*grid%h(m)
+              worst = max(worst, abs(norm2(x) - 0.025_wp))
+            end if
+          end do
+        end do
+      end do
+    end do
+    call check('sphere: hits lie on the sphere', worst/0.025_wp, 0.0_wp, 0.012_wp)
+    call check('sphere: links between inside and outside are cut', complete)
+    call check('sphere: most links are free', solid%n_link < 1000)
+  end subroutine links_of_a_sphere
+
+  !> A box through the open top: what is outside the domain is not in the grid.
+  subroutine partly_outside()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+
+    grid = make_grid([10, 10, 10], [0.05_wp, 0.05_wp, 0.05_wp])
+    call make_bodies('box', [0.01_wp, 0.01_wp, 0.02_wp], &
+                     reshape([0.0275_wp, 0.0275_wp, 0.05_wp], [3, 1]), &
+                     reshape(identity, [4, 1]), blocks)
+    call fill(grid, blocks, solid)
+    call check('half outside: half the volume', sum(solid%alpha)*grid%volume, 1e-6_wp, 1e-18_wp)
+    call check('half outside: nothing in the halo', sum(solid%alpha(:, :, 11:)), 0.0_wp, 0.0_wp)
+    call check('half outside: solid share of the side', &
+               sum(1 - solid%aperture(1:10, 1:10, 11, 3)), 4.0_wp, 1e-12_wp)
+    call check('half outside: lists end at the side', &
+               maxval(solid%face(3, 1:solid%body_face(2) - 1)) == 11 .and. &
+               maxval(solid%cell(3, 1:solid%body_cell(2) - 1)) == 10)
+    call check('half outside: no link beyond the side', all(solid%link_number(:, :, 11:, 3) == 0))
+    blocks%x(3, 1) = 0.049_wp - 0.01_wp   ! its top 1 mm below the side
+    call fill(grid, blocks, solid)
+    call check('below the side: link from the last centre', &
+               solid%link_length(1, solid%link_number(6, 6, 11, 3)), 0.3_wp, 1e-12_wp)
+  end subroutine partly_outside
+
+  !> Two boxes that overlap by half a cell, and two that share a cell without overlap.
+  subroutine bodies_in_contact()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp) :: x(3, 2), q(4, 2), beta
+    integer :: m
+
+    grid = make_grid([20, 10, 10], [0.1_wp, 0.05_wp, 0.05_wp])
+    q = spread(identity, 2, 2)
+    x(:, 1) = [0.035_wp, 0.025_wp, 0.025_wp]
+    x(:, 2) = [0.0525_wp, 0.025_wp, 0.025_wp]    ! 2.5 mm into the other
+    call make_bodies('cube', [0.02_wp, 0.0_wp, 0.0_wp], x, q, blocks)
+    call fill(grid, blocks, solid)
+    call check('overlap: shares of a cell end at one', maxval(solid%alpha), 1.0_wp, 0.0_wp)
+    call check('overlap: each body keeps its volume', &
+               sum(solid%cell_alpha(:solid%body_cell(3) - 1))*grid%volume, 1.6e-5_wp, 1e-17_wp)
+    beta = 0.0_wp
+    do m = 1, solid%body_face(3) - 1
+      if (all(solid%face(:, m) == [9, 5, 5, 2])) beta = beta + solid%face_beta(m)
+    end do
+    call check('overlap: shares of a closed face are scaled to one', beta, 1.0_wp, 1e-15_wp)
+    call check('overlap: nothing is open below zero', minval(solid%aperture), 0.0_wp, 0.0_wp)
+    x(1, :) = [0.0375_wp, 0.0575_wp]             ! side by side at x = 47.5 mm, within cell 10
+    call make_bodies('cube', [0.02_wp, 0.0_wp, 0.0_wp], x, q, blocks)
+    call fill(grid, blocks, solid)
+    call check('side by side: the shared cell is full', solid%alpha(10, 5, 5), 1.0_wp, 0.0_wp)
+    call check('side by side: and is no cut cell', solid%cut(10, 5, 5), 0)
+    call check('side by side: its faces are closed', solid%aperture(10, 5, 5, 2), 0.0_wp, 0.0_wp)
+    call check('side by side: the centre belongs to one of them', solid%inside(10, 5, 5) > 0)
+  end subroutine bodies_in_contact
+
+  !> A lid on a well of 2 x 2 cells: closed off, unless the floor is an open side.
+  subroutine sealed_pocket()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid
+    real(wp) :: x(3, 5), q(4, 5)
+    integer :: m
+
+    grid = make_grid([14, 14, 10], [0.14_wp, 0.14_wp, 0.1_wp])
+    q = spread(identity, 2, 5)
+    x(:, 1) = [0.04_wp, 0.06_wp, 0.02_wp]    ! four cubes of 4 cells around the well 7..8 x 7..8
+    x(:, 2) = [0.1_wp, 0.08_wp, 0.02_wp]
+    x(:, 3) = [0.08_wp, 0.04_wp, 0.02_wp]
+    x(:, 4) = [0.06_wp, 0.1_wp, 0.02_wp]
+    x(:, 5) = [0.07_wp, 0.07_wp, 0.025_wp]   ! the lid, down to half a cell above the floor
+    call make_bodies('cube', [0.04_wp, 0.0_wp, 0.0_wp], x, q, blocks)
+    call fill(grid, blocks, solid)
+    call check('pocket: four cells are sealed', solid%n_sealed, 4)
+    call check('pocket: their faces are closed', maxval(solid%aperture(7:8, 7:8, 1, :)), 0.0_wp, &
+               0.0_wp)
+    call check('pocket: other cells are open', solid%aperture(2, 2, 1, 1), 1.0_wp, 0.0_wp)
+    grid%side(1, 3) = side_open
+    call fill(grid, blocks, solid)
+    call check('pocket: open through the floor', solid%n_sealed, 0)
+    grid%side(1, 3) = side_no_slip
+    blocks%x(1, 1) = 0.03_wp                 ! one wall gone: a way out
+    call fill(grid, blocks, solid)
+    call check('pocket: a gap lets it out', solid%n_sealed, 0)
+    do m = 1, 5
+      blocks%present(m) = m < 5
+    end do
+    call fill(grid, blocks, solid)
+    call check('pocket: a body not present is not there', solid%body_cell(6), solid%body_cell(5))
+  end subroutine sealed_pocket
+
+  !> A body across periodic sides, and the same body three periods away: the same bits.
+  subroutine periods()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks, far
+    type(solid_geometry_t) :: solid, other
+    type(links_t) :: links
+    real(wp) :: worst
+    integer :: i, m
+
+    grid = make_grid([24, 24, 24], [0.09375_wp, 0.09375_wp, 0.09375_wp])   ! h = 1/256: exact shifts
+    grid%periodic = [.true., .false., .true.]
+    grid%side(:, 1) = side_periodic
+    grid%side(:, 3) = side_periodic
+    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], &
+                         reshape([0.0078125_wp, 0.05_wp, 0.09_wp], [3, 1]), &
+                         reshape(draw_attitude(), [4, 1]), blocks)
+    far = blocks
+    far%x(1, 1) = far%x(1, 1) - 3*grid%length(1)
+    call fill(grid, blocks, solid)
+    call fill(grid, far, other)
+    links = links_on_grid(solid)
+    call check('periods: the whole volume', sum(solid%alpha(1:24, 1:24, 1:24))*grid%volume, &
+               7*0.015_wp**3, 1e-12_wp*0.015_wp**3)
+    worst = 0.0_wp
+    do i = 1, n_halo
+      worst = max(worst, maxval(abs(solid%alpha(i, :, :) - solid%alpha(24 + i, :, :))), &
+                  maxval(abs(solid%aperture(:, :, i, :) - solid%aperture(:, :, 24 + i, :))), &
+                  maxval(abs(links%low(1 - i, :, 4:20, :) - links%low(25 - i, :, 4:20, :))))
+    end do
+    call check('periods: halos are images, bit by bit', worst, 0.0_wp, 0.0_wp)
+    call check('periods: three periods away the same bits', same_bits(solid, other))
+    worst = 0.0_wp
+    do m = 1, solid%n_cut
+      associate (c => solid%cut_cell(:, m))
+        worst = max(worst, abs(volume_of_tets(grid, solid, m) - solid%alpha(c(1), c(2), c(3))))
+      end associate
+    end do
+    call check('periods: the tetrahedra listed fill the cut cells', worst, 0.0_wp, 1e-12_wp)
+  end subroutine periods
+
+  !> Share of cut cell m by its list of tetrahedra.
+  function volume_of_tets(grid, solid, m) result(share)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, intent(in) :: m
+    real(wp) :: share, v, moment(3), low(3)
+    type(polyhedron_t) :: p
+    integer :: t
+
+    share = 0.0_wp
+    low = grid%face(solid%cut_cell(:, m), [1, 2, 3])
+    do t = solid%tets%first(m), solid%tets%first(m + 1) - 1
+      call polyhedron_of_tet(solid%tets%corner(:, :, solid%tets%list(t)), p)
+      call cut_polyhedron_by_box(p, low, low + grid%h)
+      call polyhedron_moments(p, v, moment)
+      share = share + v/grid%volume
+    end do
+  end function volume_of_tets
+
+  !> Equal bits in all arrays over cells.
+  function same_bits(a, b) result(same)
+    type(solid_geometry_t), intent(in) :: a, b
+    logical :: same
+    type(links_t) :: of_a, of_b
+
+    of_a = links_on_grid(a)
+    of_b = links_on_grid(b)
+    same = maxval(abs(a%alpha - b%alpha)) <= 0 .and. &
+           maxval(abs(a%aperture - b%aperture)) <= 0 .and. &
+           maxval(abs(of_a%low - of_b%low)) <= 0 .and. maxval(abs(of_a%high - of_b%high)) <= 0 &
+           .and. all(a%inside == b%inside) .and. all(of_a%body_low == of_b%body_low) .and. &
+           all(of_a%body_high == of_b%body_high) .and. a%n_cut == b%n_cut .and. all(a%cut == b%cut)
+  end function same_bits
+
+  !> A process that owns a part of the grid gets the bits of the one that owns all.
+  subroutine any_part_of_the_grid()
+    type(grid_t) :: grid, part
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: whole, piece
+    type(links_t) :: of_whole, of_piece
+    real(wp) :: x(3, 3), q(4, 3)
+    integer :: lo(3), a(3), b(3), e(3), i, c, d
+    logical :: same, tets
+
+    grid = make_grid([32, 16, 24], [0.16_wp, 0.08_wp, 0.12_wp])
+    do i = 1, 3
+      x(:, i) = [0.04_wp*i, 0.04_wp, 0.06_wp] + 0.01_wp*[draw(), draw(), draw()]
+      q(:, i) = draw_attitude()
+    end do
+    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
+    call fill(grid, blocks, whole)
+    of_whole = links_on_grid(whole)
+    same = .true.
+    tets = .true.
+    do i = 0, 3
+      part = grid
+      lo = 1 + [16*mod(i, 2), 0, 12*(i/2)]
+      call part%own(lo, lo + [15, 15, 11])
+      call fill(part, blocks, piece)
+      of_piece = links_on_grid(piece)
+      a = part%first
+      b = part%last
+      associate (low => max(a, 1), high => min(b, grid%n))
+        same = same .and. all(abs(piece%alpha(low(1):high(1), low(2):high(2), low(3):high(3)) - &
+                                  whole%alpha(low(1):high(1), low(2):high(2), low(3):high(3))) <= 0)
+        do d = 1, 3   ! faces with both cells in the part: a cell that bodies fill closes its faces
+          e = merge(low + unit_step(:, d), low, a > 1)
+          same = same .and. all(abs( &
+            piece%aperture(e(1):high(1), e(2):high(2), e(3):high(3), d) - &
+            whole%aperture(e(1):high(1), e(2):high(2), e(3):high(3), d)) <= 0)
+        end do
+        same = same .and. all(abs( &
+          of_piece%high(low(1):high(1), low(2):high(2), low(3):high(3), :) - &
+          of_whole%high(low(1):high(1), low(2):high(2), low(3):high(3), :)) <= 0)
+        same = same .and. all(piece%inside(low(1):high(1), low(2):high(2), low(3):high(3)) == &
+                              whole%inside(low(1):high(1), low(2):high(2), low(3):high(3)))
+      end associate
+      do c = 1, piece%n_cut
+        associate (n => piece%cut_cell(:, c))
+          tets = tets .and. abs(volume_of_tets(part, piece, c) - &
+                                volume_of_tets(grid, whole, whole%cut(n(1), n(2), n(3)))) <= 0
+        end associate
+      end do
+    end do
+    call check('parts of the grid: the same bits', same)
+    call check('parts of the grid: the same tetrahedra in cut cells', tets)
+  end subroutine any_part_of_the_grid
+
+  !> After many moves nothing of the old places is left; two objects may take turns.
+  subroutine clean_after_moving()
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid(2), fresh
+    type(solid_fraction_t) :: fraction
+    real(wp) :: x(3, 3), q(4, 3)
+    integer :: s, i
+    logical :: same
+
+    grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
+    q = spread(identity, 2, 3)
+    x = spread([0.05_wp, 0.04_wp, 0.05_wp], 2, 3)
+    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], x, q, blocks)
+    call solid_fraction_init(grid, blocks, fraction)
+    call solid_geometry_init(grid, solid(1), 3)
+    call solid_geometry_init(grid, solid(2), 3)
+    same = .true.
+    do s = 1, 12
+      do i = 2, 3   ! the first stays where it is
+        blocks%x(:, i) = 0.05_wp + 0.05_wp*(2*[draw(), draw(), draw()] - 1)
+        blocks%q(:, i) = draw_attitude()
+      end do
+      blocks%present(3) = mod(s, 3) > 0
+      call update_solid(fraction, grid, blocks, solid(1 + mod(s, 2)))
+      call fill(grid, blocks, fresh)
+      same = same .and. same_bits(solid(1 + mod(s, 2)), fresh)
+    end do
+    call check('moving: as if filled afresh', same)
+  end subroutine clean_after_moving
+
+  !> Two geometries in turn; a body only turns, only moves, only comes or goes, or nothing does.
+  subroutine filled_if_moved()
+    real(wp), parameter :: mark = 0.25_wp
+    type(grid_t) :: grid
+    type(blocks_t) :: blocks
+    type(solid_geometry_t) :: solid(2), fresh
+    type(solid_fraction_t) :: fraction
+    integer :: s, turn
+    logical :: same
+
+    grid = make_grid([20, 16, 20], [0.1_wp, 0.08_wp, 0.1_wp])
+    call make_bodies('hexapod', [0.015_wp, 0.0_wp, 0.0_wp], &
+                     spread([0.05_wp, 0.04_wp, 0.05_wp], 2, 1), spread(identity, 2, 1), blocks)
+    call solid_fraction_init(grid, blocks, fraction)
+    call solid_geometry_init(grid, solid(1), 1)
+    call solid_geometry_init(grid, solid(2), 1)
+    same = .true.
+    turn = 1
+    do s = 1, 16
+      select case (mod(s/2, 4))   ! the second of two is as the first
+      case (1)
+        if (mod(s, 2) == 0) blocks%q(:, 1) = draw_attitude()
+      case (2)
+        if (mod(s, 2) == 0) blocks%x(:, 1) = blocks%x(:, 1) + [0.003_wp, 0.0_wp, -0.002_wp]
+      case default
+        if (mod(s, 2) == 0) blocks%present(1) = .not. blocks%present(1)
+      end select
+      turn = 3 - turn
+      call update_solid(fraction, grid, blocks, solid(turn))
+      call fill(grid, blocks, fresh)
+      same = same .and. same_bits(solid(turn), fresh)
+    end do
+    call check('one thing at a time: as if filled afresh', same)
+    call update_solid(fraction, grid, blocks, solid(1))
+    solid(1)%alpha(1, 1, 1) = mark
+    call update_solid(fraction, grid, blocks, solid(1))
+    call check('nothing moved: nothing filled', solid(1)%alpha(1, 1, 1), mark, 0.0_wp)
+  end subroutine filled_if_moved
+
+end module test_solid_fraction_m

@@ -1,0 +1,147 @@
+!> What lies outside an outflow: columns at rest, the level, the part that yields to a wave.
+module test_outflow_m
+  use kinds_m, only: wp
+  use case_types_m, only: grid_input_t, boundary_input_t, fluid_t
+  use grid_m, only: grid_t, grid_init
+  use fields_m, only: flow_t, flow_init
+  use outflow_m, only: outflow_init, start_outflow, update_outflow, outside_distance, &
+    pressure_outside, mean_velocity
+  use check_m, only: check
+  implicit none
+  private
+  public :: test_outflow
+
+  real(wp), parameter :: g = 10.0_wp, rho_l = 1000.0_wp, rho_g = 2.0_wp
+  real(wp), parameter :: dt = 0.02_wp
+  type(grid_t) :: grid
+  type(flow_t) :: flow
+  type(fluid_t) :: fluid
+
+contains
+
+  subroutine test_outflow()
+    call columns()
+    call level_and_wave()
+    call mean_follows()
+    call upside_down()
+    call no_level()
+  end subroutine test_outflow
+
+  !> 4 x 3 x 5 cells of 1 x 2 x 0.1 m with an outflow at x_max; liquid up to 0.25 m.
+  subroutine make(gravity, single_phase)
+    real(wp), intent(in) :: gravity(3)
+    logical, intent(in) :: single_phase
+    type(grid_input_t) :: input
+    type(boundary_input_t) :: boundary
+
+    input%cells = [4, 3, 5]
+    input%length = [4.0_wp, 6.0_wp, 0.5_wp]
+    input%origin = [0.0_wp, 0.0_wp, 0.05_wp]
+    boundary%kind(2, 1) = 'outflow'
+    call grid_init(input, boundary, grid)
+    call flow_init(grid, flow)
+    fluid%gravity = gravity
+    fluid%liquid_density = rho_l
+    fluid%gas_density = rho_g
+    fluid%single_phase = single_phase
+    fluid%water_level = 0.3_wp
+    flow%c = 0.0_wp
+    flow%c(:, :, 1:2) = 1.0_wp
+    flow%c(:, :, 3) = 0.5_wp
+    if (single_phase) flow%c = 1.0_wp
+    call outflow_init(grid, fluid, flow%sides)
+    call start_outflow(grid, flow%c, flow%uf, flow%sides)
+  end subroutine make
+
+  subroutine update()
+    call update_outflow(grid, fluid, dt, flow%c, flow%uf, flow%sides)
+  end subroutine update
+
+  !> At the level: hydrostatic, half a cell of gas at the top, then means of two weights; the cell
+  !! of the surface has the mean of the true pressure over its height.
+  subroutine columns()
+    real(wp) :: weight(5), p
+    integer :: k
+
+    call make([0.0_wp, 0.0_wp, -g], .false.)
+    call update()
+    weight = g*0.1_wp*[rho_l, rho_l, 0.5_wp*(rho_l + rho_g), rho_g, rho_g]
+    p = 0.5_wp*weight(5)
+    do k = 5, 1, -1
+      if (k < 5) p = p + 0.5_wp*(weight(k) + weight(min(k + 1, 5)))
+      if (k == 3) then
+        call check('mean in the surface cell', pressure_outside(flow%sides(2, 1), [5, 2, k]), &
+                   weight(4) + weight(5) + g*0.1_wp*(3.0_wp*rho_g + rho_l)/8.0_wp, 1.0e-10_wp)
+        cycle
+      end if
+      call check('column at rest', pressure_outside(flow%sides(2, 1), [5, 2, k]), p, 1.0e-10_wp)
+    end do
+    call check('other sides', pressure_outside(flow%sides(1, 1), [0, 2, 1]), 0.0_wp, 0.0_wp)
+    call check('speed of long waves', flow%sides(2, 1)%celerity, sqrt(g*0.25_wp), 1.0e-14_wp)
+  end subroutine columns
+
+  !> One column stands 0.05 m higher: its liquid cells lack the weight of 0.05 m; a wave meets the
+  !! resistance rho c of the liquid share.
+  subroutine level_and_wave()
+    real(wp) :: at_rest, c
+
+    call make([0.0_wp, 0.0_wp, -g], .false.)
+    call update()
+    at_rest = pressure_outside(flow%sides(2, 1), [5, 3, 1])
+    flow%c(4, 3, 3) = 1.0_wp
+    call update()
+    call check('higher column', pressure_outside(flow%sides(2, 1), [5, 3, 1]), &
+               at_rest + g*0.05_wp*(rho_l - rho_g) - g*0.05_wp*rho_l, 1.0e-9_wp)
+    c = sqrt(g*0.25_wp)
+    call check('distance in liquid', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
+               0.5_wp + c*dt, 1.0e-14_wp)
+    call check('distance in a mixed cell', outside_distance(flow%sides(2, 1), [4, 1, 3], 0.5_wp, &
+               501.0_wp), 0.5_wp + 0.5_wp*rho_l*c*dt/501.0_wp, 1.0e-14_wp)
+    call check('distance in gas', outside_distance(flow%sides(2, 1), [4, 3, 5], 0.5_wp, rho_g), &
+      0.5_wp, 0.0_wp)
+    call check('distance elsewhere', outside_distance(flow%sides(1, 1), [1, 3, 1], 0.5_wp, rho_l), &
+               0.5_wp, 0.0_wp)
+  end subroutine level_and_wave
+
+  !> The mean velocity starts from that of the faces and follows it in 4 L/c, as far as there is
+  !! liquid.
+  subroutine mean_follows()
+    real(wp) :: t
+
+    call make([0.0_wp, 0.0_wp, -g], .false.)
+    flow%uf(5, :, :, 1) = 0.3_wp
+    call start_outflow(grid, flow%c, flow%uf, flow%sides)
+    flow%uf(5, :, :, 1) = 0.7_wp
+    call update()
+    t = 4.0_wp*4.0_wp/sqrt(g*0.25_wp)
+    call check('mean of liquid', mean_velocity(flow%sides(2, 1), [4, 1, 1]), &
+               0.3_wp + 0.4_wp*dt/(t + dt), 1.0e-14_wp)
+    call check('mean of gas', mean_velocity(flow%sides(2, 1), [4, 1, 5]), 0.3_wp, 0.0_wp)
+  end subroutine mean_follows
+
+  !> Gravity along +y: the floor is y_max, the vertical is the other direction of the side.
+  subroutine upside_down()
+    call make([0.0_wp, g, 0.0_wp], .false.)
+    flow%c = 0.0_wp
+    flow%c(:, 3, :) = 1.0_wp
+    fluid%water_level = 4.0_wp
+    call outflow_init(grid, fluid, flow%sides)
+    call update()
+    call check('upside down: bottom', pressure_outside(flow%sides(2, 1), [5, 3, 4]), &
+               g*(2.0_wp*rho_g + 2.0_wp*rho_g + rho_l), 1.0e-9_wp)
+    call check('upside down: top', pressure_outside(flow%sides(2, 1), [5, 1, 4]), g*rho_g, &
+               1.0e-9_wp)
+    call check('upside down: speed of waves', flow%sides(2, 1)%celerity, sqrt(g*2.0_wp), 1.0e-14_wp)
+  end subroutine upside_down
+
+  !> Full of liquid there is no level: weight only, no waves.
+  subroutine no_level()
+    call make([0.0_wp, 0.0_wp, -g], .true.)
+    call update()
+    call check('full: bottom', pressure_outside(flow%sides(2, 1), [5, 1, 1]), 0.45_wp*g*rho_l, &
+               1.0e-9_wp)
+    call check('full: distance', outside_distance(flow%sides(2, 1), [4, 3, 1], 0.5_wp, rho_l), &
+      0.5_wp, 0.0_wp)
+  end subroutine no_level
+
+end module test_outflow_m

@@ -1,0 +1,258 @@
+!> The plane in a box cell: constant and volume are inverse, slabs add up, normals of planes are
+!! exact.
+module test_plic_m
+  use kinds_m, only: wp, pi
+  use plic_m, only: unit_constant, unit_volume, unit_area, unit_slab, unit_normal
+  use check_m, only: check
+  implicit none
+  private
+  public :: test_plic
+
+contains
+
+  subroutine test_plic()
+    call inverse_of_each_other()
+    call against_exact_volumes()
+    call nearly_parallel_planes()
+    call slopes()
+    call slabs_add_up()
+    call normals_of_planes()
+    call normal_of_sphere()
+  end subroutine test_plic
+
+  !> Direction number i of a spiral over the sphere, with every fifth one degenerate.
+  function direction(i) result(n)
+    integer, intent(in) :: i
+    real(wp) :: n(3)
+    real(wp) :: z, angle
+
+    z = 2.0_wp*modulo(real(i, wp)*0.754877666_wp, 1.0_wp) - 1.0_wp
+    angle = 2.0_wp*pi*modulo(real(i, wp)*0.569840291_wp, 1.0_wp)
+    n = [sqrt(1.0_wp - z*z)*cos(angle), sqrt(1.0_wp - z*z)*sin(angle), z]
+    if (modulo(i, 5) == 0) n(1 + modulo(i/5, 3)) = 0.0_wp
+    if (modulo(i, 35) == 0) n(1 + modulo(i/5 + 1, 3)) = 0.0_wp
+    if (modulo(i, 7) == 0) n(1 + modulo(i/7, 3)) = sign(10.0_wp**(-modulo(i/7, 17)), n(1))
+  end function direction
+
+  subroutine inverse_of_each_other()
+    integer :: i, k
+    real(wp) :: n(3), h(3), f, d, worst, worst_small, bound
+
+    h = [0.005_wp, 0.01_wp, 0.02_wp]
+    worst = 0.0_wp
+    worst_small = 0.0_wp
+    bound = 0.0_wp
+    do i = 1, 4000
+      n = direction(i)
+      do k = 0, 8
+        f = 0.125_wp*real(k, wp)
+        if (k == 4) f = modulo(real(i, wp)*0.381966011_wp, 1.0_wp)
+        d = plane_constant(n, f, h)
+        worst = max(worst, abs(volume_below(n, d, h)/product(h) - f))
+        f = 10.0_wp**(-k - 2)
+        d = plane_constant(n, f, h)
+        worst_small = max(worst_small, abs(volume_below(n, d, h)/product(h) - f))
+        bound = max(bound, volume_below(n, d, h)/product(h) - 1.0_wp, -volume_below(n, d, h))
+      end do
+    end do
+    call check('volume below the constant of a fraction is the fraction', worst, 0.0_wp, 1.0e-14_wp)
+    call check('the same for small fractions', worst_small, 0.0_wp, 1.0e-14_wp)
+    call check('shares stay within 0 and 1', bound <= 0.0_wp)
+  end subroutine inverse_of_each_other
+
+  subroutine against_exact_volumes()
+    real(wp) :: third
+
+    third = 1.0_wp/3.0_wp
+    call check('plane through three corners', unit_volume([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp), &
+               1.0_wp/6.0_wp, 1.0e-15_wp)
+    call check('plane through the centre', unit_volume([0.3_wp, -0.5_wp, 0.2_wp], 0.0_wp), &
+               0.5_wp, 1.0e-15_wp)
+    call check('hexagon', unit_volume([third, third, third], 0.4_wp), &
+               (1.2_wp**3 - 3.0_wp*0.2_wp**3)/6.0_wp, 1.0e-15_wp)
+    call check('plane parallel to a face', unit_volume([0.0_wp, 0.0_wp, -2.0_wp], -0.5_wp), &
+               0.75_wp, 1.0e-15_wp)
+    call check('wedge', unit_volume([0.25_wp, 0.75_wp, 0.0_wp], 0.5_wp), 0.5_wp, 1.0e-15_wp)
+    call check('box of edges 1, 2, 3', volume_below([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp, &
+                                                    [1.0_wp, 2.0_wp, 3.0_wp]), &
+               1.0_wp/6.0_wp, 1.0e-15_wp)
+    call check('constant of the plane through three corners', &
+               unit_constant([1.0_wp, 1.0_wp, 1.0_wp], 1.0_wp/6.0_wp), 1.0_wp, 1.0e-14_wp)
+  end subroutine against_exact_volumes
+
+  !> Components down to 1e-14: the volume must follow the two-dimensional one.
+  subroutine nearly_parallel_planes()
+    integer :: i, k
+    real(wp) :: worst, small, flat, b
+
+    worst = 0.0_wp
+    do k = 2, 14
+      small = 10.0_wp**(-k)
+      do i = 1, 99
+        b = 0.01_wp*real(i, wp)
+        flat = unit_volume([0.0_wp, 0.4_wp, 0.6_wp], b - 0.5_wp*small)   ! equal to second order
+        worst = max(worst, abs(unit_volume([small, 0.4_wp, 0.6_wp], b) - flat) - small**2)
+      end do
+    end do
+    call check('a tiny component changes nothing but its mean', worst, 0.0_wp, 1.0e-15_wp)
+  end subroutine nearly_parallel_planes
+
+  subroutine slopes()
+    integer :: i
+    real(wp) :: m(3), a, step, slope, worst
+
+    worst = 0.0_wp
+    step = 1.0e-5_wp
+    do i = 1, 500
+      m = direction(i)
+      if (minval(abs(m)) < 0.01_wp) cycle
+      a = unit_constant(m, modulo(0.618_wp*real(i, wp), 1.0_wp))
+      slope = (unit_volume(m, a + step) - unit_volume(m, a - step))/(2.0_wp*step)
+      worst = max(worst, abs(slope - unit_area(m, a)))
+    end do
+    call check('area is the derivative of the volume', worst, 0.0_wp, 1.0e-6_wp)
+  end subroutine slopes
+
+  subroutine slabs_add_up()
+    integer :: i, d
+    real(wp) :: m(3), f, a, t, worst, low, high, h(3), n(3)
+
+    worst = 0.0_wp
+    do i = 1, 3000
+      m = direction(i)
+      f = modulo(0.618_wp*real(i, wp), 1.0_wp)
+      t = modulo(0.287_wp*real(i, wp), 1.0_wp)
+      a = unit_constant(m, f)
+      do d = 1, 3
+        low = unit_slab(m, a, d, 1, t)
+        high = unit_slab(m, a, d, 2, 1.0_wp - t)
+        worst = max(worst, abs(low + high - f))
+        if (low < 0.0_wp .or. low > t .or. high < 0.0_wp) worst = 1.0_wp
+      end do
+    end do
+    call check('two slabs make the cell', worst, 0.0_wp, 1.0e-14_wp)
+    h = [1.0_wp, 2.0_wp, 4.0_wp]
+    n = [0.0_wp, 0.0_wp, 1.0_wp]
+    call check('slab beside the lower face is under water', &
+               liquid_in_slab(n, 1.0_wp, h, 3, 1, 0.5_wp), 1.0_wp, 1.0e-15_wp)
+    call check('slab beside the upper face is dry', liquid_in_slab(n, 1.0_wp, h, 3, 2, 0.5_wp), &
+               0.0_wp, 1.0e-15_wp)
+    call check('slab across is a quarter full', liquid_in_slab(n, 1.0_wp, h, 1, 2, 0.5_wp), &
+               1.0_wp, 1.0e-15_wp)
+  end subroutine slabs_add_up
+
+  !> Shares of the 27 cells below the plane n.x = d; the centre cell is 0..1 in each direction.
+  function shares(n, d) result(c)
+    real(wp), intent(in) :: n(3), d
+    real(wp) :: c(3, 3, 3)
+    integer :: i, j, k
+
+    do k = 1, 3
+      do j = 1, 3
+        do i = 1, 3
+          c(i, j, k) = unit_volume(n, d - dot_product(n, real([i, j, k] - 2, wp)))
+        end do
+      end do
+    end do
+  end function shares
+
+  subroutine normals_of_planes()
+    integer :: i
+    real(wp) :: n(3), m(3), worst
+
+    worst = 0.0_wp
+    do i = 1, 200
+      n = [0.2_wp*sin(real(i, wp)), 0.2_wp*cos(3.0_wp*real(i, wp)), 1.0_wp]   ! flat enough
+      n = cshift(n, i)*merge(1.0_wp, -1.0_wp, modulo(i, 2) == 0)
+      n = n/sum(abs(n))
+      m = unit_normal(shares(n, unit_constant(n, 0.5_wp)))
+      worst = max(worst, maxval(abs(m - n)))
+    end do
+    call check('normal of a plane that stays in its columns is exact', worst, 0.0_wp, 1.0e-13_wp)
+    m = unit_normal(shares([0.0_wp, 0.0_wp, 1.0_wp], 0.1513_wp))
+    call check('normal of level water', all(abs(m - [0.0_wp, 0.0_wp, 1.0_wp]) <= 0.0_wp))
+    m = unit_normal(spread(spread(spread(0.3_wp, 1, 3), 2, 3), 3, 3))
+    call check('no direction without differences', all(abs(m) <= 0.0_wp))
+  end subroutine normals_of_planes
+
+  !> Angle between the computed and the true normal of a sphere of radius 10 cells: second order.
+  subroutine normal_of_sphere()
+    integer :: i
+    real(wp) :: n(3), m(3), x(3), worst
+
+    worst = 0.0_wp
+    do i = 1, 100
+      n = direction(11*i + 1)
+      if (minval(abs(n)) < 1.0e-3_wp) cycle
+      n = n/norm2(n)
+      x = n*10.0_wp
+      m = unit_normal(sphere_shares(10.0_wp, floor(x)))
+      m = m/norm2(m)
+      x = real(floor(x), wp) + 0.5_wp
+      worst = max(worst, norm2(m - x/norm2(x)))
+    end do
+    call check('normal of a sphere is within 3 degrees', worst < 0.05_wp)
+  end subroutine normal_of_sphere
+
+  !> Shares of the sphere about the origin in the 27 cells around cell number `at`, by points.
+  function sphere_shares(radius, at) result(c)
+    real(wp), intent(in) :: radius
+    integer, intent(in) :: at(3)
+    real(wp) :: c(3, 3, 3)
+    integer, parameter :: n = 12
+    integer :: i, j, k, p, q, r, inside
+    real(wp) :: x(3)
+
+    do k = 1, 3
+      do j = 1, 3
+        do i = 1, 3
+          inside = 0
+          do r = 1, n
+            do q = 1, n
+              do p = 1, n
+                x = real(at + [i, j, k] - 2, wp) + (real([p, q, r], wp) - 0.5_wp)/real(n, wp)
+                if (sum(x*x) < radius**2) inside = inside + 1
+              end do
+            end do
+          end do
+          c(i, j, k) = real(inside, wp)/real(n**3, wp)
+        end do
+      end do
+    end do
+  end function sphere_shares
+
+  !> Constant d of the plane `normal.x = d` that cuts the share `fraction` off the box (0,0,0)..h
+  !! [m].
+  pure function plane_constant(normal, fraction, h) result(d)
+    real(wp), intent(in) :: normal(3)   !! from liquid to gas
+    real(wp), intent(in) :: fraction    !! liquid share, 0..1 [-]
+    real(wp), intent(in) :: h(3)        !! edges of the cell [m]
+    real(wp) :: d
+
+    d = unit_constant(normal*h, fraction)
+  end function plane_constant
+
+  !> Volume of the box (0,0,0)..h below the plane `normal.x = d` [m3].
+  pure function volume_below(normal, d, h) result(volume)
+    real(wp), intent(in) :: normal(3)
+    real(wp), intent(in) :: d      !! [m]
+    real(wp), intent(in) :: h(3)   !! [m]
+    real(wp) :: volume
+
+    volume = unit_volume(normal*h, d)*(h(1)*h(2)*h(3))
+  end function volume_below
+
+  !> Liquid in the slab of given thickness beside the lower (side 1) or upper (side 2) face [m3].
+  pure function liquid_in_slab(normal, d, h, direction, side, thickness) result(volume)
+    real(wp), intent(in) :: normal(3)
+    real(wp), intent(in) :: d          !! [m]
+    real(wp), intent(in) :: h(3)       !! [m]
+    integer, intent(in) :: direction   !! of the normal of the face
+    integer, intent(in) :: side
+    real(wp), intent(in) :: thickness  !! 0..h(direction) [m]
+    real(wp) :: volume
+
+    volume = unit_slab(normal*h, d, direction, side, thickness/h(direction))*(h(1)*h(2)*h(3))
+  end function liquid_in_slab
+
+end module test_plic_m

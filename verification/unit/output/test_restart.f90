@@ -1,0 +1,248 @@
+!> Restart files: the state comes back bit by bit, damage and a changed case are noticed.
+! ranks: 2 3
+module test_restart_m
+  use kinds_m, only: wp, i8
+  use parallel_m, only: is_root, nproc, broadcast
+  use hdf5_file_m, only: h5_file_t
+  use restart_m, only: write_restart, read_restart
+  use state_m, only: visit_state
+  use state_visitors_m, only: image_visitor_t, size_visitor_t
+  use file_space_m, only: bytes_for_change
+  use sample_state_m, only: sample_t, make_sample
+  use check_m, only: check, checked
+  implicit none
+  private
+  public :: test_restart
+
+  character(*), parameter :: path = 'test-restart-a.h5'
+
+contains
+
+  subroutine test_restart()
+    call test_size()
+    call test_comes_back(.false.)
+    call test_comes_back(.true.)
+    call test_dry()
+    call test_case_must_stay()
+    call test_damage()
+    call test_trouble()
+    if (is_root()) call remove(path)
+  end subroutine test_restart
+
+  !> The room asked for before a restart file is written is enough, and not much too large.
+  subroutine test_size()
+    type(sample_t) :: s
+    type(size_visitor_t) :: needed
+    character(:), allocatable :: message
+    integer(i8) :: there, capacity
+    integer :: info
+
+    call make_sample(0.5_wp, .false., s)
+    call write_sample(s, info, message)
+    call visit_state(needed, s%run_state_t)
+    if (.not. is_root()) return
+    capacity = needed%bytes + len(s%case%text) + len(s%parameters) + bytes_for_change
+    inquire (file=path, size=there)
+    call check('a restart file fits into the room asked for', there <= capacity)
+    call check('the room is not much too large', capacity <= 2*there)
+  end subroutine test_size
+
+  subroutine remove(name)
+    character(*), intent(in) :: name
+    integer :: unit, info
+
+    open (newunit=unit, file=name, iostat=info)
+    if (info == 0) close (unit, status='delete')
+  end subroutine remove
+
+  subroutine write_sample(s, info, message)
+    type(sample_t), intent(inout) :: s
+    integer, intent(out) :: info
+    character(:), allocatable, intent(out) :: message
+
+    call write_restart(path, s%case%text, s%parameters, s%run_state_t, &
+                       info, message)
+  end subroutine write_sample
+
+  subroutine read_sample(s, info, message)
+    type(sample_t), intent(inout) :: s
+    integer, intent(out) :: info
+    character(:), allocatable, intent(out) :: message
+
+    call read_restart(path, s%parameters, s%run_state_t, &
+      info, message)
+  end subroutine read_sample
+
+  subroutine look(image, s)
+    type(image_visitor_t), intent(inout) :: image
+    type(sample_t), intent(inout) :: s
+
+    call visit_state(image, s%run_state_t)
+  end subroutine look
+
+  subroutine test_comes_back(periodic)
+    logical, intent(in) :: periodic
+    type(sample_t) :: s, other
+    type(image_visitor_t) :: image
+    integer :: info
+    character(:), allocatable :: message
+    logical :: there
+
+    call make_sample(0.5_wp, periodic, s)
+    call look(image, s)
+    call write_sample(s, info, message)
+    call check('a restart file is written', info, 0)
+    inquire (file=path//'.part', exist=there)
+    call check('no unfinished file is left', .not. there)
+    call make_sample(7.0_wp, periodic, other)
+    other%contacts%displacements%n = 0
+    call read_sample(other, info, message)
+    call check('a restart file is read', info, 0)
+    if (info /= 0) print '(a)', message
+    call check('the solids in the grid stay', abs(other%solid%alpha(4, 4, s%grid%lo(3)) &
+               - s%solid%alpha(4, 4, s%grid%lo(3))), 6.5_wp, 1.0e-12_wp)
+    other%solid = s%solid
+    call image%compare()
+    call look(image, other)
+    if (.not. allocated(image%difference)) image%difference = ''
+    call check('the state comes back bit by bit', image%difference == '')
+    if (periodic) call check('periodic halos are filled', &
+      all(abs(other%flow%uf(:, 1, other%grid%lo(3):other%grid%hi(3), 1) &
+              - s%flow%uf(:, 1, s%grid%lo(3):s%grid%hi(3), 1)) <= 0.0_wp))
+    call check('halos between processes are filled', all(abs( &
+      other%flow%p(4, 4, max(1, s%grid%first(3)):min(s%grid%n(3), s%grid%last(3))) &
+      - s%flow%p(4, 4, max(1, s%grid%first(3)):min(s%grid%n(3), s%grid%last(3)))) <= 0.0_wp))
+  end subroutine test_comes_back
+
+  !> Without fluid and without displacements.
+  subroutine test_dry()
+    type(sample_t) :: s, other
+    integer :: info
+    character(:), allocatable :: message
+
+    call make_sample(0.5_wp, .false., s)
+    deallocate (s%flow%u)
+    s%contacts%displacements%n = 0
+    call write_sample(s, info, message)
+    call check('a dry restart file is written', info, 0)
+    call make_sample(7.0_wp, .false., other)
+    deallocate (other%flow%u)
+    call read_sample(other, info, message)
+    call check('a dry restart file is read', info, 0)
+    call check('no displacements come back', other%contacts%displacements%n, 0)
+    call check('blocks come back', other%blocks%v(3, 2), s%blocks%v(3, 2), 0.0_wp)
+  end subroutine test_dry
+
+  !> t_end and the intervals may change, nothing else may.
+  subroutine test_case_must_stay()
+    type(sample_t) :: s
+    integer :: info
+    character(:), allocatable :: message
+
+    call make_sample(0.5_wp, .false., s)
+    call write_sample(s, info, message)
+    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01' &
+      //new_line('a') &
+      //'  field_interval = 2'//new_line('a')//'/'//new_line('a')
+    s%clock%t_end = 9.0_wp
+    s%clock%run%history_interval = 0.5_wp
+    call read_sample(s, info, message)
+    call check('t_end and intervals may change', info, 0)
+    call check('the next row is due after the restart', s%clock%next_row, 1.5_wp, 1.0e-14_wp)
+    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.02' &
+      //new_line('a') &
+      //'/'//new_line('a')
+    call read_sample(s, info, message)
+    call check('another dt is refused', info, 2)
+    call check('the message says what changed', index(message, 'dt = 0.02, was dt = 0.01') > 0)
+    s%parameters = '&run'//new_line('a')//'  t_end = 9'//new_line('a')//'  dt = 0.01'//new_line('a')
+    call read_sample(s, info, message)
+    call check('a missing line is refused', info, 2)
+    call make_sample(0.5_wp, .false., s)
+    s%clock%t_end = 1.0_wp
+    call read_sample(s, info, message)
+    call check('an end before the restart is refused', info, 2)
+  end subroutine test_case_must_stay
+
+  !> Overwrite one byte after the other, all through the file: what is read is either whole or
+  !! refused.
+  subroutine test_damage()
+    type(sample_t) :: s, other
+    type(image_visitor_t) :: image
+    integer :: info, unit, bytes, i, at, n_noticed, n_silent, n_places
+    character(:), allocatable :: message
+    character(1) :: byte
+
+    call make_sample(0.5_wp, .false., s)
+    call look(image, s)
+    call write_sample(s, info, message)
+    inquire (file=path, size=bytes)
+    n_places = merge(12, 60, checked .or. nproc() > 1)   ! slow on several processes, too
+    n_noticed = 0
+    n_silent = 0
+    do i = 1, n_places
+      at = 1 + int((real(i, wp) - 0.5_wp)/n_places*bytes)
+      if (is_root()) then
+        open (newunit=unit, file=path, access='stream', form='unformatted', status='old')
+        read (unit, pos=at) byte
+        write (unit, pos=at) achar(ieor(iachar(byte), 16))
+        close (unit)
+      end if
+      call meet()
+      call make_sample(0.5_wp, .false., other)
+      call read_sample(other, info, message)
+      if (info /= 0) then
+        n_noticed = n_noticed + 1
+      else   ! a byte that nobody needs
+        call image%compare()
+        call look(image, other)
+        if (allocated(image%difference)) n_silent = n_silent + 1
+      end if
+      call meet()
+      if (is_root()) then
+        open (newunit=unit, file=path, access='stream', form='unformatted', status='old')
+        write (unit, pos=at) byte
+        close (unit)
+      end if
+      call meet()
+    end do
+    call check('damage never passes for a state', n_silent, 0)
+    call check('damage of most places is noticed', n_noticed > n_places/2)
+    call read_sample(s, info, message)
+    call check('the file mended is read again', info, 0)
+  end subroutine test_damage
+
+  !> Wait until all processes are here.
+  subroutine meet()
+    integer :: n
+
+    n = 0
+    call broadcast(n)
+    call broadcast(n)
+  end subroutine meet
+
+  subroutine test_trouble()
+    type(sample_t) :: s
+    type(h5_file_t) :: file
+    integer :: info
+    character(:), allocatable :: message
+
+    call make_sample(0.5_wp, .false., s)
+    call write_restart('no-such-folder/restart-a.h5', s%case%text, s%parameters, &
+                       s%run_state_t, info, message)
+    call check('a missing folder is an error', info, 1)
+    call read_restart('no-such-file.h5', s%parameters, s%run_state_t, &
+                      info, message)
+    call check('a missing file is an error', info, 1)
+    call check('the message names it', index(message, 'no-such-file.h5') > 0)
+    if (is_root()) then
+      call file%create(path, .false.)
+      call file%attribute('/', 'format', 'mics-run')
+      call file%close()
+    end if
+    call meet()
+    call read_sample(s, info, message)
+    call check('a file of another kind is an error', info, 1)
+  end subroutine test_trouble
+
+end module test_restart_m

@@ -1,0 +1,490 @@
+!> Projection around held and free blocks, hydrostatic balance, pressure in closed cells.
+module test_pressure_m
+  use kinds_m, only: wp
+  use vectors_m, only: quaternion_from_axis
+  use grid_m, only: n_halo, unit_step
+  use mixture_m, only: mix_fluid, face_mean
+  use boundary_m, only: fill_velocity_halo, fill_scalar_halo
+  use rigid_flux_m, only: build_rigid_flux, force_from_faces
+  use face_velocity_m, only: acceleration_t, acceleration_init, face_acceleration, &
+    cell_mean_of_faces, predict_face_velocity
+  use pressure_system_m, only: set_pressure_system
+  use pressure_m, only: pressure_t, pressure_init, solve_pressure, divergence
+  use pressure_extension_m, only: extend_pressure
+  use advected_pressure_m, only: advect_pressure
+  use rigid_motion_m, only: rigid_motion_t, wall_velocity
+  use one_body_m, only: one_body_t, describe, place, random_numbers
+  use check_m, only: check
+  implicit none
+  private
+  public :: test_pressure
+
+  character(8), parameter :: closed(2, 3) = 'no_slip', &
+    tank(2, 3) = reshape([character(8) :: 'no_slip', 'no_slip', 'slip', 'slip', 'no_slip', &
+                          'open'], [2, 3]), &
+    channel(2, 3) = reshape([character(8) :: 'periodic', 'periodic', 'slip', 'slip', 'no_slip', &
+                             'open'], [2, 3])
+  integer, parameter :: cells(3) = [12, 8, 12]
+  real(wp), parameter :: length(3) = [0.12_wp, 0.08_wp, 0.12_wp]   !! [m]
+  real(wp), parameter :: dt = 1.0e-3_wp                            !! [s]
+  real(wp), parameter :: weight(3) = [0.0_wp, 0.0_wp, -9810.0_wp]   !! of water [N/m3]
+  type(one_body_t) :: box
+  type(pressure_t) :: pressure
+  type(acceleration_t) :: a
+  integer :: seed = 77
+
+contains
+
+  subroutine test_pressure()
+    call held_box('closed box', closed, 'cg', 'multigrid')
+    call held_box('open tank', tank, 'cg', 'multigrid')
+    call held_box('jacobi', tank, 'cg', 'jacobi')
+    call held_box('bicgstab', tank, 'bicgstab', 'multigrid')
+    call rough_and_fine()
+    call without_its_body()
+    call free_box()
+    call pressed_box()
+    call still_water()
+    call accelerations_at_faces()
+    call closed_cells()
+    call carried_with_a_body()
+  end subroutine test_pressure
+
+  !> A tilted box in liquid below and gas above, random face velocity through the open faces.
+  subroutine build(sides, free)
+    character(*), intent(in) :: sides(2, 3)
+    logical, intent(in) :: free
+    type(one_body_t) :: fresh
+
+    box = fresh
+    call describe(cells, length, sides, 'box', [0.043_wp, 0.031_wp, 0.037_wp], &
+                  [0.0613_wp, 0.0389_wp, 0.0571_wp], box%case)
+    box%case%body(1)%quaternion = quaternion_from_axis([1.0_wp, -0.3_wp, 0.5_wp], 0.7_wp)
+    box%case%body(1)%fixed = .not. free
+    box%case%body(1)%velocity = [0.3_wp, -0.2_wp, -0.1_wp]
+    box%case%body(1)%angular_velocity = [2.0_wp, 1.0_wp, -3.0_wp]
+    box%case%numerics%divergence_tolerance = 1.0e-8_wp
+    call place(box)
+    box%flow%c(:, :, 8:) = 0.0_wp
+    box%flow%c(:, :, 7) = 0.3_wp
+    call mix_fluid(box%case%fluid, box%flow)
+    call acceleration_init(box%grid, a)
+    call stir()
+  end subroutine build
+
+  !> Random face velocity, zero on walls, the same on both sides of a period.
+  subroutine stir()
+    real(wp) :: row(cells(1) + 1)
+    integer :: j, k, d
+
+    do d = 1, 3
+      do k = 1, cells(3) + 1
+        do j = 1, cells(2) + 1
+          call random_numbers(seed, row)
+          box%flow%uf(1:cells(1) + 1, j, k, d) = 0.1_wp*row
+        end do
+      end do
+    end do
+    associate (n => cells, uf => box%flow%uf)
+      uf(n(1) + 1, :, :, 1) = 0.0_wp
+      uf(1, :, :, 1) = 0.0_wp
+      uf(:, [1, n(2) + 1], :, 2) = 0.0_wp
+      uf(:, :, 1, 3) = 0.0_wp
+      if (box%case%boundary%kind(2, 3) /= 'open') uf(:, :, n(3) + 1, 3) = 0.0_wp
+    end associate
+  end subroutine stir
+
+  subroutine solve(rough)
+    logical, intent(in), optional :: rough
+
+    call pressure_init(box%grid, 1, box%case%numerics, pressure)
+    if (present(rough)) pressure%rough = rough
+    associate (system => pressure%system)
+      call set_pressure_system(box%grid, box%solid%effective, box%flow%rho, system)
+      call build_rigid_flux(box%grid, box%solid, box%bodies, system%active, system%operator%flux)
+    end associate
+    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
+  end subroutine solve
+
+  !> Largest |div u| of fluid and solid in the cells that can move, worked out here [1/s].
+  function largest_divergence() result(worst)
+    real(wp) :: worst
+    real(wp) :: net
+    integer :: i, j, k, d, s, f(3)
+
+    worst = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          net = 0.0_wp
+          do d = 1, 3
+            do s = 0, 1
+              f = [i, j, k] + s*unit_step(:, d)
+              net = net + real(2*s - 1, wp)*(box%flow%solid_flux(f(1), f(2), f(3), d) &
+                + box%solid%effective(f(1), f(2), f(3), d)*box%grid%area(d) &
+                *box%flow%uf(f(1), f(2), f(3), d))
+            end do
+          end do
+          if (box%solid%alpha(i, j, k) < 1.0_wp) worst = max(worst, abs(net)/box%grid%volume)
+        end do
+      end do
+    end do
+  end function largest_divergence
+
+  !> A moving but held box: the fluid makes way, and the velocity has changed by -dt grad(phi)/rho.
+  subroutine held_box(name, sides, solver, preconditioner)
+    character(*), intent(in) :: name, sides(2, 3), solver, preconditioner
+    real(wp), allocatable :: before(:, :, :, :)
+    real(wp) :: expected
+    integer, parameter :: at(3) = [3, 2, 7]
+
+    call build(sides, .false.)
+    if (name == 'closed box') box%bodies%motion = 0.0_wp
+    box%case%numerics%pressure_solver = solver
+    box%case%numerics%preconditioner = preconditioner
+    allocate (before, source=box%flow%uf)
+    call solve()
+    call check(name//': converged', pressure%report%converged .and. &
+               any(pressure%report%passes == [1, 2]))
+    call check(name//': divergence told', pressure%report%divergence, largest_divergence(), &
+               1.0e-12_wp)
+    call check(name//': divergence', largest_divergence() < 1.0e-8_wp)
+    expected = -dt*(box%flow%p(at(1), at(2), at(3)) - box%flow%p(at(1), at(2), at(3) - 1)) &
+               /(0.01_wp*0.5_wp*(box%flow%rho(at(1), at(2), at(3) - 1) &
+                                 + box%flow%rho(at(1), at(2), at(3))))
+    call check(name//': change of velocity', box%flow%uf(3, 2, 7, 3) - before(3, 2, 7, 3), &
+               expected, 1.0e-12_wp)
+    call check(name//': walls stay closed', all(abs(box%flow%uf(1, 1:8, 1:12, 1)) <= 0.0_wp))
+  end subroutine held_box
+
+  !> A rough solve leaves more divergence with less work, and a second one goes on from there.
+  subroutine rough_and_fine()
+    integer :: rough
+
+    call build(tank, .false.)
+    box%case%numerics%pressure_solver = 'cg'
+    box%case%numerics%preconditioner = 'multigrid'
+    call solve(rough=.true.)
+    rough = pressure%report%iterations
+    call check('rough: converged', pressure%report%converged)
+    call check('rough: divergence', largest_divergence() < 1.0e3_wp*1.0e-8_wp &
+               .and. largest_divergence() > 1.0e-8_wp)
+    pressure%rough = .false.
+    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, box%bodies, pressure)
+    call check('then fine: divergence', largest_divergence() < 1.0e-8_wp)
+    call build(tank, .false.)
+    call solve()
+    call check('rough is less work', rough < pressure%report%iterations)
+  end subroutine rough_and_fine
+
+  !> A solve that leaves the body of the run aside knows nothing of the flux that it had before.
+  subroutine without_its_body()
+    type(rigid_motion_t) :: none
+
+    call build(tank, .false.)
+    call solve()
+    call check('the box had a flux', any(abs(box%flow%solid_flux) > 0.0_wp))
+    call stir()
+    none%n = 0
+    allocate (none%free(0))
+    call solve_pressure(box%grid, box%solid, box%flow%rho, dt, box%flow, none, pressure)
+    call check('without it: none', all(abs(box%flow%solid_flux) <= 0.0_wp))
+    call check('without it: divergence', largest_divergence() < 1.0e-8_wp)
+  end subroutine without_its_body
+
+  !> A free box: velocity and motion together lose their divergence, and what the one gains in
+  !! momentum along the period the other loses.
+  subroutine free_box()
+    real(wp), allocatable :: before(:, :, :, :)
+    real(wp) :: motion(6), force(6, 1), gain(6), fluid_gain
+    integer :: i, j, k
+
+    call build(channel, .true.)
+    box%flow%uf(cells(1) + 1, :, :, 1) = box%flow%uf(1, :, :, 1)
+    allocate (before, source=box%flow%uf)
+    motion = box%bodies%motion(:, 1)
+    call solve()
+    call check('free box: converged', pressure%report%converged)
+    call check('free box: divergence', largest_divergence() < 1.0e-8_wp)
+    call check('free box: it was pushed', all(abs(box%bodies%motion(:, 1) - motion) > 1.0e-5_wp))
+    gain(1:3) = box%bodies%mass(1)*(box%bodies%motion(1:3, 1) - motion(1:3))
+    gain(4:6) = matmul(box%bodies%inertia(:, :, 1), box%bodies%motion(4:6, 1) - motion(4:6))
+    call force_from_faces(box%grid, box%bodies, pressure%system%operator%flux, &
+                          pressure%phi_total, force)
+    call check('free box: momentum is force times step', gain(1:3), dt*force(1:3, 1), 1.0e-14_wp)
+    call check('free box: spin is torque times step', gain(4:6), dt*force(4:6, 1), 1.0e-15_wp)
+    fluid_gain = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          fluid_gain = fluid_gain + box%grid%volume*box%solid%effective(i, j, k, 1) &
+            *face_mean(box%flow%rho(i, j, k), box%flow%rho(merge(cells(1), i - 1, i == 1), j, k)) &
+            *(box%flow%uf(i, j, k, 1) - before(i, j, k, 1))
+        end do
+      end do
+    end do
+    call check('free box: momentum of fluid and box', fluid_gain + gain(1), 0.0_wp, 1.0e-13_wp)
+    call check('free box: momentum changes hands', abs(gain(1)) > 1.0e-5_wp)
+  end subroutine free_box
+
+  !> A free box half a millimetre deep in the floor of a closed box: its 4 x 2 covered cells below
+  !! take no part, and all open cells share the volume that they displace on its way down.
+  subroutine pressed_box()
+    real(wp) :: motion(6), force(6, 1), displaced
+    integer, parameter :: open_cells = 12*8*12 - 4*2*3
+
+    call build(closed, .true.)
+    box%case%body(1)%quaternion = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    box%case%body(1)%position(3) = 0.018_wp
+    box%case%body(1)%angular_velocity = 0.0_wp
+    call place(box)
+    call mix_fluid(box%case%fluid, box%flow)
+    call stir()
+    motion = box%bodies%motion(:, 1)
+    call solve()
+    call check('pressed box: converged', pressure%report%converged .and. &
+               any(pressure%report%passes == [1, 2]))
+    associate (m => box%bodies%motion(:, 1), at => [0.06_wp, 0.04_wp] - box%bodies%x(1:2, 1))
+      displaced = -8*box%grid%area(3)*(m(3) + m(4)*at(2) - m(5)*at(1)) &
+                  /(open_cells*box%grid%volume)
+    end associate
+    call divergence(box%grid, box%solid%effective, box%flow, pressure%system%active, &
+                    pressure%system%solver%rhs, force(1, 1))
+    associate (net => pressure%system%solver%rhs(1:12, 1:8, 1:12)/box%grid%volume)
+      call check('pressed box: evenly shared', maxval(abs(net - displaced), &
+                 pressure%system%active(1:12, 1:8, 1:12)), 0.0_wp, 1.0e-8_wp)
+    end associate
+    call check('pressed box: it moves on', abs(displaced) > 1.0e-3_wp)
+    call force_from_faces(box%grid, box%bodies, pressure%system%operator%flux, &
+                          pressure%phi_total, force)
+    call check('pressed box: momentum is force times step', box%bodies%mass(1) &
+               *(box%bodies%motion(1:3, 1) - motion(1:3)), dt*force(1:3, 1), 1.0e-13_wp)
+  end subroutine pressed_box
+
+  !> Liquid under gas around a held tilted box, level inside a cell: nothing moves, and the pressure
+  !! is the weight above.
+  subroutine still_water()
+    real(wp) :: expected, worst, g(3)
+    integer :: k
+
+    call build(tank, .false.)
+    g = box%case%fluid%gravity
+    box%bodies%motion = 0.0_wp
+    box%case%numerics%divergence_tolerance = 1.0e-9_wp
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a%face)
+    box%flow%uf = dt*a%face
+    call solve()
+    call check('still water: converged', pressure%report%converged)
+    worst = maxval(abs(box%flow%uf(1:12, 1:8, 1:13, :)), &
+                   mask=box%solid%aperture(1:12, 1:8, 1:13, :) > 0.0_wp)
+    call check('still water stays', worst, 0.0_wp, 1.0e-10_wp)
+    expected = 0.0_wp
+    do k = cells(3), 1, -1
+      expected = expected - g(3)*box%grid%h(3)*face_mean(box%flow%rho(1, 1, k), &
+                 merge(0.0_wp, box%flow%rho(1, 1, min(k + 1, cells(3))), k == cells(3)))
+      call check('still water: weight above', box%flow%p(2, 3, k), expected, 1.0e-5_wp)
+    end do
+  end subroutine still_water
+
+  !> Accelerations, their cell means by open shares, the face velocity predicted from cells.
+  subroutine accelerations_at_faces()
+    real(wp), parameter :: g(3) = [0.5_wp, -0.25_wp, -9.81_wp], rho = 1000.0_wp, nu = 1.0e-3_wp
+    real(wp) :: short, largest
+    integer :: i
+
+    call build(tank, .false.)
+    box%flow%rho = rho
+    box%flow%mu = rho*nu
+    do i = 1 - n_halo, cells(1) + n_halo
+      box%flow%p(i, :, :) = 40.0_wp*box%grid%centre(i, 1)**2
+    end do
+    call face_acceleration(box%grid, g, box%flow%rho, box%flow%rho, box%flow%p, a%face)
+    call check('acceleration: gravity less gradient', a%face(4, 3, 2, 1), &
+               0.5_wp - 80.0_wp*box%grid%face(4, 1)/rho, 1.0e-13_wp)
+    call check('acceleration: walls', abs(a%face(1, 3, 2, 1)) + abs(a%face(13, 3, 2, 1)), 0.0_wp, &
+               0.0_wp)
+    call check('acceleration: open top', a%face(4, 3, 13, 3), &
+               -9.81_wp + box%flow%p(4, 3, 12)/(0.005_wp*rho), 1.0e-12_wp)
+    call cell_mean_of_faces(box%grid, box%solid%aperture, a%face, a%cell)
+    i = findloc(box%solid%aperture(1:12, 4, 6, 1) > 0.0_wp .and. box%solid%aperture(1:12, 4, 6, 1) &
+                < 1.0_wp, .true., 1)
+    call check('a face is partly open', i > 1)
+    associate (w => box%solid%aperture(i:i + 1, 4, 6, 1))
+      call check('mean of faces by open shares', a%cell(i, 4, 6, 1)*sum(w), &
+                 dot_product(w, a%face(i:i + 1, 4, 6, 1)), 1.0e-13_wp)
+    end associate
+
+    box%flow%u(:, :, :, 1) = 0.7_wp
+    call fill_velocity_halo(box%grid, box%flow%u)
+    a%face = 2.0_wp
+    a%cell = 0.5_wp
+    call predict_face_velocity(box%grid, dt, box%flow%rho, a, box%flow)
+    short = dt/(1.0_wp + 2.0_wp*nu*dt*3.0_wp/0.01_wp**2)
+    call check('predicted face velocity', box%flow%uf(5, 3, 3, 1), 0.7_wp + 1.5_wp*short, &
+               1.0e-15_wp)
+    call check('predicted: wall', box%flow%uf(1, 3, 3, 1), 0.0_wp, 0.0_wp)
+    call check('predicted: open top', box%flow%uf(5, 3, 13, 3), 1.5_wp*dt, 1.0e-16_wp)
+    box%flow%solid_flux = 0.0_wp
+    associate (rhs => pressure%system%solver%rhs)
+      call divergence(box%grid, 0.0_wp*box%solid%effective + 1.0_wp, box%flow, &
+                      pressure%system%active, rhs, largest)
+      call check('divergence: largest', largest, maxval(abs(rhs(1:12, 1:8, 1:12))) &
+                 /box%grid%volume, 1.0e-12_wp)
+      call check('divergence: wall cell', rhs(1, 3, 3), box%grid%area(1)*(0.7_wp &
+                 + 1.5_wp*short), 1.0e-16_wp)
+    end associate
+  end subroutine accelerations_at_faces
+
+  !> Cells that cannot move take the pressure of their height; under a closed floor, from above.
+  subroutine closed_cells()
+    real(wp), parameter :: g(3) = [0.0_wp, 0.0_wp, -9.81_wp]
+    real(wp) :: worst
+    integer :: k
+
+    call build(tank, .false.)
+    do k = 1, cells(3)
+      box%flow%p(:, :, k) = hydrostatic(k)
+    end do
+    pressure%system%active = .true.
+    pressure%system%active(4:8, 3:7, 3:9) = .false.
+    pressure%system%active(:, :, 1) = .false.
+    pressure%system%active(2:3, 2:3, 2) = .false.
+    where (.not. pressure%system%active) box%flow%p = 1.0e9_wp
+    box%solid%alpha(9, 4:6, 5) = 0.99_wp   ! next to no water
+    box%flow%p(9, 4:6, 5) = 5.0e4_wp
+    call extend_pressure(box%grid, g, box%solid%alpha, box%flow, pressure)
+    call check('closed cells: next to no water keeps its pressure', box%flow%p(9, 5, 5), &
+               5.0e4_wp, 0.0_wp)
+    box%flow%p(9, 4:6, 5) = hydrostatic(5)
+    worst = 0.0_wp
+    do k = 1, cells(3)
+      worst = max(worst, maxval(abs(box%flow%p(1:12, 1:8, k) - hydrostatic(k))))
+    end do
+    call check('closed cells: hydrostatic', worst, 0.0_wp, 1.0e-9_wp)
+    call check('closed cells: halo', box%flow%p(5, 5, 0), hydrostatic(1), 1.0e-9_wp)
+  end subroutine closed_cells
+
+  !> What is quadratic comes from where the way of the body leads back to, but for the weight of
+  !! the water; what is far, what does not take part, and everything around a body at rest stays.
+  !! What is linear does so beside the body, too, whatever stands in its cells.
+  subroutine carried_with_a_body()
+    real(wp), dimension(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                        1 - n_halo:cells(3) + n_halo) :: before, alpha
+
+    call build(tank, .false.)
+    alpha = box%solid%alpha
+    a%given = .true.
+    a%given(5, 4, 6) = .false.
+    box%solid%alpha = 0.0_wp
+    call set_bowl(1.0e5_wp)
+    before = box%flow%p
+    call carry()
+    call check('carried pressure: from where the body came', worst(1.0e5_wp), 0.0_wp, 1.0e-9_wp)
+    call check('carried pressure: it did move', maxval(abs(box%flow%p - before)) > 0.1_wp)
+    call check('carried pressure: far away', box%flow%p(12, 8, 12), before(12, 8, 12), 0.0_wp)
+    box%solid%alpha = alpha
+    call set_bowl(0.0_wp)
+    where (alpha >= 1.0_wp) box%flow%p = 1.0e9_wp
+    call carry()
+    call check('carried pressure: continued into the body', worst(0.0_wp), 0.0_wp, 1.0e-9_wp)
+    box%solid%alpha = 0.0_wp
+    a%given = .true.
+    box%bodies%x(3, 1) = 0.02_wp   ! the floor is near
+    call set_bowl(0.0_wp)
+    box%flow%p = box%flow%p - slope()
+    call fill_scalar_halo(box%grid, box%flow%p)
+    before = box%flow%p
+    call carry()
+    call check('carried pressure: water at rest', maxval(abs(box%flow%p - before)), 0.0_wp, &
+               1.0e-9_wp)
+    box%flow%p(4:6, 3:5, 2:4) = box%flow%p(4:6, 3:5, 2:4) + 100.0_wp
+    before = box%flow%p
+    box%bodies%motion = 0.0_wp
+    call carry()
+    call check('carried pressure: at rest', maxval(abs(box%flow%p - before)), 0.0_wp, 0.0_wp)
+  end subroutine carried_with_a_body
+
+  !> One call, of the case as it is.
+  subroutine carry()
+    call advect_pressure(box%grid, weight, box%solid%alpha, box%bodies, dt, a, box%flow%p)
+  end subroutine carry
+
+  !> What a bowl without curvature adds to the pressure of the weight [Pa].
+  function slope() result(p)
+    real(wp) :: p(1 - n_halo:cells(1) + n_halo, 1 - n_halo:cells(2) + n_halo, &
+                  1 - n_halo:cells(3) + n_halo)
+    integer :: i, j, k
+
+    do k = 1 - n_halo, cells(3) + n_halo
+      do j = 1 - n_halo, cells(2) + n_halo
+        do i = 1 - n_halo, cells(1) + n_halo
+          p(i, j, k) = bowl(([i, j, k] - 0.5_wp)*box%grid%h, 0.0_wp)
+        end do
+      end do
+    end do
+  end function slope
+
+  !> Largest error of the open cells, but for those at the sides of the tank, beside which the
+  !! pressure is that of a wall.
+  function worst(curvature) result(error)
+    real(wp), intent(in) :: curvature
+    real(wp) :: error, way(3), arm(3), share, x(3)
+    integer :: i, j, k
+
+    error = 0.0_wp
+    do k = 1, cells(3)
+      do j = 1, cells(2)
+        do i = 1, cells(1)
+          if (box%solid%alpha(i, j, k) >= 1.0_wp) cycle
+          if (any([i, j, k] == 1 .or. [i, j, k] == cells)) cycle
+          x = ([i, j, k] - 0.5_wp)*box%grid%h
+          arm = x - box%bodies%x(:, 1)
+          share = min(1.0_wp, max(0.0_wp, 3.0_wp - 2.0_wp*norm2(arm)/box%bodies%radius(1)))
+          if (.not. a%given(i, j, k)) share = 0.0_wp
+          way = share*dt*wall_velocity(box%bodies%motion(:, 1), arm)
+          error = max(error, abs(box%flow%p(i, j, k) - dot_product(weight, x) &
+                                 - bowl(x - way, curvature)))
+        end do
+      end do
+    end do
+  end function worst
+
+  !> Pressure of the weight and of a bowl everywhere.
+  subroutine set_bowl(curvature)
+    real(wp), intent(in) :: curvature
+    real(wp) :: x(3)
+    integer :: i, j, k
+
+    do k = 1 - n_halo, cells(3) + n_halo
+      do j = 1 - n_halo, cells(2) + n_halo
+        do i = 1 - n_halo, cells(1) + n_halo
+          x = ([i, j, k] - 0.5_wp)*box%grid%h
+          box%flow%p(i, j, k) = dot_product(weight, x) + bowl(x, curvature)
+        end do
+      end do
+    end do
+  end subroutine set_bowl
+
+  !> What moves with the body, all second derivatives there [Pa].
+  pure function bowl(x, curvature) result(p)
+    real(wp), intent(in) :: x(3), curvature   !! [m, Pa/m2]
+    real(wp) :: p
+
+    p = 3.0e3_wp*x(1) - 2.0e3_wp*x(2) + 1.0e3_wp*x(3) + curvature* &
+        (x(1)**2 - 2*x(2)**2 + 3*x(3)**2 + x(1)*x(2) - 2*x(2)*x(3) + 4*x(3)*x(1))
+  end function bowl
+
+  !> Weight per area above the centre of the cells of height k, zero half a cell above the top [Pa].
+  function hydrostatic(k) result(p)
+    integer, intent(in) :: k
+    real(wp) :: p
+    integer :: m
+
+    p = 0.5_wp*box%flow%rho(1, 1, cells(3))
+    do m = k, cells(3) - 1
+      p = p + face_mean(box%flow%rho(1, 1, m), box%flow%rho(1, 1, m + 1))
+    end do
+    p = 9.81_wp*box%grid%h(3)*p
+  end function hydrostatic
+
+end module test_pressure_m

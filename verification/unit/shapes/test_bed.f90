@@ -1,0 +1,703 @@
+!> The bed: its file, its volume in cells and faces, distances, what is refused.
+module test_bed_m
+  use, intrinsic :: iso_fortran_env, only: real32, int32
+  use kinds_m, only: wp
+  use check_m, only: check
+  use errors_m, only: problems_t
+  use rotations_m, only: rotate
+  use case_types_m, only: case_t
+  use grid_m, only: grid_t, grid_init, n_halo
+  use solid_geometry_m, only: solid_geometry_t, solid_geometry_init
+  use links_on_grid_m, only: links_t, links_on_grid
+  use solid_fraction_m, only: solid_fraction_t, solid_fraction_init, update_solid
+  use cut_cell_m, only: cut_cell_t, cut_cell_init, load_cut_cell, open_below
+  use shapes_builtin_m, only: make_shape
+  use tet_mesh_m, only: shape_t
+  use rigid_body_m, only: blocks_t, blocks_init, release_body
+  use random_counter_m, only: uniform, random_rotation
+  use surface_search_m, only: found_t, nowhere
+  use walls_m, only: walls_t, walls_init
+  use deep_overlaps_m, only: deep_overlaps_t, deep_overlaps_init, ask_for_all
+  use overlap_m, only: overlap_t, overlap_init, overlap_depth, has_place, max_overlap
+  use contact_points_m, only: contact_points_t
+  use contact_surface_m, only: contact_surface_t, contact_surface_init, find_surface_points
+  use bed_file_m, only: bed_form_t, read_bed_file
+  use bed_m, only: bed_t, make_bed, set_bed, bed_covers, bed_distance, bed_place
+  implicit none
+  private
+  public :: test_bed
+
+  character(*), parameter :: lf = new_line('a')
+  character(4), parameter :: sides(2, 3) = 'slip'
+  real(wp), parameter :: slope(3) = [0.31_wp, -0.17_wp, 0.02_wp]   !! z = slope.(x, y, 1)
+
+contains
+
+  subroutine test_bed()
+    call files()
+    call odd_stl_files()
+    call volume_of_slope()
+    call volume_of_closed_form()
+    call periodic_bed()
+    call distance_from_slope()
+    call distance_from_trench()
+    call depth_in_bed()
+    call edge_on_saddle()
+    call refusals()
+  end subroutine test_bed
+
+  !> A tank with a map of the plane z = slope.(x, y, 1) of n points from x0 on.
+  subroutine sloping_tank(case, form)
+    type(case_t), intent(out) :: case
+    type(bed_form_t), intent(out) :: form
+    character(:), allocatable :: message
+    integer :: unit, i, j
+
+    case%grid%cells = [7, 5, 9]
+    case%grid%length = [0.1_wp, 0.08_wp, 0.09_wp]
+    case%grid%origin = [0.0_wp, 0.01_wp, 0.0_wp]
+    case%boundary%kind = sides
+    case%bed%file = 'slope.txt'
+    case%fluid%initial_state = ''
+    allocate (case%shape(0), case%body(0), case%drop(0), case%water(0))
+    open (newunit=unit, file='slope.txt', status='replace')
+    write (unit, '(a)') '# a plane', '6 5  -0.013 0 0.03 0.03  # points, first, spacing'
+    do j = 0, 4
+      write (unit, *) [(dot_product(slope, [-0.013_wp + 0.03_wp*i, 0.03_wp*j, 1.0_wp]), i=0, 5)]
+    end do
+    close (unit)
+    call read_bed_file('slope.txt', 'heightmap', form, message)
+    call check('the map is read: '//message, len(message) == 0)
+  end subroutine sloping_tank
+
+  !> One triangle in both forms of STL, a map, and everything that may be wrong with them.
+  subroutine files()
+    type(bed_form_t) :: form
+    character(:), allocatable :: message
+    real(real32), parameter :: corner(9) = [0.0, 0.0, 0.1, 1.0, 0.0, 0.2, 0.0, 1.0, 0.3]
+
+    call write_text('a.txt', '2 3 0 1 0.5 0.25 # head'//lf//'1 2'//lf//'3 4'//lf//'5 6'//lf)
+    call read_bed_file('a.txt', 'heightmap', form, message)
+    call check('map', len(message) == 0 .and. size(form%triangle, 2) == 4)
+    call check('its last point', form%point(:, 6), [0.5_wp, 1.5_wp, 6.0_wp], 0.0_wp)
+    call check('its first facets', all(form%triangle(:, :2) == reshape([1, 2, 4, 1, 4, 3], [3, 2])))
+    call write_text('a.stl', 'solid a'//lf//'facet normal 0 0 1'//lf//'outer loop'//lf &
+      //'vertex 0 0 0.1'//lf//'vertex 1 0 0.2'//lf//'vertex 0 1 0.3'//lf//'endloop'//lf &
+      //'endfacet'//lf//'endsolid a'//lf)
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('ASCII STL: '//message, size(form%triangle, 2), 1)
+    call check('its corners', reshape(form%point, [9]), real(corner, wp), 1.0e-7_wp)
+    call write_binary_stl(corner, '')
+    call read_bed_file('b.stl', 'stl', form, message)
+    call check('binary STL: '//message, size(form%triangle, 2), 1)
+    call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
+    call bad('b.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
+      //'heights; an STL file is read with kind = ''stl''')
+    call write_text('a.txt', 'x'//achar(27)//'[2J')
+    call bad('a.txt', 'heightmap', 'line 1: ''x?[2J'' stands where a whole number should')
+    call bad('missing.txt', 'heightmap', 'there is no such file, or it may not be read')
+    call write_text('a.txt', '')
+    call bad('a.txt', 'heightmap', 'the file is empty')
+    call bad('a.txt', 'stl', 'the file is empty')
+    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'3 x')
+    call bad('a.txt', 'heightmap', 'line 3: ''x'' stands where a number should')
+    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'3 NaN')
+    call bad('a.txt', 'heightmap', 'line 3: ''NaN'' stands where a number should')
+    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2'//lf//'-9999 3')
+    call bad('a.txt', 'heightmap', &
+      'line 3: is the height -9999 a mark of a missing one (NODATA)? Every point needs a ' &
+      //'height, fill the gaps first')
+    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3')
+    call bad('a.txt', 'heightmap', 'line 2: the file ends where a number should stand')
+    call write_text('a.txt', '2 2 0 0 1 1'//lf//'1 2 3 4 5')
+    call bad('a.txt', 'heightmap', &
+      'line 2: ''5'' stands where the end of 4 heights should')
+    call write_text('a.txt', '1 2 0 0 1 1'//lf//'1 2')
+    call bad('a.txt', 'heightmap', 'line 1: a map of heights needs two points at least in x and y')
+    call write_text('a.txt', '2 2 0 0 -1 1'//lf//'1 2 3 4')
+    call bad('a.txt', 'heightmap', 'line 1: the spacing must be positive')
+    call write_text('a.txt', '2000 2000 0 0 1 1'//lf//'1 2 3')
+    call bad('a.txt', 'heightmap', 'line 1: the file does not hold 4000000 heights')
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//'vertex 1 2 3'//lf//'vertex 1 2 4'//lf &
+      //'endfacet'//lf)
+    call bad('a.stl', 'stl', 'line 5: a facet of the file does not have three corners')
+    call write_text('a.stl', 'solid'//lf//'vertex 1 2 3'//lf//'vertex 1 2 4'//lf)
+    call bad('a.stl', 'stl', 'line 2: a vertex stands outside of a facet')
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//'vertex 1 2 3'//lf//'facet'//lf)
+    call bad('a.stl', 'stl', 'line 4: a facet begins before the last one ends')
+    call write_text('a.stl', 'solid a facet with a vertex'//lf//'facet'//lf//'vertex 1 2 3'//lf)
+    call bad('a.stl', 'stl', 'line 4: the file ends inside a facet')
+    call write_text('a.stl', 'solid a facet with a vertex'//lf//'endsolid')
+    call bad('a.stl', 'stl', 'line 2: the file holds no facets')
+    call write_text('a.stl', 'hollow')
+    call bad('a.stl', 'stl', &
+      'line 1: ''hollow'' stands where ''solid'', the start of an STL file, should')
+  end subroutine files
+
+  !> Keywords in capitals or in two words, a byte too much, coordinates of a survey.
+  subroutine odd_stl_files()
+    real(real32), parameter :: corner(9) = [0.0, 0.0, 0.1, 1.0, 0.0, 0.2, 0.0, 1.0, 0.3]
+    character(*), parameter :: vertices = 'VERTEX 0 0 .1'//lf//'Vertex 1 0 .2'//lf//'vertex 0 1 .3'
+    character(*), parameter :: far = 'vertex 5621080 0 0'//lf//'vertex 5621080.5 0 0'//lf
+    type(bed_form_t) :: form
+    character(:), allocatable :: message
+
+    call write_text('a.stl', 'SOLID A'//lf//'FACET NORMAL 0 0 1'//lf//'OUTER LOOP'//lf//vertices &
+      //lf//'ENDLOOP'//lf//'ENDFACET'//lf//'ENDSOLID A'//lf)
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('capitals: '//message, size(form%triangle, 2), 1)
+    call bad('a.stl', 'heightmap', 'looks like an STL or another binary file, not a map of ' &
+      //'heights; an STL file is read with kind = ''stl''')
+    call write_text('a.stl', 'solid a'//lf//'facet normal 0 0 1'//lf//'outer loop'//lf//vertices &
+      //lf//'end loop'//lf//'end facet'//lf//'End Solid a'//lf)
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('end solid: '//message, size(form%triangle, 2), 1)
+    call write_binary_stl(corner, lf)
+    call read_bed_file('b.stl', 'stl', form, message)
+    call check('a byte too much: '//message, size(form%triangle, 2), 1)
+    call check('and its corners', reshape(form%point, [9]), real(corner, wp), 0.0_wp)
+    call write_binary_stl(corner, repeat('x', 50))
+    call read_bed_file('b.stl', 'stl', form, message)
+    call check('a facet too much is none', len(message) > 0)
+    call write_binary_stl(corner + 4.0e6_real32, '')
+    call bad('b.stl', 'stl', 'lies too far from zero: coordinates of 4000001 m are rounded to ' &
+      //'0.25 m in single precision, and the form is 1 m long; move it near zero where it was ' &
+      //'made, and write it anew')
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621081.1 0 0'//lf//'endfacet')
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('flat facets far from zero: '//message, index(message, 'lies too far') == 1)
+    call write_text('a.stl', 'solid'//lf//'facet'//lf//far//'vertex 5621080 .1 0'//lf//'endfacet')
+    call read_bed_file('a.stl', 'stl', form, message)
+    call check('far from zero with all digits: '//message, len(message) == 0)
+  end subroutine odd_stl_files
+
+  !> A binary file of one facet, and what follows it.
+  subroutine write_binary_stl(corner, more)
+    real(real32), intent(in) :: corner(9)
+    character(*), intent(in) :: more
+    integer :: unit
+
+    open (newunit=unit, file='b.stl', access='stream', form='unformatted', status='replace')
+    write (unit) 'solid'//repeat(' ', 75), 1_int32, [0.0_real32, 0.0_real32, 1.0_real32], corner, &
+      'xx', more
+    close (unit)
+  end subroutine write_binary_stl
+
+  subroutine bad(file, kind, expected)
+    character(*), intent(in) :: file, kind, expected
+    type(bed_form_t) :: form
+    character(:), allocatable :: message
+
+    call read_bed_file(file, kind, form, message)
+    call check(file//': '//message, message == expected)
+  end subroutine bad
+
+  subroutine write_text(file, text)
+    character(*), intent(in) :: file, text
+    integer :: unit
+
+    open (newunit=unit, file=file, access='stream', form='unformatted', status='replace')
+    write (unit) text
+    close (unit)
+  end subroutine write_text
+
+  !> Solids of a bed alone.
+  subroutine fill(case, form, grid, solid)
+    type(case_t), intent(in) :: case
+    type(bed_form_t), intent(in) :: form
+    type(grid_t), intent(out) :: grid
+    type(solid_geometry_t), intent(out) :: solid
+    type(solid_fraction_t) :: fraction
+    type(blocks_t) :: blocks
+    type(bed_t) :: bed
+    character(:), allocatable :: message
+
+    call grid_init(case%grid, case%boundary, grid)
+    call set_bed(case, form, bed, message)
+    call check('the bed is made: '//message, bed%there)
+    allocate (blocks%present(0))
+    call solid_geometry_init(grid, solid, 1)
+    call solid_fraction_init(grid, blocks, fraction, bed=bed)
+    call update_solid(fraction, grid, blocks, solid)
+  end subroutine fill
+
+  !> Under a plane the solid in a column of cells is as high as the plane in its middle; a column of
+  !! side faces likewise.
+  subroutine volume_of_slope()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(grid_t) :: grid
+    type(solid_geometry_t) :: solid
+    real(wp) :: worst(4), height
+    integer :: i, j
+
+    call sloping_tank(case, form)
+    call fill(case, form, grid, solid)
+    worst = 0.0_wp
+    do j = 1, grid%n(2)
+      do i = 1, grid%n(1)
+        height = dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])
+        worst(1) = max(worst(1), abs(sum(solid%alpha(i, j, 1:grid%n(3)))*grid%h(3) - height))
+        height = dot_product(slope, [grid%face(i, 1), grid%centre(j, 2), 1.0_wp])
+        worst(2) = max(worst(2), abs(sum(1.0_wp - solid%aperture(i, j, 1:grid%n(3), 1))*grid%h(3) &
+                                     - height))
+        height = dot_product(slope, [grid%centre(i, 1), grid%face(j, 2), 1.0_wp])
+        worst(3) = max(worst(3), abs(sum(1.0_wp - solid%aperture(i, j, 1:grid%n(3), 2))*grid%h(3) &
+                                     - height))
+        height = dot_product(slope, [grid%centre(i, 1), grid%centre(j, 2), 1.0_wp])
+        if (any((solid%inside(i, j, 1:grid%n(3)) == 1) .neqv. &
+                (grid%centre([(i, i=1, grid%n(3))], 3) < height))) worst(4) = 1.0_wp
+      end do
+    end do
+    call check('height of the columns', worst(1), 0.0_wp, 1.0e-15_wp)
+    call check('of the faces in x', worst(2), 0.0_wp, 1.0e-15_wp)
+    call check('of the faces in y', worst(3), 0.0_wp, 1.0e-15_wp)
+    call check('centres inside', worst(4), 0.0_wp, 0.0_wp)
+    call check('of the faces in z, by points', worst_level_face(grid, solid), 0.0_wp, 0.03_wp)
+  end subroutine volume_of_slope
+
+  !> Shares of the faces in z against the points of them that lie under the slope: largest error.
+  function worst_level_face(grid, solid) result(worst)
+    type(grid_t), intent(in) :: grid
+    type(solid_geometry_t), intent(in) :: solid
+    integer, parameter :: n = 40   ! points in each direction
+    real(wp) :: worst, x(3)
+    integer :: i, j, k, a, b, below
+
+    worst = 0.0_wp
+    do k = 1, grid%n(3)
+      do j = 1, grid%n(2)
+        do i = 1, grid%n(1)
+          below = 0
+          do b = 1, n
+            do a = 1, n
+              x(1) = grid%face(i, 1) + (real(a, wp) - 0.5_wp)/real(n, wp)*grid%h(1)
+              x(2) = grid%face(j, 2) + (real(b, wp) - 0.5_wp)/real(n, wp)*grid%h(2)
+              if (dot_product(slope, [x(1), x(2), 1.0_wp]) > grid%face(k, 3)) below = below + 1
+            end do
+          end do
+          worst = max(worst, abs(1.0_wp - solid%aperture(i, j, k, 3) &
+                                 - real(below, wp)/real(n**2, wp)))
+        end do
+      end do
+    end do
+  end function worst_level_face
+
+  !> A hexapod as a bed, closed and overhanging, fills the grid as the same hexapod does as a body:
+  !! shares, faces, links, and the liquid below any plane in its cut cells.
+  subroutine volume_of_closed_form()
+    type(case_t) :: case
+    type(grid_t) :: grid
+    type(shape_t) :: shapes(1)
+    type(blocks_t) :: blocks
+    type(solid_fraction_t) :: fraction
+    type(solid_geometry_t) :: solid, of_bed
+    type(links_t) :: links, links_of_bed
+    type(bed_form_t) :: form
+    type(cut_cell_t) :: a, b
+    character(:), allocatable :: message
+    real(wp) :: worst(6), m(3), share(2), at
+    integer :: pose, i, j, k, v
+
+    call hexapod_case(case, shapes(1))
+    call cut_cell_init(a)
+    call cut_cell_init(b)
+    worst = 0.0_wp
+    do pose = 1, 6
+      case%body(1)%position = 0.05_wp + 0.01_wp*[(uniform(pose, v, 1) - 0.5_wp, v=1, 3)]
+      if (pose > 1) case%body(1)%quaternion = random_rotation(7, pose)
+      call blocks_init(case, shapes, blocks)
+      call grid_init(case%grid, case%boundary, grid)
+      call solid_geometry_init(grid, solid, 1)
+      call solid_fraction_init(grid, blocks, fraction)
+      call update_solid(fraction, grid, blocks, solid)
+      form = form_of(shapes(1), blocks%x(:, 1), blocks%q(:, 1))
+      call fill(case, form, grid, of_bed)
+      worst(1) = max(worst(1), maxval(abs(solid%alpha - of_bed%alpha)))
+      worst(2) = max(worst(2), maxval(abs(solid%aperture - of_bed%aperture)))
+      links = links_on_grid(solid)
+      links_of_bed = links_on_grid(of_bed)
+      worst(3) = max(worst(3), maxval(abs(links%low - links_of_bed%low)))
+      worst(4) = max(worst(4), maxval(abs(links%high - links_of_bed%high)))
+      worst(5) = max(worst(5), real(maxval(abs(solid%inside - of_bed%inside)), wp))
+      do k = 1, grid%n(3)
+        do j = 1, grid%n(2)
+          do i = 1, grid%n(1)
+            if (solid%cut(i, j, k) == 0 .or. of_bed%cut(i, j, k) == 0) cycle
+            m = [grid%face(i, 1), grid%face(j, 2), grid%face(k, 3)]
+            call load_cut_cell(solid, solid%cut(i, j, k), m, grid%h, a)
+            call load_cut_cell(of_bed, of_bed%cut(i, j, k), m, grid%h, b)
+            m = [(2*uniform(i, 10*j + v, k) - 1.0_wp, v=1, 3)]
+            at = sum(min(m, 0.0_wp)) + uniform(i, 10*j, k)*sum(abs(m))
+            call open_below(a, m, at, share(1))
+            call open_below(b, m, at, share(2))
+            worst(6) = max(worst(6), abs(share(1) - share(2)))
+          end do
+        end do
+      end do
+    end do
+    message = 'hexapod as body and as bed: '
+    call check(message//'cells', worst(1), 0.0_wp, 1.0e-12_wp)
+    call check(message//'faces', worst(2), 0.0_wp, 1.0e-12_wp)
+    call check(message//'links up', worst(3), 0.0_wp, 1.0e-11_wp)
+    call check(message//'links down', worst(4), 0.0_wp, 1.0e-11_wp)
+    call check(message//'centres', worst(5), 0.0_wp, 0.0_wp)
+    call check(message//'liquid in cut cells', worst(6), 0.0_wp, 1.0e-11_wp)
+  end subroutine volume_of_closed_form
+
+  subroutine hexapod_case(case, shape)
+    type(case_t), intent(out) :: case
+    type(shape_t), intent(out) :: shape
+    character(:), allocatable :: message
+
+    case%grid%cells = [9, 10, 11]
+    case%grid%length = 0.1_wp
+    case%boundary%kind = sides
+    case%fluid%initial_state = ''
+    case%bed%file = ''
+    allocate (case%shape(1), case%body(1), case%drop(0), case%water(0))
+    case%shape(1)%name = 'h'
+    case%shape(1)%kind = 'hexapod'
+    case%shape(1)%size = 0.02_wp
+    case%body(1)%shape = 'h'
+    case%body(1)%fixed = .true.
+    call make_shape(case%shape(1), shape, message)
+  end subroutine hexapod_case
+
+  !> The surface of a shape at a pose, three corners for each triangle, as an STL file has it.
+  function form_of(shape, x, q) result(form)
+    type(shape_t), intent(in) :: shape
+    real(wp), intent(in) :: x(3), q(4)
+    type(bed_form_t) :: form
+    integer :: t, c, n
+
+    n = size(shape%triangle, 2)
+    allocate (form%point(3, 3*n))
+    do t = 1, n
+      do c = 1, 3
+        form%point(:, 3*t - 3 + c) = x + rotate(q, shape%point(:, shape%triangle(c, t)))
+      end do
+    end do
+    allocate (form%triangle, source=reshape([(c, c=1, 3*n)], [3, n]))
+    form%checksum = ''
+  end function form_of
+
+  !> A wavy map in a periodic tank: cells and faces beyond a side are those of the other side.
+  subroutine periodic_bed()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(bed_t) :: bed
+    type(grid_t) :: grid
+    type(solid_geometry_t) :: solid
+    real(wp) :: height(9, 2), x(3)
+    character(:), allocatable :: message
+    integer :: i, unit, n(3)
+
+    call sloping_tank(case, form)
+    case%grid%cells = [8, 1, 9]
+    case%grid%origin = 0.0_wp
+    case%boundary%kind(:, 1:2) = 'periodic'
+    do i = 1, 9
+      height(i, :) = 0.03_wp + 0.01_wp*sin(8*atan(1.0_wp)*real(i - 1, wp)/8.0_wp)
+    end do
+    open (newunit=unit, file='wave.txt', status='replace')
+    write (unit, *) 9, 2, 0.0_wp, 0.0_wp, 0.0125_wp, 0.08_wp, height
+    close (unit)
+    call read_bed_file('wave.txt', 'heightmap', form, message)
+    call fill(case, form, grid, solid)
+    n = grid%n
+    call check('cells beyond a periodic side', maxval(abs(solid%alpha(-2:0, :, :) &
+      - solid%alpha(n(1) - 2:n(1), :, :))), 0.0_wp, 1.0e-13_wp)
+    call check('faces beyond a periodic side', maxval(abs(solid%aperture(1 - n_halo:2, :, 1:9, :) &
+      - solid%aperture(n(1) + 1 - n_halo:n(1) + 2, :, 1:9, :))), 0.0_wp, 1.0e-13_wp)
+    call check('slices of one cell', maxval(abs(solid%aperture(1:8, 1, 1:9, 2) &
+      - 1.0_wp + solid%alpha(1:8, 1, 1:9))), 0.0_wp, 1.0e-13_wp)
+    call check('height of a column', sum(solid%alpha(3, 1, 1:9))*grid%h(3), &
+      0.5_wp*(height(3, 1) + height(4, 1)), 1.0e-15_wp)
+    call set_bed(case, form, bed, message)
+    x = bed_place(bed, [0.33_wp, -0.5_wp, 0.4_wp])
+    call check('a place in the tank', x, [0.03_wp, 0.06_wp, 0.4_wp], 1.0e-15_wp)
+  end subroutine periodic_bed
+
+  !> From a plane the distance is the height above it times the cosine of its slope; also inside,
+  !! as deep as is asked.
+  subroutine distance_from_slope()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(bed_t) :: bed
+    type(found_t) :: found
+    character(:), allocatable :: message
+    real(wp) :: normal(3), x(3), d, outward(3), exact, worst(3)
+    integer :: i, v
+
+    call sloping_tank(case, form)
+    call set_bed(case, form, bed, message)
+    normal = [-slope(1), -slope(2), 1.0_wp]
+    normal = normal/norm2(normal)
+    worst = 0.0_wp
+    do i = 1, 500
+      x = [0.02_wp, 0.03_wp, -0.05_wp] + [(uniform(i, 2, v), v=1, 3)]*[0.06_wp, 0.04_wp, 0.16_wp]
+      exact = normal(3)*(x(3) - slope(3)) + dot_product(normal(1:2), x(1:2))
+      if (bed_covers(bed, x) .neqv. exact < 0.0_wp) worst(1) = 1.0_wp
+      call bed_distance(bed, x, 0.01_wp, 0.015_wp, found, d, outward)
+      if (exact > 0.01_wp) then
+        if (d < 0.01_wp) worst(2) = 1.0_wp
+      else if (exact < -0.015_wp) then
+        if (d > -0.015_wp) worst(2) = 1.0_wp
+      else
+        worst(2) = max(worst(2), abs(d - exact))
+        worst(3) = max(worst(3), norm2(outward - normal))
+      end if
+    end do
+    call check('inside the slope', worst(1), 0.0_wp, 0.0_wp)
+    call check('distance from the slope', worst(2), 0.0_wp, 1.0e-15_wp)
+    call check('direction from the slope', worst(3), 0.0_wp, 1.0e-13_wp)
+  end subroutine distance_from_slope
+
+  !> A trench with vertical walls, closed below: the nearest of bottom, walls and rims.
+  subroutine distance_from_trench()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(bed_t) :: bed
+    type(found_t) :: found
+    character(:), allocatable :: message
+    real(wp) :: d, outward(3)
+
+    call trench(case, form)
+    call set_bed(case, form, bed, message)
+    call check('the trench is made: '//message, bed%there)
+    call check_distance(bed, [0.045_wp, 0.052_wp, 0.024_wp], 0.004_wp, [0.0_wp, 0.0_wp, 1.0_wp], &
+      'bottom')
+    call check_distance(bed, [0.042_wp, 0.052_wp, 0.027_wp], 0.002_wp, [1.0_wp, 0.0_wp, 0.0_wp], &
+      'wall')
+    call check_distance(bed, [0.037_wp, 0.052_wp, 0.044_wp], 0.004_wp, [0.0_wp, 0.0_wp, 1.0_wp], &
+      'beside it')
+    call check_distance(bed, [0.043_wp, 0.052_wp, 0.044_wp], 0.005_wp, [0.6_wp, 0.0_wp, 0.8_wp], &
+      'over the rim')
+    call check_distance(bed, [0.037_wp, 0.052_wp, 0.036_wp], -0.003_wp, [1.0_wp, 0.0_wp, 0.0_wp], &
+      'in the wall')
+    call check_distance(bed, [0.037_wp, 0.052_wp, 0.016_wp], -0.005_wp, [0.6_wp, 0.0_wp, 0.8_wp], &
+      'below the edge')
+    call bed_distance(bed, [0.05_wp, 0.052_wp, 0.08_wp], 0.02_wp, 0.05_wp, found, d, &
+      outward)
+    call check('high above', d, nowhere, 0.0_wp)
+  end subroutine distance_from_trench
+
+  subroutine check_distance(bed, x, exact, direction, name)
+    type(bed_t), intent(in) :: bed
+    real(wp), intent(in) :: x(3), exact, direction(3)
+    character(*), intent(in) :: name
+    type(found_t) :: found
+    real(wp) :: d, outward(3)
+
+    call bed_distance(bed, x, merge(0.0055_wp, 0.0011_wp, exact > 0.0_wp), 0.05_wp, found, &
+      d, outward)
+    call check('trench, '//name, d, exact, 1.0e-15_wp)
+    call check('trench, direction '//name, outward, direction, 1.0e-12_wp)
+  end subroutine check_distance
+
+  !> A bed at z = 0.04 with a trench along y, from x = 0.04 to 0.06, down to z = 0.02.
+  subroutine trench(case, form)
+    type(case_t), intent(out) :: case
+    type(bed_form_t), intent(out) :: form
+    real(wp), parameter :: x(6) = [0.0_wp, 0.04_wp, 0.04_wp, 0.06_wp, 0.06_wp, 0.1_wp]
+    real(wp), parameter :: z(6) = [0.04_wp, 0.04_wp, 0.02_wp, 0.02_wp, 0.04_wp, 0.04_wp]
+    integer :: i
+
+    case%grid%cells = 10
+    case%grid%length = 0.1_wp
+    case%boundary%kind = sides
+    allocate (form%point(3, 12), form%triangle(3, 10))
+    form%checksum = ''
+    do i = 1, 6
+      form%point(:, i) = [x(i), 0.0_wp, z(i)]
+      form%point(:, i + 6) = [x(i), 0.1_wp, z(i)]
+    end do
+    do i = 1, 5
+      form%triangle(:, 2*i - 1) = [i, i + 1, i + 7]
+      form%triangle(:, 2*i) = [i, i + 7, i + 6]
+    end do
+  end subroutine trench
+
+  !> Depth of a cube in a plane bed: of its lowest corner; and of a hexapod in a hexapod as in a
+  !! body. A body has room down to 1 % of its size.
+  subroutine depth_in_bed()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(shape_t) :: shapes(1)
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(overlap_t) :: overlap
+    type(deep_overlaps_t) :: deep
+    character(:), allocatable :: message
+    real(wp) :: x(3), depth, exact, worst
+    integer :: i, n
+
+    call hexapod_case(case, shapes(1))
+    x = 0.05_wp
+    form = form_of(shapes(1), x, [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+    call walls_init(case%grid, case%boundary, walls)
+    walls%n = 0
+    call set_bed(case, form, walls%bed, message)
+    case%body(1)%fixed = .false.
+    worst = 0.0_wp
+    n = 0
+    do i = 1, 400
+      case%body(1)%position = x + 0.05_wp*(2*uniform(3, i, 1) - 1.0_wp)*[1.0_wp, 0.3_wp, 0.2_wp]
+      case%body(1)%quaternion = random_rotation(9, i)
+      call blocks_init(case, shapes, blocks)
+      call overlap_init(shapes, 1, overlap)
+      call deep_overlaps_init(blocks, deep)
+      call ask_for_all(deep)
+      call max_overlap(walls, blocks, overlap, depth, deep)
+      exact = overlap_depth(shapes(1), blocks%x(:, 1), blocks%q(:, 1), shapes(1), x, &
+        [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp])
+      if (exact > 0.004_wp) cycle   ! deeper, points inside faces decide: the bed has none
+      if (depth > 0.0_wp) n = n + 1
+      worst = max(worst, abs(depth - exact))
+    end do
+    call check('hexapods that touch', n >= 15)
+    call check('hexapod in a bed as in a body', worst, 0.0_wp, 1.0e-12_wp)   ! of the same points
+    call trench(case, form)
+    call set_bed(case, form, walls%bed, message)
+    blocks%q(:, 1) = [1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+    blocks%x(:, 1) = [0.018_wp, 0.05_wp, 0.0699_wp]
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('a foot in the bed', depth, 1.0e-4_wp, 1.0e-12_wp)
+    call check('has room', has_place(walls, blocks, 1, overlap))
+    blocks%x(3, 1) = 0.0697_wp
+    call check('has no room', .not. has_place(walls, blocks, 1, overlap))
+    blocks%x(3, 1) = -0.05_wp
+    call check('deep in the bed has no room', .not. has_place(walls, blocks, 1, overlap))
+    blocks%x(:, 1) = [0.05_wp, 0.05_wp, 0.0501_wp]   ! the foot stands in the trench, just as wide
+    call max_overlap(walls, blocks, overlap, depth, deep)
+    call check('a foot in the trench', depth, 0.0_wp, 1.0e-12_wp)
+  end subroutine depth_in_bed
+
+  !> An edge across a saddle of the bed: it rests on the corner where both ridges end.
+  subroutine edge_on_saddle()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+    type(shape_t) :: shapes(1)
+    type(blocks_t) :: blocks
+    type(walls_t) :: walls
+    type(contact_surface_t) :: contact
+    type(contact_points_t) :: points
+    character(:), allocatable :: message
+    real(wp), parameter :: deep = 1.0e-4_wp, edge = 0.02_wp, top = 0.04_wp
+    integer, parameter :: round(9) = [2, 3, 6, 9, 8, 7, 4, 1, 2]   ! the points about the fifth
+    integer :: i, j
+
+    call hexapod_case(case, shapes(1))
+    case%shape(1)%kind = 'box'
+    case%shape(1)%size = [3*edge, edge, edge]
+    call make_shape(case%shape(1), shapes(1), message)
+    case%body(1)%fixed = .false.
+    case%body(1)%position = [0.05_wp, 0.05_wp, top + edge*sqrt(0.5_wp) - deep]
+    case%body(1)%quaternion = [cos(atan(1.0_wp)/2), sin(atan(1.0_wp)/2), 0.0_wp, 0.0_wp]
+    allocate (form%point(3, 9), form%triangle(3, 8))
+    form%checksum = ''
+    do j = -1, 1
+      do i = -1, 1   ! falls along x, rises along y
+        form%point(:, 5 + i + 3*j) = [0.05_wp*(1 + i), 0.05_wp*(1 + j), top + 0.01_wp*(j**2 - i**2)]
+      end do
+    end do
+    do i = 1, 8
+      form%triangle(:, i) = [5, round(i + 1), round(i)]
+    end do
+    call walls_init(case%grid, case%boundary, walls)
+    walls%n = 0
+    call set_bed(case, form, walls%bed, message)
+    call check('a saddle: '//message, len(message) == 0)
+    call blocks_init(case, shapes, blocks)
+    call contact_surface_init(0.1_wp, 1.0e-3_wp, blocks, contact)
+    call find_surface_points(walls, blocks, 0.0_wp, contact, points)
+    call check('an edge on a saddle touches it', points%n > 0)
+    call check('as deep as it lies', maxval(points%item(:points%n)%depth), deep*sqrt(0.5_wp), &
+      1.0e-12_wp)
+  end subroutine edge_on_saddle
+
+  !> What `--check` refuses.
+  subroutine refusals()
+    type(case_t) :: case
+    type(bed_form_t) :: form
+
+    call sloping_tank(case, form)
+    call refused(case, '', 'the slope')
+    case%grid%origin(1) = -0.02_wp
+    call refused(case, 'the map does not cover the tank', 'a short map')
+    case%grid%origin(1) = 0.0_wp
+    case%grid%length(3) = 0.04_wp
+    call refused(case, 'out of the tank', 'a high bed')
+    case%grid%length(3) = 0.09_wp
+    case%grid%origin(3) = 0.06_wp
+    call refused(case, 'the bed lies below the tank', 'a low bed')
+    case%grid%origin(3) = 0.0_wp
+    case%boundary%kind(:, 1) = 'periodic'
+    call refused(case, 'as long as the period', 'a map longer than the period')
+    case%boundary%kind(:, 1) = 'slip'
+    call write_text('a.txt', '2 2 0 0 100 100'//lf//'20 20 20 20')
+    case%bed%file = 'a.txt'
+    call refused(case, 'are its coordinates in mm?', 'millimetres')
+    case%bed%file = 'a.stl'
+    case%bed%kind = 'stl'
+    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 1)
+    call refused(case, '', 'a closed pyramid')
+    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, -1)
+    call refused(case, 'looks down with no solid above it', 'a pyramid inside out')
+    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 0)
+    call refused(case, 'open edges inside the tank', 'a pyramid without a side')
+    call write_stl([0.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, 2)
+    call refused(case, 'solid lies in solid', 'two pyramids in one another')
+    call write_stl([0.53_wp, 0.03_wp, 0.02_wp], 0.03_wp, 1)
+    call refused(case, 'outside the tank in x', 'a pyramid elsewhere')
+    case%grid%origin(1) = 354200.0_wp
+    call write_stl([354200.03_wp, 0.03_wp, 0.02_wp], 0.03_wp, -1)
+    call refused(case, 'x, y, z = 354200.0', 'a pyramid inside out in a survey')
+  end subroutine refusals
+
+  subroutine refused(case, expected, name)
+    type(case_t), intent(in) :: case
+    character(*), intent(in) :: expected, name
+    type(bed_t) :: bed
+    type(problems_t) :: problems
+
+    call make_bed(case, bed, problems)
+    if (len(expected) == 0) then
+      call check(name//' is good', problems%n, 0)
+      if (problems%n == 0) return
+    end if
+    call check(name//' is refused', problems%n, 1)
+    if (problems%n == 1) call check(name//': '//problems%message(1), &
+      index(problems%message(1), expected) > 0)
+  end subroutine refused
+
+  !> A tetrahedron as ASCII STL: 1 good, -1 inside out, 0 without a facet, 2 twice.
+  subroutine write_stl(corner, edge, how)
+    real(wp), intent(in) :: corner(3), edge
+    integer, intent(in) :: how
+    integer, parameter :: face(3, 4) = reshape([1, 3, 2, 1, 2, 4, 2, 3, 4, 1, 4, 3], [3, 4])
+    real(wp) :: p(3, 4)
+    integer :: unit, f, c, copy
+
+    p = spread(corner, 2, 4)
+    do c = 1, 3
+      p(c, c + 1) = p(c, c + 1) + edge
+    end do
+    open (newunit=unit, file='a.stl', status='replace')
+    write (unit, '(a)') 'solid pyramid'
+    do copy = 1, max(1, how)
+      do f = 1, merge(3, 4, how == 0)
+        write (unit, '(a)') 'facet normal 0 0 0', 'outer loop'
+        do c = 1, 3
+          write (unit, '(a, 3es25.16)') 'vertex', &
+            p(:, face(merge(4 - c, c, how < 0), f)) + 0.005_wp*real(copy - 1, wp)
+        end do
+        write (unit, '(a)') 'endloop', 'endfacet'
+      end do
+    end do
+    write (unit, '(a)') 'endsolid pyramid'
+    close (unit)
+  end subroutine write_stl
+
+end module test_bed_m

@@ -1,0 +1,305 @@
+!> Volume, centroid and inertia from tetrahedra against closed forms and surface integrals.
+module test_mass_properties_m
+  use kinds_m, only: wp, pi
+  use check_m, only: check
+  use case_types_m, only: shape_input_t
+  use tet_mesh_m, only: shape_t
+  use shapes_builtin_m, only: make_shape
+  use mass_properties_m, only: volume_and_centroid, inertia_about_origin
+  implicit none
+  private
+  public :: test_mass_properties
+
+  real(wp), parameter :: rho = 2300.0_wp
+
+contains
+
+  subroutine test_mass_properties()
+    call hexapod()
+    call box()
+    call sphere()
+    call moved_block()
+    call built_of_parts()
+    call tetrapod()
+  end subroutine test_mass_properties
+
+  subroutine build(kind, size, refinement, shape)
+    character(*), intent(in) :: kind
+    real(wp), intent(in) :: size(3)
+    integer, intent(in) :: refinement
+    type(shape_t), intent(out) :: shape
+    type(shape_input_t) :: input
+    character(:), allocatable :: message
+
+    input%kind = kind
+    input%size = size
+    input%refinement = refinement
+    input%density = rho
+    call make_shape(input, shape, message)
+    call check(kind//' is built', message == '')
+  end subroutine build
+
+  pure function flat(a) result(b)
+    real(wp), intent(in) :: a(3, 3)
+    real(wp) :: b(9)
+
+    b = reshape(a, [9])
+  end function flat
+
+  pure function diagonal(d) result(a)
+    real(wp), intent(in) :: d(3)
+    real(wp) :: a(3, 3)
+    integer :: i
+
+    a = 0.0_wp
+    do i = 1, 3
+      a(i, i) = d(i)
+    end do
+  end function diagonal
+
+  !> V = 7 d^3, J = 31/6 rho d^5, the same about every axis, whatever the mesh.
+  subroutine hexapod()
+    type(shape_t) :: s
+    real(wp), parameter :: d = 0.02_wp, j = 31.0_wp/6.0_wp*rho*d**5
+    integer :: r
+
+    do r = 1, 4
+      call build('hexapod', [d, 0.0_wp, 0.0_wp], r, s)
+      call check('hexapod: volume', s%volume, 7*d**3, 1e-14_wp*7*d**3)
+      call check('hexapod: inertia', flat(s%inertia), flat(diagonal([j, j, j])), 1e-14_wp*j)
+    end do
+    call check('hexapod: 3.803e-5 kg m2', j, 3.803e-5_wp, 5e-9_wp)
+  end subroutine hexapod
+
+  subroutine box()
+    type(shape_t) :: s
+    real(wp), parameter :: e(3) = [0.01_wp, 0.025_wp, 0.06_wp]
+    real(wp) :: m, want(3)
+
+    call build('box', e, 2, s)
+    m = rho*product(e)
+    want = m/12*[e(2)**2 + e(3)**2, e(3)**2 + e(1)**2, e(1)**2 + e(2)**2]
+    call check('box: volume', s%volume, product(e), 1e-14_wp*product(e))
+    call check('box: inertia', flat(s%inertia), flat(diagonal(want)), 1e-14_wp*maxval(want))
+  end subroutine box
+
+  !> The polyhedron: isotropic, equal to its surface integral, close to the true sphere.
+  subroutine sphere()
+    type(shape_t) :: s
+    real(wp), parameter :: a = 0.03_wp, want = 0.4_wp*rho*(4*pi/3*a**3)*a**2
+    real(wp) :: error(2)
+    integer :: r
+
+    do r = 1, 2
+      call build('sphere', [2*a, 0.0_wp, 0.0_wp], r, s)
+      call check('sphere: isotropic', flat(s%inertia), &
+                 flat(diagonal(spread(s%inertia(1, 1), 1, 3))), 1e-13_wp*want)
+      call check('sphere: inertia by the surface', flat(s%inertia), flat(inertia_of_surface(s)), &
+                 1e-13_wp*want)
+      error(r) = s%inertia(1, 1)/want - 1
+    end do
+    call check('sphere: inertia within 0.1 per cent', abs(error(2)) < 1e-3_wp)
+    call check('sphere: fourth order, since the volume is right', abs(error(1)/error(2) - 16) < 2)
+  end subroutine sphere
+
+  !> Divergence theorem: integral of x_i^2 dV = surface integral of x_i^3/3 n_i dA (and so on).
+  function inertia_of_surface(s) result(inertia)
+    type(shape_t), intent(in) :: s
+    real(wp) :: inertia(3, 3), second(3, 3), x(3, 3), normal(3), u(3), v(3), y(3)
+    real(wp), parameter :: w(4) = [-27.0_wp, 25.0_wp, 25.0_wp, 25.0_wp]/48.0_wp   ! exact for cubics
+    real(wp), parameter :: b(3, 4) = reshape([1.0_wp/3, 1.0_wp/3, 1.0_wp/3, &
+      0.6_wp, 0.2_wp, 0.2_wp, 0.2_wp, 0.6_wp, 0.2_wp, 0.2_wp, 0.2_wp, 0.6_wp], [3, 4])
+    integer :: t, g, i, j
+
+    second = 0.0_wp
+    do t = 1, size(s%triangle, 2)
+      x = s%point(:, s%triangle(:, t))
+      u = x(:, 2) - x(:, 1)
+      v = x(:, 3) - x(:, 1)
+      normal = 0.5_wp*[u(2)*v(3) - u(3)*v(2), u(3)*v(1) - u(1)*v(3), u(1)*v(2) - u(2)*v(1)]
+      do g = 1, 4
+        y = matmul(x, b(:, g))
+        do j = 1, 3
+          do i = 1, 3
+            if (i == j) second(i, i) = second(i, i) + w(g)*y(i)**3*normal(i)/3
+            if (i /= j) second(i, j) = second(i, j) + w(g)*0.5_wp*y(i)**2*y(j)*normal(i)
+          end do
+        end do
+      end do
+    end do
+    inertia = -rho*second
+    do i = 1, 3
+      inertia(i, i) = rho*(second(1, 1) + second(2, 2) + second(3, 3) - second(i, i))
+    end do
+  end function inertia_of_surface
+
+  !> A shifted mesh: centroid follows, inertia by the parallel axes.
+  subroutine moved_block()
+    type(shape_t) :: s
+    real(wp) :: volume, x(3), want(3, 3), shift(3)
+    real(wp), allocatable :: point(:, :)
+    integer :: i, j
+
+    call build('hexapod', [0.02_wp, 0.0_wp, 0.0_wp], 2, s)
+    shift = [0.01_wp, -0.02_wp, 0.03_wp]
+    point = s%point + spread(shift, 2, size(s%point, 2))
+    call volume_and_centroid(point, s%tet, volume, x)
+    call check('moved block: centroid', x, shift, 1e-16_wp)
+    do j = 1, 3
+      do i = 1, 3
+        want(i, j) = s%inertia(i, j) - rho*s%volume*shift(i)*shift(j)
+        if (i == j) want(i, j) = want(i, j) + rho*s%volume*sum(shift**2)
+      end do
+    end do
+    call check('moved block: parallel axes', flat(inertia_about_origin(point, s%tet, rho)), &
+               flat(want), 1e-18_wp)
+  end subroutine moved_block
+
+  !> Volumes against closed forms; volume and inertia of every form against integrals over its
+  !! facets by the divergence theorem, which know nothing of tetrahedra.
+  subroutine built_of_parts()
+    type(shape_t) :: s
+    real(wp), parameter :: h = 0.06_wp, size_m(3) = [h, 0.1_wp, 0.0_wp]
+    character(9), parameter :: kinds(4) = ['cylinder ', 'tetrapod ', 'dolos    ', 'reef_cube']
+    real(wp) :: volume(4), octagon, a, b, inertia(3, 3), total, ix
+    integer :: r, k
+
+    ! A dolos: four tapered legs of regular octagons, two stretches of fluke, the shank, and four
+    ! wedges of depth u - a and height 2(w - u + a) between u = a and w (half side, half waist).
+    octagon = 2*(sqrt(2.0_wp) - 1)
+    a = 0.16_wp*tan(pi/8)
+    b = 0.16_wp - a
+    volume(3) = octagon*(4*0.34_wp/3*(0.32_wp**2 + 0.32_wp*0.2_wp + 0.2_wp**2) + 3*0.32_wp**3 &
+      + 0.04_wp*0.32_wp**2) + 4*(0.16_wp*b**2 - 2*b**3/3)
+    volume(4) = 12*0.2_wp**2*0.6_wp + 8*0.2_wp**3   ! twelve bars, eight corners
+    do r = 1, 3
+      do k = 1, size(kinds)
+        call build(trim(kinds(k)), size_m, r, s)
+        if (k >= 3) call check(trim(kinds(k))//': volume', s%volume, volume(k)*h**3, &
+                               1e-14_wp*h**3)
+        call by_surface(s, total, inertia)
+        call check(trim(kinds(k))//': volume by the surface', s%volume, total, 1e-13_wp*total)
+        call check(trim(kinds(k))//': inertia by the surface', flat(s%inertia), flat(inertia), &
+                   1e-13_wp*maxval(inertia))
+      end do
+      call build('cylinder', size_m, r, s)
+      call check('cylinder: volume', s%volume, 0.25_wp*pi*h**2*size_m(2), 1e-14_wp*h**3)
+      ! a polygon of n sides and the area of the circle has the second moment
+      ! A R^2/4 * (2 pi/n) (2 + cos(2 pi/n))/(3 sin(2 pi/n))
+      b = 2*pi/(6*r)
+      ix = rho*s%volume*h**2/16*b*(2 + cos(b))/(3*sin(b))
+      call check('cylinder: inertia', flat(s%inertia), flat(diagonal([ix + rho*s%volume &
+        *size_m(2)**2/12, ix + rho*s%volume*size_m(2)**2/12, 2*ix])), 1e-13_wp*ix)
+    end do
+  end subroutine built_of_parts
+
+  !> Volume and inertia of a block from its facets: with div(x f) = (3 + m) f for f of degree m,
+  !! V = 1/3 sum (x.n) A and int x x^T dV = 1/5 sum (x.n) int x x^T dA.
+  subroutine by_surface(s, volume, inertia)
+    type(shape_t), intent(in) :: s
+    real(wp), intent(out) :: volume, inertia(3, 3)
+    real(wp) :: x(3, 3), c(3), second(3, 3), height_area
+    integer :: m, k, i, j
+
+    volume = 0.0_wp
+    second = 0.0_wp
+    do m = 1, size(s%facet) - 1
+      do k = s%facet(m) + 1, s%facet(m + 1) - 2
+        x = s%point(:, s%facet_point([s%facet(m), k, k + 1]))
+        c = sum(x, 2)
+        height_area = (x(1, 1)*(x(2, 2)*x(3, 3) - x(3, 2)*x(2, 3)) &
+          + x(2, 1)*(x(3, 2)*x(1, 3) - x(1, 2)*x(3, 3)) &
+          + x(3, 1)*(x(1, 2)*x(2, 3) - x(2, 2)*x(1, 3)))/2
+        volume = volume + height_area/3
+        do j = 1, 3
+          do i = 1, 3
+            second(i, j) = second(i, j) + height_area/60*(dot_product(x(i, :), x(j, :)) &
+              + c(i)*c(j))
+          end do
+        end do
+      end do
+    end do
+    inertia = rho*(diagonal(spread(second(1, 1) + second(2, 2) + second(3, 3), 1, 3)) - second)
+  end subroutine by_surface
+
+  !> The volume goes to that of four cones around the hull of their roots, with the square of the
+  !! number of sides; inertia the same about every axis; 0.280 H^3 as published.
+  subroutine tetrapod()
+    type(shape_t) :: s
+    real(wp), parameter :: h = 0.06_wp
+    real(wp) :: away(4), round, j
+    integer :: r
+
+    round = round_tetrapod()
+    call check('tetrapod: 0.280 of the height cubed', round, 0.280_wp, 5e-4_wp)
+    do r = 1, 4
+      call build('tetrapod', [h, 0.0_wp, 0.0_wp], r, s)
+      away(r) = s%volume/(round*h**3) - 1
+      j = (s%inertia(1, 1) + s%inertia(2, 2) + s%inertia(3, 3))/3
+      call check('tetrapod: inertia the same about every axis', flat(s%inertia), &
+                 flat(diagonal([j, j, j])), 1e-13_wp*j)
+    end do
+    call check('tetrapod: volume too large by', away, &
+               [3.770e-3_wp, 4.36e-4_wp, 1.58e-4_wp, 8.2e-5_wp], 1e-6_wp)
+    call check('tetrapod: at least second order in the refinement', away(2)/away(4) > 4)
+  end subroutine tetrapod
+
+  !> Volume of a tetrapod of unit height with round legs. The hull of the roots by the divergence
+  !! theorem: four discs, four triangles, twelve strips of straight lines between mirrored points.
+  function round_tetrapod() result(volume)
+    real(wp) :: volume
+    real(wp), parameter :: e = 0.235_wp, b = 0.151_wp
+    real(wp) :: s, length, p(3), q(3), dp(3), middle(3, 3), strip, phi
+    real(wp) :: axis(3, 3), u(3), v(3)
+    integer :: i
+    integer, parameter :: n = 2000   ! even
+
+    axis(:, 1) = [1, 1, 1]/sqrt(3.0_wp)
+    axis(:, 2) = [1, -1, -1]/sqrt(3.0_wp)
+    axis(:, 3) = [-1, 1, -1]/sqrt(3.0_wp)
+    s = e/sqrt(2.0_wp)
+    length = 0.75_wp*(1 - sqrt(8.0_wp)/3*b) - s
+    volume = 4*(pi/3*length*(e**2 + e*b + b**2) + pi*e**2*s/3)
+    ! root of leg 1 from where it meets leg 2 towards where it meets leg 3; leg 2: y and z change
+    u = axis(:, 2) - dot_product(axis(:, 2), axis(:, 1))*axis(:, 1)
+    u = u/norm2(u)
+    v = axis(:, 3) - dot_product(axis(:, 3), axis(:, 1))*axis(:, 1)
+    v = v - dot_product(v, u)*u
+    v = v/norm2(v)
+    strip = 0.0_wp
+    do i = 0, n
+      phi = pi/3*real(i, wp)/n
+      p = s*axis(:, 1) + e*(cos(phi)*u + sin(phi)*v)
+      dp = e*(-sin(phi)*u + cos(phi)*v)
+      ! the mirror that swaps legs 1 and 2 and keeps 3: (x, y, z) to (x, -z, -y)
+      q = [p(1), -p(3), -p(2)]
+      strip = strip + real(merge(1, merge(4, 2, mod(i, 2) == 1), i == 0 .or. i == n), wp) &
+        *strip_height(p, q, dp)
+    end do
+    volume = volume + 12*abs(strip)*pi/3/n/3/3
+    middle(:, 1) = p
+    middle(:, 2) = q
+    middle(:, 3) = [q(2), q(1), q(3)]   ! the mirror that swaps legs 2 and 3
+    volume = volume + 4*abs(determinant(middle))/6
+  end function round_tetrapod
+
+  !> Integral over the line from p to q of x . (x_phi cross x_t), x = p + t (q - p).
+  pure function strip_height(p, q, dp) result(f)
+    real(wp), intent(in) :: p(3), q(3), dp(3)
+    real(wp) :: f
+    real(wp) :: dq(3)
+
+    dq = [dp(1), -dp(3), -dp(2)]
+    ! p . ((dp + t (dq - dp)) cross (q - p)): linear in t
+    f = determinant(reshape([p, 0.5_wp*(dp + dq), q - p], [3, 3]))
+  end function strip_height
+
+  pure function determinant(a) result(d)
+    real(wp), intent(in) :: a(3, 3)
+    real(wp) :: d
+
+    d = a(1, 1)*(a(2, 2)*a(3, 3) - a(3, 2)*a(2, 3)) + a(2, 1)*(a(3, 2)*a(1, 3) - a(1, 2)*a(3, 3)) &
+      + a(3, 1)*(a(1, 2)*a(2, 3) - a(2, 2)*a(1, 3))
+  end function determinant
+
+end module test_mass_properties_m
