@@ -68,7 +68,7 @@ program mics
   if (len(options%restart) == 0) then   ! else what was due has been written
     call write_due_output(sim%run_state_t, report, output)
   end if
-  call watch_for_stop(output%folder, options%max_wall, began, stop_requests)
+  call watch_for_stop(output%lock, options%max_wall, began, stop_requests)
   call store_places(sim, fault)
   do while (.not. sim%clock%finished())
     call take_step(sim, report)

@@ -497,6 +497,21 @@ def test_stop_file(wet: Path, tmp_path: Path) -> None:
     assert but_restarts(differences(wet, output)) == []
 
 
+def test_stop_file_of_a_killed_run(wet: Path, tmp_path: Path) -> None:
+    """One that was never read does not end the run that goes on."""
+    output = tmp_path / "run"
+    process = start(output)
+    while not (output / "restart-a.h5").exists() and process.poll() is None:
+        time.sleep(0.002)
+    process.kill()
+    process.communicate(timeout=60)
+    (output / "stop").touch()
+    code, said = run(None, "--restart", output / "restart-a.h5")
+    assert code == 0, said
+    assert not (output / "stop").exists()
+    assert but_restarts(differences(wet, output)) == []
+
+
 def test_max_wall(wet: Path, tmp_path: Path) -> None:
     """A run ends in good order before its wall time is over, and says how to go on."""
     output = tmp_path / "run"

@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from run_cases import ROOT, Machine
-from soak import any_number, full_disk, kills, memory, mpi_signals, still_pile, two_programs
+from soak import (
+    any_number,
+    full_disk,
+    kills,
+    memory,
+    moved_folders,
+    mpi_signals,
+    still_pile,
+    two_programs,
+)
 
 MICS, PARALLEL = ROOT / "mics", ROOT / "mics_mpi"
 pytestmark = pytest.mark.skipif(not MICS.exists(), reason="./mics is not built")
@@ -56,6 +65,16 @@ def test_kill(disk_shop: full_disk.Workshop, seconds: float, tmp_path: Path) -> 
     assert found == [], said
 
 
+@pytest.mark.parametrize("seconds", [0.1, 0.3])
+@pytest.mark.parametrize("way", moved_folders.WAYS)
+def test_folder_moved(
+    disk_shop: full_disk.Workshop, way: str, seconds: float, tmp_path: Path
+) -> None:
+    """The run ends with code 4; nothing of the run that has its place is touched."""
+    said, found = moved_folders.trial(disk_shop, way, seconds, tmp_path)
+    assert found == [], said
+
+
 @pytest.fixture(scope="module")
 def parallel_shop(tmp_path_factory: pytest.TempPathFactory) -> full_disk.Workshop:
     return full_disk.open_shop(Machine(PARALLEL, 2, 1), tmp_path_factory.mktemp("signals"))
@@ -66,6 +85,15 @@ def parallel_shop(tmp_path_factory: pytest.TempPathFactory) -> full_disk.Worksho
 def test_signal_to_mpirun(parallel_shop: full_disk.Workshop, number: int, tmp_path: Path) -> None:
     """The run ends in good order; what a process that is killed leaves behind goes on, too."""
     said, found = mpi_signals.trial(parallel_shop, number, 1.0, False, tmp_path)
+    assert found == [], said
+
+
+@pytest.mark.xdist_group("ranks")
+@pytest.mark.parametrize("way", ["moved", "unseen in place"])
+def test_folder_moved_from_ranks(
+    parallel_shop: full_disk.Workshop, way: str, tmp_path: Path
+) -> None:
+    said, found = moved_folders.trial(parallel_shop, way, 0.5, tmp_path)
     assert found == [], said
 
 

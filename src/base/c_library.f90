@@ -4,13 +4,15 @@ module c_library_m
     c_null_char, c_ptr, c_size_t
   implicit none
   private
-  public :: c_access, c_close, c_closedir, c_errno, c_exit, c_fclose, c_fdopen, c_ferror, &
-    c_fflush, c_fileno, c_flock, c_fopen, c_fread, c_fsync, c_ftruncate, c_fwrite, c_gethostname, &
-    c_getpid, c_getrlimit, c_isatty, c_lseek, c_mkdir, c_open, c_opendir, c_readdir, c_realpath, &
-    c_rename, c_setenv, c_signal, c_strerror, c_truncate, c_unlink, c_usleep
+  public :: c_access, c_close, c_closedir, c_dup, c_errno, c_exit, c_faccessat, c_fclose, &
+    c_fdopen, c_ferror, c_fflush, c_fileno, c_flock, c_fopen, c_fread, c_fstat, c_fsync, &
+    c_ftruncate, c_fwrite, c_gethostname, c_getpid, c_getrlimit, c_isatty, c_lseek, c_mkdir, &
+    c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_renameat, c_setenv, &
+    c_signal, c_stat, c_strerror, c_unlink, c_unlinkat, c_usleep
   public :: text_at, text_of_letters
 
   integer, parameter, public :: max_path = 4096   !! PATH_MAX of Linux
+  integer, parameter, public :: stat_size = 64    !! longs, more than any system writes
 
   interface
     ! Streams.
@@ -113,12 +115,66 @@ module c_library_m
       integer(c_long), value :: length
     end function c_ftruncate
 
-    integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
-      import :: c_char, c_int, c_long
+    integer(c_int) function c_dup(fd) bind(c, name='dup')
+      import :: c_int
+      implicit none
+      integer(c_int), value :: fd
+    end function c_dup
+
+    integer(c_size_t) function c_pread(fd, buffer, count, offset) bind(c, name='pread')
+      import :: c_char, c_int, c_long, c_size_t
+      implicit none
+      integer(c_int), value :: fd
+      character(kind=c_char), intent(inout) :: buffer(*)
+      integer(c_size_t), value :: count
+      integer(c_long), value :: offset
+    end function c_pread
+
+    integer(c_size_t) function c_pwrite(fd, buffer, count, offset) bind(c, name='pwrite')
+      import :: c_char, c_int, c_long, c_size_t
+      implicit none
+      integer(c_int), value :: fd
+      character(kind=c_char), intent(in) :: buffer(*)
+      integer(c_size_t), value :: count
+      integer(c_long), value :: offset
+    end function c_pwrite
+
+    ! What the system knows of a file; it begins with its device and its number there (inode).
+    integer(c_int) function c_stat(path, found) bind(c, name='stat')
+      import :: c_char, c_int, c_long, stat_size
       implicit none
       character(kind=c_char), intent(in) :: path(*)
-      integer(c_long), value :: length
-    end function c_truncate
+      integer(c_long), intent(out) :: found(stat_size)
+    end function c_stat
+
+    integer(c_int) function c_fstat(fd, found) bind(c, name='fstat')
+      import :: c_int, c_long, stat_size
+      implicit none
+      integer(c_int), value :: fd
+      integer(c_long), intent(out) :: found(stat_size)
+    end function c_fstat
+
+    ! Files of an open folder, wherever that has been moved.
+    integer(c_int) function c_faccessat(folder, name, mode, flags) bind(c, name='faccessat')
+      import :: c_char, c_int
+      implicit none
+      integer(c_int), value :: folder, mode, flags
+      character(kind=c_char), intent(in) :: name(*)
+    end function c_faccessat
+
+    integer(c_int) function c_unlinkat(folder, name, flags) bind(c, name='unlinkat')
+      import :: c_char, c_int
+      implicit none
+      integer(c_int), value :: folder, flags
+      character(kind=c_char), intent(in) :: name(*)
+    end function c_unlinkat
+
+    integer(c_int) function c_renameat(folder, from, to_folder, to) bind(c, name='renameat')
+      import :: c_char, c_int
+      implicit none
+      integer(c_int), value :: folder, to_folder
+      character(kind=c_char), intent(in) :: from(*), to(*)
+    end function c_renameat
 
     integer(c_int) function c_unlink(path) bind(c, name='unlink')
       import :: c_char, c_int

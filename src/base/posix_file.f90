@@ -3,15 +3,14 @@
 !! The first error sets `info` and a `message` that names the file and the reason; from then on
 !! every procedure of that file returns at once.
 module posix_file_m
-  use, intrinsic :: iso_c_binding, only: c_int, c_loc, c_long, c_null_char, c_null_ptr, c_ptr, &
-    c_size_t, c_associated
-  use kinds_m, only: i8
+  use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_long, c_null_char, c_null_ptr, &
+    c_ptr, c_size_t, c_associated
   use c_library_m, only: c_close, c_errno, c_fclose, c_ferror, c_fflush, c_fileno, c_flock, &
-    c_fopen, c_fread, c_fsync, c_ftruncate, c_fwrite, c_lseek, c_open, c_strerror, c_truncate, &
-    c_unlink, text_at
+    c_fopen, c_fread, c_fstat, c_ftruncate, c_fwrite, c_lseek, c_open, c_pread, c_stat, &
+    c_strerror, stat_size, text_at, text_of_letters
   implicit none
   private
-  public :: posix_file_t, cut_file, delete_file, is_pipe, store_file
+  public :: posix_file_t, is_pipe, is_file_at, system_reason
   public :: lock_taken, lock_refused, lock_unknown
 
   integer, parameter :: lock_taken = 0, lock_refused = 1
@@ -29,6 +28,7 @@ module posix_file_m
     procedure :: rewrite => file_rewrite
     procedure :: read => file_read
     procedure :: lock => file_lock
+    procedure :: is_at, content
     procedure, private :: check
   end type posix_file_t
 
@@ -39,15 +39,20 @@ contains
     class(posix_file_t), intent(inout) :: self
     logical, intent(in) :: well
     character(*), intent(in) :: what   !! like 'write'
-    type(c_ptr) :: reason
 
     if (well .or. self%info /= 0) return
-    reason = c_strerror(c_errno())
     self%info = 1
-    self%message = self%path//': cannot '//what//': '//text_at(reason)
+    self%message = self%path//': cannot '//what//': '//system_reason()
   end subroutine check
 
-  !> Open a file; `mode` as in C: 'r' to read, 'w' to write anew, 'a' to write at the end.
+  !> Why the last call of the system failed, in its words.
+  function system_reason() result(reason)
+    character(:), allocatable :: reason
+
+    reason = text_at(c_strerror(c_errno()))
+  end function system_reason
+
+  !> Open a file; `mode` as in C: 'r' to read, 'wx' to write a new one, 'a' to write at the end.
   subroutine file_open(self, path, mode)
     class(posix_file_t), intent(inout) :: self
     character(*), intent(in) :: path, mode
@@ -107,6 +112,20 @@ contains
     call self%check(c_ferror(self%stream) == 0, 'read')
   end subroutine file_read
 
+  !> What a short file holds now, wherever it was read or written last.
+  function content(self) result(text)
+    class(posix_file_t), intent(in) :: self
+    character(:), allocatable :: text
+    integer, parameter :: longest = 400
+    character(kind=c_char) :: letter(longest)
+
+    text = ''
+    if (.not. c_associated(self%stream)) return
+    letter = c_null_char
+    if (c_pread(c_fileno(self%stream), letter, int(longest, c_size_t), 0_c_long) > 0) &
+      text = text_of_letters(letter)
+  end function content
+
   !> Try to take a lock on the open file; it ends when the file is closed or the program ends.
   subroutine file_lock(self, alone, outcome)
     class(posix_file_t), intent(inout) :: self
@@ -140,34 +159,26 @@ contains
     if (c_close(fd) /= 0) return
   end function is_pipe
 
-  !> Have the system write all that it still keeps of a closed file to the disk; only then is it
-  !! known that the file is there, and that it will be after a power cut.
-  subroutine store_file(path, info, message)
+  !> Does a path lead to this open file, and not to another that has its name now?
+  function is_at(self, path) result(yes)
+    class(posix_file_t), intent(in) :: self
     character(*), intent(in) :: path
-    integer, intent(out) :: info   !! 0: done
-    character(:), allocatable, intent(inout) :: message
-    type(posix_file_t) :: file
+    logical :: yes
 
-    call file%open(path, 'a')
-    if (file%info == 0) call file%check(c_fsync(c_fileno(file%stream)) == 0, 'store')
-    call file%close()
-    info = file%info
-    if (info /= 0) message = file%message
-  end subroutine store_file
+    yes = c_associated(self%stream)
+    if (yes) yes = is_file_at(c_fileno(self%stream), path)
+  end function is_at
 
-  !> Make a file shorter, if that is possible.
-  subroutine cut_file(path, length)
+  !> The same for the open file of a number: device and inode say it.
+  function is_file_at(fd, path) result(yes)
+    integer(c_int), intent(in) :: fd
     character(*), intent(in) :: path
-    integer(i8), intent(in) :: length   !! [bytes]
+    logical :: yes
+    integer(c_long) :: held(stat_size), found(stat_size)
 
-    if (c_truncate(path//c_null_char, int(length, c_long)) /= 0) return   ! it stays as it is
-  end subroutine cut_file
-
-  !> Delete a file if it is there.
-  subroutine delete_file(path)
-    character(*), intent(in) :: path
-
-    if (c_unlink(path//c_null_char) /= 0) return   ! it was not there, or nothing can be done
-  end subroutine delete_file
+    yes = c_fstat(fd, held) == 0
+    if (yes) yes = c_stat(path//c_null_char, found) == 0
+    if (yes) yes = all(held(:2) == found(:2))
+  end function is_file_at
 
 end module posix_file_m

@@ -1,4 +1,7 @@
-!> Space on the disk for what is about to be written.
+!> A result file that is held open, and space on the disk for what is about to be written to it.
+!!
+!! A file is cut, lengthened and deleted as the one that is held: its path may lead to a file of
+!! another run by now, where somebody has moved the folder.
 !!
 !! HDF5 keeps the structure of a file in memory and changes it in place when the file is flushed. A
 !! disk that is full in the middle of that leaves pieces that point to others which are not there.
@@ -6,52 +9,116 @@
 !! if that fails nothing has been touched, and otherwise nothing that follows can fail for want of
 !! space. HDF5 cuts off most of what it did not need when it flushes.
 module file_space_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_long, c_null_char, c_size_t
   use kinds_m, only: i8
-  use posix_file_m, only: posix_file_t, cut_file
+  use c_library_m, only: c_close, c_dup, c_fsync, c_ftruncate, c_lseek, c_open, c_pwrite, c_unlink
+  use posix_file_m, only: is_file_at, system_reason
   implicit none
   private
-  public :: lengthen_file, shorten_file, bytes_for_chunks
+  public :: held_file_t, bytes_for_chunks
 
   integer(i8), parameter, public :: bytes_for_change = 8192
   !! attributes, headers and ends of blocks that a row or a frame may touch [bytes]
 
+  type :: held_file_t
+    character(:), allocatable :: path
+    integer(c_int), private :: fd = -1   !! its number in this process; -1: none is held
+  contains
+    procedure :: hold, length, lengthen, shorten, store, discard, let_go
+  end type held_file_t
+
 contains
 
-  !> Make a file at least `length` bytes long; one for which there is no room stays as it was.
-  subroutine lengthen_file(path, length, message)
+  !> Hold a file that was just opened for writing: that of a number, or else that of the path.
+  subroutine hold(self, path, message, number)
+    class(held_file_t), intent(inout) :: self
     character(*), intent(in) :: path
-    integer(i8), intent(in) :: length                   !! [bytes]
     character(:), allocatable, intent(out) :: message   !! of an error, else empty
-    integer, parameter :: piece = 2**20
-    type(posix_file_t) :: file
+    integer(c_int), intent(in), optional :: number
+    integer(c_int), parameter :: read_and_write = 2
+
+    self%path = path
+    message = ''
+    if (present(number)) then
+      self%fd = c_dup(number)
+    else
+      self%fd = c_open(path//c_null_char, read_and_write)
+    end if
+    if (self%fd < 0) message = path//': cannot open the file: '//system_reason()
+  end subroutine hold
+
+  !> Bytes of the file.
+  function length(self) result(bytes)
+    class(held_file_t), intent(in) :: self
+    integer(i8) :: bytes
+    integer(c_int), parameter :: from_end = 2
+
+    bytes = int(c_lseek(self%fd, 0_c_long, from_end), i8)
+  end function length
+
+  !> Make the file at least `wanted` bytes long; one for which there is no room stays as it was.
+  subroutine lengthen(self, wanted, message)
+    class(held_file_t), intent(in) :: self
+    integer(i8), intent(in) :: wanted                   !! [bytes]
+    character(:), allocatable, intent(out) :: message   !! of an error, else empty
+    integer(i8), parameter :: piece = 2**20
     character(:), allocatable :: zeros
-    integer(i8) :: before, there
+    integer(i8) :: before, there, n
 
     message = ''
-    inquire (file=path, size=before)
-    if (before >= length) return
-    zeros = repeat(char(0), int(min(length - before, int(piece, i8))))
-    call file%open(path, 'a')
+    before = self%length()
+    zeros = repeat(char(0), int(min(max(wanted - before, 0_i8), piece)))
     there = before
-    do while (there < length .and. file%info == 0)
-      call file%write(zeros(:int(min(length - there, int(piece, i8)))))
-      there = there + piece
+    do while (there < wanted)
+      n = int(c_pwrite(self%fd, zeros, int(min(wanted - there, piece), c_size_t), &
+                       int(there, c_long)), i8)
+      if (n <= 0) then
+        message = self%path//': cannot write: '//system_reason()
+        call self%shorten(before)
+        return
+      end if
+      there = there + n
     end do
-    call file%close()
-    if (file%info == 0) return
-    call cut_file(path, before)
-    message = file%message
-  end subroutine lengthen_file
+  end subroutine lengthen
 
-  !> Cut off what a file has beyond `length`.
-  subroutine shorten_file(path, length)
-    character(*), intent(in) :: path
-    integer(i8), intent(in) :: length   !! [bytes]
-    integer(i8) :: now
+  !> Cut off what the file has beyond `wanted`.
+  subroutine shorten(self, wanted)
+    class(held_file_t), intent(in) :: self
+    integer(i8), intent(in) :: wanted   !! [bytes]
 
-    inquire (file=path, size=now)
-    if (now > length) call cut_file(path, length)
-  end subroutine shorten_file
+    if (self%length() <= wanted) return
+    if (c_ftruncate(self%fd, int(wanted, c_long)) /= 0) return   ! it stays as it is
+  end subroutine shorten
+
+  !> Have the system write all that it still keeps of the file to the disk; only then is it known
+  !! that the file is there, and that it will be after a power cut.
+  subroutine store(self, message)
+    class(held_file_t), intent(in) :: self
+    character(:), allocatable, intent(out) :: message   !! of an error, else empty
+
+    message = ''
+    if (c_fsync(self%fd) /= 0) message = self%path//': cannot store: '//system_reason()
+  end subroutine store
+
+  !> Delete the file; it gives its room back at once.
+  subroutine discard(self)
+    class(held_file_t), intent(inout) :: self
+
+    if (self%fd < 0) return
+    call self%shorten(0_i8)
+    if (is_file_at(self%fd, self%path)) then
+      if (c_unlink(self%path//c_null_char) /= 0) continue   ! nothing more can be done
+    end if
+    call self%let_go()
+  end subroutine discard
+
+  subroutine let_go(self)
+    class(held_file_t), intent(inout) :: self
+
+    if (self%fd < 0) return
+    if (c_close(self%fd) /= 0) continue   ! all that was to be said of it has been said
+    self%fd = -1
+  end subroutine let_go
 
   !> Most that new chunks of a dataset take at the end of a file [bytes].
   !!

@@ -14,18 +14,19 @@
 !! changes such a file reserves its space first (`reserve`). A file is left as it is on the
 !! disk, without the changes that HDF5 still keeps in memory, once HDF5 has failed to write to it.
 module hdf5_handle_m
+  use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_ptr, c_f_pointer
   use hdf5, only: hid_t, hsize_t, size_t, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f
   use hdf5, only: h5fopen_f, h5gclose_f, h5gcreate_f, h5ldelete_f, h5lexists_f, h5pclose_f
   use hdf5, only: h5pcreate_f, h5pset_cache_f, h5pset_fclose_degree_f, H5F_ACC_RDONLY_F
-  use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
-  use hdf5, only: H5P_DATASET_XFER_F, H5P_FILE_ACCESS_F
+  use hdf5, only: H5F_ACC_RDWR_F, H5F_ACC_EXCL_F, H5F_CLOSE_STRONG_F, H5F_SCOPE_LOCAL_F
+  use hdf5, only: H5P_DATASET_XFER_F, H5P_DEFAULT_F, H5P_FILE_ACCESS_F
   use kinds_m, only: wp, i8
   use errors_m, only: fatal, exit_files
   use parallel_m, only: is_root, my_rank, nproc, set_file_access, set_collective, global_max
   use parallel_m, only: global_min, broadcast, share_failure
   use hdf5_reason_m, only: hdf5_start, hdf5_reason
-  use posix_file_m, only: cut_file, delete_file, is_pipe
-  use file_space_m, only: lengthen_file, shorten_file
+  use posix_file_m, only: is_pipe
+  use file_space_m, only: held_file_t
   implicit none
   private
   public :: h5_handle_t
@@ -42,10 +43,12 @@ module hdf5_handle_m
     integer(hid_t) :: collective = -1      !! transfer list of blocks of cells
     logical, private :: writing = .false.
     logical, private :: complete = .false.   !! it was whole on the disk at least once
+    type(held_file_t), private :: held       !! while it is written
   contains
     procedure :: create => file_create
     procedure :: open => file_open
     procedure :: close => file_close
+    procedure :: abandon
     procedure :: flush => file_flush
     procedure :: reserve
     procedure :: group => file_group
@@ -53,6 +56,17 @@ module hdf5_handle_m
     procedure :: remove => file_remove
     procedure :: check, agree
   end type h5_handle_t
+
+  interface
+    !> The address of the number of the open file.
+    integer(c_int) function h5fget_vfd_handle(file, access, handle) &
+      bind(c, name='H5Fget_vfd_handle')
+      import :: c_int, c_int64_t, c_ptr
+      implicit none
+      integer(c_int64_t), value :: file, access
+      type(c_ptr), intent(out) :: handle
+    end function h5fget_vfd_handle
+  end interface
 
 contains
 
@@ -113,7 +127,7 @@ contains
     end do
   end subroutine share_message
 
-  !> Create an empty file; one that exists is overwritten.
+  !> Create an empty file; one that exists is an error, whoever made it.
   subroutine file_create(self, path, shared)
     class(h5_handle_t), intent(inout) :: self
     character(*), intent(in) :: path
@@ -124,9 +138,10 @@ contains
     call begin_file(self, path, shared, access)
     self%writing = .true.
     if (self%info /= 0) return
-    call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, status, access_prp=access)
+    call h5fcreate_f(path, H5F_ACC_EXCL_F, self%id, status, access_prp=access)
     call self%check(status, 'create the file')
     call h5pclose_f(access, status)
+    call hold_file(self)
     call self%agree()
   end subroutine file_create
 
@@ -150,8 +165,29 @@ contains
     call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, writing), self%id, status, access)
     call self%check(status, 'open the file')
     call h5pclose_f(access, status)
+    if (writing) call hold_file(self)
     call self%agree()
   end subroutine file_open
+
+  !> Hold the file by the number under which HDF5 has it. MPI tells none: then each process opens
+  !! the path once more.
+  subroutine hold_file(self)
+    class(h5_handle_t), intent(inout) :: self
+    type(c_ptr) :: handle
+    integer(c_int), pointer :: number
+
+    if (self%info /= 0) return
+    if (self%shared) then
+      call self%held%hold(self%path, self%message)
+    else
+      call self%check(h5fget_vfd_handle(self%id, H5P_DEFAULT_F, handle), 'open the file')
+      if (self%info /= 0) return
+      call c_f_pointer(handle, number)
+      call self%held%hold(self%path, self%message, number)
+    end if
+    self%broken = len(self%message) > 0
+    if (self%broken) self%info = 1
+  end subroutine hold_file
 
   !> Start HDF5 and make the lists that say how the file is accessed.
   subroutine begin_file(self, path, shared, access)
@@ -187,8 +223,9 @@ contains
   end subroutine begin_file
 
   !> Write everything out and close the file, its datasets with it; done even after an error.
-  subroutine file_close(self)
+  subroutine file_close(self, stored)
     class(h5_handle_t), intent(inout) :: self
+    logical, intent(in), optional :: stored   !! wait until the disk has it
     integer(i8) :: used
     integer :: status
 
@@ -201,11 +238,35 @@ contains
       call h5pclose_f(self%collective, status)
       call h5fclose_f(self%id, status)
       call self%check(status, 'close the file')
-      if (self%writing .and. .not. self%shared) call shorten_file(self%path, used)
+      if (self%writing .and. .not. self%shared) call self%held%shorten(used)
+      if (present(stored) .and. self%info == 0) call store_file(self)
     end if
     self%id = -1
     call self%agree()
+    call self%held%let_go()
   end subroutine file_close
+
+  !> Wait until a file that was closed is on the disk; one that does not get there is deleted.
+  subroutine store_file(self)
+    class(h5_handle_t), intent(inout) :: self
+
+    call self%held%store(self%message)
+    self%broken = len(self%message) > 0
+    if (.not. self%broken) return
+    self%info = 1
+    call self%held%discard()
+  end subroutine store_file
+
+  !> Close a file that was created, and delete it.
+  subroutine abandon(self)
+    class(h5_handle_t), intent(inout) :: self
+
+    self%complete = .false.
+    self%broken = .true.
+    if (self%info == 0) self%info = 1
+    if (self%id >= 0) call leave(self)
+    self%id = -1
+  end subroutine abandon
 
   !> Bytes of a file that are in use. Of a shared file HDF5 does not know; it cuts it to that length
   !! when it flushes.
@@ -216,7 +277,7 @@ contains
     integer :: status
 
     if (self%shared) then
-      inquire (file=self%path, size=bytes)
+      bytes = self%held%length()
     else
       call h5fget_filesize_f(self%id, used, status)
       call self%check(status, 'tell the size of the file')
@@ -225,13 +286,11 @@ contains
   end function length_of
 
   !> Leave a file that could not be written: to close it would write half of what is in memory.
-  !! One that was never complete is deleted; it gives its room back at once.
+  !! One that was never complete is deleted.
   subroutine leave(self)
-    class(h5_handle_t), intent(in) :: self
+    class(h5_handle_t), intent(inout) :: self
 
-    if (self%complete) return
-    call cut_file(self%path, 0_i8)
-    call delete_file(self%path)
+    if (.not. self%complete) call self%held%discard()
   end subroutine leave
 
   !> Hand everything written so far to the operating system.
@@ -255,8 +314,7 @@ contains
 
     if (self%info /= 0) return
     reason = ''
-    if (is_root() .or. .not. self%shared) call lengthen_file(self%path, length_of(self) + bytes, &
-      reason)
+    if (is_root() .or. .not. self%shared) call self%held%lengthen(length_of(self) + bytes, reason)
     if (self%shared) call broadcast(reason)
     if (len(reason) == 0) return
     self%info = 1

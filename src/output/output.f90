@@ -14,7 +14,6 @@ module output_m
   use hdf5_file_m, only: h5_file_t
   use output_folder_m, only: check_folder, prepare_folder, continue_folder
   use folder_lock_m, only: folder_lock_t
-  use posix_file_m, only: delete_file
   use diagnostics_m, only: step_report_t, quantity_t, make_row
   use write_run_m, only: run_file_t, create_run_file, reopen_run_file, continue_run_file, &
     write_row, close_run_file
@@ -31,7 +30,9 @@ module output_m
 
   character(*), parameter :: run_name = '/run.h5', field_name = '/fields.vtkhdf', &
     block_name = '/blocks.vtkhdf'
-  character(*), parameter :: restart_name(2) = ['/restart-a.h5', '/restart-b.h5']
+  character(*), parameter :: restart_name(2) = ['restart-a.h5', 'restart-b.h5']
+  character(*), parameter :: unfinished = '.part'   !! of a restart file
+  real(wp), parameter :: look_interval = 0.5_wp     !! wall time between two looks at the folder [s]
 
   type :: output_t
     integer :: code = exit_ok                !! exit code of the error met
@@ -50,7 +51,8 @@ module output_m
     type(run_file_t), private :: run_file
     type(field_file_t), private :: field_file
     type(block_file_t), private :: block_file
-    type(folder_lock_t), private :: lock     !! of the folder; the root process has it
+    type(folder_lock_t) :: lock              !! of the folder; the root process has it
+    real(wp), private :: next_look = 0.0_wp  !! at the folder, on the wall clock [s]
     type(progress_t), private :: progress
   end type output_t
 
@@ -137,24 +139,23 @@ contains
     if (output%surfaces) call create_block_file(output%folder//block_name, state%blocks, &
       output%block_file)
     call check_files(output)
-    if (output%code /= exit_ok) call remove_files(output)
+    call watch_folder(output)
+    if (output%code == exit_ok) return
+    call output%run_file%file%abandon()   ! no files that would look like results
+    call output%field_file%file%abandon()
+    call output%block_file%file%abandon()
   end subroutine create_files
 
-  !> A run that cannot begin leaves no files that would look like results.
-  subroutine remove_files(output)
+  !> Close all files, unless another run has taken the folder and them. All processes call.
+  subroutine close_files(output, exit_code)
     type(output_t), intent(inout) :: output
+    integer, intent(in), optional :: exit_code   !! of a run that ends; else it could not begin
+    integer :: taken
 
-    call close_files(output)
-    if (.not. is_root()) return
-    call delete_file(output%folder//run_name)
-    call delete_file(output%folder//field_name)
-    call delete_file(output%folder//block_name)
-  end subroutine remove_files
-
-  !> Close all files as they are.
-  subroutine close_files(output)
-    type(output_t), intent(inout) :: output
-
+    taken = merge(1, 0, output%lock%taken)
+    call broadcast(taken)
+    if (taken == 1) return
+    if (present(exit_code)) call close_run_file(output%run_file, exit_code)
     call output%run_file%file%close()
     call output%field_file%file%close()
     call output%block_file%file%close()
@@ -178,6 +179,7 @@ contains
                                                      state%clock, output%block_file)
     end if
     call check_files(output)
+    call watch_folder(output)
     if (output%code /= exit_ok) return
     call continue_run_file(output%text, output%parameters, output%run_file)
     if (output%fluid) call continue_fields(state, output)
@@ -188,7 +190,7 @@ contains
     call broadcast(up_to_date)   ! only the root process knows about its own files
     if (up_to_date(1) == 1) output%row_step = state%clock%step
     if (up_to_date(2) == 1) output%frame_step = state%clock%step
-    if (index('/'//options%restart, restart_name(1)) > 0) output%next_restart = 2
+    if (index(options%restart, restart_name(1)) > 0) output%next_restart = 2
     output%restart_step = state%clock%step
   end subroutine continue_files
 
@@ -202,6 +204,7 @@ contains
       call continue_field_file(output%field_file)
       if (.not. output%fields) call output%field_file%file%close()
     else if (output%fields) then
+      if (is_root()) call output%lock%remove(field_name(2:))   ! of a part of the run that was killed
       call create_field_file(output%folder//field_name, state, output%field_file)
     end if
   end subroutine continue_fields
@@ -215,6 +218,7 @@ contains
       call continue_block_file(output%block_file)
       if (.not. output%surfaces) call output%block_file%file%close()
     else if (output%surfaces) then
+      if (is_root()) call output%lock%remove(block_name(2:))
       call create_block_file(output%folder//block_name, state%blocks, output%block_file)
     end if
   end subroutine continue_surfaces
@@ -240,6 +244,14 @@ contains
 
   end subroutine check_files
 
+  !> Before anything is written, on all processes: is the folder still that of this run?
+  subroutine watch_folder(output)
+    type(output_t), intent(inout) :: output
+
+    if (is_root() .and. output%code == exit_ok) call output%lock%verify(output%code, output%message)
+    call broadcast(output%code)
+  end subroutine watch_folder
+
   !> After a step, and once before the first: write the row, the frames and the restart file that
   !! are due, and a line of the table. All processes call.
   subroutine write_due_output(state, report, output)
@@ -248,6 +260,7 @@ contains
     type(output_t), intent(inout) :: output
     type(quantity_t), allocatable :: row(:)
     logical :: row_wanted, frame_wanted, line_wanted
+    real(wp) :: now   ! [s]
 
     if (output%code /= exit_ok) return
     call tic(output%phase)
@@ -257,7 +270,12 @@ contains
     frame_wanted = state%clock%frame_due() .and. output%frame_step /= state%clock%step
     line_wanted = line_due(output%progress)
     line_wanted = line_wanted .or. frame_wanted
-    if (.not. (row_wanted .or. frame_wanted)) call share_outcome(output%quiet, line_wanted)
+    if (row_wanted .or. frame_wanted) then
+      call watch_folder(output)
+      if (output%code /= exit_ok) return
+    else
+      call share_outcome(output%quiet, line_wanted)
+    end if
     if (row_wanted .or. line_wanted) then
       row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report)
@@ -272,6 +290,11 @@ contains
       call state%clock%frame_done()
     end if
     if (line_wanted) call write_line(output%progress, state%clock, row, state%blocks)
+    now = wall_clock()
+    if (is_root() .and. now > output%next_look) then   ! rows may be far apart
+      call output%lock%verify(output%code, output%message)
+      output%next_look = now + look_interval
+    end if
     call check_files(output)
     call toc(output%phase)
     if (state%clock%restart_due()) then
@@ -304,18 +327,25 @@ contains
     output%frame_step = state%clock%step
   end subroutine write_frames
 
-  !> Write the restart file whose turn it is.
+  !> Write the restart file whose turn it is under a temporary name, and rename it when it is
+  !! complete and on the disk.
   subroutine save_state(state, output)
     type(run_state_t), intent(inout) :: state
     type(output_t), intent(inout) :: output
     character(:), allocatable :: message
     integer :: info
 
+    call watch_folder(output)
     if (output%code /= exit_ok) return
     call tic(output%restart_phase)
-    call write_restart(output%folder//restart_name(output%next_restart), output%text, &
-      output%parameters, state, info, message)
-    if (info == 0) output%restart_file = output%folder//restart_name(output%next_restart)
+    associate (name => restart_name(output%next_restart), lock => output%lock)
+      if (is_root()) call lock%remove(name//unfinished)   ! of a run that was killed
+      call write_restart(output%folder//'/'//name//unfinished, output%text, output%parameters, &
+        state, info, message)
+      if (is_root() .and. info == 0) call lock%rename(name//unfinished, name, info, message)
+      call broadcast(info)
+      if (info == 0) output%restart_file = output%folder//'/'//name
+    end associate
     output%next_restart = 3 - output%next_restart
     output%restart_step = state%clock%step
     call toc(output%restart_phase)
@@ -335,6 +365,7 @@ contains
     integer :: code
     logical :: row_wanted, frame_wanted
 
+    call watch_folder(output)
     if (output%code == exit_ok) then
       row = make_row(output%properties, output%run_file%wall_time + wall_clock() &
         - output%progress%began, state, report)
@@ -351,8 +382,7 @@ contains
       if (output%restart_step /= state%clock%step) call save_state(state, output)
     end if
     code = merge(exit_code, output%code, output%code == exit_ok)
-    call close_run_file(output%run_file, code)
-    call close_files(output)
+    call close_files(output, code)
     call output%lock%release()
     call check_files(output)
     if (output%code /= exit_ok) code = output%code

@@ -10,11 +10,11 @@ module output_folder_m
     c_rename, max_path, text_of_letters
   use errors_m, only: to_text, exit_ok, exit_input, exit_files
   use parallel_m, only: is_root, broadcast
-  use posix_file_m, only: posix_file_t, delete_file
-  use folder_lock_m, only: folder_lock_t, lock_name, look_at_folder
+  use posix_file_m, only: posix_file_t
+  use folder_lock_m, only: folder_lock_t, lock_name, stop_name, look_at_folder
   implicit none
   private
-  public :: check_folder, prepare_folder, continue_folder, folder_of, rename_file
+  public :: check_folder, prepare_folder, continue_folder
 
   character(*), parameter :: result_file(*) = [character(14) :: 'run.h5', 'fields.vtkhdf', &
     'blocks.vtkhdf']
@@ -96,25 +96,29 @@ contains
     end do
   end subroutine take_folder
 
-  !> Rename a folder to the first free DIR.bak-N.
+  !> Rename a folder that is locked to the first free DIR.bak-N.
   subroutine keep_old_results(path, lock, code, message)
     character(*), intent(in) :: path
     type(folder_lock_t), intent(inout) :: lock             !! of this folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
+    character(:), allocatable :: older
     integer :: n
 
     n = 1
     do while (exists(path//'.bak-'//to_text(n)))
       n = n + 1
     end do
-    call rename_file(path, path//'.bak-'//to_text(n), code, message)
-    if (code /= 0) then
+    older = path//'.bak-'//to_text(n)
+    call lock%verify(code, message)
+    if (code /= exit_ok) return
+    if (c_rename(path//c_null_char, older//c_null_char) /= 0) then
       code = exit_files
+      message = path//': cannot rename it to '//older//': '//refused
       return
     end if
-    lock%folder = path//'.bak-'//to_text(n)
-    write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as '//lock%folder
+    lock%folder = older
+    write (error_unit, '(a)') 'mics: the older results in '//path//' are kept as '//older
   end subroutine keep_old_results
 
   !> Make a folder and those around it, as far as they are missing.
@@ -155,31 +159,34 @@ contains
     if (len(output) > 0) path = trimmed(output)
     if (is_same(path, from)) then
       if (is_root()) call lock%take(path, code, message)
+      if (is_root() .and. code == exit_ok) call lock%remove(stop_name)   ! it was for an earlier run
     else
       if (is_root()) call look_at_folder(from, code, message)   ! no copy of a growing file
       call share_outcome(code, message)
       if (code == exit_ok) call prepare_folder('--output', output, lock, code, message)
-      if (code == exit_ok .and. is_root()) call copy_results(from, path, lock, code, message)
+      if (code == exit_ok .and. is_root()) call copy_results(from, lock, code, message)
     end if
     call share_outcome(code, message)
   end subroutine continue_folder
 
   !> Copy the result files of a run to a new folder, all or none.
-  subroutine copy_results(from, to, lock, code, message)
-    character(*), intent(in) :: from, to
+  subroutine copy_results(from, lock, code, message)
+    character(*), intent(in) :: from
     type(folder_lock_t), intent(inout) :: lock             !! of the new folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
-    integer :: i
+    integer :: i, made
 
+    made = 0
     do i = 1, size(result_file)
-      if (.not. exists(from//'/'//trim(result_file(i)))) cycle
-      call copy_file(from//'/'//trim(result_file(i)), to//'/'//trim(result_file(i)), code, message)
       if (code /= exit_ok) exit
+      if (exists(from//'/'//trim(result_file(i)))) call copy_file(from, trim(result_file(i)), &
+        lock, code, message)
+      if (code == exit_ok) made = i
     end do
     if (code == exit_ok) return
-    do i = 1, size(result_file)
-      call delete_file(to//'/'//trim(result_file(i)))
+    do i = 1, made
+      call lock%remove(trim(result_file(i)))
     end do
     call lock%release()
   end subroutine copy_results
@@ -272,31 +279,23 @@ contains
     if (c_closedir(folder) /= 0) yes = .false.
   end function is_empty
 
-  !> Rename a file or folder; a file of the new name is replaced in one stroke.
-  subroutine rename_file(from, to, info, message)
-    character(*), intent(in) :: from, to
-    integer, intent(out) :: info   !! 0: done
-    character(:), allocatable, intent(inout) :: message
-
-    info = 0
-    if (c_rename(from//c_null_char, to//c_null_char) == 0) return
-    info = 1
-    message = from//': cannot rename it to '//to//': '//refused
-  end subroutine rename_file
-
-  !> Copy a file; a copy that cannot be completed is deleted.
-  subroutine copy_file(from, to, code, message)
-    character(*), intent(in) :: from, to
+  !> Copy a file to a folder where there is none of its name; a copy that cannot be completed is
+  !! deleted.
+  subroutine copy_file(from, name, lock, code, message)
+    character(*), intent(in) :: from, name
+    type(folder_lock_t), intent(in) :: lock                !! of the folder
     integer, intent(inout) :: code
     character(:), allocatable, intent(inout) :: message
     integer, parameter :: piece = 2**20
     character(:), allocatable :: bytes
     type(posix_file_t) :: source, target
+    logical :: made
     integer :: n
 
     allocate (character(piece) :: bytes)
-    call source%open(from, 'r')
-    call target%open(to, 'w')
+    call source%open(from//'/'//name, 'r')
+    call target%open(lock%folder//'/'//name, 'wx')
+    made = target%info == 0
     do
       call source%read(bytes, n)
       if (n == 0 .or. target%info /= 0) exit
@@ -308,7 +307,7 @@ contains
     code = exit_files
     message = source%message
     if (source%info == 0) message = target%message
-    call delete_file(to)
+    if (made) call lock%remove(name)
   end subroutine copy_file
 
 end module output_folder_m

@@ -1,8 +1,8 @@
 !> Restart files: the whole state in double precision, checksummed, exact on any number of
 !! processes.
 !!
-!! A file is written under a temporary name and renamed when it is complete and on the disk, so a
-!! run that is killed while it writes, or a power cut, leaves the older files whole. Layout (as
+!! The caller writes under a temporary name and renames the file then, so a run that is killed
+!! meanwhile, or a power cut, leaves the older files whole. Layout (as
 !! h5py shows it; faces carry one layer more in each direction, element (d, k, j, i) is the lower
 !! face of cell (i, j, k) in direction d):
 !!
@@ -20,15 +20,13 @@
 !! `visit_state` lists all of it. The volume flux through a face is aperture*area*uf + solid_flux.
 module restart_m
   use kinds_m, only: wp
-  use parallel_m, only: is_root, nproc, broadcast, halo_exchange
+  use parallel_m, only: nproc, broadcast, halo_exchange
   use build_info_m, only: version, git_revision
   use grid_m, only: grid_t, n_halo
   use solid_geometry_m, only: solid_geometry_t
   use clock_m, only: clock_resume
   use run_state_m, only: run_state_t
   use hdf5_file_m, only: h5_file_t
-  use output_folder_m, only: rename_file
-  use posix_file_m, only: delete_file, store_file
   use state_m, only: state_visitor_t, visit_state, owned_part, pack_part, unpack_part, state_groups
   use state_visitors_m, only: checksum_visitor_t, size_visitor_t
   use file_space_m, only: bytes_for_change
@@ -57,7 +55,7 @@ module restart_m
 
 contains
 
-  !> Write the state to `path`, all processes together.
+  !> Write the state to a new file `path`, all processes together, until it is on the disk.
   subroutine write_restart(path, text, parameters, state, info, message)
     character(*), intent(in) :: path
     character(*), intent(in) :: text, parameters   !! the case: verbatim, and all its values
@@ -67,12 +65,11 @@ contains
     type(writer_t) :: writer
     type(checksum_visitor_t) :: checksum
     type(size_visitor_t) :: needed
-    character(*), parameter :: unfinished = '.part'
     integer :: g
 
     call visit_state(checksum, state)
     associate (file => writer%file)
-      call file%create(path//unfinished, .true.)
+      call file%create(path, .true.)
       if (nproc() > 1) then   ! one that failed alone could not stop the others
         call visit_state(needed, state)
         call file%reserve(needed%bytes + len(text) + len(parameters) + bytes_for_change)
@@ -88,28 +85,13 @@ contains
       end do
       call visit_state(writer, state)
       call file%attribute('/', 'checksum', checksum%sum%text())
-      call file%close()
+      call file%close(stored=.true.)
+      info = file%info
+      message = ''
+      if (info /= 0) message = file%message
     end associate
-    call finish_file(path//unfinished, path, writer%file, info, message)
-  end subroutine write_restart
-
-  !> Give a complete file its name, on the root process, and broadcast the outcome.
-  subroutine finish_file(unfinished, path, file, info, message)
-    character(*), intent(in) :: unfinished, path
-    type(h5_file_t), intent(in) :: file
-    integer, intent(out) :: info
-    character(:), allocatable, intent(out) :: message
-
-    message = ''
-    info = file%info
-    if (info /= 0) message = file%message
-    if (is_root()) then
-      if (info == 0) call store_file(unfinished, info, message)
-      if (info == 0) call rename_file(unfinished, path, info, message)
-      if (info /= 0) call delete_file(unfinished)   ! the older files may need its room
-    end if
     call broadcast(info)
-  end subroutine finish_file
+  end subroutine write_restart
 
   !> Read the state from `path`, all processes together, and check that it is whole and of this
   !! case.

@@ -5,7 +5,7 @@ module stop_requests_m
   use parallel_m, only: is_root, global_max
   use signals_m, only: signal_caught, signal_terminate
   use timers_m, only: wall_clock
-  use posix_file_m, only: delete_file
+  use folder_lock_m, only: folder_lock_t, stop_name
   implicit none
   private
   public :: stop_requests_t, watch_for_stop, stop_asked
@@ -17,7 +17,7 @@ module stop_requests_m
 
   type :: stop_requests_t
     character(:), allocatable :: reason      !! why the run ends, on the root process
-    character(:), allocatable, private :: file   !! that ends the run
+    type(folder_lock_t), private :: folder   !! of the results
     real(wp), private :: max_wall = 0.0_wp   !! time given [s], 0: no end
     real(wp), private :: began = 0.0_wp      !! when the time given began
     real(wp), private :: last = 0.0_wp       !! when the last step ended
@@ -29,13 +29,13 @@ contains
 
   !> Begin to watch; the time given runs from `began`.
   subroutine watch_for_stop(folder, max_wall, began, self)
-    character(*), intent(in) :: folder   !! of the results
+    type(folder_lock_t), intent(in) :: folder   !! of the results, on the root process
     real(wp), intent(in) :: max_wall     !! [s], 0: no end
     real(wp), intent(in) :: began        !! wall clock when the program began [s]
     type(stop_requests_t), intent(out) :: self
 
     self%reason = ''
-    self%file = folder//'/stop'
+    self%folder = folder
     self%max_wall = max_wall
     self%began = began
     self%last = wall_clock()
@@ -62,7 +62,6 @@ contains
   subroutine look_around(self)
     type(stop_requests_t), intent(inout) :: self
     real(wp) :: now, kept
-    logical :: there
 
     now = wall_clock()
     self%slowest = max(self%slowest, now - self%last)
@@ -73,10 +72,9 @@ contains
     end if
     if (now < self%next_look) return
     self%next_look = now + look_interval
-    inquire (file=self%file, exist=there)
-    if (.not. there) return
-    call delete_file(self%file)
-    self%reason = "stopped by the file '"//self%file//"', now removed"
+    if (.not. self%folder%has(stop_name)) return
+    call self%folder%remove(stop_name)
+    self%reason = "stopped by the file '"//self%folder%folder//'/'//stop_name//"', now removed"
   end subroutine look_around
 
 end module stop_requests_m

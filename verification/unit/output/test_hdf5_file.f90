@@ -2,6 +2,8 @@
 ! ranks: 2 3
 module test_hdf5_file_m
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+  use, intrinsic :: iso_c_binding, only: c_funptr, c_int, c_long, c_null_char
+  use c_library_m, only: c_getrlimit, c_rename, c_signal
   use kinds_m, only: wp, sp, i8
   use parallel_m, only: is_root, nproc, my_rank, broadcast
   use hdf5_file_m, only: h5_file_t, h5_column_t, file_real64, file_real32, file_integer32
@@ -12,6 +14,15 @@ module test_hdf5_file_m
   public :: test_hdf5_file
 
   character(*), parameter :: path = 'test_hdf5_file.h5'
+
+  interface
+    integer(c_int) function c_setrlimit(resource, limit) bind(c, name='setrlimit')
+      import :: c_int, c_long
+      implicit none
+      integer(c_int), value :: resource
+      integer(c_long), intent(in) :: limit(2)
+    end function c_setrlimit
+  end interface
 
 contains
 
@@ -24,6 +35,7 @@ contains
     call test_go_on_together()
     call test_room()
     call test_no_room()
+    call test_another_in_its_place()
     call test_trouble()
     call remove(path)
   end subroutine test_hdf5_file
@@ -61,6 +73,7 @@ contains
 
     if (.not. is_root()) return
     long = repeat('&body position = 0.1, 0.2, 0.3 /'//new_line('a'), 5000)   ! more than 64 kB
+    call remove(path)
     call file%create(path, .false.)
     call file%group('/provenance')
     call file%attribute('/provenance', 'namelist', long)
@@ -90,6 +103,7 @@ contains
 
     if (.not. is_root()) return
     a = reshape([(1.0_wp/i, i=1, 6)], [2, 3])
+    call remove(path)
     call file%create(path, .false.)
     call file%store('/a', 'm', a)
     call file%store('/n', '1', [5, 6, 7, 8])
@@ -118,6 +132,7 @@ contains
     integer :: step
 
     if (.not. is_root()) return
+    call remove(path)
     call file%create(path, .false.)
     call file%new_column('/time', 's', file_real64, [integer ::], 4, time)
     call file%new_column('/place', 'm', file_real64, [3, 2], 4, place)
@@ -161,6 +176,7 @@ contains
     real(wp) :: x(1)
 
     if (.not. is_root()) return
+    call remove(path)
     call writer%create(path, .false.)
     call writer%new_column('/time', 's', file_real64, [integer ::], 64, time)
     call writer%append(time, [42.0_wp])
@@ -188,6 +204,7 @@ contains
     first = 1 + (layers*my_rank())/nproc()
     last = (layers*(my_rank() + 1))/nproc()
     mine = [(sqrt(real(i, wp)), i=1, 2*layers)]
+    call remove(path)
     call meet()
     call file%create(path, .true.)
     call file%attribute('/', 'note', 'shared')
@@ -238,7 +255,8 @@ contains
     last = (layers*(my_rank() + 1))/nproc()
     a = [(sqrt(real(i, sp)), i=1, layers)]
     if (is_root()) then
-      call file%create(path, .false.)
+      call remove(path)
+    call file%create(path, .false.)
       call file%new_compressed_column('/field', 'm', file_real32, [layers], [layers, 1], field)
       do i = 1, 3
         call file%append_block(field, [1], [layers], -a)
@@ -271,6 +289,7 @@ contains
     logical :: grew
 
     if (.not. is_root()) return
+    call remove(path)
     call file%create(path, .false.)
     call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
     call file%new_compressed_column('/field', 'm', file_real32, [3, n/3], [9, 1], field)
@@ -301,20 +320,25 @@ contains
   subroutine test_no_room()
     type(h5_file_t) :: file
     type(h5_column_t) :: time
-    character(*), parameter :: no_folder = 'no/such/folder/run.h5'   !! nothing can grow there
     real(wp) :: x(2)
+    integer(i8) :: before, after
     integer :: n
 
     if (.not. is_root()) return
+    call remove(path)
     call file%create(path, .false.)
     call file%attribute('/', 'exit_status', -1)
     call file%new_column('/time', 's', file_real64, [integer ::], 3, time)
     call file%append_rows(time, 2, [1.0_wp, 2.0_wp])
     call file%flush()
-    file%path = no_folder
+    inquire (file=path, size=before)
+    call limit_files(before + 100)
     call file%reserve(1000_i8)
+    call limit_files(-1_i8)
     call check('no room is an error', file%info /= 0)
-    call check('and named', index(file%message, no_folder//': cannot') == 1)
+    call check('and named', index(file%message, path//': cannot write: ') == 1)
+    inquire (file=path, size=after)
+    call check('the file is as long as before', after == before)
     call file%append(time, [3.0_wp])
     call file%last_integer('/', 'exit_status', 4)
     call file%close()
@@ -325,6 +349,58 @@ contains
     call check_file('the file stays whole', file)
     call check('the last word is in it', n, 4)
   end subroutine test_no_room
+
+  !> Let no file become longer; -1: as long as the system likes.
+  subroutine limit_files(bytes)
+    integer(i8), intent(in) :: bytes
+    integer(c_int), parameter :: file_size = 1, too_large = 25   ! RLIMIT_FSIZE, SIGXFSZ
+    type(c_funptr) :: before
+    integer(c_long) :: limit(2)
+
+    before = c_signal(too_large, transfer(1_i8, before))   ! ignored: the call fails instead
+    if (c_getrlimit(file_size, limit) /= 0) error stop 'getrlimit'
+    limit(1) = merge(limit(2), int(bytes, c_long), bytes < 0)
+    if (c_setrlimit(file_size, limit) /= 0) error stop 'setrlimit'
+  end subroutine limit_files
+
+  !> A file that is there is not overwritten; what is done to a file that has been moved is not done
+  !! to the one in its place.
+  subroutine test_another_in_its_place()
+    type(h5_file_t) :: file, other
+    character(*), parameter :: kept = 'test_hdf5_kept.h5'
+    integer(i8) :: before, after
+    integer :: i
+
+    if (.not. is_root()) return
+    call remove(path)
+    call file%create(path, .false.)
+    call file%store('/a', 'm', [1.0_wp])
+    call file%flush()
+    if (c_rename(path//c_null_char, kept//c_null_char) /= 0) error stop 'rename'
+    call other%create(path, .false.)
+    call other%store('/b', 'm', [(1.0_wp*i, i=1, 5000)])
+    call other%close()
+    inquire (file=path, size=before)
+    call file%reserve(10000_i8*100)
+    call file%store('/c', 'm', [2.0_wp])
+    call file%close()
+    inquire (file=path, size=after)
+    call check('the other file keeps its length', after == before)
+    call file%create(path, .false.)
+    call check('a file that is there is not overwritten', file%info /= 0)
+    call file%abandon()
+    call file%open(kept, .false., .false.)
+    call check('the moved file has what was written', file%has('/c'))
+    call file%close()
+    call remove(path)
+    call file%create(path, .false.)
+    if (c_rename(kept//c_null_char, path//c_null_char) /= 0) error stop 'rename'
+    call file%abandon()
+    call file%open(path, .false., .false.)
+    call check('nor is it deleted in place of the moved one', file%has('/a'))
+    call file%close()
+    call check_file('files are held, not named', file)
+  end subroutine test_another_in_its_place
 
   subroutine test_trouble()
     type(h5_file_t) :: file
@@ -346,6 +422,7 @@ contains
     call file%open(path, .false., .false.)
     call check('a file of another kind is an error', file%info /= 0)
     call file%close()
+    call remove(path)
     call file%create(path, .false.)
     call file%read('/series/time', x)
     call check('a missing dataset is named', file%info /= 0 .and. index(file%message, &

@@ -60,6 +60,8 @@ contains
     integer, intent(out) :: info
     character(:), allocatable, intent(out) :: message
 
+    if (is_root()) call remove(path)
+    call meet()
     call write_restart(path, s%case%text, s%parameters, s%run_state_t, &
                        info, message)
   end subroutine write_sample
@@ -236,6 +238,7 @@ contains
     call check('a missing file is an error', info, 1)
     call check('the message names it', index(message, 'no-such-file.h5') > 0)
     if (is_root()) then
+      call remove(path)
       call file%create(path, .false.)
       call file%attribute('/', 'format', 'mics-run')
       call file%close()
